@@ -31,7 +31,7 @@ from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
 from diagnosis.search.prediction_fit.refit import fit_model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import Estimate
-from fmus.effects import STANDARD
+from fmus.ship import ship
 
 from .hidden_effects.__main__ import PROBLEMS
 from .hidden_effects.answers import window_shares, within_bands
@@ -86,7 +86,7 @@ def fitted(problem: Problem) -> tuple[Fitted, NominalPrior, list]:
     """The fit to predictions of the training runs of a problem, its prior, and all runs."""
     runs = [weak_windows(smooth(clean(run))) for run in problem.runs]
     train = runs[:-1]
-    names = [n for d in problem.hidden if d.values for n in STANDARD[d.plain].coefficients]
+    names = [n for d in problem.hidden if d.values for n in ship().effects[d.plain].coefficients]
     prior = NominalPrior.of(Model(), problem.prior)
     at = Estimate(Model(), np.zeros(prior.size), dict.fromkeys(names, 0.0), np.zeros((len(names),) * 2))
     for _ in range(2):  # the second time with what the first leaves as noise

@@ -22,6 +22,7 @@ from time import process_time
 import cosim
 from fmus.build import build, export, native_targets
 from fmus.declare import discover, flatten, packer, variables
+from fmus.ship import ship
 
 SCENARIO = Path(__file__).parent.parent / "scenarios" / "ellipse.json"
 ROWS, STEP = 500, 0.01
@@ -89,7 +90,7 @@ def build_time(name, folder):
 
 def step_table(names, repeats):
     print(f"{'component':30}{'Python us':>10}{'C us':>8}{'ratio':>8}{'build s':>9}{'FMU kB':>8}")
-    for component in [c for _, c in discover() if not names or c.name in names]:
+    for component in [c for _, c in discover(ship()) if not names or c.name in names]:
         rng = random.Random(component.name)
         rows = [[rng.uniform(-0.5, 0.5) for _ in variables(component.inputs)] for _ in range(ROWS)]
         with TemporaryDirectory() as folder:

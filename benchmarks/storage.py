@@ -17,6 +17,7 @@ from unittest.mock import patch
 import cosim
 from fmus.controller import concurrent, store
 from fmus.declare import discover, packer, variables
+from fmus.ship import ship
 
 SCENARIO = Path(__file__).parent.parent / "scenarios" / "ellipse.json"
 
@@ -60,7 +61,7 @@ def storage_times(component, rows, step):
 
 def main():
     argparse.ArgumentParser(prog="python -m benchmarks.storage", description=__doc__).parse_args()
-    components = [c for _, c in discover() if c.name.startswith("controller_cl")]
+    components = [c for _, c in discover(ship()) if c.name.startswith("controller_cl")]
     print(f"us, ellipse, 19,800 steps, Python {platform.python_version()}")
     print(f"{'controller':28}{'loop':>8}{'storage':>9}{'of loop':>9}{'worst':>9}{'changes':>9}")
     for component in components:

@@ -20,6 +20,7 @@ from fmus.controller import cl_improved
 from fmus.controller.backstepping import Applied, Inputs
 from fmus.declare import Component, packer, variables
 from fmus.observer import mdf
+from fmus.ship import ship
 from fmus.signals import Force, Measurement
 from fmus.watch import thruster_watch
 from studies.study_report import Report
@@ -173,9 +174,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     detector: list[Told] = []
     printed: list[Told] = []
     with np.errstate(all="ignore"):
+        detecting = thruster_watch.make(ship().effects, ship().description)
+        assert detecting is not None
         for first in range(0, len(todo), TOGETHER):
             runs = sail_watched(todo[first : first + TOGETHER])
-            detector += watched(runs, thruster_watch.COMPONENT, lambda o: (o.failed_vsp, o.failed_bow))
+            detector += watched(runs, detecting, lambda o: tuple(o[:2]))
             printed += watched(runs, cl_improved.COMPONENT, losses)
     print(report(options.out, options.seed, detector, printed))
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from fmus.build import build, native_targets
 from fmus.declare import discover, variables, width
+from fmus.ship import ship
 
 HOST = Path(__file__).parent / "fmu_host.c"
 # Where Debian and others have what runs programs for 64-bit Windows.
@@ -88,7 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with TemporaryDirectory(prefix="windows_") as work:
         folder = Path(work)
         programs = {target: host(target, folder) for target in PROGRAMS}
-        for component in [c for _, c in discover() if not options.names or c.name in options.names]:
+        for component in [
+            c for _, c in discover(ship()) if not options.names or c.name in options.names
+        ]:
             (archive,) = build([component.name], native=native_targets(",".join(PROGRAMS)))
             zipfile.ZipFile(archive).extractall(folder / component.name)
             rows = inputs(component)

@@ -13,12 +13,12 @@ itself, over its last step. An acceleration input gets M^-1 of that.
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from .declare import Component, Variable, bundle, flatten, group_of, packer, variables
+from .declare import Component, Variable, bundle, flatten, group_of, packer, variables, width
 from .frames import rotate_to_body, rotate_to_earth
 from .hull import accelerated, inertia_force
 from .ops import Number, fmax, where, wrap
 from .ship import Ship
-from .signals import Force
+from .signals import Force, VelocityInCurrent
 from .vessel.vessel import State, disturbed
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
@@ -71,7 +71,7 @@ def addition(
         beside: force or acceleration -> how the FMU takes what acts beside all else; of an axis that is
             missing here, the force is added to that which is given.
     """
-    drive, commands = of.thrusters, variables(of.thrusters.inputs)[: -len(VELOCITY)]
+    drive, commands = of.thrusters, variables(of.thrusters.inputs)[: -width(VelocityInCurrent)]
     hulls = [of.vessel.prepared(_params(of.vessel, v["vessel"])) for v in (before, after)]
     plants = [_params(drive, v["thrusters"]) for v in (before, after)]
     drives = [drive.prepared(p) for p in plants]
@@ -112,7 +112,7 @@ def addition(
     def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Number, Number]:
         ship, nu_dot = moving(s, i, h)
         given_now = flatten(i)[: len(commands)]
-        asked = packer(drive.inputs)([*given_now, ship.u, ship.v, ship.r])
+        asked = packer(drive.inputs)([*given_now, ship.u, ship.v, ship.r, 0.0, 0.0])
         forces, pasts = [], []
         for hull, b, past in zip(hulls, drives, (s.before, s.after), strict=True):
             past, out = drive.advance(past, asked, b, h)
@@ -144,7 +144,6 @@ def addition(
         init=init,
         step=step,
         hold_nonfinite=False,
-        any_ship=False,
     )
 
 

@@ -317,7 +317,7 @@ class Component:
             anew in every step would cost time.
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
         starts: start values of parameters and inputs that are not those of the declaration.
-        any_ship: whether it serves every ship; False where it names the parts of one.
+        any_ship: whether it serves every ship; False where it serves the default one alone.
         outline: of the ship that it is the hull of.
         trial: the manoeuvring trial that it conducts by its output ``order``; empty: none.
     """
@@ -411,12 +411,11 @@ def component(
     return Component(name, description, params, state, inputs, outputs, init, step, **more)
 
 
-def discover(ship: Any = None) -> Iterator[tuple[str, Component]]:
+def discover(ship: Any) -> Iterator[tuple[str, Component]]:
     """Every (module name, component) of this project, found by importing the modules of all kinds.
 
     Args:
-        ship: a :class:`~fmus.ship.Ship` that the components are to be made for; by default CyberShip
-            Enterprise 1 with the effects of this project.
+        ship: a :class:`~fmus.ship.Ship` that the components are to be made for.
     """
     root = __package__ or "fmus"
     for kind in KINDS:
@@ -424,8 +423,6 @@ def discover(ship: Any = None) -> Iterator[tuple[str, Component]]:
         for info in pkgutil.iter_modules(package.__path__):
             name = f"{root}.{kind}.{info.name}"
             module = importlib.import_module(name)
-            component = getattr(module, "COMPONENT", None)
-            if isinstance(component, Component):
-                made = component if ship is None else ship.component(component, module)
-                if made is not None:
-                    yield name, made
+            made = ship.component(getattr(module, "COMPONENT", None), module)
+            if made is not None:
+                yield name, made

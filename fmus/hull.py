@@ -6,10 +6,11 @@ and a controller's belief about it are two separate sets of these parameters.
 """
 
 import re
+from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, NamedTuple
 
-from .declare import POSITIVE, Known, Variable
+from .declare import POSITIVE, Known, Variable, group_of, variables
 from .hull_functions import FUNCTIONS
 from .ops import Number
 from .signals import Force
@@ -29,7 +30,6 @@ BORROWED = Known("damping", "borrowed from CyberShip II", 1.0)
 # The table's curves miss the tow tests that they were fitted to by up to a quarter of the force below
 # 0.3 m/s, and neighbouring powers of the speed stand for one another.
 TOWED = Known("damping", "tow tests (2011)", 0.3)
-UNKNOWN = Known("damping", "not in Table 2.1", 1.0)
 
 
 class Inertia(NamedTuple):
@@ -74,21 +74,18 @@ class RotationalDamping(NamedTuple):
     N_absr_r: Annotated[float, "N.m.s2/rad2", "yaw moment, |r|r", BORROWED] = -0.750
 
 
-class ExtraDamping(NamedTuple):
-    """Terms that Table 2.1 does not have; zero unless somebody finds them."""
-
-    X_uu: Annotated[float, "N.s2/m2", "surge force, u^2: differs ahead and astern", UNKNOWN] = 0.0
-    X_absu_r: Annotated[float, "N.s2/(m.rad)", "surge force, |u|r", UNKNOWN] = 0.0
-    X_vr: Annotated[float, "N.s2/(m.rad)", "surge force, v r", UNKNOWN] = 0.0
-    X_rr: Annotated[float, "N.s2/rad2", "surge force, r^2", UNKNOWN] = 0.0
-    Y_ur: Annotated[float, "N.s2/(m.rad)", "sway force, u r", UNKNOWN] = 0.0
-    Y_uv: Annotated[float, "N.s2/m2", "sway force, u v", UNKNOWN] = 0.0
-    N_ur: Annotated[float, "N.s2/rad", "yaw moment, u r", UNKNOWN] = 0.0
-    N_uv: Annotated[float, "N.s2/m", "yaw moment, u v", UNKNOWN] = 0.0
-
-
-class FurtherDamping(NamedTuple):
-    """Coefficients of other products of u, v, r, |u|, |v| and |r|, which a ship's description adds."""
+# Terms that Table 2.1 does not have; zero unless somebody finds them.
+EXTRA = (
+    Variable("X_uu", "N.s2/m2", "surge force, u^2: differs ahead and astern", 0.0),
+    Variable("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0),
+    Variable("X_vr", "N.s2/(m.rad)", "surge force, v r", 0.0),
+    Variable("X_rr", "N.s2/rad2", "surge force, r^2", 0.0),
+    Variable("Y_ur", "N.s2/(m.rad)", "sway force, u r", 0.0),
+    Variable("Y_uv", "N.s2/m2", "sway force, u v", 0.0),
+    Variable("N_ur", "N.s2/rad", "yaw moment, u r", 0.0),
+    Variable("N_uv", "N.s2/m", "yaw moment, u v", 0.0),
+)
+Terms = group_of("Terms", [*variables(TowedDamping), *variables(RotationalDamping), *EXTRA])
 
 
 class HullFunctions(NamedTuple):
@@ -96,13 +93,10 @@ class HullFunctions(NamedTuple):
 
 
 class Damping(NamedTuple):
-    """All damping coefficients."""
+    """All damping: coefficients of products of speeds by their names, and other functions."""
 
-    towed: TowedDamping = TowedDamping()
-    rotational: RotationalDamping = RotationalDamping()
-    extra: ExtraDamping = ExtraDamping()
-    further: FurtherDamping = FurtherDamping()
-    functions: HullFunctions = HullFunctions()
+    terms: Any = Terms()
+    functions: Any = HullFunctions()
 
 
 def mass_matrix(p: Inertia) -> tuple[Triple, Triple, Triple]:
@@ -165,18 +159,6 @@ def rotational_damping_force(v: Number, r: Number, c: RotationalDamping) -> Trip
     )
 
 
-def extra_damping_force(u: Number, v: Number, r: Number, c: ExtraDamping) -> Triple:
-    """Force on the hull [N, N, N m] by the terms that Table 2.1 lacks."""
-    X_uu, X_absu_r, X_vr, X_rr, Y_ur, Y_uv, N_ur, N_uv = c
-    ur = u * r
-    uv = u * v
-    return (
-        X_uu * u * u + (X_absu_r * abs(u) + X_vr * v + X_rr * r) * r,
-        Y_ur * ur + Y_uv * uv,
-        N_ur * ur + N_uv * uv,
-    )
-
-
 @cache
 def term(name: str) -> tuple[int, tuple[tuple[bool, int], ...]]:
     """What the name of a coefficient says: its axis, and for each factor whether of its size, and which.
@@ -225,32 +207,52 @@ def term_force(name: str, value: Number, u: Number, v: Number, r: Number) -> Tri
     return value if axis == 0 else 0.0, value if axis == 1 else 0.0, value if axis == 2 else 0.0
 
 
-def described_damping_force(u: Number, v: Number, r: Number, further: Any, functions: Any) -> Triple:
-    """Force on the hull [N, N, N m] by further products and by functions, of a ship's description."""
-    forces = [term_force(name, c, u, v, r) for name, c in zip(further._fields, further, strict=True)]
-    forces += [
-        FUNCTIONS[name](u, v, r, *p) for name, p in zip(functions._fields, functions, strict=True)
-    ]
-    X, Y, N = forces[0]
-    for dX, dY, dN in forces[1:]:
-        X, Y, N = X + dX, Y + dY, N + dN
-    return X, Y, N
+@cache
+def _plan(names: tuple[str, ...]) -> tuple[Sequence[tuple[int, bool, int]], Sequence[tuple[int, int]]]:
+    """How products of speeds follow from each other, and what each coefficient is of.
+
+    Returns:
+        For each product the number of the one that it extends (-1: none), and its last factor: whether
+        of its size, and which; for each coefficient its axis and the number of its product.
+    """
+    known: dict[tuple[tuple[bool, int], ...], int] = {}
+    steps: list[tuple[int, bool, int]] = []
+    uses = []
+    for name in names:
+        axis, factors = term(name)
+        for k in range(1, len(factors) + 1):
+            if factors[:k] not in known:
+                known[factors[:k]] = len(steps)
+                steps.append((known.get(factors[: k - 1], -1), *factors[k - 1]))
+        uses.append((axis, known[factors]))
+    return tuple(steps), tuple(uses)
+
+
+def terms_force(u: Any, v: Any, r: Any, terms: Any) -> Triple:
+    """Force on the hull [N, N, N m] by coefficients of products of speeds, named by them."""
+    steps, uses = _plan(terms._fields)
+    speeds, sizes = (u, v, r), (abs(u), abs(v), abs(r))
+    products: list[Any] = []
+    for before, sign, k in steps:
+        factor = sizes[k] if sign else speeds[k]
+        products.append(factor if before < 0 else products[before] * factor)
+    found: list[Any] = [0.0, 0.0, 0.0]
+    for (axis, k), c in zip(uses, terms, strict=True):
+        found[axis] = found[axis] + c * products[k]
+    return found[0], found[1], found[2]
 
 
 def damping_force(u: Any, v: Any, r: Any, c: Any) -> Triple:
     """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected.
 
-    The coefficients c are a Damping, or a tuple of groups in the same order.
+    The coefficients c are a Damping, or a tuple of terms and functions.
     """
-    towed, rotational, extra, further, functions = c
-    X1, Y1, N1 = towed_damping_force(u, v, towed)
-    _, Y2, N2 = rotational_damping_force(v, r, rotational)
-    X3, Y3, N3 = extra_damping_force(u, v, r, extra)
-    X, Y, N = X1 + X3, Y1 + Y2 + Y3, N1 + N2 + N3
-    if not further and not functions:
-        return X, Y, N
-    X4, Y4, N4 = described_damping_force(u, v, r, further, functions)
-    return X + X4, Y + Y4, N + N4
+    terms, functions = c
+    X, Y, N = terms_force(u, v, r, terms)
+    for name, p in zip(functions._fields, functions, strict=True):
+        dX, dY, dN = FUNCTIONS[name](u, v, r, *p)
+        X, Y, N = X + dX, Y + dY, N + dN
+    return X, Y, N
 
 
 class Hull(NamedTuple):

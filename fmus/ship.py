@@ -4,24 +4,23 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from inspect import signature
 from pathlib import Path
 from types import ModuleType
-from typing import Any, get_args
+from typing import Any
 
 from .actuators.actuation import command_units
+from .actuators.actuator_layout import layouts
 from .actuators.law import Law
 from .actuators.response import Layout, Prepared
 from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
-from .effects.effect import Device
 from .hull_functions import FUNCTIONS
-from .scale import REFERENCE, Scale
+from .scale import Scale
 from .ship_description import Description
-from .ships.expansion import effects_of_ship
+from .ships.expansion import effects_of_ship, ship_parts
+from .ships.naming import DEFAULT, described_ship
 from .sizing import sized
-from .thrusters.chain import FIVE, THREE
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
 
@@ -33,17 +32,28 @@ class Ship:
     Attributes:
         effects: what it may have beyond its nominal model.
         vessel, thrusters: its components, which have these effects.
-        devices: thrusters that it has.
-        scale: its size.
-        description: that it is made from; None: CyberShip Enterprise 1.
+        description: that it is made from.
     """
 
     effects: EffectSet
     vessel: Component
     thrusters: Component
-    devices: frozenset[str] = frozenset(get_args(Device))
-    scale: Scale = REFERENCE
-    description: Description | None = None
+    description: Description
+
+    @property
+    def name(self) -> str:
+        """By which it is called."""
+        return self.description.name
+
+    @property
+    def scale(self) -> Scale:
+        """Its size."""
+        return self.description.scale
+
+    @property
+    def devices(self) -> frozenset[str]:
+        """Names of its actuators, and of the units of those that have two."""
+        return frozenset(ship_parts(self.description))
 
     @cached_property
     def parameters(self) -> Mapping[str, Mapping[str, Variable]]:
@@ -71,8 +81,8 @@ class Ship:
 
     @property
     def layouts(self) -> tuple[Layout, ...]:
-        """How runs may have its commands: as the FMU does, and each actuator by its own."""
-        return (self.layout,) if self.description is not None else (THREE, FIVE)
+        """How runs may have its commands: as the FMU does, and each unit of its actuators by its own."""
+        return layouts(self.description)
 
     def layout_of(self, commands: Any) -> Layout:
         """The layout of a run's commands (n, k); that of the FMU for None."""
@@ -81,15 +91,34 @@ class Ship:
         return next(one for one in self.layouts if len(one.commands) == commands.shape[1])
 
     @property
-    def commands(self) -> Mapping[str, str] | None:
-        """``ACTUATOR.COMMAND`` and unit of each command of a described ship."""
-        return None if self.description is None else command_units(self.description)
+    def commands(self) -> Mapping[str, str]:
+        """``ACTUATOR.COMMAND`` and unit of each of its commands."""
+        return command_units(self.description)
+
+    @property
+    def command_forms(self) -> tuple[Mapping[str, str], ...]:
+        """The same for each of :attr:`layouts`."""
+        return tuple([command_units(self.description, k > 0) for k in range(len(self.layouts))])
+
+    def form_of(self, commands: Any) -> Mapping[str, str]:
+        """The names and units of a run's commands (n, k)."""
+        return self.command_forms[self.layouts.index(self.layout_of(commands))]
+
+    @property
+    def power_settings(self) -> tuple[str, ...]:
+        """Names of the power settings of its actuators."""
+        return tuple([v.name for v in variables(type(self.nominal_drive.params.power))])
+
+    @property
+    def allocation_parameters(self) -> frozenset[str]:
+        """Parameters of its thrusters that are of the allocation's model, and not of the plant."""
+        p = self.thrusters.params()
+        return frozenset(v.name for part in (p.allocation, p.attack) for v in variables(type(part)))
 
     @property
     def fully_actuated(self) -> bool:
         """Whether its thrusters can be asked for a force on every axis."""
-        d = self.description
-        return d is None or (d.allocates and len(axes(d)) == 3)
+        return self.description.allocates and len(axes(self.description)) == 3
 
     def commanded_force(self, commands: Any, settings: Any = None) -> Any:
         """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands at rest.
@@ -100,7 +129,7 @@ class Ship:
         """
         import numpy as np
 
-        layout = next(one for one in self.layouts if len(one.commands) == commands.shape[1])
+        layout = self.layout_of(commands)
         drive = (
             self.nominal_drive if settings is None else layout.powered(self.nominal_drive, settings.T)
         )
@@ -115,23 +144,21 @@ class Ship:
 
     def serving(self, component: Component) -> Component:
         """A component that is no part of the ship, such as a controller, made for it."""
-        return component if self.description is None else sized(component, self.description)
+        return sized(component, self.description)
 
-    def component(self, component: Component, module: ModuleType) -> Component | None:
-        """A component of this project, made for this ship; None: it is of another ship's kind.
+    def component(self, component: Component | None, module: ModuleType) -> Component | None:
+        """A component of a module, made for this ship; None: it has none for such a ship.
 
         Args:
-            component: as its module declares it.
+            component: as its module declares it, if it does.
             module: that declares it; one that makes components of effects and of a ship has ``make``.
         """
         make = getattr(module, "make", None)
-        if self.description is None:
-            return component if make is None else make(self.effects)
-        if not component.any_ship:
+        if make is not None:
+            return make(self.effects, self.description)
+        if component is None or not (component.any_ship or self.name == DEFAULT):
             return None
-        if make is None:
-            return self.serving(component)
-        return make(self.effects, self.description) if "ship" in signature(make).parameters else None
+        return self.serving(component)
 
     @property
     def candidates(self) -> list[str]:
@@ -140,25 +167,27 @@ class Ship:
 
 
 def ship(effects: EffectSet = STANDARD, description: Description | None = None) -> Ship:
-    """A ship that may have some effects: a described one, or CyberShip Enterprise 1.
+    """A ship that may have some effects.
+
+    Args:
+        effects: those of every ship, with or without a user's.
+        description: of the ship; None: the default ship.
 
     Raises:
         DeclarationError: parts of the description have names of others, or of its effects.
     """
-    return _ship(effects, description)
+    return _ship(effects, described_ship(description))
 
 
 @cache
-def _ship(effects: EffectSet, description: Description | None) -> Ship:
-    if description is None:
-        return Ship(effects, make_vessel(effects), make_thrusters(effects))
+def _ship(effects: EffectSet, description: Description) -> Ship:
     for file in sorted(_files_of_laws(description) - {file.resolve() for file in effects.files}):
         effects = effects.plus_file(file)
     own = effects_of_ship(description, effects)
     parts = make_vessel(own, description), make_thrusters(own, description)
     for part in parts:
         _ = part.variables  # refuses names that are there twice
-    return Ship(own, *parts, frozenset(), description.scale, description)
+    return Ship(own, *parts, description)
 
 
 def _files_of_laws(description: Description) -> set[Path]:

@@ -39,10 +39,11 @@ class Part(NamedTuple):
     Attributes:
         name: of the actuator; of a function of the hull that of the law.
         law: see :mod:`fmus.actuators.laws` and :mod:`fmus.hull_functions`.
-        title: what people call it.
+        title: its name in sentences.
         values: of its parameters; what is not named is as the law declares it.
         order: name of the commands that it shares with others; empty: they have its own name.
         behind: actuator in whose race it works; empty: in none.
+        label: its name in descriptions of variables; empty: the title.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Part(NamedTuple):
     values: tuple[Value, ...]
     order: str = ""
     behind: str = ""
+    label: str = ""
 
     def number(self, name: str, otherwise: float = 0.0) -> float:
         """A number of the part, by its name."""
@@ -73,6 +75,10 @@ class Description(NamedTuple):
         actuators: what drives it, in the order of its commands.
         allocates: whether its thrusters get a force to give; else commands of each actuator.
         wind: areas above the water, parameters of :mod:`fmus.effects.wind`; empty: not known.
+        effects: effects of its actuators, ``KIND ACTUATOR`` or ``KIND``, in the order in which they act;
+            empty: all that each actuator may have, see :mod:`fmus.actuators.failings`.
+        aliases: (name, alias) of variables of its actuators; a name also stands for the beginning of
+            longer ones, and ``each_`` before that of a command means it where each unit has its own.
     """
 
     name: str
@@ -87,6 +93,8 @@ class Description(NamedTuple):
     actuators: tuple[Part, ...] = ()
     allocates: bool = True
     wind: tuple[Value, ...] = ()
+    effects: tuple[str, ...] = ()
+    aliases: tuple[tuple[str, str], ...] = ()
 
     @property
     def scale(self) -> Scale:
@@ -97,6 +105,14 @@ class Description(NamedTuple):
     def drawn(self) -> Outline:
         """What pictures need of it."""
         return Outline(self.name, self.length, self.outline)
+
+    def called(self, name: str) -> str:
+        """The alias of a variable of its actuators, or its name where there is none."""
+        known = dict(self.aliases)
+        if name in known:
+            return known[name]
+        stem = next((s for s in known if name.startswith(f"{s}_")), "")
+        return known[stem] + name[len(stem) :] if stem else name
 
     def values(self) -> Mapping[str, Value]:
         """Numbers of the hull, by the name of the parameter."""

@@ -1,4 +1,4 @@
-"""Components for a described ship: what they believe of it, and all else to its size."""
+"""Components for a ship: what they believe of it, and all else to its size."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import Any
 from .declare import Component, Variable, flatten, packer, redeclared, variables
 from .hull import Damping, Inertia
 from .ops import Number
-from .scale import Scale
+from .scale import REFERENCE, Scale
 from .ship_description import Description
 
 
@@ -33,6 +33,9 @@ def sized(component: Component, ship: Description) -> Component:
             return replace(v, start=given.get(name, 0.0))
         return scale.of(v)
 
+    declared = redeclared(component.params, for_ship)
+    if scale == REFERENCE:
+        return replace(component, params=declared)
     params, inputs = (_converted(group, scale, -1) for group in (component.params, component.inputs))
     outputs = _converted(component.outputs, scale, 1)
     law = component.prepared_step or component.step
@@ -52,7 +55,7 @@ def sized(component: Component, ship: Description) -> Component:
 
     return replace(
         component,
-        params=redeclared(component.params, for_ship),
+        params=declared,
         inputs=redeclared(component.inputs, scale.of),
         init=init,
         step=step,

@@ -141,7 +141,7 @@ def turn(name, d, U, angle, lengths=14.0, h=0.05):
     Returns:
         Rows of (x, y, psi, u) in ship's lengths and shares of U, and the largest share of a limit.
     """
-    parts, controller = ship(description=d), heading.make(ship=d)
+    parts, controller = ship(description=d), heading.make(ship().effects, d)
     assert controller is not None
     vessel, thrusters = parts.vessel, parts.thrusters
     c, hull = controller.prepared(controller.params()), vessel.prepared(vessel.params())

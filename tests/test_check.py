@@ -575,7 +575,7 @@ def test_documented_rules_are_the_rules():
 
 
 def test_fmus_do_not_carry_the_checker_and_trials_start_light():
-    for module, _ in discover():
+    for module, _ in discover(ship()):
         assert not [inside for inside in sources(module, None, ship()) if inside.startswith("check")]
     heavy = "import sys, fmucheck.child, fmucheck.rules; print({'fmpy', 'numpy', 'rich', 'lxml'} & set(sys.modules))"
     done = subprocess.run(

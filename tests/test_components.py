@@ -173,8 +173,8 @@ def test_initial_dependencies_hold_against_perturbation(name):
 
 def test_steps_need_only_the_standard_library():
     code = (
-        "import sys; from fmus.declare import discover\n"
-        "for _, c in discover():\n"
+        "import sys; from fmus.declare import discover; from fmus.ship import ship\n"
+        "for _, c in discover(ship()):\n"
         "    i, p = c.inputs(), c.params()\n"
         "    c.step(c.init(i, p), i, p, 0.01)\n"
         "print(sorted({'numpy', 'scipy', 'pythonfmu'} & set(sys.modules)))"

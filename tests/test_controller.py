@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.cse1 import VESSEL
 from support.project import COMPONENTS
 
 from fmus.controller import abs as abs_module
@@ -12,7 +13,7 @@ from fmus.controller.adaptive import Disturbance
 from fmus.controller.backstepping import Gains, Inputs, control_errors
 from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
 from fmus.frames import rotate_to_body
-from fmus.hull import Damping, Inertia, RotationalDamping, mass_matrix
+from fmus.hull import Damping, Inertia, RotationalDamping, Terms, mass_matrix
 from fmus.signals import Estimate, Force, Target
 from fmus.vessel import vessel
 from thesis.basin_trials.trials import SOFT
@@ -53,10 +54,10 @@ def rich_target(t):
 
 def closed_loop(component, params, seconds, h=H, start=None, plant=None):
     """Yield (time, vessel state, controller state, inputs, outputs), with true states fed back."""
-    plant = plant or vessel.COMPONENT.params()
+    plant = plant or VESSEL.params()
     s = start or vessel.State()
     cs = component.init(Inputs(true_estimate(s), rich_target(0.0)), params)
-    b = vessel.COMPONENT.prepare(plant).hull
+    b = VESSEL.prepare(plant).hull
     for k in range(round(seconds / h)):
         i = Inputs(true_estimate(s), rich_target(k * h))
         cs, out = component.step(cs, i, params, h)
@@ -113,7 +114,7 @@ def test_adaptation_recovers_known_parameters_under_rich_motion():
 def test_adaptation_approaches_four_unknown_parameters():
     """r and |r|r are alike at the same yaw rates, so this takes long: the error falls to a seventh."""
     only = RotationalDamping(Y_absr_v=0.0, Y_absv_r=0.0, N_absr_v=0.0, N_absv_r=0.0)
-    plant = vessel.COMPONENT.params(damping=Damping(rotational=only))
+    plant = VESSEL.params(damping=Damping(Terms()._replace(**only._asdict())))
     gamma = ROTATIONAL.gamma(0.0, 1000.0, 0.0, 8000.0, 0.0, 250.0, 0.0, 4000.0)
     params = Params(gamma=gamma)
     *_, (_, _, state, _, _) = closed_loop(ABS, params, 600.0, 0.01, plant=plant)
@@ -139,7 +140,7 @@ def test_earth_fixed_force_is_found():
         phi=ROTATIONAL.start(*TRUE_PHI), gamma=ROTATIONAL.gamma(*[0.0] * 8), disturbance=disturbance
     )
     north, east, h = 0.2, -0.1, 0.01
-    s, b = vessel.State(), vessel.COMPONENT.prepare(vessel.COMPONENT.params()).hull
+    s, b = vessel.State(), VESSEL.prepare(VESSEL.params()).hull
     cs = ABS.init(None, params)
     for k in range(20000):
         cs, out = ABS.step(cs, Inputs(true_estimate(s), rich_target(k * h)), params, h)
@@ -155,7 +156,7 @@ def test_force_is_the_sum_of_its_parts_and_omega_hat_is_the_models():
     linear = (out.tau_lin_X, out.tau_lin_Y, out.tau_lin_N)
     nonlinear = (out.tau_nonlin_X, out.tau_nonlin_Y, out.tau_nonlin_N)
     assert tuple(out.tau) == pytest.approx([a + b for a, b in zip(linear, nonlinear, strict=True)])
-    _, plant = vessel.COMPONENT.step(s, Force(), vessel.COMPONENT.params(), 0.0)
+    _, plant = VESSEL.step(s, Force(), VESSEL.params(), 0.0)
     assert (out.omega_hat_Y, out.omega_hat_N) == pytest.approx((plant.omega_star_Y, plant.omega_star_N))
 
 
@@ -197,7 +198,7 @@ def test_pid_finds_a_constant_force():
     """Its integral is what the force is, and then the ship lies where it should; windup has an end."""
     force = np.array([0.3, -0.2])  # N, north and east
     params, h = pid.COMPONENT.params(), 0.1
-    body = vessel.COMPONENT.prepare(vessel.COMPONENT.params()).hull
+    body = VESSEL.prepare(VESSEL.params()).hull
     s = vessel.State()
     cs = pid.COMPONENT.init(pid.Inputs(true_estimate(s), Target()), params)
     out = None

@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.cases import slow
+from support.cse1 import EFFECTS
 from support.measured import sail
 from support.shared import once
 
@@ -170,7 +171,7 @@ def test_json_has_every_key_of_the_format(learned):
     assert effect <= set(content["effects"][0])
     assert {"value", "unit", "ci95", "run"} == set(content["effects"][0]["coefficients"]["delta_X_u"])
     assert {"id", "score", "q2", "beyond", "behind", "behind_std"} == set(content["ranking"][0])
-    assert {r["id"] for r in content["ranking"]} <= set(STANDARD)
+    assert {r["id"] for r in content["ranking"]} <= set(EFFECTS)
     counts = {"samples", "frozen", "dropped", "spikes", "used"}
     assert counts <= set(content["data"])
     for name in counts:

@@ -4,9 +4,10 @@ import re
 from itertools import combinations
 
 import pytest
+from support.cse1 import EFFECTS
 
 from diagnosis.report.finding_text import advice, equation, sentence, separation_note, tell_apart, unit
-from fmus.effects import STANDARD, Effect
+from fmus.effects import Effect
 from fmus.effects.families import UNKNOWN
 from fmus.effects.text import Found
 
@@ -17,9 +18,9 @@ def values(effect, x):
     return dict.fromkeys(effect.coefficients, x) | ends
 
 
-@pytest.mark.parametrize("name", STANDARD)
+@pytest.mark.parametrize("name", EFFECTS)
 def test_every_effect_has_a_sentence_of_its_own_with_numbers(name):
-    effect = STANDARD[name]
+    effect = EFFECTS[name]
     assert effect.wording.sentence is not None
     said = sentence(Found(effect, values(effect, 0.25)))
     assert said[0].isupper()
@@ -36,7 +37,7 @@ SIGNS = (
 
 @pytest.mark.parametrize("name", [*SIGNS.split(), "marker_offset", "clock_offset", "Y_ur", "curve_X(u)"])
 def test_the_other_sign_says_the_other(name):
-    effect = STANDARD[name]
+    effect = EFFECTS[name]
     more, less = (sentence(Found(effect, values(effect, x))) for x in (0.25, -0.25))
     assert more != less
 
@@ -63,11 +64,11 @@ def test_the_other_sign_says_the_other(name):
     ],
 )
 def test_sentences(name, given, said):
-    assert sentence(Found(STANDARD[name], given)) == said
+    assert sentence(Found(EFFECTS[name], given)) == said
 
 
 def test_force_of_a_damping_term_is_that_at_the_speeds_reached():
-    said = sentence(Found(STANDARD["X_|u|u"], {"delta_X_absu_u": -20.0}, (0.2, 0.0, 0.0)))
+    said = sentence(Found(EFFECTS["X_|u|u"], {"delta_X_absu_u": -20.0}, (0.2, 0.0, 0.0)))
     assert said == "The ship has more surge drag than the model believes: 0.8 N at 0.2 m/s."
 
 
@@ -78,12 +79,12 @@ def test_an_effect_of_a_user_says_what_it_says_of_itself():
         == "The ship has an effect that the model lacks: A moment that I suspect."
     )
     assert mine.wording.family is UNKNOWN
-    assert UNKNOWN.excite in tell_apart(mine, STANDARD["mass"])
+    assert UNKNOWN.excite in tell_apart(mine, EFFECTS["mass"])
 
 
-@pytest.mark.parametrize("name", [e.id for e in STANDARD.values() if e.search.by != "given"])
+@pytest.mark.parametrize("name", [e.id for e in EFFECTS.values() if e.search.by != "given"])
 def test_equation_has_every_number_with_its_unit(name):
-    effect = STANDARD[name]
+    effect = EFFECTS[name]
     given = dict.fromkeys(effect.coefficients, 0.25)
     text = equation(effect, given, dict.fromkeys(given, (0.125, 0.375)))
     assert effect.formula in text
@@ -95,36 +96,36 @@ def test_equation_has_every_number_with_its_unit(name):
 
 
 def test_every_effect_has_a_family_and_every_pair_an_advice():
-    assert all(e.wording.family is not UNKNOWN for e in STANDARD.values())
-    for a, b in combinations(STANDARD.values(), 2):
+    assert all(e.wording.family is not UNKNOWN for e in EFFECTS.values())
+    for a, b in combinations(EFFECTS.values(), 2):
         assert tell_apart(a, b)
         same_family = a.wording.family is b.wording.family
         assert tell_apart(a, b) == tell_apart(b, a) or not same_family
 
 
 def test_what_tells_effects_apart_names_effects_and_families_that_there_are():
-    families = {e.wording.family.name for e in STANDARD.values()}
-    for e in STANDARD.values():
-        assert set(e.wording.apart) <= set(STANDARD)
+    families = {e.wording.family.name for e in EFFECTS.values()}
+    for e in EFFECTS.values():
+        assert set(e.wording.apart) <= set(EFFECTS)
         assert set(e.wording.family.apart) <= families
 
 
 def test_known_pairs():
     def apart(a, b):
-        return tell_apart(STANDARD[a], STANDARD[b])
+        return tell_apart(EFFECTS[a], EFFECTS[b])
 
     assert "astern" in apart("X_u", "body_bias")
     assert "sync pulse" in apart("delay", "clock_offset")
     assert "turn on the spot" in apart("N_ur", "N_r")
-    assert advice("X_u", [], STANDARD) == separation_note("X_u", []) == ""
-    said = advice("lag", ["delay", "clock_offset"], STANDARD)
+    assert advice("X_u", [], EFFECTS) == separation_note("X_u", []) == ""
+    said = advice("lag", ["delay", "clock_offset"], EFFECTS)
     assert said.count("To tell lag from") == 2
     assert separation_note("lag", ["delay", "mass", "X_u"]).endswith("from delay, mass or X_u.")
 
 
 def test_of_many_others_the_likeliest_are_told():
-    others = [name for name in STANDARD if name != "X_u"]
+    others = [name for name in EFFECTS if name != "X_u"]
     assert separation_note("X_u", others).endswith(f"or {len(others) - 4} others.")
-    said = advice("X_u", others, STANDARD)
+    said = advice("X_u", others, EFFECTS)
     assert said.count("To tell") <= 4
     assert said.endswith("vary speed, turn and drift more.")

@@ -7,11 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from support.cse1 import FIVE
 from support.measured import DATA, commands, needs_data
 
 import diagnosis
 from diagnosis import InputError
-from diagnosis.runs.columns.columns import FIVE, TAU
+from diagnosis.runs.columns.columns import TAU
 
 N = 120
 TIME = np.arange(N) * 0.1

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.cse1 import EFFECTS
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, omega
@@ -13,7 +14,7 @@ from diagnosis.search.candidates import SMALL, additions, candidate, covered, mo
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.nonlinear.multistart import Landscape, best_values
 from fmus.declare import Range, Variable
-from fmus.effects import STANDARD, effect
+from fmus.effects import effect
 
 SPANS = [(8.0, 14.0), (25.3, 28.0), (40.0, 52.0)]
 
@@ -31,7 +32,7 @@ def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tm
     w = weak_windows(smoothed(sail(64.0, thrusters=hidden)[0]))
     model = Model()
     base = model_error([w], model)
-    (shape,) = candidate([w], model, base, STANDARD[f"{device}_outage"]).shapes
+    (shape,) = candidate([w], model, base, EFFECTS[f"{device}_outage"]).shapes
     found = shape.given
     assert set(found) == set(times(device, SPANS, "made"))
     assert [*found.values()] == pytest.approx([*hidden.values()], abs=0.3)
@@ -43,7 +44,7 @@ def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tm
 
 
 def test_what_is_tried_of_a_coefficient_is_an_addition_and_of_a_shape_the_value_itself():
-    for e in STANDARD.values():
+    for e in EFFECTS.values():
         start = Model().plus({p.name: 0.1 for p in e.parameters if p.name not in e.coefficients})
         tried = {p.name: 0.3 for p in e.parameters}
         found = start.plus(additions(start, e, tried))
@@ -57,7 +58,7 @@ def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure(
         w = weak_windows(smoothed(sail(64.0, thrusters=hidden)[0]))
         model = Model()
         base = model_error([w], model)
-        assert not candidate([w], model, base, STANDARD["bow_outage"]).shapes
+        assert not candidate([w], model, base, EFFECTS["bow_outage"]).shapes
 
 
 RUNS = {"a": [(12.0, 18.0), (35.0, 41.0)], "b": [], "c": [(4.0, 9.0), (22.0, 27.0), (44.3, 52.0)]}
@@ -75,7 +76,7 @@ def test_outages_at_other_times_in_each_run_are_found_where_they_are():
     data = in_runs({name: times("bow", spans) for name, spans in RUNS.items()})
     model = Model()
     base = model_error(data, model)
-    (shape,) = candidate(data, model, base, STANDARD["bow_outage"]).shapes
+    (shape,) = candidate(data, model, base, EFFECTS["bow_outage"]).shapes
     true = times("bow", RUNS["a"], "a") | times("bow", RUNS["c"], "c")
     assert shape.given == pytest.approx(true, abs=0.3)
     learned = model.plus(shape.given)
@@ -90,10 +91,10 @@ def test_a_failure_for_good_begins_at_another_time_in_each_run():
     data = in_runs({"a": {"bow_failure_time": 30.0}, "b": {}, "c": {"bow_failure_time": 15.0}})
     model = Model()
     base = model_error(data, model)
-    (shape,) = candidate(data, model, base, STANDARD["bow_failure"]).shapes
+    (shape,) = candidate(data, model, base, EFFECTS["bow_failure"]).shapes
     true = {"bow_failure_time@a": 30.0, "bow_failure_time@c": 15.0}
     assert shape.given == pytest.approx(true, abs=0.3)
-    assert not candidate(data, model, base, STANDARD["bow_outage"]).shapes
+    assert not candidate(data, model, base, EFFECTS["bow_outage"]).shapes
 
 
 def test_times_of_one_run_are_left_out_of_the_predictions_of_others():
@@ -114,11 +115,9 @@ def test_times_of_one_run_are_left_out_of_the_predictions_of_others():
 def test_what_is_dead_most_of_the_time_is_no_outage():
     w = weak_windows(smoothed(sail(64.0, thrusters=times("vsp", [(8.0, 45.0)]))[0]))
     model = Model()
-    assert not candidate([w], model, model_error([w], model), STANDARD["vsp_outage"]).shapes
+    assert not candidate([w], model, model_error([w], model), EFFECTS["vsp_outage"]).shapes
     rest = [weak_windows(smoothed(replace(sail(64.0)[0], name=name))) for name in "bc"]
-    assert not candidate(
-        [w, *rest], model, model_error([w, *rest], model), STANDARD["vsp_outage"]
-    ).shapes
+    assert not candidate([w, *rest], model, model_error([w, *rest], model), EFFECTS["vsp_outage"]).shapes
 
 
 def test_the_shape_of_an_effect_is_found_far_from_its_start():

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
+from support.cse1 import ASIDE, EFFECTS, FIVE, SHIP
 from support.measured import NOISE, smoothed
 from test_diagnosis_selection import learn
 
 from diagnosis import Model, Run, weak_windows
-from diagnosis.runs.columns.columns import FIVE
 from fmus.actuators.response import total
-from fmus.effects import STANDARD, Running, Thrust
-from fmus.effects.cse1 import ASIDE
+from fmus.effects import Running, Thrust
 from fmus.signals import Force
-from fmus.thrusters import chain
 from fmus.vessel.vessel import State
 
 H = 0.02
@@ -39,9 +37,9 @@ def voyage(seconds=90.0, **values):
     ready, s, poses = model.hull, State(psi=3.0), []
     for now, shares, power in zip(t.tolist(), five.tolist(), setting.tolist(), strict=True):
         poses.append(s[:3])
-        drive = chain.FIVE.powered(model.drive, power)
-        running = chain.FIVE.running(now, *s[3:6], tuple(shares), drive)
-        force = chain.FIVE.act(tuple(shares), running, drive)
+        drive = SHIP.layouts[-1].powered(model.drive, power)
+        running = SHIP.layouts[-1].running(now, *s[3:6], tuple(shares), drive)
+        force = SHIP.layouts[-1].act(tuple(shares), running, drive)
         s, _ = model.ship.vessel.advance(s, Force(*force), ready, H)
     pose = np.array(poses) + NOISE * np.random.default_rng(4).standard_normal((t.size, 3))
     force = model.ship.commanded_force(five, setting)
@@ -54,7 +52,7 @@ AT = (-0.4575, -0.4575, 0.3875)
 
 def act(name, now, **values):
     """Thrust of an effect on propellers of 0.5 N ahead and 0.2 N to starboard, and a bow of 0.1 N."""
-    e = STANDARD[name]
+    e = EFFECTS[name]
     f = Thrust((0.5, 0.5, 0.0), (0.2, 0.2, 0.1), AT, (*ASIDE, 0.0), (0.5, 0.5, 1.0))
     return e(f, now, *[values.get(p.name, p.start) for p in e.parameters])
 

@@ -29,7 +29,7 @@ HIDDEN = {"ship": {"V_n": 0.05, "V_e": -0.03}, "thrusters": {"lag": 0.6}}
 def grown(d, scale):
     """A description with every number at another size."""
     units = {n: v.unit for n, v in ship(STANDARD, d).parameters["vessel"].items()}
-    always = {"x": "m", "y": "m", "lag": "s"}
+    always = {"x": "m", "y": "m", "abreast": "m", "lag": "s"}
 
     everything = ship(STANDARD, d).effects.values()
     wind = {p.name: p.unit for e in everything if e.id == "wind" for p in e.parameters}

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.cases import in_part, slow
+from support.cse1 import EFFECTS
 from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model, omega, weak_windows
@@ -12,7 +13,6 @@ from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import Estimate, TrainingSet
 from diagnosis.search.shortlist import NEW, novelty, rank
 from diagnosis.verdict.confidence import probability
-from fmus.effects import STANDARD
 
 
 def learn(data, prior, model=None):
@@ -125,7 +125,7 @@ def test_nothing_is_found_where_nothing_is_missing(prior):
     w, _ = data()
     learned = learn([w], prior)
     assert list(learned.effects) == []
-    assert {r.id for r in learned.ranking} <= set(STANDARD)
+    assert {r.id for r in learned.ranking} <= set(EFFECTS)
 
 
 def test_coefficients_within_the_prior_are_no_finding():
@@ -152,7 +152,7 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     Seen in a model error that is large against the noise: a small share of its own is enough.
     """
     w, _ = data()
-    effect = STANDARD["curve_vsp_x(c)"]
+    effect = EFFECTS["curve_vsp_x(c)"]
     names = [p.name for p in effect.parameters if p.name in effect.coefficients]
     curve = dict(zip(names, 0.1 * np.linspace(-1.0, 1.0, len(names)) ** 3, strict=True))
     prior = NominalPrior.of(Model(), 0.1)

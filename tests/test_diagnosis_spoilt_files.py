@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.cases import in_part
+from support.closed_form import Allocation, thrust
 from support.measured import DATA, commands, jumps, needs_data, sail, smoothed
 from support.planted import voyages
 
@@ -19,7 +20,6 @@ from diagnosis.assessment.plausibility import refuse_implausible
 from diagnosis.assessment.readings import Reading, of_commands, of_pose, reread
 from diagnosis.predictors.thrust import full_thrust
 from diagnosis.search import shortlist
-from fmus.thrusters.allocation import Allocation, thrust
 
 RATE = 20  # Hz
 

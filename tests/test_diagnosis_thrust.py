@@ -5,17 +5,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.closed_form import Allocation, allocate
+from support.cse1 import EFFECTS, FIVE, Inputs
+from support.cse1 import THRUSTERS as COMPONENT
 from support.measured import sail
 
 from diagnosis import Model, Run
 from diagnosis.predictors.thrust import Integral, Response, thrust
-from diagnosis.runs.columns.columns import FIVE
 from fmus.declare import variables
-from fmus.effects import STANDARD
-from fmus.signals import Force, Velocity
-from fmus.thrusters.allocation import allocate
-from fmus.thrusters.chain import Inputs
-from fmus.thrusters.thrusters import COMPONENT
+from fmus.signals import Force, VelocityInCurrent
 
 # Of every effect on thrusters, and of every other parameter of the plant's, a value that matters.
 VALUES = {
@@ -47,13 +45,15 @@ VALUES = {
     "cross_vsp_sway": 0.5,
     "cross_vsp_surge": 0.5,
 }
-EFFECTS = STANDARD.of_kind("actuator")
+EFFECTS = EFFECTS.of_kind("actuator")
 BY_EFFECT = {e.id: {n: VALUES.get(n, 0.1) for n in e.coefficients} for e in EFFECTS}
 BY_EFFECT["power_exponent"] |= {"power_vsp": 0.7, "power_bow": 0.6}  # at full power it does nothing
 OTHERS = [
     n
     for n in (v.name for v in variables(COMPONENT.params))
-    if n.startswith(("plant_", "power_")) and n not in BY_EFFECT
+    if n.startswith(("plant_", "power_"))
+    and n not in BY_EFFECT
+    and not n.endswith(("P_idle", "P_full", "bow_y"))  # no part of its force, or along it
 ]
 BY_PARAMETER = {n: {n: VALUES.get(n, 0.02)} for n in OTHERS}
 TOGETHER = {"delay and lag": {"delay": 0.36, "lag": 0.7}, "all": {**VALUES, "loss_bow": 0.2}}
@@ -85,7 +85,7 @@ def by_steps(run, nu, values):
     # The force over the step that begins at a sample follows from the command of that sample.
     past, out = COMPONENT.init(Inputs(), model.drive.params)._replace(t=run.time[0] - h), []
     for tau, velocity in zip(run.tau_cmd.tolist(), nu.tolist(), strict=True):
-        inputs = Inputs(Force(*tau), Velocity(*velocity))
+        inputs = Inputs(Force(*tau), VelocityInCurrent(*velocity))
         past, outputs = COMPONENT.advance(past, inputs, model.drive, h)
         out.append(outputs[6:])
     return np.array(out)
@@ -109,7 +109,7 @@ def test_mean_force_over_each_interval_from_series_is_that_of_the_steps(values):
 def test_two_propellers_with_the_same_commands_are_twice_the_one_that_stands_for_both(values):
     """One set of the FMU stands for both, at the mean of their places: to port and starboard alike."""
     run, nu = base(), true_nu()
-    u = np.column_stack(allocate(*run.tau_cmd.T, Model().drive.params.allocation))
+    u = np.column_stack(allocate(*run.tau_cmd.T, Allocation()))
     u[:, 2] = 0.0
     one = replace(run, commands=u)
     two = replace(run, commands=np.column_stack([u[:, :2], u[:, :2], u[:, 2]]), signals=FIVE)

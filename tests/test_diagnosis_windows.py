@@ -8,15 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 from support.cases import in_part
+from support.closed_form import Allocation, allocate
+from support.cse1 import ASIDE, FIVE, THRUSTERS
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, clean, read, smooth
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.predictors.weak_form import HORIZON
-from diagnosis.runs.columns.columns import FIVE
-from fmus.effects.cse1 import ASIDE
-from fmus.thrusters.allocation import Allocation, allocate
-from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 
 # The first window starts where the smoother sees one side only: a velocity error of a millimetre a second.
 POSITION, HEADING, USUAL = 6e-3, 4e-3, 1.5e-3

@@ -11,18 +11,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import ccode
+from support.cse1 import EFFECTS, SHIP, THRUSTERS, Inputs
+from support.cse1 import VESSEL as COMPONENT
 from support.project import ROOT
 
 from fmus.declare import flatten, packer, variables
-from fmus.effects import STANDARD, Loaded, Motion, Running, Thrust
+from fmus.effects import Loaded, Motion, Running, Thrust
 from fmus.effects.__main__ import table as effects_table
 from fmus.effects.environment import surface
 from fmus.frames import rotate_to_earth
 from fmus.hull import Inertia, damping_force
-from fmus.signals import Force, Velocity
-from fmus.thrusters import propeller, table, thrusters
-from fmus.thrusters.chain import Inputs
-from fmus.vessel.vessel import COMPONENT, Start, State, hull
+from fmus.signals import Force, VelocityInCurrent
+from fmus.thrusters import propeller, table
+from fmus.vessel.vessel import Start, State, hull
 from fmus.vessel.vessel_effects import vessel_effects
 
 CONTRACT = [
@@ -87,8 +88,9 @@ CONTRACT = [
     "curve_vsp2_y(c)",
 ]
 Params = COMPONENT.params
-CHANGES, OUTSIDE = vessel_effects(STANDARD).changes, vessel_effects(STANDARD).outside
-LINEAR = [e.id for e in STANDARD.values() if e.linear and e.kind in ("force", "environment")]
+PROPELLER, TABLE = (m.make(SHIP.effects, SHIP.description) for m in (propeller, table))
+CHANGES, OUTSIDE = vessel_effects(EFFECTS).changes, vessel_effects(EFFECTS).outside
+LINEAR = [e.id for e in EFFECTS.values() if e.linear and e.kind in ("force", "environment")]
 speeds = st.floats(-0.6, 0.6)
 
 
@@ -111,12 +113,12 @@ def sail(p, seconds=5.0, h=0.01, tau=Force(0.5, 0.2, 0.1), start=None):
 
 
 def test_every_effect_of_the_contract_is_registered():
-    assert set(CONTRACT) <= set(STANDARD)
+    assert set(CONTRACT) <= set(EFFECTS)
 
 
 def test_every_parameter_of_an_effect_is_one_of_an_fmu():
-    declared = {v.name for v in COMPONENT.variables} | {v.name for v in thrusters.COMPONENT.variables}
-    of_fmus = [e for e in STANDARD.values() if e.function is not None]
+    declared = {v.name for v in COMPONENT.variables} | {v.name for v in THRUSTERS.variables}
+    of_fmus = [e for e in EFFECTS.values() if e.function is not None]
     missing = [p.name for e in of_fmus for p in e.parameters if p.name not in declared]
     assert not missing
     assert "delta_X_absu_u" in declared
@@ -124,13 +126,13 @@ def test_every_parameter_of_an_effect_is_one_of_an_fmu():
 
 
 def test_coefficients_start_at_zero_and_can_be_tuned():
-    for e in STANDARD.values():
+    for e in EFFECTS.values():
         for p in e.parameters:
             assert not p.fixed
             assert p.start == 0.0 or p.name not in e.coefficients
 
 
-@pytest.mark.parametrize("e", STANDARD.of_kind("force")[: len(CHANGES.members)], ids=lambda e: e.id)
+@pytest.mark.parametrize("e", EFFECTS.of_kind("force")[: len(CHANGES.members)], ids=lambda e: e.id)
 def test_damping_like_force_is_the_coefficient_times_the_product_in_its_name(e):
     axis, _, text = e.id.partition("_")
     assert e.axis == axis
@@ -150,7 +152,7 @@ def test_damping_like_force_is_the_coefficient_times_the_product_in_its_name(e):
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_regressors_carry_the_whole_effect(name):
-    e = STANDARD[name]
+    e = EFFECTS[name]
     rng = np.random.default_rng(2)
     ship = Loaded(*rng.uniform(-0.5, 0.5, (10, 30)))
     weights = rng.uniform(0.0, 1.0, len(e.coefficients))
@@ -197,14 +199,14 @@ def test_scaled_damping_is_that_of_the_ship_at_hand(values):
         _, out = COMPONENT.step(s, Force(0.0, 0.0, 0.0), with_params(COMPONENT, **values, **more), 0.0)
         return np.array([out.omega_X, out.omega_Y, out.omega_N])
 
-    _, _, damping = hull(with_params(COMPONENT, **values), vessel_effects(STANDARD))
+    _, _, damping = hull(with_params(COMPONENT, **values), vessel_effects(EFFECTS))
     gained = omega_star(scale_damping=0.5) - omega_star()
     assert gained == pytest.approx(0.5 * np.array(damping_force(s.u, s.v, s.r, damping)), abs=1e-12)
 
 
 @given(st.floats(-3.0, 3.0), speeds, speeds)
 def test_earth_force_pushes_the_same_way_on_every_heading(psi, F_n, F_e):
-    X, Y, N = STANDARD["earth_force"].function(Motion(psi=psi), F_n, F_e, 100.0, 0.0)
+    X, Y, N = EFFECTS["earth_force"].function(Motion(psi=psi), F_n, F_e, 100.0, 0.0)
     assert rotate_to_earth(psi, X, Y) == pytest.approx((F_n, F_e), abs=1e-12)
     assert N == 0.0
 
@@ -238,7 +240,7 @@ def test_the_integration_stays_of_fourth_order_with_effects():
 
 def test_waves_have_the_strength_the_peak_and_the_drift_that_were_asked_for():
     t = np.arange(0.0, 3600.0, 0.05)
-    F = np.array(STANDARD["waves"].function(Motion(t=t), 0.3, 0.1, 4.0, 0.0, 0.1)[0])
+    F = np.array(EFFECTS["waves"].function(Motion(t=t), 0.3, 0.1, 4.0, 0.0, 0.1)[0])
     assert F.mean() == pytest.approx(0.1, abs=0.003)
     assert F.std() == pytest.approx(0.3, rel=0.02)
     spectrum = np.abs(np.fft.rfft(F - F.mean())) ** 2
@@ -285,10 +287,10 @@ def test_an_effect_switched_on_during_a_run_makes_no_jump():
 # Thrusters
 
 
-def push(p, request=(0.5, 0.3, 0.1), velocity=Velocity(), steps=1, h=0.01, model=thrusters):
-    s, out = model.COMPONENT.init(None, p), None
+def push(p, request=(0.5, 0.3, 0.1), velocity=VelocityInCurrent(), steps=1, h=0.01, model=THRUSTERS):
+    s, out = model.init(None, p), None
     for _ in range(steps):
-        s, out = model.COMPONENT.step(s, Inputs(Force(*request), velocity), p, h)
+        s, out = model.step(s, Inputs(Force(*request), velocity), p, h)
     return out
 
 
@@ -301,7 +303,7 @@ def cmd(out):
 
 
 def thruster_params(**changed):
-    return with_params(thrusters.COMPONENT, **changed)
+    return with_params(THRUSTERS, **changed)
 
 
 @pytest.mark.parametrize(("axis", "k"), [("surge", 0), ("sway", 1), ("yaw", 2)])
@@ -341,9 +343,9 @@ def test_bow_loses_effect_with_speed_and_never_turns_round():
     p = thruster_params(bow_speed_loss=2.0)
     assert act(push(p)) == pytest.approx(cmd(push(p)))
     for u in (0.2, -0.2):
-        half = act(push(p, velocity=Velocity(u, 0.0, 0.0)))
+        half = act(push(p, velocity=VelocityInCurrent(u, 0.0, 0.0)))
         assert half == pytest.approx(act(push(thruster_params(loss_bow=0.4))))
-    assert act(push(p, velocity=Velocity(2.0, 0.0, 0.0))) == pytest.approx(
+    assert act(push(p, velocity=VelocityInCurrent(2.0, 0.0, 0.0))) == pytest.approx(
         act(push(thruster_params(loss_bow=1.0)))
     )
 
@@ -378,12 +380,12 @@ def test_thrust_curve_is_asymmetric_and_has_a_dead_band():
 def test_free_curves_pass_through_their_nodes():
     p = thruster_params(curve_vsp_x_c_16=0.1, curve_bow_u_11=-0.5)
     assert push(p, (0.5 * 1.165, 0.0, 0.0)).tau_act_X == pytest.approx(0.5 * 1.165 + 0.1)
-    moving = push(p, (0.0, 0.0, 0.5), Velocity(0.3, 0.0, 0.0))
+    moving = push(p, (0.0, 0.0, 0.5), VelocityInCurrent(0.3, 0.0, 0.0))
     assert act(moving) == pytest.approx(act(push(thruster_params(loss_bow=0.5), (0.0, 0.0, 0.5))))
     ship = Motion(u=0.3)
     nodes = [0.0] * 21
     nodes[15] = 2.0
-    assert STANDARD["curve_X(u)"].function(ship, *nodes, 0.6)[0] == pytest.approx(2.0)
+    assert EFFECTS["curve_X(u)"].function(ship, *nodes, 0.6)[0] == pytest.approx(2.0)
 
 
 def test_lag_is_the_exact_exponential():
@@ -394,11 +396,11 @@ def test_lag_is_the_exact_exponential():
 @pytest.mark.parametrize("delay", [0.01, 0.2, 0.63, 3.0])
 def test_delay_brings_every_command_later(delay):
     p = thruster_params(delay=delay)
-    s = thrusters.COMPONENT.init(None, p)
+    s = THRUSTERS.init(None, p)
     acted = []
     for k in range(500):
         request = Force(0.5 if k >= 100 else 0.0, 0.0, 0.0)
-        s, out = thrusters.COMPONENT.step(s, Inputs(request, Velocity()), p, 0.01)
+        s, out = THRUSTERS.step(s, Inputs(request, VelocityInCurrent()), p, 0.01)
         acted.append(out.tau_act_X)
     # A delay longer than the memory is kept in steps of a sixty-third of itself.
     first = next(k for k, X in enumerate(acted) if X > 0.0)
@@ -413,33 +415,33 @@ def test_rate_limit_holds():
 
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5))
 def test_propeller_allocation_knows_the_square(X, Y, N):
-    p = propeller.COMPONENT.params()
-    out = push(p, (X, Y, N), model=propeller)
+    p = PROPELLER.params()
+    out = push(p, (X, Y, N), model=PROPELLER)
     assert act(out) == pytest.approx(cmd(out), abs=1e-12)
-    straight = push(thrusters.COMPONENT.params(), (X, Y, N))
+    straight = push(THRUSTERS.params(), (X, Y, N))
     assert abs(out.u_vsp_x) >= abs(straight.u_vsp_x) - 1e-12
 
 
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), speeds)
 def test_table_starts_as_the_straight_line(X, Y, u):
-    p = table.COMPONENT.params()
-    out = push(p, (X, Y, 0.1), Velocity(u, 0.1, 0.0), model=table)
+    p = TABLE.params()
+    out = push(p, (X, Y, 0.1), VelocityInCurrent(u, 0.1, 0.0), model=TABLE)
     assert act(out) == pytest.approx(cmd(out), abs=1e-12)
 
 
 def test_table_interpolates_over_command_and_inflow():
-    p = with_params(table.COMPONENT, table_vsp_x_9_1=1.0, table_vsp_x_9_2=0.8, table_vsp_x_9_3=0.6)
+    p = with_params(TABLE, table_vsp_x_9_1=1.0, table_vsp_x_9_2=0.8, table_vsp_x_9_3=0.6)
     for u, share in ((0.0, 1.0), (0.1, 0.9), (0.2, 0.8), (0.4, 0.6), (1.0, 0.6)):
-        out = push(p, (9.0, 0.0, 0.0), Velocity(u, 0.0, 0.0), model=table)
+        out = push(p, (9.0, 0.0, 0.0), VelocityInCurrent(u, 0.0, 0.0), model=TABLE)
         assert out.tau_act_X == pytest.approx(share * 1.165)
 
 
 @pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
-@pytest.mark.parametrize("component", [COMPONENT, thrusters.COMPONENT], ids=lambda c: c.name)
+@pytest.mark.parametrize("component", [COMPONENT, THRUSTERS], ids=lambda c: c.name)
 def test_same_source_in_c_with_every_effect_on(component, tmp_path):
     run = ccode.Compiled(component, tmp_path)
     rng = random.Random(4)
-    names = {p.name for e in STANDARD.values() for p in e.parameters}
+    names = {p.name for e in EFFECTS.values() for p in e.parameters}
     for _ in range(20):
         changed = {
             v.name: v.start + rng.uniform(0.0, 0.3) for v in component.variables if v.name in names
@@ -458,7 +460,7 @@ def test_actuator_effects_leave_what_they_do_not_concern():
     commands = (0.3, 0.2, 0.1)
     now = Running(0.0, 0.1, 0.0, 0.0, commands, (0.3, 0.2, 0.3, 0.2, 0.1), (1.0, 1.0, 1.0))
     f = Thrust((0.3, 0.3, 0.0), (0.2, 0.2, 0.1), (-0.4, -0.4, 0.4), (-0.1, 0.1, 0.0), (0.5, 0.5, 1.0))
-    for e in STANDARD.of_kind("actuator"):
+    for e in EFFECTS.of_kind("actuator"):
         if e.memory is None:
             given = e.function(f, now, *[p.start for p in e.parameters])
             assert flatten(given) == pytest.approx(flatten(f)), e.id
@@ -486,8 +488,8 @@ def command(module, *arguments, cwd):
 
 
 def test_values_that_are_tried_are_allowed_and_those_of_one_parameter_grow():
-    for name in STANDARD:
-        effect = STANDARD[name]
+    for name in EFFECTS:
+        effect = EFFECTS[name]
         tries = effect.search.tries if isinstance(effect.search.tries, list) else []
         ranges = {p.name: p.range for p in effect.parameters}
         for parameter, value in (pair for each in tries for pair in each.items()):
@@ -500,15 +502,13 @@ def test_values_that_are_tried_are_allowed_and_those_of_one_parameter_grow():
 
 
 def test_no_more_than_all_of_a_force_is_lost_and_it_is_no_more_than_doubled():
-    ranges = [
-        p.range for name in STANDARD if name.startswith("loss_") for p in STANDARD[name].parameters
-    ]
+    ranges = [p.range for name in EFFECTS if name.startswith("loss_") for p in EFFECTS[name].parameters]
     assert len(ranges) > 3
     assert all((1.0 - r.max, 1.0 - r.min) == (0.0, 2.0) for r in ranges)
 
 
 def test_documentation_table_is_that_of_the_registry():
-    assert (ROOT / "docs" / "effects.md").read_text() == effects_table()
+    assert (ROOT / "docs" / "effects.md").read_text() == effects_table(EFFECTS)
 
 
 def test_one_function_in_one_file_adds_an_effect_to_the_fmu(tmp_path):

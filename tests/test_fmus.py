@@ -15,6 +15,7 @@ import pytest
 from fmpy.model_description import read_model_description
 from fmpy.validation import validate_fmu
 from support.command import command
+from support.cse1 import VESSEL
 from support.opened import Opened
 from support.project import COMPONENTS, ROOT
 
@@ -22,7 +23,6 @@ from fmus.build import BuildError, build, building, packing
 from fmus.build.__main__ import main
 from fmus.declare import flatten, packer, width
 from fmus.fmi.slave import Slave, StateError
-from fmus.vessel.vessel import COMPONENT as VESSEL
 
 every_fmu = pytest.mark.parametrize("name", COMPONENTS)
 

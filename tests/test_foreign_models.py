@@ -31,9 +31,10 @@ OTHER = '''
 from typing import Annotated, NamedTuple
 
 from fmus.declare import FIXED, Component
+from fmus.ship import ship
 from fmus.signals import Force
-from fmus.vessel.vessel import COMPONENT as SHIP
 
+SHIP = ship().vessel
 DEG, KNOT = 57.29577951308232, 3600.0 / 1852.0
 
 

@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.closed_form import Allocation, thrust
 from support.cosimulated import build, sail
+from support.cse1 import EFFECTS
 from support.shared import once
 
 from benchmarks.hidden_effects import fleet, simulated_runs
@@ -49,8 +51,6 @@ from benchmarks.hidden_effects.targets import bias
 from benchmarks.hidden_effects.truth import Motion, force, motion, over, windows
 from cosim import InputError
 from diagnosis import Model, Run
-from fmus.effects import STANDARD
-from fmus.thrusters.allocation import Allocation, thrust
 
 
 def sailed(seconds=60.0, speed=0.3, ahead=0.08):
@@ -128,7 +128,7 @@ def test_every_effect_is_in_the_benchmark():
 
 
 def test_twenty_pairs_half_of_them_on_one_axis():
-    axes = [tuple(set(STANDARD[e].axis) for e in pair) for pair in PAIRS]
+    axes = [tuple(set(EFFECTS[e].axis) for e in pair) for pair in PAIRS]
     assert len(set(map(frozenset, PAIRS))) == 20
     assert sum(a.isdisjoint(b) for a, b in axes) >= 5
     assert sum(bool(a & b) for a, b in axes) >= 10
@@ -148,8 +148,8 @@ def test_library_knows_nothing_of_foreign_physics():
     ids = {e.id for e in FOREIGN_PHYSICS}
     parameters = {p.name for e in FOREIGN_PHYSICS for p in e.parameters}
     assert len(ids) == 6
-    assert ids.isdisjoint(STANDARD)
-    assert parameters.isdisjoint(p.name for e in STANDARD.values() for p in e.parameters)
+    assert ids.isdisjoint(EFFECTS)
+    assert parameters.isdisjoint(p.name for e in EFFECTS.values() for p in e.parameters)
 
 
 @pytest.mark.parametrize("effect", [e for e in UNKNOWN if e != "bias by place"])
@@ -202,7 +202,7 @@ def test_separations_are_shares_and_nuisance_parameters_make_them_smaller():
 def test_separation_of_two_linear_effects_is_symmetric(a, b):
     """With a column each it is the sine squared of the angle between them."""
     rivals = Rivals(RUNS, False)
-    one, other = (flat(over(RUNS, {STANDARD[e].coefficients[0]: 1.0})) for e in (a, b))
+    one, other = (flat(over(RUNS, {EFFECTS[e].coefficients[0]: 1.0})) for e in (a, b))
     assert rivals.left(one, b) == pytest.approx(rivals.left(other, a), abs=1e-9)
     assert rivals.left(-3.0 * one, b) == pytest.approx(rivals.left(one, b))
 

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.cse1 import VESSEL
 
 from fmus.declare import flatten, packer
 from fmus.hull import (
     Damping,
-    ExtraDamping,
     Inertia,
     RotationalDamping,
+    Terms,
     TowedDamping,
     coriolis_force,
     damping_force,
@@ -19,13 +20,10 @@ from fmus.hull import (
     mass_matrix,
 )
 from fmus.signals import Force
-from fmus.vessel.vessel import COMPONENT as VESSEL
 from fmus.vessel.vessel import Start, State, integrate, motion
 
 speed = st.floats(-1.0, 1.0)
-NO_DAMPING = Damping(
-    TowedDamping._make([0.0] * 9), RotationalDamping._make([0.0] * 8), ExtraDamping._make([0.0] * 8)
-)
+NO_DAMPING = Damping(Terms._make([0.0] * len(Terms._fields)))
 Params = VESSEL.params
 HULL = VESSEL.prepare(Params()).hull
 UNDAMPED = Params(damping=NO_DAMPING)

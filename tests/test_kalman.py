@@ -78,7 +78,7 @@ def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
         x, y, psi = out.pose
         psi = math.remainder(psi + rng.gauss(0, 1.5 * noise), math.tau)
         rows.append([x + rng.gauss(0, noise), y + rng.gauss(0, noise), psi, *known])
-        nu.append(out.velocity)
+        nu.append(out.velocity[:3])
         nu_dot.append((out.u_dot, out.v_dot, out.r_dot))
     return rows, np.array(nu), np.array(nu_dot)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.cases import in_part
+from support.cse1 import VESSEL
 from support.loops import closed_loop, ellipse_target, multisine_target, unlimited
 from support.project import COMPONENTS
 
@@ -35,7 +36,7 @@ def sysid4_plant():
     changes = {"X_absu_u": SYSID4[0], "X_u": SYSID4[1], "X_absu_r": SYSID4[2]}
     nominal = RotationalDamping()._asdict()
     changes |= {n: a - b for a, (n, b) in zip(SYSID4[3:11], nominal.items(), strict=True)}
-    plant = vessel.COMPONENT.params()
+    plant = VESSEL.params()
     return plant._replace(
         change=plant.change._replace(**{f"delta_{name}": x for name, x in changes.items()})
     )

@@ -3,16 +3,22 @@
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from support.cse1 import VESSEL
 from support.loops import acting, closed_loop, multisine_target
 
 from fmus.build import build
 from fmus.controller.models import ALL_UNKNOWN, PARAMETRISATIONS, ROTATIONAL, SCALED, SURGE
 from fmus.declare import Component, packer, variables
-from fmus.hull import Damping, Inertia, RotationalDamping, TowedDamping, motion
+from fmus.hull import Damping, Inertia, RotationalDamping, Terms, TowedDamping, motion
 from fmus.signals import Force
 from fmus.vessel import vessel
 
 every_model = pytest.mark.parametrize("name", PARAMETRISATIONS)
+
+
+def terms(**values):
+    """Damping of the plant with some coefficients of another value."""
+    return Damping(Terms()._replace(**values))
 
 
 def force_by_model(model, nu, nu_dot, tau, phi):
@@ -24,7 +30,7 @@ def force_by_model(model, nu, nu_dot, tau, phi):
 def nothing_left(model, nu, tau, phi, plant, loss=(0.0, 0.0, 0.0)):
     """What M nu_dot - tau has beyond known + F phi."""
     state = vessel.State(0.0, 0.0, 0.0, *nu)
-    nu_dot = motion(*nu, acting(state, tau, loss), vessel.COMPONENT.prepare(plant).hull)
+    nu_dot = motion(*nu, acting(state, tau, loss), VESSEL.prepare(plant).hull)
     y = model.error(nu, nu_dot, tau, model.belief)
     F = model.regressors(nu, nu_dot, tau, model.belief)
     return np.subtract(y, model.force(F, phi))
@@ -40,7 +46,7 @@ def test_true_coefficients_give_the_hull(name):
     rng = np.random.default_rng(1)
     for _ in range(50):
         nu, tau = random_motion(rng)
-        left = nothing_left(model, nu, tau, model.truth(), vessel.COMPONENT.params())
+        left = nothing_left(model, nu, tau, model.truth(), VESSEL.params())
         assert left == pytest.approx([0.0] * 3, abs=1e-12)
 
 
@@ -48,7 +54,7 @@ def test_loss_of_thrust_is_among_the_coefficients():
     rng = np.random.default_rng(2)
     loss = (0.3, -0.1, 0.31)
     phi = (*SURGE.truth()[:11], *loss)
-    plant = vessel.COMPONENT.params()
+    plant = VESSEL.params()
     change = plant.change._replace(delta_X_u=-3.5, delta_X_absu_u=-0.26)
     phi = (-0.26, -3.5, *phi[2:])
     for _ in range(50):
@@ -62,9 +68,9 @@ def test_factors_of_inertia_and_damping():
     rng = np.random.default_rng(3)
     heavier = Inertia(*(1.3 * x for x in Inertia()))._replace(x_g=Inertia().x_g)
     towed, rotational = ([0.7 * x for x in group()] for group in (TowedDamping, RotationalDamping))
-    plant = vessel.COMPONENT.params(
+    plant = VESSEL.params(
         inertia=heavier,
-        damping=Damping(TowedDamping(*towed), RotationalDamping(*rotational)),
+        damping=terms(**TowedDamping(*towed)._asdict(), **RotationalDamping(*rotational)._asdict()),
     )
     for _ in range(50):
         nu, tau = random_motion(rng)
@@ -76,7 +82,7 @@ def test_factors_of_inertia_and_damping():
 def test_factors_of_inertia_damping_and_thrust_are_known_but_for_one(factor):
     """The ship of the effects (2.20)-(2.23): any multiple of the three factors explains it as well."""
     rng = np.random.default_rng(6)
-    c = vessel.COMPONENT
+    c = VESSEL
     names = [v.name for v in variables(c.params)]
     values = {v.name: v.start for v in variables(c.params)} | {
         "scale_inertia": 0.2,
@@ -182,9 +188,7 @@ def test_one_file_of_a_user_learns_what_it_likes(tmp_path):
     exec(compile(USERS, str(own), "exec"), scope)
     component: Component = scope["COMPONENT"]
     assert {"phi_hat_1", "sigma_min"} <= {v.name for v in variables(component.outputs)}
-    plant = vessel.COMPONENT.params(
-        damping=Damping(rotational=RotationalDamping(*[0.0] * 8)._replace(N_r=-1.9))
-    )
+    plant = VESSEL.params(damping=terms(**dict.fromkeys(RotationalDamping._fields, 0.0) | {"N_r": -1.9}))
     *_, (*_, out) = closed_loop(
         component, component.params(), 60.0, 0.02, multisine_target(), plant=plant
     )

@@ -41,7 +41,7 @@ BELL = '''
 from typing import Annotated
 from fmus.declare import POSITIVE
 from fmus.effects import effect
-from fmus.effects.cse1 import BOW
+from support.cse1 import BOW
 from fmus.effects.devices import changed
 from fmus.ops import exp
 
@@ -256,5 +256,5 @@ def test_a_wrong_file_of_a_method_is_told(tmp_path, text, told):
         method(str(file))
 
 
-def test_a_ship_has_all_thrusters_unless_it_is_told_otherwise():
-    assert ship().devices == {"vsp", "bow", "each vsp"}
+def test_a_ship_has_its_actuators_and_their_units():
+    assert ship().devices == {"vsp", "bow", "vsp1", "vsp2"}

@@ -7,6 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from support.cse1 import THREE
 from support.measured import sail
 
 import diagnosis
@@ -15,7 +16,6 @@ from benchmarks.peers.chosen_settings import Answer, Method, answer
 from benchmarks.peers.same_windows import Continuous, Held, Nominal, moved, table
 from diagnosis import Model, Run
 from diagnosis.predictors.thrust import commanded_shares
-from diagnosis.runs.columns.columns import THREE
 
 LENGTH = 8.0
 DAMPED = np.array([[-0.2, 0.0, 0.0], [0.0, -0.3, 0.05], [0.0, 0.1, -0.5]])

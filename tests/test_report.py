@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support import reported
+from support.cse1 import EFFECTS
 from support.measured import sail, smoothed
 
 from diagnosis import Comparison, Model, PredictionError, evaluate_run
@@ -35,7 +36,6 @@ from diagnosis.report import (
 from diagnosis.report.content import coefficients
 from diagnosis.report.reported_effect import Coefficient
 from diagnosis.search.prediction_fit.joint_posterior import Posterior
-from fmus.effects import STANDARD
 from fmus.ship import ship
 from fmus.ships.naming import described_ship
 
@@ -261,7 +261,7 @@ def test_a_shape_is_that_of_the_effect(name, evaluations, tmp_path):
     for c in drawn:
         assert isinstance(c, Curve)
         assert c.covered[0] < c.covered[1]
-        assert (c.sure is not None) == STANDARD[name].linear
+        assert (c.sure is not None) == EFFECTS[name].linear
         if c.sure is not None:
             assert (c.sure[0] <= c.learned + 1e-12).all()
             assert (c.learned <= c.sure[1] + 1e-12).all()

@@ -248,7 +248,9 @@ def test_the_page_shows_what_is_in_the_file_of_the_otter() -> None:
     assert not [line for line in shown if line.partition(" = ")[0] != "source" and line not in shipped]
 
 
-@pytest.mark.parametrize("law", Law.known)
+@pytest.mark.parametrize(
+    "law", [n for n, law in Law.known.items() if law.__module__.startswith("fmus.actuators.")]
+)
 def test_the_page_has_the_parameters_of_a_law_with_their_units(law: str) -> None:
     (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `{law}` |")]
     _, commands, _, numbers = row.split(" | ")
@@ -258,7 +260,10 @@ def test_the_page_has_the_parameters_of_a_law_with_their_units(law: str) -> None
         for names, unit in re.findall(r"((?:`\w+`(?:, )?)+) \[(.+?)\]", numbers)
         for name in re.findall(r"`(\w+)`", names)
     }
-    assert told == {v.name: v.unit for v in variables(Law.known[law].Parameters)}
+    inner = re.compile(r"table_([xy]_)?\d_\d")  # of a table its first and its last cell stand there
+    declared = [v for v in variables(Law.known[law].Parameters) if not inner.fullmatch(v.name)]
+    declared += [v for v in variables(Law.known[law].Parameters) if v.name.endswith(("_1_1", "_9_3"))]
+    assert told == {v.name: v.unit for v in declared}
 
 
 def test_the_page_has_the_parameters_of_each_function() -> None:

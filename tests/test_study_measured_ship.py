@@ -12,6 +12,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from support.closed_form import Allocation, allocate
+from support.cse1 import FIVE, Inputs
+from support.cse1 import THRUSTERS as COMPONENT
 from support.measured import DATA, needs_data, sail
 from support.project import ROOT
 
@@ -19,12 +22,8 @@ import diagnosis
 from cosim import InputError
 from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, omega, session, weak_windows
 from diagnosis.predictors import DescribedShip
-from diagnosis.runs.columns.columns import FIVE
 from diagnosis.search import Suspect
-from fmus.signals import Force, Velocity
-from fmus.thrusters.allocation import allocate
-from fmus.thrusters.chain import Inputs
-from fmus.thrusters.thrusters import COMPONENT
+from fmus.signals import Force, VelocityInCurrent
 from studies import measured_ship
 from studies.measured import bollard, expected, leave_one_out, ship_tables
 from studies.measured.expected import BY_HAND, STEERED, Fall
@@ -36,7 +35,7 @@ COMMANDS = np.linspace(-1.0, 1.0, 11)
 
 def five(run):
     """The commands of both VSP, each with half of the force, and of the bow."""
-    x, y, bow = allocate(*run.tau_cmd.T, COMPONENT.params().allocation)
+    x, y, bow = allocate(*run.tau_cmd.T, Allocation())
     return np.column_stack([x / 2, y / 2, x / 2, y / 2, bow])
 
 
@@ -60,7 +59,7 @@ def test_force_is_that_of_the_fmu_at_rest():
     )
     p = model.drive.params
     for command in COMMANDS:
-        inputs = Inputs(Force(1.165 * command, 0.0, 0.0), Velocity())
+        inputs = Inputs(Force(1.165 * command, 0.0, 0.0), VelocityInCurrent())
         _, out = COMPONENT.advance(COMPONENT.init(inputs, p), inputs, COMPONENT.prepared(p), 0.01)
         force = bollard.surge_force(model, np.array([command]))
         assert force == pytest.approx([out.tau_act_X], abs=1e-12)

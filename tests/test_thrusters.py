@@ -4,20 +4,29 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.closed_form import Allocation, allocate, thrust
+from support.cse1 import THRUSTERS as COMPONENT
+from support.cse1 import Inputs
 
-from fmus.signals import Force, Velocity
-from fmus.thrusters.allocation import Allocation, allocate, thrust
-from fmus.thrusters.chain import Inputs, Plant, Power
-from fmus.thrusters.thrusters import COMPONENT
+from fmus.declare import packer, variables
+from fmus.signals import Force, VelocityInCurrent
 
 Params = COMPONENT.params
+
+
+def with_values(**values):
+    """Parameters of the thrusters, some of another value."""
+    return packer(Params)([values.get(v.name, v.start) for v in variables(Params)])
+
 
 command = st.floats(-1.0, 1.0)
 offset = st.floats(-0.1, 0.1)
 
 
 def run(X, Y, N, p=Params()):
-    return COMPONENT.step(COMPONENT.init(None, p), Inputs(Force(X, Y, N), Velocity()), p, 0.01)[1]
+    return COMPONENT.step(COMPONENT.init(None, p), Inputs(Force(X, Y, N), VelocityInCurrent()), p, 0.01)[
+        1
+    ]
 
 
 @given(command, command, command, offset, offset)
@@ -48,17 +57,15 @@ def test_largest_forces_are_those_of_the_ship():
 
 
 def test_wrong_point_of_attack_turns_the_ship_when_it_is_pushed_sideways():
-    wrong = run(0.0, 0.5, 0.0, Params(plant=Plant(plant_p_x=0.03)))
+    wrong = run(0.0, 0.5, 0.0, with_values(plant_p_x=0.03))
     assert wrong.tau_cmd_N == pytest.approx(0.0, abs=1e-12)
     assert wrong.tau_act_N == pytest.approx(0.03 * 0.5)
-    right = run(0.0, 0.5, 0.0, Params(Allocation(p_x=0.03), Plant(plant_p_x=0.03)))
+    right = run(0.0, 0.5, 0.0, with_values(p_x=0.03, plant_p_x=0.03))
     assert right.tau_act_N == pytest.approx(0.0, abs=1e-12)
 
 
 def test_surge_with_a_lateral_point_of_attack():
-    assert run(0.5, 0.0, 0.0, Params(plant=Plant(plant_p_y=0.02))).tau_act_N == pytest.approx(
-        -0.02 * 0.5
-    )
+    assert run(0.5, 0.0, 0.0, with_values(plant_p_y=0.02)).tau_act_N == pytest.approx(-0.02 * 0.5)
 
 
 @given(command, command, command, st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.booleans())
@@ -68,7 +75,7 @@ def test_power_scales_what_a_thruster_and_its_effects_give(a, b, c, vsp, bow, be
     full = COMPONENT.params()._replace(wrong=curve)
 
     def acting(p_vsp, p_bow):
-        out = run(*tau, full._replace(power=Power(p_vsp, p_bow)))
+        out = run(*tau, full._replace(power=type(full.power)(p_vsp, p_bow)))
         return np.array([out.tau_act_X, out.tau_act_Y, out.tau_act_N])
 
     by_parts = vsp * acting(1.0, 0.0) + bow * acting(0.0, 1.0)

@@ -11,13 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.predictors import of_one_run, of_run
-from fmus.effects import APART, STANDARD
+from fmus.ship import ship
 
 from .effect_forms import form
 from .fleet import ProcessNoise
 from .foreign_physics import FOREIGN_PHYSICS
 from .simulated_runs import STOP
 from .truth import NAMES, Motion, Values, force, over, windows
+
+EFFECTS = ship().effects
 
 SMALLEST, LARGEST = 0.05, 0.4
 # Ids of hidden effects whose form the diagnosis does not have, and the ids that come nearest.
@@ -27,7 +29,7 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "delay off the grid": ("delay",),
 }
 # The runs have one set of commands: what acts on one of the two propellers is no candidate there.
-LOOKED_FOR = [e for e in STANDARD.values() if APART not in e.needs and e.search.by != "given"]
+LOOKED_FOR = [e for e in EFFECTS.values() if not e.apart and e.search.by != "given"]
 SINGLE = [*(e.id for e in LOOKED_FOR), *FOREIGN]
 OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
 # Physics of which the diagnosis has nothing: no id is a right answer.
@@ -100,7 +102,7 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
     elif effect in OUTAGES:  # and so are these
         return outages(effect, rng, pilot)
-    elif effect in STANDARD and STANDARD[effect].search.intervals:
+    elif effect in EFFECTS and EFFECTS[effect].search.intervals:
         values = outage(effect, rng)
     elif effect == "backlash":  # so is its play, of which a series takes seconds
         values = {"backlash": less * MOST_PLAY * float(rng.uniform(0.25, 1.0))}
@@ -120,7 +122,7 @@ def process_noise(rng: np.random.Generator, pilot: Sequence[Motion]) -> ProcessN
 
 def outage(effect: str, rng: np.random.Generator) -> dict[str, float]:
     """Three to eight intervals that take a share of the time, one in each equal part of it."""
-    names = STANDARD[effect].search.intervals
+    names = EFFECTS[effect].search.intervals
     count = int(rng.integers(3, len(names) + 1))
     room = STOP / count
     lasts = np.maximum(SHORTEST, OUT * room * rng.uniform(0.5, 1.5, count))

@@ -4,11 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from fmus.effects import STANDARD
+from fmus.ship import ship
 
 from .foreign_physics import MIDDLE_X, MIDDLE_Y, REACH
 from .simulated_runs import FINE, STEP
 from .truth import Motion
+
+EFFECTS = ship().effects
 
 Scaled = Callable[[float], dict[str, float]]
 NODES = np.linspace(-1.0, 1.0, 21)
@@ -34,7 +36,7 @@ def form(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scal
     if effect in FORMS:
         return FORMS[effect](rng, pilot)
     sign = float(rng.choice([-1.0, 1.0]))
-    names = STANDARD[effect].coefficients
+    names = EFFECTS[effect].coefficients
     if len(names) == 1:
         return lambda s: {names[0]: sign * s}
     if effect in CURVES:
@@ -55,7 +57,7 @@ CURVES: dict[str, tuple[Callable[[Motion], np.ndarray], bool]] = {
 def _shape(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
     """Two bumps of opposite sign within what the runs cover: no polynomial, no dead band."""
     over, both = CURVES[effect]
-    e = STANDARD[effect]
+    e = EFFECTS[effect]
     reach = e.parameters[-1].start
     covered = np.concatenate([over(m) for m in pilot])
     nodes = reach * (NODES if both else 0.5 * (NODES + 1.0))

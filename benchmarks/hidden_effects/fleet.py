@@ -20,9 +20,8 @@ from fmus.controller import abs as controller
 from fmus.declare import Component, flatten, packer, variables
 from fmus.effects import EffectSet
 from fmus.observer import kalman
-from fmus.signals import Estimate, Force, Measurement, Target, Velocity
-from fmus.thrusters import chain, thrusters
-from fmus.vessel import vessel
+from fmus.ship import ship
+from fmus.signals import Estimate, Force, Measurement, Target
 
 from . import other_thrusters, other_vessel
 from .foreign_physics import WITH_FOREIGN
@@ -157,10 +156,10 @@ class Fleet:
             Estimate(*flatten(self.observer.outputs)), Target(*self.targets[:, k].T)
         )
 
-    def _request(self) -> chain.Inputs:
+    def _request(self) -> Any:
         """What the thrusters get."""
-        velocity = Velocity(*self.vessel.outputs.velocity)
-        return chain.Inputs(Force(*self.controller.outputs[0]), velocity)
+        force = Force(*self.controller.outputs[0])
+        return ship().thrusters.inputs(force, self.vessel.outputs.velocity)
 
     def row(self) -> list[Any]:
         """True pose, velocity, acceleration, force, model error, measurement, command: 21 columns."""
@@ -207,7 +206,7 @@ def _pushed(order: Order, steps: int) -> np.ndarray:
 def ships(effects: EffectSet) -> dict[bool, tuple[Component, Component]]:
     """Vessel and thrusters: those of the project, and those of another form."""
     return {
-        False: (vessel.make(effects), thrusters.make(effects)),
+        False: (ship(effects).vessel, ship(effects).thrusters),
         True: (other_vessel.COMPONENT, other_thrusters.COMPONENT),
     }
 

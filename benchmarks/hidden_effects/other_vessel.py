@@ -8,10 +8,11 @@ from typing import Annotated, Any, NamedTuple
 from fmus.declare import POSITIVE, Component, bundle
 from fmus.frames import rotate_to_earth
 from fmus.ops import Number, sqrt
-from fmus.signals import Force, Velocity
+from fmus.ship import ship
+from fmus.signals import Force, VelocityInCurrent
 from fmus.vessel import vessel
 
-SHIP = vessel.COMPONENT
+SHIP = ship().vessel
 
 
 class Drag(NamedTuple):
@@ -35,7 +36,10 @@ def step(s: vessel.State, i: Force, p: Any, h: Number) -> tuple[vessel.State, ve
     after = vessel.State(s.x + h * x_dot, s.y + h * y_dot, s.psi + h * r, u, v, r, s.t + h)
     nu_dot = motion(after, i, p, b)
     omega = vessel.model_error(after, nu_dot, i, p.ship)
-    pose, speed = vessel.Pose(after.x, after.y, after.psi), Velocity(u, v, r)
+    pose, speed = (
+        vessel.Pose(after.x, after.y, after.psi),
+        VelocityInCurrent(u, v, r, *vessel.water_velocity(after, b)),
+    )
     return after, vessel.Outputs(pose, speed, *nu_dot, vessel.measured(after, b), *omega, *omega)
 
 

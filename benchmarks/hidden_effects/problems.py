@@ -15,7 +15,7 @@ import numpy as np
 
 from cosim import atomic_write
 from diagnosis import Run
-from fmus.effects import STANDARD
+from fmus.ship import ship
 
 from .cells import Cell, Key
 from .draw import (
@@ -34,6 +34,8 @@ from .manoeuvres import manoeuvres
 from .separation import COEFFICIENTS, SEPARABLE, Rivals
 from .simulated_runs import NOISE, Hidden, RunawayError, Voyage
 from .truth import NAMES, Motion, motion
+
+EFFECTS = ship().effects
 
 WRONG = 0.1  # largest relative error of a coefficient, and the prior's standard deviation
 TRIES = 6  # sizes to try until the ship stays on its path
@@ -171,7 +173,7 @@ def _problem(cell: Cell, hidden: Sequence[Draw], redrawn: int, voyages: Sequence
     ship = plant(cell, hidden)
     # The diagnosis has no model of waves that are known, nor of a ship of another form; and nobody knows
     # when a thruster fails in a run held out.
-    never = {*UNKNOWN, *OUTAGES, *(e.id for e in STANDARD.values() if e.search.times)}
+    never = {*UNKNOWN, *OUTAGES, *(e.id for e in EFFECTS.values() if e.search.times)}
     known = not (ship.other or "wave_force" in ship.vessel or {d.effect for d in hidden} & never)
     alike = confusable(hidden, voyages[:-1], cell.wrong)
     true = (ship.vessel, ship.thrusters, ship.clock) if known else (None, None, 0.0)

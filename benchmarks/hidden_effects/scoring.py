@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 
 from diagnosis import Model
-from fmus.effects import STANDARD
+from fmus.ship import ship
 
 from .answers import Answer
 from .draw import Draw, run_names
 from .problems import RUNS, Problem
 from .results import Row
 from .separation import COEFFICIENTS, NOTHING
+
+EFFECTS = ship().effects
 
 # Coefficients whose change is the same as an effect that does not bear their name.
 SAME_AS = {
@@ -31,7 +33,7 @@ SMALL = 1e-6  # of a parameter that is told in the table
 
 def same_coefficients(effect: str) -> set[str]:
     """Nominal coefficients whose change is the same as an effect."""
-    named = {STANDARD[effect].gives} if effect in STANDARD else set()
+    named = {EFFECTS[effect].gives} if effect in EFFECTS else set()
     return SAME_AS.get(effect, set()) | named & set(COEFFICIENTS)
 
 

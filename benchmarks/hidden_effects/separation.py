@@ -12,10 +12,11 @@ from itertools import product
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from fmus.effects import APART, STANDARD
 from fmus.ship import ship
 
 from .truth import WEIGHTS, Motion, Values, over
+
+EFFECTS = ship().effects
 
 SEPARABLE = 0.05
 # The nominal coefficients of hull and thrusters.
@@ -103,8 +104,8 @@ class Rivals:
         """
         target = flat(hidden)
         contained = [e for e, held in CONTAINS.items() if held & set(right)]
-        looked_for = (e for e in STANDARD.values() if e.search.by != "given")
-        possible = [e.id for e in looked_for if APART not in e.needs]
+        looked_for = (e for e in EFFECTS.values() if e.search.by != "given")
+        possible = [e.id for e in looked_for if not e.apart]
         found = {e: self.left(target, e) for e in possible if e not in {*right, *contained, "waves"}}
         if self.nuisance:
             found[NOTHING] = self._share(target, target, [])
@@ -115,7 +116,7 @@ class Rivals:
         if effect in DIFFERENTIABLE:
             return self._gauss_newton(target, effect)
         if effect not in GRIDS:
-            names = STANDARD[effect].coefficients
+            names = EFFECTS[effect].coefficients
             return self._share(target, target, [self._force({name: 1.0}) for name in names])
         shares = []
         for given in GRIDS[effect]:
@@ -131,7 +132,7 @@ class Rivals:
 
     def _gauss_newton(self, target: np.ndarray, effect: str) -> float:
         """Share left by a differentiable effect, by Gauss-Newton steps."""
-        names = STANDARD[effect].coefficients
+        names = EFFECTS[effect].coefficients
         values, best = dict.fromkeys(names, 0.0), 1.0
         for _ in range(GAUSS_NEWTON_STEPS):
             offset = self._force(values) if any(values.values()) else 0.0 * target

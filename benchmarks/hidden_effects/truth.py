@@ -15,15 +15,15 @@ from scipy.signal import lfilter
 from fmus.declare import packer, variables
 from fmus.frames import rotate_to_body
 from fmus.hull import Inertia, mass_matrix
+from fmus.ship import ship
 from fmus.signals import Force
-from fmus.thrusters import chain, thrusters
-from fmus.thrusters.allocation import Allocation, allocate
 from fmus.vessel import vessel
 
 from .foreign_physics import WITH_FOREIGN, backlash, bias_by_place
 from .simulated_runs import HEADING, POSITION, STEP, Voyage
 
-VESSEL, THRUSTERS = vessel.make(WITH_FOREIGN), thrusters.make(WITH_FOREIGN)
+SHIP = ship(WITH_FOREIGN)
+VESSEL, THRUSTERS = SHIP.vessel, SHIP.thrusters
 WINDOW, EVERY = 3.0, 0.5  # s, width of a window and from one to the next
 THIN = 5  # samples in a step for forces on the hull, which change slowly
 MASS = np.array(mass_matrix(Inertia()))
@@ -75,7 +75,9 @@ class Motion:
 def motion(voyage: Voyage, values: Values) -> Motion:
     """The motion of a run as it is measured where the measurement has the effects in ``values``."""
     time = voyage.measured.time
-    commanded = np.column_stack(allocate(*voyage.measured.tau_cmd.T, Allocation()))
+    commanded = np.column_stack(
+        SHIP.layout.allocate(tuple(voyage.measured.tau_cmd.T), SHIP.nominal_drive.params)
+    )
     true = Motion(time, voyage.eta, voyage.nu, voyage.nu_dot, commanded)
     eta, nu, nu_dot = behind(true, {name: -value for name, value in values.items()})
     return Motion(time, eta, nu, nu_dot, commanded)
@@ -136,11 +138,11 @@ def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
     if "backlash" in values:
         shares = followed(shares, values["backlash"])
     ready = THRUSTERS.prepared(p)
-    now = chain.running(m.time, *nu.T, tuple(shares.T), ready)
+    now = SHIP.layout.running(m.time, *nu.T, tuple(shares.T), ready)
     if lag:
         step = 1.0 - np.exp(-STEP / lag)
         shares = lfilter([step], [1.0, step - 1.0], shares, axis=0)
-    tau = chain.act(tuple(shares.T), now, ready)
+    tau = SHIP.layout.act(tuple(shares.T), now, ready)
     return np.column_stack(np.broadcast_arrays(*tau))
 
 

@@ -11,8 +11,9 @@ from .plan import Plan
 def time_components(plan: Plan, out: Path) -> dict[str, float]:
     """The step functions inside the FMUs, called from Python in the same closed loop."""
     from fmus.declare import discover, flatten, packer, width
+    from fmus.ship import ship
 
-    known = {component.name: component for _, component in discover()}
+    known = {component.name: component for _, component in discover(ship())}
     values: dict[str, float] = {}
     loop = []
     for name in plan["order"]:

@@ -32,7 +32,7 @@ def unit_of(signal: str, evaluation: Evaluation) -> str:
     """SI unit of a signal of a run."""
     if signal in MOTION:
         return MOTION[signal]
-    commands = evaluation.model.ship.commands or {}
+    commands = evaluation.model.ship.commands
     quantity = OF_UNIT[commands[signal]] if signal in commands else QUANTITY.get(signal, "command")
     return SI[quantity]
 

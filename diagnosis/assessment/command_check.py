@@ -34,11 +34,11 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
 
 def _beyond_limits(run: Run, model: Model) -> str | None:
     """A clause about a command that is many times its limit, as which it then counts."""
-    if run.commands is None or model.ship.commands is None:
-        return None  # shares of the full thrust, see :func:`diagnosis.read`
+    if run.commands is None:
+        return None
     layout = model.ship.layout_of(run.commands)
-    limits = layout.limits(model.drive.params)
-    for k, ((name, unit), limit) in enumerate(zip(model.ship.commands.items(), limits, strict=True)):
+    limits, form = layout.limits(model.drive.params), model.ship.form_of(run.commands)
+    for k, ((name, unit), limit) in enumerate(zip(form.items(), limits, strict=True)):
         most, size = float(np.abs(limit).max()), np.abs(run.commands[:, k])
         beyond = size > SETTINGS.most_gain * most
         if (layout.round and layout.round[k]) or beyond.mean() <= SETTINGS.negligible:

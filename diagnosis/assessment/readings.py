@@ -87,7 +87,7 @@ def directions(run: Run, model: Model) -> Iterator[Reading]:
             yield of_commands(f"{name} has the wrong sign", (1.0 - 2.0 * np.eye(3)[k]).tolist())
         yield from (swapped(TAU, *pair) for pair in ((0, 1), (0, 2), (1, 2)))
     else:
-        unit = model.ship.commands or {}  # a force turns round with its thrust, at the same angle
+        unit = model.ship.commands  # a force turns round with its thrust, at the same angle
         thrusts = [s for s in run.signals if unit.get(s) != "rad"]
         changes = {s: Change(s, -1.0) for s in thrusts or run.signals}
         yield Reading(wrong, changes, commands=-np.eye(3))
@@ -101,8 +101,7 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
     half = Change("psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
     if run.commands is not None:
-        if model.ship.commands is not None:
-            yield from _shares(run, run.commands, model)
+        yield from _shares(run, run.commands, model)
         return
     forces, moments = UNITS["force"], UNITS["moment"]
     percent = (0.01 * full_thrust(model)).tolist()

@@ -32,7 +32,7 @@ def order_under_trial(run: Run, ship: Ship) -> np.ndarray:
     """
     if run.trial == "stop":
         return run.tau_cmd[:, 0]
-    angles = [k for k, unit in enumerate((ship.commands or {}).values()) if unit == "rad"]
+    angles = [k for k, unit in enumerate(ship.commands.values()) if unit == "rad"]
     ordered = run.tau_cmd[:, [2]] if run.commands is None or not angles else run.commands[:, angles]
     return ordered.mean(axis=1)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim import InputError
 from fmus.ship import Ship, ship
-from fmus.ships.naming import DEFAULT
+from fmus.ships.naming import described_ship
 
 from ..execution.progress import Advance, silent
 from ..runs import Smoothed
@@ -76,7 +76,7 @@ def windows_of(runs: Sequence[Smoothed], length: float) -> Windows | None:
 
 def ship_name(of: Ship) -> str:
     """The name of a ship."""
-    return DEFAULT if of.description is None else of.description.name
+    return of.name
 
 
 def nominal(runs: Sequence[WeakWindows]) -> Model:
@@ -85,9 +85,9 @@ def nominal(runs: Sequence[WeakWindows]) -> Model:
     Raises:
         InputError: they are of several ships.
     """
-    ships = dict.fromkeys(w.run.ship for w in runs)
+    ships = dict.fromkeys(described_ship(w.run.ship) for w in runs)
     if len(ships) > 1:
-        names = (DEFAULT if one is None else one.name for one in ships)
+        names = (one.name for one in ships)
         raise InputError(f"the runs are of several ships: {', '.join(names)}")
     return Model(ship=ship(description=next(iter(ships), None)))
 

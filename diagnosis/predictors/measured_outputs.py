@@ -17,14 +17,13 @@ from .weak_form import WeakWindows, arriving, inflow_along
 
 def named(w: WeakWindows, model: Model) -> list[str]:
     """The measured outputs of a run that the ship's laws give, ``ACTUATOR.OUTPUT``."""
-    known = {} if model.ship.description is None else measurable(model.ship.description)
+    known = measurable(model.ship.description)
     return [name for name in w.run.measured if name in known]
 
 
 def residual(w: WeakWindows, model: Model, name: str) -> np.ndarray:
     """Measured less modelled output (n,) of a run; NaN where either is not known."""
     description = model.ship.description
-    assert description is not None
     model = model.during(w.run.name)
     s, known = w.smoothed, w.known[:, None]
     eta, nu = (np.where(known, x, np.nan) for x in (s.eta, s.nu))
@@ -40,11 +39,8 @@ def rms(w: WeakWindows, model: Model, name: str) -> float:
 
 def inseparable(runs: Sequence[WeakWindows], model: Model) -> list[str]:
     """What the commands of some runs leave open between thrust and resistance, a sentence each."""
-    description = model.ship.description
-    if description is None:
-        return []
     told = []
-    for a in actuators(description):
+    for a in actuators(model.ship.description):
         shafts = [a.first + k for k, c in enumerate(a.law.commands) if c.unit == "1/s"]
         given = [w.run.commands for w in runs if w.run.commands is not None]
         if not (a.leads and shafts and given):

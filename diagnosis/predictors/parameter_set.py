@@ -80,7 +80,7 @@ def ship_with(files: Sequence[Path], name: str | Path | None = None) -> Ship:
 
     Args:
         files: of effects, or names of effects of installed packages.
-        name: of a shipped ship, or the path of a description; None: CyberShip Enterprise 1.
+        name: of a shipped ship, or the path of a description; None: the default ship.
 
     Raises:
         InputError: no such ship, or a file has no effects, or fails.

@@ -192,7 +192,7 @@ class Model:
 
     @cached_property
     def drive(self) -> Any:
-        """The thrusters, ready for a step, :class:`fmus.thrusters.chain.Prepared`."""
+        """The thrusters, ready for a step, :class:`fmus.actuators.response.Prepared`."""
         return self.ship.thrusters.prepared(parameters(self.ship.thrusters, self.thrusters))
 
     @cached_property

@@ -50,12 +50,7 @@ def full_thrust(model: Model) -> np.ndarray:
 
 
 def inflow(s: State, model: Model) -> tuple[Any, Any, Any]:
-    """u, v, r of a ship as the FMU of its thrusters meets the water [m/s, m/s, rad/s].
-
-    That of CyberShip Enterprise 1 knows the velocity over ground alone.
-    """
-    if model.ship.description is None:
-        return s.u, s.v, s.r
+    """u, v, r of a ship as the FMU of its thrusters meets the water [m/s, m/s, rad/s]."""
     u_c, v_c = water_velocity(s, model.hull)
     return s.u - u_c, s.v - v_c, s.r
 

@@ -87,7 +87,7 @@ def prepare(
 
     Args:
         source: a file or the folder of a log, see :func:`.read`, or a run that was read.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
         anyway: whether a run is accepted whose units seem to be other ones than stated, whose channels
             contradict each other beyond repair, or many of whose samples are spikes.
         also: see :func:`.read`.
@@ -133,7 +133,7 @@ def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> li
 
     Args:
         sources: files, folders of logs, or runs that were read.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
 
     Raises:
         InputError: a run cannot be read, or two hold the same measurement, which would count twice, and

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fmus.effects import Effect
-from fmus.effects.effect import APART
 from fmus.scale import Scale
 
 from ..execution.parallel import for_each
@@ -249,6 +248,6 @@ def candidates(
     apart = ship.layouts[-1]
     each = any(ship.layout_of(w.run.commands) is apart for w in data)
     effects = [ship.effects[name] for name in ship.candidates if name not in known]
-    possible = [e for e in effects if e.search.by == "regression" and (each or APART not in e.needs)]
+    possible = [e for e in effects if e.search.by == "regression" and (each or not e.apart)]
     found = for_each(lambda e: candidate(data, model, base, e), possible, possible)
     return [c for c in found if c.shapes]

@@ -4,16 +4,17 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from ..declare import Known, Range, Variable, group_of, variables
+from ..declare import POSITIVE, Known, Range, Variable, group_of, variables
 from ..effects import Thrust
 from ..hull import Triple
 from ..ops import Number, clip, wrap
 from ..ship_description import Description
-from . import azimuth_leg as azimuth_leg  # registers laws, as the next two do
-from . import force_table as force_table  # registers its laws
+from . import azimuth_leg as azimuth_leg  # registers laws, as the next ones do
+from . import force_table as force_table
 from . import laws as laws
 from . import standard_method as standard_method
-from .failings import Actuator, goes_round
+from . import thrust_forms as thrust_forms
+from .actuator import Actuator, goes_round
 from .law import Flow, Law
 
 
@@ -22,17 +23,24 @@ def actuators(ship: Description) -> tuple[Actuator, ...]:
     """The actuators of a ship, each with its law and the place of its commands."""
     found: list[Actuator] = []
     places: dict[str, int] = {}
-    first = 0
+    first = unit = own = 0
     names = [part.name for part in ship.actuators]
     for k, part in enumerate(ship.actuators):
         law = Law.known[part.law]
         order = part.order or part.name
         leads = order not in places
-        own = places.setdefault(order, first)
+        at = places.setdefault(order, first)
         behind = names.index(part.behind) if part.behind else None
-        round_ = goes_round(part, law)
-        found.append(Actuator(k, own, part, law, ship.scale, round_, leads, behind))
-        first += len(law.commands) if leads else 0
+        strength = law.strength and ship.called(f"plant_{part.name}_{law.strength}")
+        a = Actuator(
+            k, at, part, law, ship.scale, goes_round(part, law), leads, behind, unit, own, strength
+        )
+        if not leads:
+            a = a._replace(own=next(b.own for b in found if b.order == order))
+        found.append(a)
+        unit += len(a.sides)
+        first += len(law.commands) * leads
+        own += len(law.commands) * leads * len(a.sides)
     return tuple(found)
 
 
@@ -43,14 +51,34 @@ def ordered(ship: Description) -> tuple[Actuator, ...]:
 
 
 @cache
-def command_units(ship: Description) -> dict[str, str]:
-    """``ACTUATOR.COMMAND`` of every command of a ship, and its unit."""
-    return {f"{a.order}.{c.name}": c.unit for a in ordered(ship) for c in a.law.commands}
+def command_units(ship: Description, apart: bool = False) -> dict[str, str]:
+    """``ACTUATOR.COMMAND`` of every command of a ship, or its alias, and its unit.
+
+    Args:
+        ship: its actuators.
+        apart: whether units that share commands have their own.
+    """
+    found = {}
+    for a in ordered(ship):
+        for name in a.names if apart and len(a.sides) > 1 else (a.order,):
+            for c in a.law.commands:
+                known = f"{'each_' * apart}{name}_{c.name}"
+                alias = ship.called(known)
+                found[f"{name}.{c.name}" if alias == known else alias] = c.unit
+    return found
 
 
-def command_names(ship: Description) -> tuple[str, ...]:
-    """``ACTUATOR.COMMAND`` of every command of a ship."""
-    return tuple(command_units(ship))
+def command_names(ship: Description, apart: bool = False) -> tuple[str, ...]:
+    """``ACTUATOR.COMMAND`` of every command of a ship, or its alias."""
+    return tuple(command_units(ship, apart))
+
+
+@cache
+def shared(ship: Description) -> tuple[int, ...]:
+    """For each command of each unit the place of the command that it shares among those of the ship."""
+    return tuple(
+        [k for a in ordered(ship) for _ in a.sides for k in range(a.commands.start, a.commands.stop)]
+    )
 
 
 def variable(command: str) -> str:
@@ -58,15 +86,16 @@ def variable(command: str) -> str:
     return command.replace(".", "_")
 
 
-def parameters(a: Actuator, prefix: str, known: bool) -> type[Any]:
+def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type[Any]:
     """Parameters of an actuator: those of its law, and its place.
 
     Args:
+        ship: whose it is, with aliases.
         a: the actuator.
         prefix: of their names.
         known: whether they are of the real ship, with where their values come from.
     """
-    name, title = a.part.name, a.part.title
+    name, title = a.part.name, a.label
     place = [
         Variable("x", "m", "place, forward of the body origin", 0.0, Range(), False),
         Variable("y", "m", "place, to starboard", 0.0, Range(), False),
@@ -82,7 +111,10 @@ def parameters(a: Actuator, prefix: str, known: bool) -> type[Any]:
             if known and fits:
                 fit = Known("place" if v.name in ("x", "y") else "thrust", value.origin, value.share)
         text = f"{title}: {v.description}"
-        found.append(Variable(f"{prefix}{name}_{v.name}", v.unit, text, start, v.range, False, fit))
+        called = ship.called(f"{prefix}{name}_{v.name}")
+        # The allocation divides by a full force; a real one may be lost.
+        span = POSITIVE if known and v.name == a.law.strength else v.range
+        found.append(Variable(called, v.unit, text, start, span, False, fit))
     return group_of(f"{prefix}{name}", found)
 
 
@@ -129,25 +161,48 @@ def water_at(
     return flow._replace(race=b.law.race(given, flow_at(*nu, x, y), p))
 
 
-def forces(ship: Description, commands: Sequence[Number], nu: Triple, values: Any) -> Thrust:
-    """The force of each actuator, nothing wrong with it.
+def forces(
+    ship: Description,
+    commands: Sequence[Number],
+    nu: Triple,
+    values: Any,
+    settings: Sequence[Number] = (),
+    apart: bool = False,
+) -> Thrust:
+    """The force of each unit of each actuator, nothing wrong with it.
 
     Args:
         ship: its actuators.
         commands: of all of them.
         nu: u, v, r [m/s, m/s, rad/s].
         values: parameters of each actuator.
+        settings: of the power of each actuator that has one; empty: full.
+        apart: whether each unit has commands of its own.
     """
-    X, Y, xs, ys = [], [], [], []
+    X, Y, xs, ys, gains = [], [], [], [], []
     every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
-    for a, (p, x, y) in zip(actuators(ship), every, strict=True):
+    power = power_of(ship, settings)
+    for a, (p, x, y), gain in zip(actuators(ship), every, power, strict=True):
         flow = water_at(ship, a, every, commands, nu)
-        f_x, f_y = a.law.force(within(a, commands[a.commands], p), flow, p)
-        X.append(f_x)
-        Y.append(f_y)
-        xs.append(a.law.acts_at(x, p))
-        ys.append(y)
-    return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), (1.0,) * len(X))
+        at, sides = a.law.acts_at(x, p), a.sides
+        # Units with the same commands have one object as force, which effects then change once.
+        places = [a.commands_of(k) for k in range(len(sides))] if apart else [a.commands]
+        given = [a.law.force(within(a, commands[place], p), flow, p) for place in places]
+        each = gain if len(given) == len(sides) else gain / len(sides)
+        for k, side in enumerate(sides):
+            f_x, f_y = given[k] if len(given) == len(sides) else given[0]
+            X.append(f_x)
+            Y.append(f_y)
+            xs.append(at)
+            ys.append(y + side if side else y)
+            gains.append(each)
+    return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), tuple(gains))
+
+
+def power_of(ship: Description, settings: Sequence[Number] = ()) -> list[Number]:
+    """The power of each actuator, for the settings of those that have one; empty: full."""
+    given = iter(settings)
+    return [next(given) if settings and a.law.powered else 1.0 for a in actuators(ship)]
 
 
 @cache
@@ -178,6 +233,13 @@ def output(ship: Description, name: str, commands: Sequence[Number], nu: Triple,
     return a.law.output(what, within(a, commands[a.commands], p), flow, p)
 
 
-def limits(ship: Description, values: Any) -> tuple[tuple[Number, Number], ...]:
+def limits(ship: Description, values: Any, apart: bool = False) -> tuple[tuple[Number, Number], ...]:
     """The lowest and the highest value of each command, by the parameters of each actuator."""
-    return tuple([span for a in ordered(ship) for span in a.law.limits(law_of(a, values[a.k])[0])])
+    return tuple(
+        [
+            span
+            for a in ordered(ship)
+            for _ in (a.sides if apart else (0.0,))
+            for span in a.law.limits(law_of(a, values[a.k])[0])
+        ]
+    )

@@ -1,99 +1,27 @@
-"""What may go wrong with the actuators of a described ship: the effects of each, by its law."""
+"""Effects of the actuators of a ship: all that each may have, or those that the ship names."""
 
-from math import pi
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
-from ..declare import variables
+from ..declare import DeclarationError, nearest
 from ..effects.all_thrusters import slow
 from ..effects.devices import Devices, parameter
 from ..effects.effect import Effect
-from ..effects.families import Family
-from ..effects.lost_force import Inflow, deadband, failure, inflow, loss, outage, saturation, speed_loss
+from ..effects.families import SMALL_OR_LARGE
+from ..effects.lost_force import (
+    Inflow,
+    deadband,
+    failure,
+    inflow,
+    loss,
+    outage,
+    saturation,
+    speed_loss,
+)
 from ..effects.misplaced import elsewhere, turned
-from ..effects.own_curves import command_curve
+from ..effects.own_curves import ALONG, command_curve, force_curve, speed_curve, thrust_curve
+from ..effects.power import crossed_forces, power_exponent
 from ..effects.text import number
-from ..scale import Scale
-from ..ship_description import Part
-from .law import Flow, Law
-
-
-class Actuator(NamedTuple):
-    """An actuator of a ship.
-
-    Attributes:
-        k: its number.
-        first: number of its first command among those of the ship.
-        part: its description.
-        law: that it follows.
-        scale: of its ship.
-        round: for each of its commands whether it is an angle that goes round.
-        leads: whether it is the first with its commands, which others may share.
-        behind: number of the actuator in whose race it works; None: in none.
-    """
-
-    k: int
-    first: int
-    part: Part
-    law: type[Law]
-    scale: Scale
-    round: tuple[bool, ...]
-    leads: bool = True
-    behind: int | None = None
-
-    @property
-    def order(self) -> str:
-        """The name that its commands have."""
-        return self.part.order or self.part.name
-
-    @property
-    def commands(self) -> slice:
-        """Where its commands lie among those of the ship."""
-        return slice(self.first, self.first + len(self.law.commands))
-
-    @property
-    def axis(self) -> str:
-        """Axes on which its force may act."""
-        pushes = self.law.pushes or self.law.components
-        ahead, aside = "X" in pushes, "Y" in pushes
-        turns = aside or self.part.number("y") != 0.0
-        return "X" * ahead + "Y" * aside + "N" * turns
-
-    @property
-    def devices(self) -> Devices:
-        """The actuator as what effects concern."""
-        title, last = self.part.title, self.first + len(self.law.commands) - 1
-        family = Family(
-            title,
-            f"the {title} alone, at several commands, at rest and at speed",
-            {title: f"the {title} at rest and at speed, small and large commands"},
-        )
-        return Devices(
-            self.part.name,
-            title,
-            title,
-            (self.k,),
-            ((last, last),),
-            self.axis,
-            family,
-            full_force(self),
-            scale=self.scale,
-        )
-
-
-def goes_round(part: Part, law: type[Law]) -> tuple[bool, ...]:
-    """For each command of an actuator whether it is an angle that goes round."""
-    starts = {v.name: v.start for v in variables(law.Parameters)}
-    limits = [c.angle_limit for c in law.commands]
-    return tuple([bool(name) and part.number(name, starts[name]) >= pi for name in limits])
-
-
-def full_force(a: Actuator) -> float:
-    """The largest force [N] that the description gives it at rest."""
-    p = a.law.Parameters(
-        **{v.name: v.value for v in a.part.values if v.name in a.law.Parameters._fields}
-    )
-    most = [abs(end) for span in a.law.reach(Flow(0.0, 0.0), p) for end in span]
-    return max(most, default=0.0)
+from .actuator import Actuator
 
 
 def failings(a: Actuator) -> list[Effect]:
@@ -114,7 +42,7 @@ def failings(a: Actuator) -> list[Effect]:
         command_curve(d, a.law.commands[-1].name),
         loss(d),
         speed_loss(d),
-        inflow(d, [Inflow(lost, "XY", "X")]),
+        inflow(d, [Inflow(lost, "XY", "Y")]),
         failure(d),
         *([deadband(d), saturation([d], d)] if d.full > 0.0 else []),
         turned(d),
@@ -122,3 +50,83 @@ def failings(a: Actuator) -> list[Effect]:
         outage(d, f"{d.name}_failure"),
         *([lagging] if a.leads else []),
     ]
+
+
+def by_axis(d: Devices) -> Effect:
+    """Force lost with the inflow, by a slope on each axis."""
+    slopes = [
+        Inflow(
+            parameter(
+                f"inflow_{d.name}_{axis.lower()}",
+                "N.s/m",
+                f"{way} force lost by the inflow, full command",
+            ),
+            axis,
+            axis,
+        )
+        for axis, way in ALONG.items()
+    ]
+    apart = {"X_u": "coast, and drive at the same speed", "Y_v": "drift freely"}
+    return inflow(d._replace(apart=True), slopes, apart)
+
+
+# Of an actuator, or of one of its units, by what a ship's description calls them.
+KINDS: Mapping[str, Callable[[Devices, frozenset[str]], list[Effect]]] = {
+    "thrust_curve": lambda d, named: [thrust_curve(d)],
+    "force_curves": lambda d, named: [force_curve(d, axis) for axis in "XY"],
+    "speed_curve": lambda d, named: [speed_curve(d)],
+    "loss": lambda d, named: [loss(d, f"failure {d.name}" in named)],
+    "speed_loss": lambda d, named: [speed_loss(d)],
+    "crossed_forces": lambda d, named: [crossed_forces(d)],
+    "inflow": lambda d, named: [by_axis(d)],
+    "failure": lambda d, named: [failure(d)],
+    "outage": lambda d, named: [outage(d, f"{d.name}_failure" if f"failure {d.name}" in named else "")],
+}
+# Of all actuators together.
+TOGETHER: Mapping[str, Callable[[Devices, Sequence[Devices]], Effect]] = {
+    "power_exponent": lambda every, parts: power_exponent(every, parts),
+    "deadband": lambda every, parts: deadband(every, parts, "deadband"),
+    "saturation": lambda every, parts: saturation(parts, every, "saturation"),
+}
+
+
+def named_effects(
+    every: Sequence[Actuator], names: Sequence[str], others: Mapping[str, Effect]
+) -> list[Effect]:
+    """The effects that a ship's description names, in their order.
+
+    Args:
+        every: the actuators of the ship.
+        names: ``KIND ACTUATOR`` of :data:`KINDS`, ``KIND`` of :data:`TOGETHER`, or an id of ``others``.
+        others: effects of every ship.
+
+    Raises:
+        DeclarationError: there is no such effect or actuator.
+    """
+    devices = {a.part.name: a.devices for a in every}
+    parts = tuple(devices.values())
+    devices |= {d.name: d for a in every for d in a.devices_each}
+    together = Devices(
+        "",
+        "thrusters",
+        "thruster",
+        tuple([k for d in parts for k in d.members]),
+        tuple([pair for d in parts for pair in d.commands]),
+        "XYN",
+        SMALL_OR_LARGE,
+        parts[0].full if parts else 0.0,
+        plural=True,
+    )
+    found: list[Effect] = []
+    for name in names:
+        kind, _, of = name.partition(" ")
+        if of in devices and kind in KINDS:
+            found += KINDS[kind](devices[of], frozenset(names))
+        elif kind in TOGETHER and not of:
+            found.append(TOGETHER[kind](together, parts))
+        elif name in others:
+            found.append(others[name])
+        else:
+            known = [*(f"{k} {d}" for k in KINDS for d in devices), *TOGETHER, *others]
+            raise DeclarationError(f"effects: there is no '{name}'{nearest(name, known)}")
+    return found

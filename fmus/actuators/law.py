@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ..declare import DeclarationError
+from ..effects.families import Family
 from ..hull_functions import Change
 from ..ops import Number
 from ..ship_description import Part
@@ -61,6 +62,7 @@ class Law:
 
     Attributes:
         name: by which descriptions call it.
+        strength: parameter that is its full force; empty: none is.
         commands: that it gets.
         components: axes X and Y of the force that it can be asked for; empty: it is not asked.
         pushes: axes X and Y of the force that it has; empty: those of ``components``.
@@ -68,10 +70,17 @@ class Law:
         changes: what a ship may have otherwise than described.
         in_race: whether it works in the race of a propeller; has_race: whether it has one itself.
         measurable: what can be measured of it beside its commands -> unit.
+        by_axis: whether its first command pushes ahead and its last one to starboard.
+        powered: whether its force is scaled by a power setting.
+        proportional: whether its force is in proportion to its commands.
+        family: the manoeuvre that shows its effects; None: one of its own.
+        allocated: law by which its commands are allocated; None: itself.
+        variants: name of another form of its force over the command -> the law of that form.
         Parameters: NamedTuple class of its parameters, of which the place has its own.
     """
 
     name: ClassVar[str]
+    strength: ClassVar[str] = ""
     commands: ClassVar[tuple[Command, ...]]
     components: ClassVar[str] = ""
     pushes: ClassVar[str] = ""
@@ -80,6 +89,12 @@ class Law:
     in_race: ClassVar[bool] = False
     has_race: ClassVar[bool] = False
     measurable: ClassVar[Mapping[str, str]] = {}
+    by_axis: ClassVar[bool] = False
+    powered: ClassVar[bool] = False
+    proportional: ClassVar[bool] = False
+    family: ClassVar[Family | None] = None
+    allocated: ClassVar["type[Law] | None"] = None
+    variants: ClassVar[Mapping[str, str]] = {}
     Parameters: ClassVar[type[Any]]
     known: ClassVar[dict[str, type["Law"]]] = {}
 

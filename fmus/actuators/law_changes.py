@@ -8,7 +8,7 @@ from ..effects.effect import Effect, Search, Wording, effect
 from ..effects.text import Found
 from ..hull_functions import Change
 from ..ops import Number
-from .failings import Actuator
+from .actuator import Actuator
 
 
 def changed(alike: Sequence[Actuator], change: Change) -> Effect:
@@ -56,8 +56,8 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
     def function(plant: Any, *additions: Number) -> Any:
         for b in alike:
             own = plant[b.k]
-            names = [f"plant_{b.part.name}_{p}" for p in change.parameters]
-            more = {n: getattr(own, n) + d for n, d in zip(names, additions, strict=True)}
+            places = [b.law.Parameters._fields.index(p) for p in change.parameters]
+            more = {own._fields[k]: own[k] + d for k, d in zip(places, additions, strict=True)}
             plant = plant._replace(**{b.part.name: own._replace(**more)})
         return plant
 

@@ -5,6 +5,7 @@ from math import pi
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ..declare import POSITIVE, Range
+from ..effects.families import PROPELLERS, TUNNEL_THRUSTER
 from ..ops import Number, atan2, clip, cos, fmax, fmin, power, signed_root, sin, sqrt, where
 from ..ship_description import Part
 from .law import Command, Flow, Law, Race, Span
@@ -152,8 +153,16 @@ class TunnelThruster(Law):
     """Thruster in a tunnel across the ship, whose force is linear in its command."""
 
     name = "tunnel_thruster"
+    strength = "F"
     commands = (Command("u", "1", "command, -1...1"),)
     components = "Y"
+    powered = True
+    proportional = True
+    family = TUNNEL_THRUSTER
+    variants: ClassVar[Mapping[str, str]] = {
+        "squared": "squared_tunnel_thruster",
+        "table": "tabulated_tunnel_thruster",
+    }
     Parameters = Tunnel
 
     @classmethod
@@ -187,11 +196,20 @@ class VoithSchneider(Law):
     """
 
     name = "voith_schneider"
+    strength = "F"
     commands = (
         Command("surge", "1", "command in surge, -1...1"),
         Command("sway", "1", "command in sway, -1...1"),
     )
     components = "XY"
+    by_axis = True
+    powered = True
+    proportional = True
+    family = PROPELLERS
+    variants: ClassVar[Mapping[str, str]] = {
+        "squared": "squared_voith_schneider",
+        "table": "tabulated_voith_schneider",
+    }
     Parameters = Cycloidal
     limiting = ("P_idle", "P_full")  # no part of the force, which is fitted
     measurable: ClassVar[Mapping[str, str]] = {"power": "W"}

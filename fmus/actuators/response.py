@@ -33,7 +33,7 @@ class Layout(NamedTuple):
     Attributes:
         commands: names of their variables, in the order of all tuples of commands and shares.
         running: ``running(t, u, v, r, commands, b)``: what a thruster's force may depend on.
-        thrust: ``thrust(shares, running, b)``: the force of each actuator, effects included.
+        thrust: ``thrust(shares, running, b)``: the force of each unit, effects included.
         believed: ``believed(commands, params)``: tau that the allocation expects of commands at rest.
         allocate: ``allocate(tau, params)``: the commands, or shares of full force, that give a force.
         full: ``full(params)``: the largest force and moment on each axis [N, N, N m].
@@ -175,7 +175,7 @@ def command_response(
 ) -> tuple[Past, tuple[Number, ...]]:
     """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
     memories, given = remember(s.memories, commands, "command", b, h)
-    rates = b.params.rate if len(b.params.rate) == len(given) else (b.params.rate[0],) * len(given)
+    rates = b.params.rate if len(b.params.rate) == len(given) else tuple(b.params.rate) * len(given)
     angles = b.effects.layout.round or (False,) * len(given)
     given = tuple(
         [

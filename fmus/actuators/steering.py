@@ -39,7 +39,7 @@ class Roles(NamedTuple):
 @cache
 def believed(ship: Description) -> tuple[Number, ...]:
     """The parameters of a ship's actuators, as its description has them."""
-    return tuple([parameters(a, "", False)() for a in actuators(ship)])
+    return tuple([parameters(ship, a, "", False)() for a in actuators(ship)])
 
 
 @cache

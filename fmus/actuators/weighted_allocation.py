@@ -1,4 +1,4 @@
-"""Allocation: commands of a described ship's actuators that give a force, and what they can give."""
+"""Allocation: commands of a ship's actuators that give a force, and what they can give."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -8,7 +8,7 @@ from ..hull import Triple
 from ..ops import Number, clip, where
 from ..ship_description import Description
 from .actuation import actuators, flow_at, law_of, ordered, within
-from .failings import Actuator
+from .actuator import Actuator
 from .law import Flow
 
 PASSES = 2  # of the allocation: what the first one clips is asked of the others
@@ -60,18 +60,22 @@ def _column(c: Component, x: Number, y: Number) -> Triple:
     return (1.0, 0.0, -y) if c.along == "X" else (0.0, 1.0, x)
 
 
-def allocate(ship: Description, tau: Sequence[Number], nu: Triple, values: Any) -> tuple[Number, ...]:
-    """Commands that give a force as nearly as the actuators can: weighted least squares within limits.
+def allocate(
+    ship: Description, tau: Sequence[Number], nu: Triple, values: Any, apart: bool = False
+) -> tuple[Number, ...]:
+    """Commands that give a force as nearly as the actuators can, within limits.
 
-    Each force is weighed by what its actuator can give; what a limit cuts off is asked of the others
-    (redistributed pseudo-inverse: Johansen and Fossen 2013, Automatica 49, section 2.2). An axis that
-    the ship cannot give is not asked for.
+    As many components of forces as axes follow exactly, and are clipped to their limits. More of them
+    are found by weighted least squares: each is weighed by what its actuator can give, and what a limit
+    cuts off is asked of the others (redistributed pseudo-inverse: Johansen and Fossen 2013, Automatica
+    49, section 2.2). An axis that the ship cannot give is not asked for.
 
     Args:
         ship: its actuators.
         tau: force to give [N, N, N m].
         nu: u, v, r [m/s, m/s, rad/s], by which a rudder's force goes.
-        values: what the allocation believes of each actuator.
+        values: parameters of each actuator in the controller's model.
+        apart: whether each unit has commands of its own, which are alike then.
 
     Returns:
         The commands, within their limits.
@@ -83,31 +87,107 @@ def allocate(ship: Description, tau: Sequence[Number], nu: Triple, values: Any) 
         p, x, y = every[c.actuator.k]
         column = _column(c, x, y)
         columns.append([column[k] for k in asked])
-        span = c.actuator.law.reach(flow_at(*nu, x, y), p)
-        spans.append(span[c.actuator.law.components.index(c.along)])
-    weights = [0.25 * (high - low) * (high - low) for low, high in spans]
-    found: list[Any] = [0.0 * tau[0]] * len(parts)
-    for _ in range(PASSES):
-        left = [tau[k] for k in asked]
-        for f, column in zip(found, columns, strict=True):
-            left = [rest - f * b for rest, b in zip(left, column, strict=True)]
-        more = _least(columns, weights, left)
-        wanted = [f + g for f, g in zip(found, more, strict=True)]
-        found = [clip(w, low, high) for w, (low, high) in zip(wanted, spans, strict=True)]
-        weights = [
-            where(abs(w - f) > 0.0, 0.0, weight)
-            for w, f, weight in zip(wanted, found, weights, strict=True)
-        ]
+        low, high = c.actuator.law.reach(flow_at(*nu, x, y), p)[c.actuator.law.components.index(c.along)]
+        count = _units(c.actuator, apart)
+        spans.append((count * low, count * high) if count > 1 else (low, high))
+    wanted = [tau[k] for k in asked]
+    if len(parts) == len(asked):
+        exact = _eliminated(ship, columns, wanted)
+        found = [clip(f, low, high) for f, (low, high) in zip(exact, spans, strict=True)]
+    else:
+        found = _shared(columns, spans, wanted)
     commands: list[Any] = []
     for a in ordered(ship):
         p, x, y = every[a.k]
-        own = tuple([f for f, c in zip(found, parts, strict=True) if c.actuator is a])
+        count = _units(a, apart)
+        own = tuple(
+            [f / count if count > 1 else f for f, c in zip(found, parts, strict=True) if c.actuator is a]
+        )
         if own:
             given = a.law.commanded(own, flow_at(*nu, x, y), p)
         else:
             given = tuple([0.0 * tau[0]] * len(a.law.commands))
-        commands += within(a, given, p)
+        commands += [*within(a, given, p)] * count
     return tuple(commands)
+
+
+def _units(a: Actuator, apart: bool) -> int:
+    """How many sets of commands an actuator has."""
+    return len(a.sides) if apart else 1
+
+
+@cache
+def _order(ship: Description) -> tuple[tuple[int, int], ...]:
+    """(axis, component) of each step of the elimination, by the largest number of the description."""
+    asked, parts = axes(ship), components(ship)
+    columns = [_column(c, c.actuator.part.number("x"), c.actuator.part.number("y")) for c in parts]
+    rows = [[float(column[k]) for column in columns] for k in asked]
+    found: list[tuple[int, int]] = []
+    for _ in rows:
+        done = {i for i, _ in found}, {j for _, j in found}
+        free = [
+            (i, j)
+            for i in range(len(rows))
+            for j in range(len(parts))
+            if i not in done[0] and j not in done[1]
+        ]
+        i, j = max(free, key=lambda at: abs(rows[at[0]][at[1]]))
+        found.append((i, j))
+        for k in {k for k, _ in free} - {i}:
+            share = rows[k][j] / rows[i][j]
+            rows[k] = [x - share * y for x, y in zip(rows[k], rows[i], strict=True)]
+    return tuple(found)
+
+
+def solution(ship: Description, tau: Sequence[Number], values: Any) -> Triple:
+    """The forces [N] of as many components as axes that give a force exactly, whatever their limits."""
+    every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
+    columns = [_column(c, *every[c.actuator.k][1:]) for c in components(ship)]
+    asked = axes(ship)
+    found = _eliminated(ship, [[c[k] for k in asked] for c in columns], [tau[k] for k in asked])
+    return found[0], found[1], found[2]
+
+
+def _eliminated(
+    ship: Description, columns: Sequence[Sequence[Number]], wanted: Sequence[Number]
+) -> list[Any]:
+    """f of B f = tau for the columns of a square B, by elimination."""
+    n = len(wanted)
+    rows = [[column[i] for column in columns] for i in range(n)]
+    right, order = list(wanted), _order(ship)
+    for k, (i, j) in enumerate(order):
+        rows[i][j] = where(rows[i][j] == 0.0, NOTHING, rows[i][j])
+        for m, _ in order[k + 1 :]:
+            share = rows[m][j] / rows[i][j]
+            rows[m] = [x - share * y for x, y in zip(rows[m], rows[i], strict=True)]
+            right[m] = right[m] - share * right[i]
+    found: list[Any] = [0.0] * n
+    for k, (i, j) in reversed([*enumerate(order)]):
+        known = sum_of([rows[i][other] * found[other] for _, other in order[k + 1 :]])
+        found[j] = (right[i] - known) / rows[i][j]
+    return found
+
+
+def _shared(
+    columns: Sequence[Sequence[Number]],
+    spans: Sequence[tuple[Number, Number]],
+    wanted: Sequence[Number],
+) -> list[Any]:
+    """Forces within their spans that give what is wanted as nearly as they can."""
+    weights = [0.25 * (high - low) * (high - low) for low, high in spans]
+    found: list[Any] = [0.0] * len(columns)
+    for _ in range(PASSES):
+        left = list(wanted)
+        for f, column in zip(found, columns, strict=True):
+            left = [rest - f * b for rest, b in zip(left, column, strict=True)]
+        more = _least(columns, weights, left)
+        asked = [f + g for f, g in zip(found, more, strict=True)]
+        found = [clip(w, low, high) for w, (low, high) in zip(asked, spans, strict=True)]
+        weights = [
+            where(abs(w - f) > 0.0, 0.0, weight)
+            for w, f, weight in zip(asked, found, weights, strict=True)
+        ]
+    return found
 
 
 def _least(
@@ -142,12 +222,12 @@ def sum_of(values: Sequence[Number]) -> Any:
     return found
 
 
-def largest(ship: Description, values: Any) -> Triple:
+def largest(ship: Description, values: Any, apart: bool = False) -> Triple:
     """The largest force and moment on each axis [N, N, N m], of all actuators at rest together."""
     found = [0.0, 0.0, 0.0]
     for c in components(ship):
         p, x, y = law_of(c.actuator, values[c.actuator.k])
         low, high = c.actuator.law.reach(Flow(), p)[c.actuator.law.components.index(c.along)]
         for axis, part in enumerate(_column(c, x, y)):
-            found[axis] += abs(part) * max(-low, high)
+            found[axis] += _units(c.actuator, apart) * abs(part) * max(-low, high)
     return found[0], found[1], found[2]

@@ -55,7 +55,7 @@ def build(
         native: the platforms to compile for; None means FMUs that run in Python.
         overwrite: whether other files of these names may be replaced in ``out``.
         ship: that the FMUs are to be made for: a description, its file, or the name of a shipped one;
-            None: CyberShip Enterprise 1.
+            None: the default ship.
 
     Returns:
         Path of each FMU, in the order of the names.
@@ -230,11 +230,10 @@ def _source_hash(
 ) -> str:
     """Hash of all that a build reads, of ship and start values, and of its compilers."""
     digest = hashlib.sha256(own_source().encode())
+    digest.update(repr(of.description).encode())
     digest.update(importlib.metadata.version("pythonfmu").encode())
     for path in [*of.effects.files, *([own_file] if own_file else [])]:
         _read(digest, path)
-    if of.description is not None:
-        digest.update(repr(of.description).encode())
     digest.update(changes(starts).encode())
     if native is not None:
         digest.update(native.key.encode())

@@ -11,6 +11,7 @@ from ..declare import Component, DeclarationError, discover, nearest, width
 from ..effects import EffectSet
 from ..fmi.trace import trace_init, trace_step
 from ..ship import Ship, ship
+from ..ships.naming import DEFAULT
 
 ROOT = Path(__file__).parent.parent
 
@@ -39,11 +40,11 @@ def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str,
         of = of or ship()
         known = {component.name: (module, component) for module, component in discover(of)}
         if name in known:
-            if of.effects.files or of.description is not None:
+            if of.effects.files:
                 _check_effects(known[name][1], of.effects)
             return known[name]
         hint = nearest(name, known) or f"; there are {', '.join(known)}"
-        whose = f" for the ship '{of.description.name}'" if of.description is not None else ""
+        whose = "" if of.name == DEFAULT else f" for the ship '{of.name}'"
         raise BuildError(f"no FMU '{name}'{whose}{hint}")
     spec = importlib.util.spec_from_file_location(own_file.stem, own_file)
     if spec is None or spec.loader is None:

@@ -20,12 +20,14 @@ from pathlib import Path
 
 from ..declare import Component
 from ..ship import Ship
+from ..ships.naming import DEFAULT
 from .finding import ROOT
 
 FACE = "fmus.fmi.slave"
 EFFECTS = "fmus.effects"
-# What an FMU for a described ship imports beside its component.
-SHIPS = ("fmus.ship_description", "fmus.ships.expansion", "fmus.sizing")
+# What an FMU imports in addition to its component, by whether it is made of effects or to scale.
+DESCRIPTION, EXPANSION, SIZING = "fmus.ship_description", "fmus.ships.expansion", "fmus.sizing"
+NAMING, SHIPPED = Path("ships", "naming.py"), Path("shipped", f"{DEFAULT}.toml")
 # Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -63,7 +65,9 @@ def sources(module: str, own_file: Path | None, of: Ship) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     files = {f"{EFFECTS}.{file.stem}": file for file in of.effects.files}
-    pending = [module, FACE, *(SHIPS if of.description is not None else ())]
+    pending = [module, FACE]
+    if own_file is None:
+        pending += [DESCRIPTION, EXPANSION if _has_factory(module) else SIZING]
     while pending:
         name = pending.pop()
         relative = Path(*name.split(".")[1:])
@@ -84,6 +88,10 @@ def sources(module: str, own_file: Path | None, of: Ship) -> dict[str, str]:
         pending += [package, *_imports(found[inside], package)]
         if name == EFFECTS:
             pending += files
+    if str(NAMING) in found:  # a component that asks for the default ship
+        from ..ships.ship_file import find_ship  # only now: pydantic takes a while to import
+
+        found[str(SHIPPED)] = find_ship(DEFAULT).read_text(encoding="utf-8")
     return found
 
 
@@ -104,9 +112,7 @@ def _imports(source: str, package: str) -> tuple[str, ...]:
 
 def hash_of(files: Mapping[str, str], starts: Mapping[str, float], of: Ship) -> str:
     """What identifies a component, in Python and compiled: hash of its source, start values and ship."""
-    digest = hashlib.sha256()
-    if of.description is not None:
-        digest.update(repr(of.description).encode())
+    digest = hashlib.sha256(repr(of.description).encode())
     for inside in sorted(files):
         digest.update(f"{inside}\0{files[inside]}\0".encode())
     digest.update(changes(starts).encode())
@@ -151,35 +157,29 @@ def pack(
 
 
 def _entry(module: str, package: str, own_file: Path | None, of: Ship) -> tuple[str, str]:
-    """How an FMU's script imports its component, and names it.
-
-    A module that makes components of a set of effects, and of a ship, has ``make``.
-    """
-    has_factory = hasattr(sys.modules.get(f"fmus.{module.partition('.')[2]}"), "make")
-    plain = f"from {module} import COMPONENT", "COMPONENT"
+    """How an FMU's script imports its component, and names it."""
     if own_file is not None:
-        return plain
+        return f"from {module} import COMPONENT", "COMPONENT"
+    described = [
+        f"from {package}.ship_description import Description, Part, Value",
+        f"SHIP = {of.description!r}",
+    ]
+    if not _has_factory(f"fmus.{module.partition('.')[2]}"):
+        lines = [f"from {package}.sizing import sized", f"from {module} import COMPONENT"]
+        return "\n".join([*lines, *described]), "sized(COMPONENT, SHIP)"
     stems = [file.stem for file in of.effects.files]
+    lines = [
+        f"from {package}.effects import STANDARD, effects_of{''.join(f', {s}' for s in stems)}",
+        f"from {package}.ships.expansion import effects_of_ship",
+        f"from {module} import make",
+    ]
     more = "".join(f".plus(effects_of({stem}))" for stem in stems)
-    lines = [f"from {package}.effects import STANDARD, effects_of{''.join(f', {s}' for s in stems)}"]
-    if of.description is not None:
-        names = "Description, Part, Value"
-        lines += [
-            f"from {package}.ship_description import {names}",
-            f"from {package}.{'ships.expansion' if has_factory else 'sizing'} import "
-            f"{'effects_of_ship' if has_factory else 'sized'}",
-            f"from {module} import {'make' if has_factory else 'COMPONENT'}",
-            f"SHIP = {of.description!r}",
-        ]
-        made = (
-            f"make(effects_of_ship(SHIP, STANDARD{more}), SHIP)"
-            if has_factory
-            else "sized(COMPONENT, SHIP)"
-        )
-        return "\n".join(lines), made
-    if not stems or not has_factory:
-        return plain
-    return "\n".join([*lines, f"from {module} import make"]), f"make(STANDARD{more})"
+    return "\n".join([*lines, *described]), f"make(effects_of_ship(SHIP, STANDARD{more}), SHIP)"
+
+
+def _has_factory(module: str) -> bool:
+    """Whether a module makes components of a set of effects and of a ship."""
+    return hasattr(sys.modules.get(module), "make")
 
 
 @contextmanager

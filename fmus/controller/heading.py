@@ -37,7 +37,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..actuators.steering import steerable
 from ..declare import POSITIVE, Component, Range, component, group_of, variables
-from ..effects import STANDARD, EffectSet
+from ..effects import EffectSet
 from ..frames import rotate_to_body
 from ..hull import Damping, Inertia, mass_matrix
 from ..ops import Number, clip, cos, exp, fmax, sin, where, wrap
@@ -237,13 +237,11 @@ COMPONENT = component(
 )
 
 
-def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Component | None:
-    """The autopilot of CyberShip Enterprise 1, or of a described ship.
+def make(effects: EffectSet, ship: Description) -> Component | None:
+    """The autopilot of a ship.
 
     Where thrusters get commands in place of a force, it gives these; None: none of them steers.
     """
-    if ship is None:
-        return COMPONENT
     autopilot = sized(COMPONENT, ship)
     if ship.allocates:
         return autopilot

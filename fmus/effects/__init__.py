@@ -2,7 +2,6 @@
 
 from . import (
     all_thrusters,
-    cse1,
     environment,
     force,
     inertia,
@@ -11,7 +10,6 @@ from . import (
     scaling,
 )
 from .effect import (
-    APART,
     Effect,
     Loaded,
     Memory,
@@ -26,7 +24,6 @@ from .effect_set import EffectSet, effects_of
 from .families import Family
 
 __all__ = [
-    "APART",
     "STANDARD",
     "Effect",
     "EffectSet",
@@ -42,10 +39,10 @@ __all__ = [
     "effects_of",
 ]
 
-# The effects of this project. Those of the thrusters act in this order.
+# The effects of every ship. Those of the thrusters act in this order.
 STANDARD = EffectSet(
     [
-        *cse1.EFFECTS,
+        *all_thrusters.LOSSES,
         all_thrusters.lag,
         all_thrusters.delay,
         *[

@@ -10,6 +10,7 @@ from cybership.message_text import printable
 from ..declare import DeclarationError, Variable
 from ..installed import plus_files
 from ..interruption import program
+from ..ship import ship
 from . import STANDARD
 from .effect import Effect
 from .effect_set import EffectSet
@@ -18,7 +19,7 @@ HEAD = """# Model effects
 
 What the real ship may have and the nominal model lacks. Every effect is off (its coefficients are zero)
 until a parameter of the vessel or the thrusters says otherwise; all parameters can be changed during a
-run. Printed by `python -m fmus.effects`.
+run. The effects of actuators are those of the default ship. Printed by `python -m fmus.effects`.
 
 | id | kind | axis | formula | symbol | parameters [unit] | sign | source |
 |---|---|---|---|---|---|---|---|
@@ -48,7 +49,7 @@ def _one(p: Variable) -> str:
     return f"`{p.name}` [{p.unit}]" + (f" = {p.start:g}" if p.start else "")
 
 
-def table(effects: EffectSet = STANDARD) -> str:
+def table(effects: EffectSet) -> str:
     """Effects as a table in Markdown."""
     rows = [
         " | ".join(
@@ -91,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except DeclarationError as error:
         print("error:", printable(str(error)), file=sys.stderr)
         return 2
-    print(table(effects), end="")
+    print(table(ship(effects).effects), end="")
     return 0
 
 

@@ -175,6 +175,9 @@ def attack_point(f: Thrust, now: Running, dx: float, dy: float) -> Thrust:
     return f._replace(dx=f.dx + dx, dy=f.dy + dy)
 
 
+LOSSES = (loss_surge, loss_sway, loss_yaw, attack_point)
+
+
 lag = slow(
     Devices("", "thrusters", "all thrusters", (), (), "XYN", TIMING, plural=True),
     "lag",

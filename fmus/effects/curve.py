@@ -26,12 +26,20 @@ def interpolate(x: Number, low: Number, high: Number, values: Sequence[Number]) 
 
 
 def node_parameters(
-    prefix: str, unit: str, what: str, over: str, over_unit: str, reach: float
+    prefix: str, unit: str, what: str, over: str, over_unit: str, reach: float, least: float = 0.01
 ) -> tuple[Variable, ...]:
-    """Parameters of a curve: its value at each of the nodes, and the range that they span."""
+    """Parameters of a curve: its value at each of the nodes, and the range that they span.
+
+    Args:
+        prefix: of their names.
+        unit, what: of the values.
+        over, over_unit: what the curve is over.
+        reach: range at the start.
+        least: the smallest range.
+    """
     nodes = [
         Variable(f"{prefix}_{k}", unit, f"{what}, node {k} of {NODES}", 0.0, Range(), False)
         for k in range(1, NODES + 1)
     ]
     span = f"reach of the nodes of {prefix}: {over}"
-    return (*nodes, Variable(f"{prefix}_range", over_unit, span, reach, Range(min=0.01), False))
+    return (*nodes, Variable(f"{prefix}_range", over_unit, span, reach, Range(min=least), False))

@@ -2,8 +2,8 @@
 
 What may go wrong with actuators is declared once, for :class:`Devices`, and made for those of each ship:
 :mod:`.lost_force`, :mod:`.own_curves`, :mod:`.misplaced`, :mod:`.all_thrusters`. The effects act on
-:class:`~fmus.effects.effect.Thrust`, the forces of all actuators, one after the other. CyberShip
-Enterprise 1 has those of :mod:`.cse1`, any other ship those of :mod:`fmus.actuators.failings`.
+:class:`~fmus.effects.effect.Thrust`, the forces of all actuators, one after the other. Which of them a
+ship has :mod:`fmus.actuators.failings` says.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,8 +34,8 @@ class Devices(NamedTuple):
         full: the largest force of one of them at rest [N].
         strength: name of the parameter that is this force; empty: there is none.
         plural: whether the title is of several.
-        needs: thrusters that a ship must have.
         scale: of the ship.
+        apart: whether their effects show only where each unit has commands of its own.
     """
 
     name: str
@@ -48,8 +48,8 @@ class Devices(NamedTuple):
     full: float = 0.0
     strength: str = ""
     plural: bool = False
-    needs: frozenset[str] = frozenset()
     scale: Scale = REFERENCE
+    apart: bool = False
 
     def does(self, verb: str, article: str = "The") -> str:
         """Subject and verb of a sentence, such as ``The propellers give``."""
@@ -144,5 +144,5 @@ def declared(
     """
     wording = Wording(sentence, d.family, apart or {}, pictures)
     return effect(
-        id, "actuator", axis or d.axis, parameters=parameters, wording=wording, needs=d.needs, **more
+        id, "actuator", axis or d.axis, parameters=parameters, wording=wording, apart=d.apart, **more
     )

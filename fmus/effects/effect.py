@@ -33,9 +33,6 @@ from ..hull import Damping
 from .families import UNKNOWN, Family
 
 Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
-Device = Literal["vsp", "bow", "each vsp"]
-# Of an effect on one of several actuators that may share a command: here each has its own.
-APART: Device = "each vsp"
 
 
 class Picture(NamedTuple):
@@ -229,7 +226,8 @@ class Effect:
         settings: parameters that are given and never fitted.
         gives: a ``force``; ``water velocity``, body-fixed (u, v) [m/s, m/s]; or the name of the damping
             coefficient that it adds to.
-        needs: thrusters that a ship must have for it.
+        needs: actuators that a ship must have for it, by their names.
+        apart: whether it shows only where each of several units that may share commands has its own.
         memory: how it depends on the past; None: not at all.
         search, wording: see there.
     """
@@ -251,6 +249,7 @@ class Effect:
     memory: Memory | None = None
     search: Search = Search()
     wording: Wording = Wording()
+    apart: bool = False
 
     def __call__(self, *arguments: Any) -> Any:
         """What the function gives."""
@@ -318,13 +317,14 @@ def effect(
 
     Args:
         id, kind, axis, formula, symbol, sign, source, linear, settings: see :class:`Effect`.
-        more: further fields of :class:`Effect`: gives, needs, memory, search, wording; and parameters,
-            where the function does not declare them in its signature, with description.
+        more: further fields of :class:`Effect`: gives, needs, apart, memory, search, wording; and
+            parameters, where the function does not declare them in its signature, with description.
 
     Raises:
         DeclarationError: unknown kind, axis or field, or a parameter without unit, description or start.
     """
-    unknown = set(more) - {"gives", "needs", "memory", "search", "wording", "parameters", "description"}
+    further = {"gives", "needs", "apart", "memory", "search", "wording", "parameters", "description"}
+    unknown = set(more) - further
     if unknown:
         raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
 
@@ -366,6 +366,7 @@ def effect(
             memory,
             search,
             more.get("wording", Wording()),
+            more.get("apart", False),
         )
 
     return declare

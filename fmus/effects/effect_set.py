@@ -10,7 +10,7 @@ from typing import Any
 
 from ..declare import DeclarationError, flatten, nearest
 from ..hull_functions import FUNCTIONS
-from ..scale import Scale
+from ..scale import REFERENCE, Scale
 from .effect import Effect, Kind, Loaded, Running, Thrust
 
 ROOM = Path(__file__).parent
@@ -22,6 +22,7 @@ class EffectSet(Mapping[str, Effect]):
     Args:
         effects: the effects.
         files: users' files that some of them are from.
+        general: the effects of every ship that those of a ship were made from; None: these are such.
 
     Attributes:
         timed: parameter that is a time within a run -> its effect.
@@ -30,8 +31,14 @@ class EffectSet(Mapping[str, Effect]):
         DeclarationError: an id or a parameter is declared twice.
     """
 
-    def __init__(self, effects: Iterable[Effect], files: Iterable[Path] = ()) -> None:
+    def __init__(
+        self,
+        effects: Iterable[Effect],
+        files: Iterable[Path] = (),
+        general: "EffectSet | None" = None,
+    ) -> None:
         self._effects: dict[str, Effect] = {}
+        self.general = self if general is None else general
         self.files = tuple(files)
         taken: dict[str, str] = {}
         for e in effects:
@@ -67,6 +74,8 @@ class EffectSet(Mapping[str, Effect]):
 
     def at(self, scale: Scale) -> "EffectSet":
         """The set for a ship of another size: starts, ranges and values to try by Froude's law."""
+        if scale == REFERENCE:
+            return self
         return EffectSet([_scaled(e, scale) for e in self.values()], self.files)
 
     def of_kind(self, *kinds: Kind) -> list[Effect]:

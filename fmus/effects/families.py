@@ -71,12 +71,12 @@ PROPELLERS = Family(
     {"inertia": _STEADY, "propellers": "give pulses of several sizes, ahead and astern"},
 )
 SIDE_THRUST = Family("side thrust", "pulses of sway force alone and of yaw moment alone")
-BOW_THRUSTER = Family(
-    "bow thruster",
-    "the bow thruster at work at rest, at speed, and over the whole run",
+TUNNEL_THRUSTER = Family(
+    "tunnel thruster",
+    "the tunnel thruster at work at rest, at speed, and over the whole run",
     {
-        "bow thruster": "use the bow thruster at rest, at speed, and over the whole run",
-        "side thrust": "make the same moment by the propellers and by the bow thruster",
+        "tunnel thruster": "use the tunnel thruster at rest, at speed, and over the whole run",
+        "side thrust": "make the same moment by the propellers and by the tunnel thruster",
     },
 )
 SMALL_OR_LARGE = Family(

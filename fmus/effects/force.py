@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from math import degrees
 
-from ..declare import Range, Variable, packer, variables, width
-from ..hull import Damping, Triple, damping_force, product, term_force
+from ..declare import Range, Variable, variables
+from ..hull import Damping, Triple, product, term_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
 from .effect import Effect, Motion, Picture, Search, Wording, effect
@@ -21,8 +21,6 @@ from .families import (
     Family,
 )
 from .text import Found, number, peak, reach, towards
-
-_COUNT = width(Damping)
 
 _MEMBERS: dict[str, Family] = {
     "X_u X_|u|u X_uuu X_uu": SURGE_DRAG,
@@ -56,15 +54,8 @@ MOTION = {
 }
 
 
-def change(k: int, ship: Motion, delta: Number) -> Triple:
-    """Force [N, N, N m] of an addition to the k-th coefficient of :class:`~fmus.hull.Damping`."""
-    only = [0.0] * _COUNT
-    only[k] = delta
-    return damping_force(ship.u, ship.v, ship.r, packer(Damping)(only))
-
-
-def further_change(coefficient: Variable) -> Effect:
-    """The effect that changes the coefficient of a further product of speeds."""
+def change(coefficient: Variable) -> Effect:
+    """The effect that changes the coefficient of a product of speeds."""
     name = coefficient.name
     return _change(lambda ship, delta: term_force(name, delta, ship.u, ship.v, ship.r), coefficient)
 
@@ -117,10 +108,7 @@ def _change(function: Callable[[Motion, Number], Triple], coefficient: Variable)
 
 
 # In the order of Damping.
-CHANGES = tuple(
-    _change(lambda ship, delta, k=k: change(k, ship, delta), coefficient)
-    for k, coefficient in enumerate(variables(Damping))
-)
+CHANGES = tuple([change(coefficient) for coefficient in variables(Damping)])
 
 
 def surge_curve_sentence(f: Found) -> str:

@@ -26,6 +26,7 @@ def speed_curve(d: Devices) -> Effect:
             "surge speed",
             "m/s",
             0.6 * d.scale.factor("m/s"),
+            0.01 * d.scale.factor("m/s"),
         ),
         lambda f: (
             f"The {d.title}'s force changes with the speed: "

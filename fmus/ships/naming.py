@@ -7,19 +7,18 @@ from ..ship_description import Description
 DEFAULT = "cse1"
 
 
-def described_ship(name: Description | str | Path | None) -> Description | None:
-    """The description of a ship; None for CyberShip Enterprise 1, which the components declare.
+def described_ship(name: Description | str | Path | None = None) -> Description:
+    """The description of a ship.
 
     Args:
-        name: of a shipped ship, or the path of a ``.toml`` file; a description stays what it is.
+        name: of a shipped ship, or the path of a ``.toml`` file; a description stays what it is; None:
+            the default ship.
 
     Raises:
         DeclarationError: no such ship, or its file is not as it should be.
     """
-    if name is None or isinstance(name, Description):
+    if isinstance(name, Description):
         return name
-    if str(name) == DEFAULT:
-        return None
     from .ship_file import read_ship  # only now: pydantic takes a while to import
 
-    return read_ship(name)
+    return read_ship(DEFAULT if name is None else name)

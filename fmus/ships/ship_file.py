@@ -32,6 +32,7 @@ from .numbers_told import Finite, Given, Number, Prime, Strict, Term, valued
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
 NAME = r"^[a-z][a-z0-9_]*$"
+VARIABLE = r"^[A-Za-z][A-Za-z0-9_]*$"
 REQUIRED = ("m", "I_z")  # of the inertia; what else is not named is zero
 
 
@@ -50,6 +51,7 @@ class ActuatorTable(BaseModel):
     name: Annotated[str, Field(pattern=NAME, max_length=30)]
     law: str
     title: Annotated[str, Field(max_length=60)] = ""
+    label: Annotated[str, Field(max_length=60)] = ""
     order: Annotated[str, Field(pattern=NAME, max_length=30)] | None = None
     behind: str = ""
 
@@ -78,6 +80,14 @@ class ShipTable(Strict):
     wind: dict[str, Given] = Field({})
     hull: HullTable = HullTable()
     actuators: list[ActuatorTable] = Field([])
+    effects: list[str] = Field(
+        [],
+        description="effects of its actuators, in their order; all that each may have where it is empty",
+    )
+    aliases: dict[str, Annotated[str, Field(pattern=VARIABLE, max_length=60)]] = Field(
+        {},
+        description="variable of an actuator, or the beginning of its name -> what it is called instead",
+    )
 
 
 def json_schema() -> dict[str, Any]:
@@ -176,6 +186,8 @@ def _description(table: ShipTable) -> Description:
     actuators = tuple(_actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators)
     _once([a.name for a in actuators], "actuators")
     _belong_together(actuators, table.allocates)
+    if any(a.number("abreast") for a in actuators) and not table.effects:
+        raise DeclarationError("effects: a ship with two units abreast names those of its actuators")
     terms = tuple(t.named(t.name, term_variable(t.name).unit, prime) for t in table.hull.terms)
     _once([t.name for t in terms], "hull.terms")
     return Description(
@@ -191,6 +203,8 @@ def _description(table: ShipTable) -> Description:
         actuators,
         table.allocates,
         _values("wind", table.wind, WIND_SETTINGS, prime),
+        tuple(table.effects),
+        tuple(table.aliases.items()),
     )
 
 
@@ -211,6 +225,10 @@ def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:
         alike = [b for b in actuators if (b.order or b.name) == (a.order or a.name)]
         if any(Law.known[b.law].commands != law.commands for b in alike):
             raise DeclarationError(f"{where}: others at its order have other commands")
+        if len(alike) > 1 and a.number("abreast"):
+            raise DeclarationError(f"{where}: two abreast share no order with others")
+        if a.number("abreast") and (law.has_race or law.in_race):
+            raise DeclarationError(f"{where}: two abreast work in no race and have none")
         if len(alike) > 1 and allocates:
             raise DeclarationError(f"{where}: a ship of shared orders has 'allocates = false'")
 
@@ -296,6 +314,7 @@ def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
         *variables(law.Parameters),
         Variable("x", "m", "place", 0.0),
         Variable("y", "m", "place", 0.0),
+        Variable("abreast", "m", "place of two units to port and starboard of it", 0.0, Range(0.0)),
         Variable("lag", "s", "first-order lag", 0.0, scale.limits("s", LONGEST)),
         *rates,
     )
@@ -303,7 +322,7 @@ def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
         raise DeclarationError(f"{where}: a word of Python's own is no name")
     numbers = {name: _checked(where, name, given) for name, given in (a.model_extra or {}).items()}
     title, values = a.title or a.name.replace("_", " "), _values(where, numbers, declared, prime)
-    return Part(a.name, a.law, title, values, a.order or "", a.behind)
+    return Part(a.name, a.law, title, values, a.order or "", a.behind, a.label)
 
 
 def _checked(where: str, name: str, given: Any) -> "float | Number":

@@ -1,29 +1,12 @@
-"""Thrusters that are propellers: the force grows with the square of the speed of rotation, (2.11).
+"""Thrusters that are propellers: the force grows with the square of the speed of rotation, (2.11)."""
 
-f = sign(n) K_T rho D^4 n^2; with n proportional to the command and F the force at full command this is
-F |u| u. The allocation knows and takes the root.
-"""
-
-from typing import Any
-
-from ..effects import Running
-from ..hull import Triple
-from ..ops import signed_root
-from .chain import thrusters
-from .thrusters import Line
+from ..declare import Component
+from ..effects import EffectSet
+from ..ship_description import Description
+from .thrusters import variant
 
 
-def squared(now: Running, p: Any) -> Triple:
-    """Shares of full force: the commands squared, with their sign, (2.11)."""
-    x, y, bow = now.given
-    return abs(x) * x, abs(y) * y, abs(bow) * bow
-
-
-make = thrusters(
-    "thrusters_propeller",
-    "Thrust allocation, and thrusters whose force grows with the square of the command",
-    Line,
-    squared,
-    signed_root,
-)
-COMPONENT = make()
+def make(effects: EffectSet, ship: Description) -> Component | None:
+    """The FMU of a ship's thrusters by the square of the command; None: none of them has that form."""
+    form = ", whose force grows with the square of the command"
+    return variant("thrusters_propeller", "squared", form, effects, ship)

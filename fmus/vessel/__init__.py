@@ -1,1 +1,1 @@
-"""The plant: the hull of CyberShip Enterprise 1 and everything that acts on it."""
+"""The plant: the hull of a ship and everything that acts on it."""

@@ -1,4 +1,4 @@
-"""The hull of CyberShip Enterprise 1 in surge, sway and yaw, (2.1)-(2.9), and what acts on it.
+"""The hull of a ship in surge, sway and yaw, (2.1)-(2.9), and what acts on it.
 
 Integrated by the classical fourth-order Runge-Kutta method with the force held over the step; a
 communication step above 0.02 s is divided. A force input that is NaN or infinite acts as zero. Every
@@ -11,7 +11,6 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import (
     FIXED,
     Component,
-    Outline,
     Variable,
     bundle,
     group_of,
@@ -19,15 +18,14 @@ from ..declare import (
     redeclared,
     variables,
 )
-from ..effects import STANDARD, EffectSet, Loaded, Motion
+from ..effects import EffectSet, Loaded, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
-    ExtraDamping,
     Hull,
     Inertia,
     RotationalDamping,
-    TowedDamping,
+    Terms,
     Triple,
     coriolis_force,
     damping_force,
@@ -39,22 +37,9 @@ from ..hull import (
 )
 from ..hull_functions import FUNCTIONS
 from ..ops import Condition, Number, finite, when, wrap
-from ..scale import REFERENCE_LENGTH
 from ..ship_description import Description, Part, Value
-from ..signals import Force, Measurement, Velocity, VelocityInCurrent
+from ..signals import Force, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
-
-_TOWED = len(TowedDamping._fields)
-_ROTATIONAL = _TOWED + len(RotationalDamping._fields)
-_EXTRA = _ROTATIONAL + len(ExtraDamping._fields)
-
-
-# As long and wide as the waterline of the model ship.
-CSE1_OUTLINE = Outline(
-    "cse1",
-    REFERENCE_LENGTH,
-    ((0.5525, 0.0), (0.2431, 0.124), (-0.5525, 0.10416), (-0.5525, -0.10416), (0.2431, -0.124)),
-)
 
 
 class Start(NamedTuple):
@@ -82,7 +67,7 @@ class Outputs(NamedTuple):
     """Outputs of every vessel; behind them come the forces of its effects."""
 
     pose: Pose = Pose()
-    velocity: Velocity = Velocity()
+    velocity: VelocityInCurrent = VelocityInCurrent()
     u_dot: Annotated[float, "m/s2", "surge acceleration"] = 0.0
     v_dot: Annotated[float, "m/s2", "sway acceleration"] = 0.0
     r_dot: Annotated[float, "rad/s2", "yaw acceleration"] = 0.0
@@ -100,14 +85,8 @@ def hull(p: Any, effects: VesselEffects) -> Hull:
     inertia = p.inertia
     for member in effects.inertia.members:
         inertia = member.apply(member.acting(p.heavier), p.heavier, inertia, inertia)
-    nominal, change = p.damping, p.change
-    damping = Damping(
-        TowedDamping._make(map(add, nominal.towed, change[:_TOWED])),
-        RotationalDamping._make(map(add, nominal.rotational, change[_TOWED:_ROTATIONAL])),
-        ExtraDamping._make(map(add, nominal.extra, change[_ROTATIONAL:_EXTRA])),
-        type(nominal.further)._make(map(add, nominal.further, change[_EXTRA:])),
-        nominal.functions,
-    )
+    terms, functions = p.damping
+    damping = Damping(type(terms)._make(map(add, terms, p.change)), functions)
     return Hull(inertia, inverse_mass(inertia), damping)
 
 
@@ -259,22 +238,18 @@ def described(ship: Description) -> tuple[Number, Number, Number]:
     """Inertia, damping and start of a described ship, with where their values come from."""
     given = ship.values()
 
+    groups_of = {v.name: v.known.group for v in variables(Inertia) if v.known is not None}
+
     def valued(v: Variable) -> Variable:
         start = given.get(v.name, Value(v.name, 0.0, "", 0.0))
-        return start.of(v, "inertia" if v.name in Inertia._fields else "damping")
+        return start.of(v, groups_of.get(v.name, "damping"))
 
-    own = [v.name for v in variables(Damping)]
-    further = [v for v in ship.terms if v.name not in own]
-    groups = {
-        name: redeclared(type(group), valued)()
-        for name, group in zip(Damping._fields, Damping(), strict=True)
-    }
-    groups["further"] = group_of("FurtherDamping", [valued(term_variable(v.name)) for v in further])()
-    groups["functions"] = bundle(
-        "HullFunctions", **{part.law: _function(part)() for part in ship.functions}
-    )()
+    own = [v.name for v in variables(Terms)]
+    further = [term_variable(v.name) for v in ship.terms if v.name not in own]
+    terms = group_of("Terms", map(valued, [*variables(Terms), *further]))()
+    functions = bundle("HullFunctions", **{part.law: _function(part)() for part in ship.functions})()
     start = redeclared(Start, ship.scale.of)()
-    return redeclared(Inertia, valued)(), bundle("Damping", **groups)(), start
+    return redeclared(Inertia, valued)(), bundle("Damping", terms=terms, functions=functions)(), start
 
 
 def _function(part: Part) -> type[Any]:
@@ -286,14 +261,14 @@ def _function(part: Part) -> type[Any]:
     )
 
 
-def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Component:
+def make(effects: EffectSet, ship: Description) -> Component:
     """The FMU of the vessel with some effects, each off until a parameter says otherwise.
 
     Args:
         effects: that it has.
-        ship: whose hull it is; None: CyberShip Enterprise 1's.
+        ship: whose hull it is.
     """
-    inertia, damping, start = (Inertia(), Damping(), Start()) if ship is None else described(ship)
+    inertia, damping, start = described(ship)
     groups = vessel_effects(effects, type(damping))
     unchanged, undisturbed = groups.change_forces(), groups.outside_forces()
     params = bundle(
@@ -307,8 +282,7 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         measurement=groups.measurement.params(),
         start=start,
     )
-    moving = {} if ship is None else {"velocity": VelocityInCurrent()}
-    outputs = bundle("Outputs", Outputs, **moving, change=unchanged, outside=undisturbed)
+    outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
 
     def init(i: Force, p: Any) -> State:
         return State(*p.start)
@@ -328,13 +302,13 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
         change = when(b.changed, lambda: change_forces(after, b), lambda: unchanged)
         outside = when(b.disturbed, lambda: outside_forces(after, tau, b), lambda: undisturbed)
-        _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
+        phi = [getattr(p.damping.terms, name) for name in RotationalDamping._fields]
+        _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, RotationalDamping._make(phi))
         u_dot, v_dot, r_dot = nu_dot
         omega_X, omega_Y, omega_N = omega
-        nu = Velocity(after.u, after.v, after.r)
         return after, outputs(
             Pose(after.x, after.y, after.psi),
-            nu if ship is None else VelocityInCurrent(*nu, *water_velocity(after, b)),
+            VelocityInCurrent(after.u, after.v, after.r, *water_velocity(after, b)),
             u_dot,
             v_dot,
             r_dot,
@@ -354,7 +328,7 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
 
     return Component(
         name="vessel",
-        description=f"Hull of {ship.title if ship else 'CyberShip Enterprise 1'} in surge, sway and yaw",
+        description=f"Hull of {ship.title} in surge, sway and yaw",
         params=params,
         state=State,
         inputs=Force,
@@ -362,12 +336,9 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         init=init,
         step=step,
         sampled=False,
-        max_step=0.02 * (ship.scale.time if ship else 1.0),
+        max_step=0.02 * ship.scale.time,
         hold_nonfinite=False,
         prepare=prepare,
         prepared_step=prepared_step,
-        outline=CSE1_OUTLINE if ship is None else ship.drawn,
+        outline=ship.drawn,
     )
-
-
-COMPONENT = make()

@@ -11,21 +11,28 @@ learned.
 The inputs are those of a controller; ``tau_cmd`` must be connected. The target is not used.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
+from ..actuators.actuation import actuators, parameters
+from ..actuators.attack import Attack, attacking
+from ..actuators.weighted_allocation import axes, components, solution
 from ..controller.backstepping import HELD, Inputs, acting
 from ..controller.eigen import dot
 from ..controller.models import FullBelief, everything
-from ..declare import POSITIVE, Range, component
+from ..declare import POSITIVE, Component, Range, Variable, bundle, group_of
+from ..effects import EffectSet
 from ..hull import inertia_force
 from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
+from ..ship_description import Description
 from ..signals import Force
-from ..thrusters.allocation import Allocation, allocate
+from ..sizing import sized
 
 Triple = tuple[Number, Number, Number]
 
 ROWS = 20  # of the window
 LEAST_ROWS = 4  # since the failure, before it is told
+AXES = ((0, 1), (2,))  # of the forces, those of each of the two thrusters
 COUNT = 7  # regressors of what is usual: 1, u, v, r, and the forces of the three thrusters
 STILL: Triple = (0.0, 0.0, 0.0)
 # Prior standard deviations of what is usual [N per 1, m/s, m/s, rad/s, N, N, N]; chosen: a hull and
@@ -37,9 +44,7 @@ NOISE = 0.05  # N; of g before anything is known; chosen: what a millimetre of n
 NEVER_SURE = 40.0  # largest logarithm of odds, so that no exponential overflows
 
 
-class Params(NamedTuple):
-    belief: FullBelief = FullBelief()
-    allocation: Allocation = Allocation()
+class Settings(NamedTuple):
     filter_time: Annotated[float, "s", "time constant of the low pass", Range(0.01)] = 1.0
     sample_time: Annotated[float, "s", "between samples of the window of 20", Range(0.01)] = 0.5
     memory: Annotated[float, "s", "over which the usual is learned", Range(1.0)] = 120.0
@@ -51,12 +56,28 @@ class Params(NamedTuple):
     failure_rate: Annotated[float, "1/s", "how often a failure is to be expected", Range(1e-12)] = 2.8e-5
 
 
-class Outputs(NamedTuple):
-    failed_vsp: Annotated[float, "1", "probability that the VSP has failed, 0...1"] = 0.0
-    failed_bow: Annotated[float, "1", "probability that the bow thruster has failed, 0...1"] = 0.0
-    since: Annotated[float, "s", "when the failure that is told began; 0: none is"] = 0.0
-    lost_vsp: Annotated[float, "1", "share of the VSP's force that seems lost"] = 0.0
-    lost_bow: Annotated[float, "1", "share of the bow thruster's force that seems lost"] = 0.0
+class Told(NamedTuple):
+    """Probability that each of two thrusters has failed, since when [s], and the share of its force."""
+
+    failed: tuple[Number, Number] = (0.0, 0.0)
+    since: Number = 0.0
+    lost: tuple[Number, Number] = (0.0, 0.0)
+
+
+def outputs_of(ship: Description) -> type[Any]:
+    """The outputs of the detector of a ship."""
+
+    def each(stem: str, text: str) -> list[Variable]:
+        return [
+            Variable(f"{stem}_{a.part.name}", "1", text.format(a.part.title), 0.0)
+            for a in actuators(ship)
+        ]
+
+    since = Variable("since", "s", "when the failure that is told began; 0: none is", 0.0)
+    failed = each("failed", "probability that the {} failed, 0...1")
+    return group_of(
+        "Outputs", [*failed, since, *each("lost", "share of the force of the {} that seems lost")]
+    )
 
 
 class Row(NamedTuple):
@@ -102,19 +123,13 @@ class State(NamedTuple):
     f: Triple
     rows: tuple[Row, ...]
     usual: Usual
-    told: Outputs
+    told: Told
 
 
-def init(i: Inputs, p: Params) -> State:
+def init(i: Inputs, p: Any) -> State:
     e = i.estimate
     nu = (e.u_hat, e.v_hat, e.r_hat)
-    return State(0.0, 0.0, 0.0, nu, STILL, STILL, (Row(),) * ROWS, Usual(), Outputs())
-
-
-def forces(tau: Any, p: Allocation) -> Triple:
-    """The thrusters' forces [N] that give a force: VSP in surge and sway, bow."""
-    s_x, s_y, s_bow = allocate(tau[0], tau[1], tau[2], p)
-    return p.F_vsp * s_x, p.F_vsp * s_y, p.F_bow * s_bow
+    return State(0.0, 0.0, 0.0, nu, STILL, STILL, (Row(),) * ROWS, Usual(), Told())
 
 
 def low_pass(before: Triple, now: Triple, share: Number) -> Triple:
@@ -133,7 +148,7 @@ def unusual(row: Row, usual: Usual) -> Triple:
     return a, b, c
 
 
-def learned(usual: Usual, old: Row, p: Params) -> Usual:
+def learned(usual: Usual, old: Row, p: Any) -> Usual:
     """What is usual, with one more sample, by recursive least squares that forgets."""
     z = regressors(old.nu, old.f)
     keep = exp(-p.sample_time / p.memory)
@@ -185,25 +200,28 @@ def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: 
     return up * up / down, best, share, since
 
 
-def judged(rows: tuple[Row, ...], usual: Usual, p: Params) -> tuple[tuple[Number, Number], Outputs]:
+def judged(rows: tuple[Row, ...], usual: Usual, p: Any) -> tuple[tuple[Number, Number], Told]:
     """The likelihood ratios of the window, and what is told."""
-    whole_v, best_v, lost_v, since_v = evidence(rows, usual, (0, 1), p.least_loss)
-    whole_b, best_b, lost_b, since_b = evidence(rows, usual, (2,), p.least_loss)
+    found = [evidence(rows, usual, axes, p.least_loss) for axes in AXES]
+    (whole_a, best_a, lost_a, since_a), (whole_b, best_b, lost_b, since_b) = found
     # A failure somewhere in the window, at any of its times.
     expected = p.failure_rate * p.sample_time
     against = -log(expected)
     odds = [
         exp(clip(0.5 * best / fmax(mean, 1.0) - against, -NEVER_SURE, NEVER_SURE))
-        for best, mean in ((best_v, usual.ratios[0]), (best_b, usual.ratios[1]))
+        for best, mean in ((best_a, usual.ratios[0]), (best_b, usual.ratios[1]))
     ]
     ready = where(usual.judged >= p.first, 1.0, 0.0)
-    vsp, bow = [ready * x / (1.0 + odds[0] + odds[1]) for x in odds]
-    since = where(vsp > bow, since_v, since_b)
-    told = fmax(vsp, bow) > 0.5
-    return (whole_v, whole_b), Outputs(vsp, bow, where(told, since, 0.0), lost_v, lost_b)
+    a, b = [ready * x / (1.0 + odds[0] + odds[1]) for x in odds]
+    since = where(a > b, since_a, since_b)
+    told = fmax(a, b) > 0.5
+    return (whole_a, whole_b), Told((a, b), where(told, since, 0.0), (lost_a, lost_b))
 
 
-def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
+def advanced(
+    s: State, i: Inputs, p: Any, h: Number, forces: Callable[[Any], Triple]
+) -> tuple[State, Told]:
+    """The state after h [s]; ``forces(tau)``: the thrusters' forces [N] that give a force."""
     e = i.estimate
     nu = (e.u_hat, e.v_hat, e.r_hat)
     tau = acting(i.applied, Force())
@@ -213,7 +231,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     moved = inertia_force(a, b, c, p.belief.inertia)
     known = everything(*nu, p.belief)
     rest = low_pass(s.rest, (known[0] + tau[0], known[1] + tau[1], known[2] + tau[2]), share)
-    f = low_pass(s.f, forces(tau, p.allocation), share)
+    f = low_pass(s.f, forces(tau), share)
     quiet = where(e.frozen > 0.5, 0.0, s.quiet + h)
     waited = s.waited + h
     time = s.time + h
@@ -221,12 +239,12 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     ready = (waited > p.sample_time * (1.0 - 1e-9)) & (quiet > 2.0 * p.filter_time * (1.0 - 1e-9))
     due = (h > 0.0) & ready
 
-    def sampled() -> tuple[tuple[Row, ...], Usual, Outputs]:
+    def sampled() -> tuple[tuple[Row, ...], Usual, Told]:
         omega = (moved[0] - rest[0], moved[1] - rest[1], moved[2] - rest[2])
         old = s.rows[-1]
-        calm = (s.told.failed_vsp < 0.5) & (s.told.failed_bow < 0.5)
+        calm = (s.told.failed[0] < 0.5) & (s.told.failed[1] < 0.5)
         usual = when((old.filled > 0.5) & calm, lambda: learned(s.usual, old, p), lambda: s.usual)
-        row = Row(1.0, time, slow, f, forces(omega, p.allocation))
+        row = Row(1.0, time, slow, f, forces(omega))
         z = regressors(slow, f)
         unsure = 1.0 + fmax(dot(z, [dot(line, z) for line in usual.P]), 0.0)
         row = row._replace(error=unusual(row, usual), unsure=unsure)
@@ -239,11 +257,37 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     return choose(h > 0.0, after, s), told
 
 
-COMPONENT = component(
-    name="watch_thrusters",
-    any_ship=False,
-    description="Detector of thrusters that lose force, by the model error",
-    init=init,
-    step=step,
-    held=HELD,
-)
+def make(effects: EffectSet, ship: Description) -> Component | None:
+    """The detector for a ship of two thrusters, the first of two components; None: it has others."""
+    whose = tuple(
+        [tuple([k for k, c in enumerate(components(ship)) if c.actuator is a]) for a in actuators(ship)]
+    )
+    if whose != AXES or len(axes(ship)) != len(components(ship)):
+        return None
+    known = {a.part.name: parameters(ship, a, "", False)() for a in actuators(ship)}
+    params = bundle(
+        "Params",
+        Settings,
+        belief=FullBelief(),
+        allocation=bundle("Allocation", **known)(),
+        attack=Attack(),
+    )
+    outputs = outputs_of(ship)
+
+    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+        values = attacking(p.allocation, p.attack)
+        after, told = advanced(s, i, p, h, lambda tau: solution(ship, tau, values))
+        return after, outputs(*told.failed, told.since, *told.lost)
+
+    watch = Component(
+        name="watch_thrusters",
+        description="Detector of thrusters that lose force, by the model error",
+        params=params,
+        state=State,
+        inputs=Inputs,
+        outputs=outputs,
+        init=init,
+        step=step,
+        held=HELD,
+    )
+    return sized(watch, ship)

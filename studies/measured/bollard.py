@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from cosim import InputError
 from cosim.errors import nearest
 from diagnosis import Model
-from fmus.thrusters import chain
 
 PULLS = Path("cse1_static", "vsp_surge_bollard.csv")
 COLUMNS = ("pitch", "F_per_vsp")
@@ -71,8 +70,9 @@ def surge_force(model: Model, command: np.ndarray) -> np.ndarray:
     """
     none = np.zeros_like(command)
     commands: Any = (command, none, none)
-    now = chain.running(0.0, 0.0, 0.0, 0.0, commands, model.drive)
-    X, _, _ = chain.act(commands, now, model.drive)
+    layout = model.ship.layout
+    now = layout.running(0.0, 0.0, 0.0, 0.0, commands, model.drive)
+    X, _, _ = layout.act(commands, now, model.drive)
     return np.broadcast_to(X, command.shape)
 
 

@@ -22,7 +22,7 @@ from diagnosis import (
 from diagnosis.execution.progress import Advance
 from diagnosis.predictors import Response
 from diagnosis.search import Prior
-from fmus.thrusters.chain import FIVE
+from fmus.ship import ship
 
 SAME = 1e-6
 TOGETHER = 2  # blocks of 15 s: what counts as independent
@@ -100,7 +100,7 @@ def gather(files: Sequence[Path], advance: Advance) -> list[WeakWindows]:
 
 def apart(w: WeakWindows) -> bool:
     """Whether each VSP has commands of its own."""
-    return w.run.signals == FIVE.commands and w.run.commands is not None
+    return w.run.signals == ship().layouts[-1].commands and w.run.commands is not None
 
 
 def steered(w: WeakWindows) -> bool:

@@ -8,6 +8,7 @@ from fmus.guidance import ellipse, multisine
 from fmus.hull import motion
 from fmus.signals import Estimate, Force, Nothing
 from fmus.vessel import vessel
+from support.cse1 import VESSEL
 
 NO_LOSS = (0.0, 0.0, 0.0)
 NO_FORCE = (0.0, 0.0, 0.0)
@@ -63,7 +64,7 @@ def closed_loop(
 ):
     """Yield (t, vessel state, controller state, outputs) of each step; every request acts in full."""
     params = unlimited(params)
-    b = vessel.COMPONENT.prepare(plant or vessel.COMPONENT.params()).hull
+    b = VESSEL.prepare(plant or VESSEL.params()).hull
     s = start or vessel.State(5.0, 2.0)
     goal = target(0, h)
 

@@ -10,10 +10,8 @@ import pytest
 
 from diagnosis import Run, clean, smooth
 from diagnosis.predictors.ship_model import parameters
-from fmus.signals import Force, Velocity
-from fmus.thrusters.chain import Inputs
-from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
-from fmus.vessel import vessel
+from fmus.signals import Force, VelocityInCurrent
+from support.cse1 import THRUSTERS, VESSEL, Inputs
 from support.shared import kept
 
 DATA = Path(os.environ.get("CYBERSHIP_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -92,7 +90,7 @@ def voyage(seconds, h, ship, thrusters, quick, craft=None, given=commands):
     """Time (n,), pose and nu (n, 3) of the ship under the commands, and these."""
     t = np.arange(round(seconds / h)) * h
     tau_cmd = commands(t, quick) if given is commands else given(t)
-    hull, drive = (craft.vessel, craft.thrusters) if craft else (vessel.COMPONENT, THRUSTERS)
+    hull, drive = (craft.vessel, craft.thrusters) if craft else (VESSEL, THRUSTERS)
     p = parameters(hull, START | ship)
     plan = parameters(drive, thrusters)
     body, machine = hull.prepared(p), drive.prepared(plan)
@@ -102,7 +100,7 @@ def voyage(seconds, h, ship, thrusters, quick, craft=None, given=commands):
     for tau in tau_cmd.tolist():
         poses.append(tuple(seen.measured))
         nu.append((s.u, s.v, s.r))
-        inputs = Inputs(Force(*tau), Velocity(s.u, s.v, s.r))
+        inputs = Inputs(Force(*tau), VelocityInCurrent(s.u, s.v, s.r))
         past, out = drive.advance(past, inputs, machine, before)
         s, seen = hull.advance(s, Force(*out[3 + 3 :]), body, h)
         before = h

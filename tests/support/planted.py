@@ -7,10 +7,9 @@ import numpy as np
 from diagnosis import Run, WeakWindows, clean, smooth, weak_windows
 from diagnosis.predictors.ship_model import parameters
 from fmus.hull import Triple
-from fmus.signals import Force, Velocity
-from fmus.thrusters.chain import Inputs
-from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
+from fmus.signals import Force, VelocityInCurrent
 from fmus.vessel import vessel
+from support.cse1 import THRUSTERS, VESSEL, Inputs
 from support.measured import NOISE, START, commands
 from support.shared import kept
 
@@ -62,7 +61,7 @@ def voyages(
 def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> WeakWindows:
     t = np.arange(round(seconds / STEP)) * STEP
     tau_cmd = commands(t + APART * k)
-    hull = vessel.COMPONENT
+    hull = VESSEL
     p = parameters(hull, START | ship)
     body = hull.prepared(p)
     plan = parameters(THRUSTERS, thrusters)
@@ -75,7 +74,7 @@ def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> WeakWindows
     for now, tau in zip(t.tolist(), tau_cmd.tolist(), strict=True):
         poses.append(tuple(seen.measured))
         machine = machines[dead is not None and dead(now)]
-        inputs = Inputs(Force(*tau), Velocity(s.u, s.v, s.r))
+        inputs = Inputs(Force(*tau), VelocityInCurrent(s.u, s.v, s.r))
         past, out = THRUSTERS.advance(past, inputs, machine, before)
         force = np.array(out[6:]) + (push(now, s) if push else 0.0)
         s, seen = hull.advance(s, Force(*force.tolist()), body, STEP)

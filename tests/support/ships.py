@@ -40,7 +40,8 @@ def scaled(d: Description, ratio: float) -> Description:
         command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
         if command is not None:
             return {"1": "1/s", "1/s": "1/s2"}.get(command.unit, f"{command.unit}/s")
-        return "s" if name == "lag" else units[f"{a.part.name}_{name}"]
+        placed = {"lag": "s", "abreast": "m"}
+        return placed[name] if name in placed else units[d.called(f"{a.part.name}_{name}")]
 
     return d._replace(
         length=d.length * ratio,
@@ -76,6 +77,10 @@ EVERY_LAW = described(
     part("vsp", "voith_schneider", {"x": 0.2, "F": 9.0}),
     part("jet", "force_table_ahead", {**TABLE, "x": -0.9, "y": 0.1}),
     part("stern", "force_table_aside", {**TABLE, "x": -0.9}),
+    part("square", "squared_tunnel_thruster", {"x": 0.7, "F": 2.0}),
+    part("squares", "squared_voith_schneider", {"x": 0.1, "F": 3.0}),
+    part("tabled", "tabulated_tunnel_thruster", {"x": 0.6, "F": 2.0}),
+    part("tables", "tabulated_voith_schneider", {"x": -0.1, "F": 3.0}),
     part("tug", "given_force", {"F_X": 5.0, "F_Y": 7.0, "x": 0.9}),
     terms={"X_absu_u": -20.0, "Y_absu_v": -80.0, "N_uuv": -3.0, "N_r": -30.0, "Y_vvr": -1.0},
     functions=(part("cross_flow", "cross_flow", {"cross_flow_length": 2.0}),),
@@ -101,7 +106,7 @@ def component(name: str) -> Component:
     """One of :data:`PARTS`, such as ``otter vessel``."""
     of, which = name.split()
     if which == "autopilot":
-        autopilot = heading.make(ship=SHIPS[of])
+        autopilot = heading.make(ship().effects, SHIPS[of])
         assert autopilot is not None
         return autopilot
     return getattr(ship(description=SHIPS[of]), which)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.command import command
+from support.cse1 import VESSEL as COMPONENT
 from support.measured import sail, smoothed
 
 from cosim import InputError
@@ -20,7 +21,7 @@ from fmus.effects import STANDARD
 from fmus.effects.linear_map import AXES, REGRESSORS, parameter, regressors
 from fmus.hull import RotationalDamping
 from fmus.signals import Force
-from fmus.vessel.vessel import COMPONENT, State
+from fmus.vessel.vessel import State
 from thesis.analysis import concurrent_passes as cp
 from thesis.analysis import into_the_plant as plant
 from thesis.analysis.samples import Samples, by_run, gather_samples, joined, model_error

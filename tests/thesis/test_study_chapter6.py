@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from support.cse1 import VESSEL
 
 import cosim
 from cosim.dispatch import FinishedRun
 from diagnosis import Model
 from diagnosis.predictors import write_model
 from fmus.hull import RotationalDamping
-from fmus.vessel import vessel
 from thesis import chapter6
 from thesis.basin_trials import (
     causes,
@@ -40,13 +40,13 @@ def run(content, folder):
 def test_plant_has_the_coefficients_of_table_7_1():
     named = sysid4.parameters()
     own = {k.removeprefix("vessel."): x for k, x in named.items() if k.startswith("vessel.")}
-    damping = vessel.COMPONENT.prepare(parameters(vessel.COMPONENT, own)).hull.damping
-    assert damping.rotational == pytest.approx(
+    damping = VESSEL.prepare(parameters(VESSEL, own)).hull.damping
+    assert [getattr(damping.terms, n) for n in RotationalDamping._fields] == pytest.approx(
         RotationalDamping(-0.014, 1.55, 0.017, 0.2, 0.017, -1.8, -0.02, -0.2)
     )
-    assert damping.towed.X_u == pytest.approx(-0.6555 - 3.5)
-    assert damping.towed.X_absu_u == pytest.approx(0.3545 - 0.26)
-    assert damping.extra.X_absu_r == pytest.approx(0.2)
+    assert damping.terms.X_u == pytest.approx(-0.6555 - 3.5)
+    assert damping.terms.X_absu_u == pytest.approx(0.3545 - 0.26)
+    assert damping.terms.X_absu_r == pytest.approx(0.2)
     assert [named[f"thrusters.loss_{a}"] for a in ("surge", "sway", "yaw")] == [0.3, 0.0, 0.31]
 
 

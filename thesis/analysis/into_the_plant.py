@@ -96,13 +96,14 @@ def as_model(c: np.ndarray, B: np.ndarray, columns: Sequence[str], of: Ship | No
         c: (3,) [N, N, N m].
         B: (3, m).
         columns: names of the m columns.
+        of: the ship, by :func:`~diagnosis.analysis.samples.model_error`; None: the default ship.
         of: the ship, by :func:`~thesis.analysis.samples.model_error`; None: CyberShip Enterprise 1.
     """
     of = of or ship()
     values = (
-        {}
-        if of.description is not None
-        else {f"delta_{v.name}": -v.start for v in variables(RotationalDamping) if v.start}
+        {f"delta_{v.name}": -v.start for v in variables(RotationalDamping) if v.start}
+        if of.name == ship().name
+        else {}
     )
     for k, axis in enumerate(AXES):
         values[parameter(axis, "1")] = float(c[k])

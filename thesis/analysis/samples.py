@@ -78,7 +78,7 @@ def model_error(
         nu, nu_dot, tau: (n, 3), velocity, acceleration and force.
         of: the ship; by default control model (2.27), of a described ship its nominal model.
     """
-    if of is None or of.description is None:
+    if of is None or of.name == ship().name:
         error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
         return np.column_stack(np.broadcast_arrays(*error))
     body = Model(ship=of).hull
@@ -125,7 +125,7 @@ def gather_samples(
         estimates: ``smoothed``: by the smoother, which sees the whole run and leaves spikes out;
             ``mdf``: by the thesis' causal derivative filter, spikes and lag included.
         advance: progress callback.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
         anyway: see :func:`.runs.prepare`.
 
     Returns:

@@ -18,7 +18,7 @@ import cosim
 from cosim.process import scratch_folder
 from diagnosis.execution import Advance, silent
 from fmus.declare import Component, variables
-from fmus.thrusters.allocation import Allocation
+from fmus.ship import ship
 
 from .run_source import COMMAND, TARGET, Source
 
@@ -97,7 +97,7 @@ def loop_of(run: Path, controller: str, observer: str | None, scenario: Path | N
     believed = {
         k: x
         for k, x in fmus.get("thrusters", {}).get("parameters", {}).items()
-        if k in Allocation._fields
+        if k in ship().allocation_parameters
     }
     wired = [] if content is None else [target for _, target in content["connections"]]
     told = not own or any(target.startswith("controller.tau_cmd") for target in wired)

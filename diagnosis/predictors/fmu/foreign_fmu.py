@@ -240,7 +240,7 @@ def _as_one(path: Path, folder: Path) -> Path:
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:
     """Signal -> quantity of the forces and commands that all of some runs of a ship have."""
-    units = ship(description=runs[0].ship).commands or {}
+    units = ship(description=runs[0].ship).commands
     every = [{*TAU, *run.commanded} for run in runs]
     common = [s for s in dict.fromkeys([*TAU, *runs[0].commanded]) if all(s in e for e in every)]
     return {s: QUANTITY[s] if s in QUANTITY else OF_UNIT[units[s]] for s in common}

@@ -43,6 +43,7 @@ from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
 from cybership.message_text import Location, first_fault
+from fmus.ship import Ship
 
 from .unit_check import UNITS
 
@@ -50,13 +51,8 @@ PREAMBLE = 1000  # lines; chosen: far more than any file has before its names
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
-THREE = ("u_vsp_x", "u_vsp_y", "u_bow")
-FIVE = ("u1", "u2", "u3", "u4", "u5")
-COMMANDS = (TAU, THREE, FIVE)
-POWER = ("power_vsp", "power_bow")  # may be beside the five
-ALL = (*TAU, *THREE, *FIVE, *POWER)
 
-# Quantity of a described ship's command, by the unit that its law has for it.
+# Quantity of a ship's command, by the unit that its law has for it.
 OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}
 # Signal -> quantity, of what may be measured beside pose and commands.
 BESIDE = {
@@ -80,7 +76,6 @@ QUANTITY = {
     "tau_X": "force",
     "tau_Y": "force",
     "tau_N": "moment",
-    **dict.fromkeys((*THREE, *FIVE, *POWER), "command"),
     **BESIDE,
 }
 
@@ -91,10 +86,10 @@ def outputs(commands: Iterable[str]) -> dict[str, str]:
     return {f"{actuator}.{name}": q for actuator in actuators for name, q in OUTPUTS.items()}
 
 
-def quantities(commands: Mapping[str, str] | None) -> dict[str, str]:
-    """Signal -> quantity, of a described ship with its own commands (name -> unit) too."""
-    own = {name: OF_UNIT[unit] for name, unit in (commands or {}).items()}
-    return QUANTITY | outputs(own) | own
+def quantities(of: Ship) -> dict[str, str]:
+    """Signal -> quantity, those of a ship's own commands, power settings and outputs too."""
+    own = {name: OF_UNIT[unit] for form in of.command_forms for name, unit in form.items()}
+    return QUANTITY | outputs(own) | own | dict.fromkeys(of.power_settings, "command")
 
 
 def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
@@ -160,12 +155,10 @@ class Layout(BaseModel):
     @classmethod
     def _known(cls, value: dict[str, Column]) -> dict[str, Column]:
         for key, column in value.items():
-            of_ship = "." in key  # ACTUATOR.COMMAND: which there are is known with the ship
-            if key not in QUANTITY and not of_ship:
-                raise ValueError(f"{shown(key)} is not a signal of a run{nearest(key, QUANTITY)}")
             if column.factor == 0.0:
                 raise ValueError(f"{key}.factor is not zero")
             own = QUANTITY | outputs([key])
+            # Which commands there are is known with the ship.
             possible = [own[key]] if key in own else OF_UNIT.values()
             units = [unit for quantity in possible for unit in UNITS[quantity]]
             if column.unit is not None and column.unit not in units:
@@ -192,7 +185,7 @@ def layout_of(
     names: Sequence[str],
     units: Mapping[str, str],
     where: str,
-    commands: Mapping[str, str] | None = None,
+    of: Ship,
     folder: Path | None = None,
 ) -> Layout:
     """The layout of a log by its usual names or the roles of its scenario, or of a table by its units.
@@ -201,20 +194,20 @@ def layout_of(
         names: of the columns, which may end in a unit, as ``x [mm]``.
         units: column -> unit, where that is known otherwise; those of no signal do not count.
         where: what messages call the table.
-        commands: of a described ship, see :func:`signals`.
+        of: the ship that was measured.
         folder: in which it lies, where the run's scenario may be.
 
     Raises:
         InputError: a unit that the signal cannot have.
     """
-    log = log_of(commands or THREE)
+    log = log_of(of.commands)
     if log.column("x").name in names:
         return log
     if folder is not None:
         named = dict(zip((*POSE, *TAU), read_options(folder).roles.of("pose", "force"), strict=True))
         if set(named.values()) <= set(names):
             return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
-    known = quantities(commands)
+    known = quantities(of)
     stated = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
     stated |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
@@ -263,9 +256,7 @@ def _nearest_key(location: Location) -> str:
     return nearest(str(location[-1]), known)
 
 
-def signals(
-    layout: Layout, names: Sequence[str], where: str, commands: Mapping[str, str] | None = None
-) -> list[str]:
+def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[str]:
     """The signals of a run that a file has: time, pose, commands in one form or more, and others.
 
     A force on an axis that is never commanded needs no column, unless one has nearly its name.
@@ -274,19 +265,18 @@ def signals(
         layout: which column is which signal.
         names: columns of the file.
         where: what messages call the file.
-        commands: of a described ship, ``ACTUATOR.COMMAND`` and unit of each, in place of those of
-            CyberShip Enterprise 1.
+        of: the ship that was measured.
 
     Raises:
         InputError: a column is missing, or there twice.
     """
-    every = COMMANDS if commands is None else (tuple(commands), TAU)
+    own = [tuple(form) for form in of.command_forms]
+    every = (TAU, *own) if of.fully_actuated else (*own, TAU)
     groups: list[tuple[str, ...]] = [g for g in every if any(layout.column(s).name in names for s in g)]
-    if commands is not None:
-        known = quantities(commands)
-        strange = next((signal for signal in layout.columns if signal not in known), None)
-        if strange:
-            raise InputError(f"{where}: {shown(strange)} is not a signal{nearest(strange, known)}")
+    known = quantities(of)
+    strange = next((signal for signal in layout.columns if signal not in known), None)
+    if strange:
+        raise InputError(f"{where}: {shown(strange)} is not a signal of a run{nearest(strange, known)}")
     if not groups:
         forms = ", or ".join(", ".join(group) for group in every)
         told = f'{{"columns": {{"{every[0][0]}": "name of its column", ...}}}}'
@@ -294,13 +284,14 @@ def signals(
             f"{where} has no commands: {forms}{nearest(every[0][0], names)}; "
             f"if they have other names, put {told} into a file of the same name with .json behind it"
         )
-    if FIVE in groups and any(layout.column(s).name in names for s in POWER):
-        groups.append(POWER)
+    power = of.power_settings
+    if own[-1] in groups and any(layout.column(s).name in names for s in power):
+        groups.append(power)
     wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g]])
     named: Collection[str] = ()
-    if layout != log_of(commands or THREE):  # of a log of ours only what a ship would measure is read
+    if layout != log_of(of.commands):  # of a log of ours only what a ship would measure is read
         named = layout.columns.keys()
-        others = [s for s in (*BESIDE, *outputs(commands or ())) if layout.column(s).name in names]
+        others = [s for s in (*BESIDE, *outputs(of.commands)) if layout.column(s).name in names]
         wanted |= dict.fromkeys((*named, *others))
     others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
     for signal in list(wanted):

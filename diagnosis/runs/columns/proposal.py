@@ -16,7 +16,6 @@ from ..files.reading import Run, column_names, read
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from .columns import (
     QUANTITY,
-    THREE,
     UNITS,
     UTF_8,
     WITH_UNIT,
@@ -107,14 +106,14 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
 
     Args:
         path: a CSV or Parquet file; what is told beside it does not count.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
 
     Raises:
         InputError: no such file, no table of numbers below names, a unit that is not known, or a signal
             without a column.
     """
     of = of or ship()
-    quantity = quantities(of.commands)
+    quantity = quantities(of)
     if path.suffix not in (".csv", ".parquet") or path.is_dir():
         raise InputError(f"'{path}' is not a CSV or Parquet file, whose columns have names")
     text = Layout()
@@ -127,7 +126,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     elif not path.is_file():
         read(path, of=of)  # says so
     names = column_names(path, text)
-    log = log_of(of.commands or THREE)
+    log = log_of(of.commands)
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
     units = _units_line(path, text) if text.units_line else [""] * len(names)
@@ -135,7 +134,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     try:
-        signals(layout, names, f"'{path}'", of.commands)
+        signals(layout, names, f"'{path}'", of)
     except InputError as error:
         more = f"; columns that are no signals as far as is known: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None

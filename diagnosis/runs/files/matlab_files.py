@@ -1,24 +1,36 @@
 """The MATLAB files that NTNU publishes of CyberShip Enterprise 1; docs/measurements.md."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from cosim import InputError
+from fmus.ship import Ship
 
-from ..columns.columns import FIVE, POSE, POWER
+from ..columns.columns import POSE
 
 MATLAB = "cse1_data"
-# Its first rows. Of the two power settings the first is that of the bow by hand, and that of the VSP in
-# dynamic positioning.
-ROWS = ("time", "x", "y", "z", "roll", "pitch", "psi", *FIVE, "first power", "second power")
+# Its first rows, and those of the five commands. Of the two power settings the first is that forward by
+# hand, and that aft in dynamic positioning.
+ROWS = ("time", "x", "y", "z", "roll", "pitch", "psi")
+COMMANDS = slice(7, 12)
+POWER = slice(12, 14)
 # The settings in dynamic positioning, at which the thrusters give their nominal force.
-FULL_VSP, FULL_BOW = 0.4, 0.5
+FULL = (0.4, 0.5)
 
 
-def read_matlab(path: Path) -> dict[str, np.ndarray]:
+def fits_matlab(of: Ship) -> bool:
+    """Whether these files have the commands of a ship: five of its units, and two power settings."""
+    width = COMMANDS.stop - COMMANDS.start
+    return len(of.layouts[-1].commands) == width and len(of.power_settings) == len(FULL)
+
+
+def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
     """Signals of one of NTNU's files: one matrix, one column for each sample.
+
+    Args:
+        path: of the file.
+        of: the ship, with the names of its commands.
 
     Raises:
         InputError: not such a file.
@@ -34,21 +46,23 @@ def read_matlab(path: Path) -> dict[str, np.ndarray]:
     except Exception as error:  # a broken file makes the reader stumble in many ways
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
     rows: dict[str, np.ndarray] = dict(zip(ROWS, data, strict=False))
-    return {s: rows[s] for s in ("time", *POSE, *FIVE)} | dict(zip(POWER, _power(rows), strict=True))
+    names = (*of.layouts[-1].commands, *of.power_settings)
+    given = zip(names, [*data[COMMANDS], *_power(data)], strict=True)
+    return {s: rows[s] for s in ("time", *POSE)} | dict(given)
 
 
-def _power(rows: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Thrust of VSP and bow thruster (2, n), of that in dynamic positioning, by the power settings.
+def _power(data: np.ndarray) -> np.ndarray:
+    """Thrust of the propellers aft and of the thruster forward (2, n), of that in dynamic positioning.
 
-    The settings hold for stretches. In those that a controller steers, both VSP have the same sway
-    command. The VSP's thrust goes with the square of their speed (2.11), the bow thruster's with its
-    limit.
+    The settings hold for stretches. In those that a controller steers, both propellers have the same
+    sway command. Their thrust goes with the square of their speed (2.11), that of the thruster forward
+    with its limit.
     """
-    bow, vsp = rows["first power"], rows["second power"]
-    alike = np.isclose(rows["u2"], rows["u4"])
+    fore, aft = data[POWER]
+    alike = np.isclose(data[COMMANDS][1], data[COMMANDS][3])
     stretch = np.cumsum(
-        np.diff(bow, prepend=bow[0]).astype(bool) | np.diff(vsp, prepend=vsp[0]).astype(bool)
+        np.diff(fore, prepend=fore[0]).astype(bool) | np.diff(aft, prepend=aft[0]).astype(bool)
     )
     steered = (np.bincount(stretch, alike) > 0.5 * np.bincount(stretch))[stretch]
-    vsp, bow = np.where(steered, (bow, vsp), (vsp, bow))
-    return np.array([(np.maximum(vsp, 0.0) / FULL_VSP) ** 2, np.maximum(bow, 0.0) / FULL_BOW])
+    aft, fore = np.where(steered, (fore, aft), (aft, fore))
+    return np.array([(np.maximum(aft, 0.0) / FULL[0]) ** 2, np.maximum(fore, 0.0) / FULL[1]])

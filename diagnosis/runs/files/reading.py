@@ -21,13 +21,9 @@ from fmus.ship_description import Description
 from fmus.ships.naming import DEFAULT
 
 from ..columns.columns import (
-    ALL,
     BESIDE,
-    FIVE,
     POSE,
-    POWER,
     TAU,
-    THREE,
     Column,
     Layout,
     layout_of,
@@ -38,7 +34,7 @@ from ..columns.columns import (
     to_si,
 )
 from ..columns.unit_check import LARGEST, UNITS
-from .matlab_files import read_matlab
+from .matlab_files import fits_matlab, read_matlab
 from .tables import column_names, date_stamps, numbers, table_of_file
 
 LOGS = ("log.csv", "log.parquet")
@@ -65,7 +61,7 @@ class Run:
         signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
         measured: beside the pose: signal of :mod:`.columns` -> (n,) in SI, NaN where it is missing.
         noise: signal -> standard deviation that the file beside tells [SI].
-        ship: that was measured; None: CyberShip Enterprise 1.
+        ship: that was measured; None: the default ship.
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
     """
 
@@ -80,7 +76,7 @@ class Run:
     called: Mapping[str, str] | None = None
     file: Path | None = None
     absent: tuple[str, ...] = ()
-    signals: tuple[str, ...] = THREE
+    signals: tuple[str, ...] = field(default_factory=lambda: ship().layout.commands)
     measured: Mapping[str, np.ndarray] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     ship: Description | None = None
@@ -89,9 +85,17 @@ class Run:
     @property
     def commanded(self) -> dict[str, np.ndarray]:
         """Signal -> (n,), the commands in the form in which they were given."""
-        forms = [(self.signals, self.commands), (POWER, self.power)]
-        given = [form for form in forms if form[1] is not None] or [(TAU, self.tau_cmd)]
-        return {s: c for names, table in given for s, c in zip(names, table.T, strict=True)}
+        settings = ship(description=self.ship).power_settings
+        forms = [
+            (names, c)
+            for names, c in ((self.signals, self.commands), (settings, self.power))
+            if c is not None
+        ]
+        return {
+            s: c
+            for names, table in forms or [(TAU, self.tau_cmd)]
+            for s, c in zip(names, table.T, strict=True)
+        }
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
@@ -108,7 +112,7 @@ def read(
     Args:
         path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
         layout: in place of what the file beside it says.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
         also: names of other columns [SI] that are kept in :attr:`Run.measured` where there are such.
 
     Raises:
@@ -126,8 +130,8 @@ def read(
     is_log = path.name in LOGS
     name = path.absolute().parent.name if is_log else path.stem
     of = of or ship()
-    if path.suffix == ".mat" and of.commands is None:
-        return replace(_run(name, read_matlab(path), f"'{path}'", of), file=path)
+    if path.suffix == ".mat" and fits_matlab(of):
+        return replace(_run(name, read_matlab(path, of), f"'{path}'", of), file=path)
     table, layout = _tabular(path, layout, of, set(also))
     run = replace(_of_table(name, table, layout, path, f"'{path}'", of), file=path)
     others = {n: pd.to_numeric(table[n], errors="coerce") for n in also if n in table}
@@ -143,14 +147,14 @@ def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None)
         frame: columns as in a file, units in their names (``x [mm]``) or in ``attrs["units"]``; or the
             log of a run, :func:`cosim.log_frame`.
         name: of the run.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
 
     Raises:
         InputError: a column is missing, or commands are in another unit.
     """
     of = of or ship()
     where, names = f"the table '{name}'", [str(column) for column in frame.columns]
-    layout = layout_of(names, frame.attrs.get("units", {}), where, of.commands)
+    layout = layout_of(names, frame.attrs.get("units", {}), where, of)
     return _of_table(name, frame.set_axis(names, axis=1), layout, Path(name), where, of)
 
 
@@ -159,8 +163,8 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
     given = layout or read_layout(path)
     try:
         names = column_names(path, given or Layout())
-        layout = given or layout_of(names, {}, f"'{path}'", of.commands, path.parent)
-        wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of.commands)}
+        layout = given or layout_of(names, {}, f"'{path}'", of, path.parent)
+        wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of)}
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
     except ImportError:
         raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
@@ -173,8 +177,8 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
 
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
-    columns, noise, called, quantity = {}, {}, {}, quantities(of.commands)
-    for signal in signals(layout, list(table.columns), where, of.commands):
+    columns, noise, called, quantity = {}, {}, {}, quantities(of)
+    for signal in signals(layout, list(table.columns), where, of):
         column = layout.column(signal)
         cells = table[column.name]
         values = date_stamps(cells, f"'{path}'") if signal == "time" else None
@@ -191,17 +195,24 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
     """A run of its signals, commands without a gap."""
-    forms = (FIVE, THREE) if of.commands is None else (tuple(of.commands),)
-    own = next((form for form in forms if form[0] in columns), forms[-1])
+    own, units = next(
+        (
+            (tuple(form), set(form.values()))
+            for form in reversed(of.command_forms)
+            if next(iter(form), "") in columns
+        ),
+        (tuple(of.commands), set()),
+    )
+    settings = of.power_settings
     absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
     columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
 
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
-        return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
+        return np.column_stack([columns[s] for s in group]) if columns.keys() & group[:1] else None
 
-    tau, commands, power = (_held(stack(group)) for group in (TAU, own, POWER))
+    tau, commands, power = (_held(stack(group)) for group in (TAU, own, settings))
     power = None if power is None else np.maximum(power, 0.0)
-    if of.commands is None and commands is not None:
+    if units == {"1"} and commands is not None:
         most = float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
@@ -209,7 +220,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
     if tau is not None and np.abs(tau).max(initial=0.0) > LARGEST:
         raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
-    missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*ALL, *own)) if s in columns]
+    missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*TAU, *own, *settings)) if s in columns]
     lost = sum(gaps.any() for gaps in missing)
     if tau is None:
         assert commands is not None
