@@ -34,6 +34,11 @@ def brief(text: str) -> str:
     return _cut(_words_cut(text, LONGEST_VALUE + 4), LONGEST_FAULT)  # quotes and punctuation around it
 
 
+def quoted(value: object) -> str:
+    """A value of a file as a message repeats it: as Python writes it, and cut."""
+    return _cut(repr(value), LONGEST_VALUE)
+
+
 def first_fault(
     error: ValidationError,
     hint: Callable[[Location], str] = lambda _: "",

@@ -44,8 +44,10 @@ def ship_file(name: str) -> Path | None:
         return None
     spec = find_spec(point.value)
     folders = [] if spec is None else spec.submodule_search_locations or []
-    files = [Path(folder, f"{name}.toml") for folder in folders]
-    return next(filter(Path.is_file, files), None) or _missing(point, f"{name}.toml")
+    for folder in folders:
+        if (file := Path(folder, f"{name}.toml")).is_file():
+            return file
+    raise _missing(point, f"{name}.toml")
 
 
 def module_file(group: str, name: str) -> Path | None:
@@ -58,7 +60,9 @@ def module_file(group: str, name: str) -> Path | None:
     if point is None:
         return None
     spec = find_spec(point.value)
-    return Path(spec.origin) if spec is not None and spec.origin else _missing(point, "such module")
+    if spec is None or not spec.origin:
+        raise _missing(point, "such module")
+    return Path(spec.origin)
 
 
 def plus_files(effects: EffectSet, given: Iterable[str | Path]) -> EffectSet:
@@ -81,9 +85,7 @@ def _point(group: str, name: str) -> EntryPoint | None:
     return next(iter(entry_points(group=group, name=name)), None)
 
 
-def _missing(point: EntryPoint, what: str) -> Path:
-    return _refuse(f"entry point '{point.name}' of {point.group}: '{point.value}' has no {what}")
-
-
-def _refuse(message: str) -> Path:
-    raise DeclarationError(message)
+def _missing(point: EntryPoint, what: str) -> DeclarationError:
+    return DeclarationError(
+        f"entry point '{point.name}' of {point.group}: '{point.value}' has no {what}"
+    )

@@ -441,12 +441,13 @@ def test_bad_input_is_one_line_and_leaves_nothing(case, ugly, tmp_path, monkeypa
     "name", ["compare", "learn", "pca", "pls", "propose_columns", "replay", "sysid", "watch"]
 )
 def test_help_has_examples_and_exit_codes_on_lines_of_their_own(name):
-    code, text = run(import_module(f"diagnosis.{name}").main, "--help")
+    room = "diagnosis" if name in ("compare", "learn", "propose_columns") else "thesis"
+    code, text = run(import_module(f"{room}.{name}").main, "--help")
     lines = text.splitlines()
     assert code == 0
     assert any(line.startswith("exit codes: 0 done") for line in lines)
     first = next(k for k, line in enumerate(lines) if line.startswith("examples:"))
-    assert f"python -m diagnosis.{name} " in lines[first]
+    assert f"python -m {room}.{name} " in lines[first]
 
 
 @pytest.fixture

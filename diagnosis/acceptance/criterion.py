@@ -4,7 +4,6 @@ import json
 from datetime import datetime, timezone
 from hashlib import sha256
 from pathlib import Path
-from reprlib import repr as shortened
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
@@ -19,7 +18,7 @@ from pydantic import (
 
 from cosim import InputError
 from cosim.errors import nearest
-from cybership.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault, quoted
 
 from ..runs import UNITS
 
@@ -62,7 +61,7 @@ class Criterion(BaseModel):
         units = UNITS[JUDGED[self.quantity]]
         if self.unit not in units:
             hint = nearest(self.unit, units)
-            raise ValueError(f"{shortened(self.unit)} is no unit of {self.quantity}{hint}")
+            raise ValueError(f"{quoted(self.unit)} is no unit of {self.quantity}{hint}")
         if self.statistic != "share" and "coverage" in self.model_fields_set:
             raise ValueError(f"coverage is of the statistic 'share', not of '{self.statistic}'")
         for signal, (low, high) in self.within.items():

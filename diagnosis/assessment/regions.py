@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.special import ndtri
 
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import NOISE_TOLERANCE
+from ..runs.cleaning import Z95
 from .clusters import ClusterMean, cluster_mean, numbered, welch_p_value
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
 from .settings import SETTINGS
@@ -144,7 +144,7 @@ def _exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) 
     """Whether a model error (K,) is more than the noise of the measurement."""
     excess = squares - NOISE_TOLERANCE**2 * noise
     above = cluster_mean(np.bincount(cluster, excess), np.bincount(cluster))
-    return above.mean > ndtri(1.0 - SETTINGS.chance) * np.sqrt(above.variance)
+    return above.mean > Z95 * np.sqrt(above.variance)
 
 
 @dataclass(frozen=True, eq=False)

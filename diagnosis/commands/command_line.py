@@ -18,7 +18,7 @@ from cybership.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
 
 from ..execution.progress import Advance, progress
-from ..execution.result_folder import default_folder, keep_inputs, sha256
+from ..execution.result_folder import clean, default_folder, keep_inputs, sha256
 from ..search import Prior
 
 # Options that name files which decide a result.
@@ -183,6 +183,8 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
     with Held() as interrupts:
         interrupts.allow()
         try:
+            if options.out is not None:
+                clean(options.out)
             _take_ship_of_logs(options)
             inputs = None
             if options.out is None:

@@ -26,8 +26,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
 
     If anything goes wrong before, ``out`` is as it was. A file of these names that was there and is not
     made again goes away, for it would be of another result. Interrupts act while the files are made;
-    while folders are made, files move and the scratch folder goes, they wait. What killed calls have
-    left in ``out`` is removed.
+    while folders are made, files move and the scratch folder goes, they wait.
 
     Args:
         out: a folder, made if it is not there.
@@ -41,7 +40,6 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
         scratch = None
         try:
             try:
-                _clean(out)
                 scratch = _scratch(out)
                 STATE.unfinished(*(folder.absolute() for folder in (scratch.outer, *made)))
             except OSError as error:
@@ -67,7 +65,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
             STATE.unfinished()
 
 
-def _clean(out: Path) -> None:
+def clean(out: Path) -> None:
     """Remove from a folder what calls that were killed have left, and say so."""
     if removed := sweep(out, NEW):
         complain(f"removed {removed} unfinished result(s) of killed calls from '{out}'", "note: ")
@@ -103,7 +101,7 @@ def default_folder(usual: Path, inputs: Mapping[str, str], overwrite: bool = Fal
         return usual
     for number in count(1):
         folder = usual if number == 1 else usual.with_name(f"{usual.name}_{number}")
-        _clean(folder)
+        clean(folder)
         if not folder.is_dir() or not any(folder.iterdir()) or _made_of(folder) == [*inputs.values()]:
             return folder
     raise AssertionError

@@ -1,7 +1,7 @@
 """FMUs in the user's cache: whole, of this user, and where nobody else may write.
 
 What is taken from there runs as the user. ``cosim.compiled`` keeps its library in the same way, in code
-of its own: of this package it imports only how messages and scratch folders are made.
+of its own, as neither package imports the other.
 """
 
 import hashlib

@@ -18,7 +18,6 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from reprlib import repr as shown
 from typing import Annotated, Any
 
 from pydantic import (
@@ -34,7 +33,7 @@ from pydantic import (
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
-from cybership.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault, quoted
 from fmus.addition import Line
 from fmus.base_units import base_exponents
 
@@ -194,12 +193,12 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
                 raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
             if column.name not in variables:
                 hint = nearest(column.name, variables)
-                raise InputError(f"{place}: the FMU has no such variable {shown(column.name)}{hint}")
+                raise InputError(f"{place}: the FMU has no such variable {quoted(column.name)}{hint}")
             if column.factor == 0.0:
                 raise InputError(f"{place}.factor is not zero")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
-                raise InputError(f"{place}: {shown(column.unit)} is no unit of {signal}{hint}")
+                raise InputError(f"{place}: {quoted(column.unit)} is no unit of {signal}{hint}")
             found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
     return VariableMap(**found)
 

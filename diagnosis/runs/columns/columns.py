@@ -22,7 +22,6 @@ import json
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from reprlib import repr as shown
 from typing import Annotated, Any
 
 import numpy as np
@@ -42,7 +41,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
-from cybership.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault, quoted
 from fmus.ship import Ship
 
 from .unit_check import UNITS
@@ -94,7 +93,7 @@ def quantities(of: Ship) -> dict[str, str]:
 
 def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
     """The message about a unit that a signal cannot have."""
-    return f"{shown(unit)} is not a unit of {signal}{nearest(unit, units)}"
+    return f"{quoted(unit)} is not a unit of {signal}{nearest(unit, units)}"
 
 
 Mark = Annotated[str, StringConstraints(min_length=1, max_length=1)]  # a character
@@ -131,7 +130,7 @@ class Layout(BaseModel):
     def _is_trial(cls, value: str | None) -> str | None:
         if value is not None and value not in KINDS:
             hint = nearest(value, KINDS) or f"; there are {', '.join(KINDS)}"
-            raise ValueError(f"{shown(value)} is not a manoeuvring trial{hint}")
+            raise ValueError(f"{quoted(value)} is not a manoeuvring trial{hint}")
         return value
 
     @field_validator("encoding")
@@ -141,7 +140,7 @@ class Layout(BaseModel):
             "".encode(value)  # there are others than those of texts
             return codecs.lookup(value).name
         except (LookupError, UnicodeError):
-            text = f"{shown(value)} is not an encoding; there are utf-8, latin-1, ..."
+            text = f"{quoted(value)} is not an encoding; there are utf-8, latin-1, ..."
             raise ValueError(text) from None
 
     @field_validator("columns", mode="before")
@@ -276,7 +275,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
     known = quantities(of)
     strange = next((signal for signal in layout.columns if signal not in known), None)
     if strange:
-        raise InputError(f"{where}: {shown(strange)} is not a signal of a run{nearest(strange, known)}")
+        raise InputError(f"{where}: {quoted(strange)} is not a signal of a run{nearest(strange, known)}")
     if not groups:
         forms = ", or ".join(", ".join(group) for group in every)
         told = f'{{"columns": {{"{every[0][0]}": "name of its column", ...}}}}'

@@ -5,12 +5,12 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from reprlib import repr as shown
 from typing import Any, NamedTuple
 
 import pandas as pd
 
 from cosim import InputError
+from cybership.message_text import quoted
 
 from ..files.text_layout import text_layout
 from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, read_layout
@@ -102,7 +102,7 @@ def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
     if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:
         return
     if numbers.iloc[0].isna().all():
-        told = shown(", ".join(cells.iloc[0]))
+        told = quoted(", ".join(cells.iloc[0]))
         raise InputError(
             f"'{path}' has a line of units below the names ({told}); "
             f"{_changed(path, layout, units_line=True)}, with the units of "

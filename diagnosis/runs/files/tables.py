@@ -2,13 +2,13 @@
 
 from collections.abc import Collection
 from pathlib import Path
-from reprlib import repr as shown
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from cosim import InputError
+from cybership.message_text import quoted
 
 from ..columns.columns import Layout
 from ..columns.side_car import decimal_comma, refuse_encoding, refuse_layout, refuse_units
@@ -95,7 +95,7 @@ def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
         return None
     wrong = _first(cells, stamps.isna())
     if wrong is not None:
-        raise InputError(f"{where}: {cells.name} = {shown(wrong)} is not a date stamp of ISO 8601")
+        raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a date stamp of ISO 8601")
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 
@@ -108,7 +108,7 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     wrong = _first(cells, np.isnan(found))
     if wrong is not None:
         hint = decimal_comma(path, layout, wrong)
-        raise InputError(f"'{path}': {cells.name} = {shown(wrong)} is not a number{hint}")
+        raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
     return found
 
 

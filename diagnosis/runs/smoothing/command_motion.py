@@ -11,21 +11,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.scale import REFERENCE_LENGTH, Scale
+from fmus.scale import Scale
 
 from ..cleaning import Track, impulse
 from ..linear_filter import filtered
 from .spline import Knots
 
 # Of CyberShip Enterprise 1, times the scale of the ship.
-# m/s, of each of its ends: a ship slower than that at a run's start had no thrusters at work before.
-IDLE = 0.02
+# m/s, m/s, rad/s: a ship slower than that at a run's start had no thrusters at work before. Chosen; of
+# a turn at 0.035 rad/s at the start, by noise alone, a run of the Otter was predicted nine times worse.
+IDLE = (0.02, 0.02, 0.05)
 FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
 
 
 def idle(scale: Scale) -> np.ndarray:
     """(3,), speeds [m/s, m/s, rad/s] below which a ship of a size hardly moves."""
-    return np.multiply((IDLE, IDLE, 2.0 * IDLE / REFERENCE_LENGTH), scale.speeds)
+    return np.multiply(IDLE, scale.speeds)
 
 
 class CommandResponse(NamedTuple):

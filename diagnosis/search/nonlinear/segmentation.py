@@ -32,15 +32,12 @@ from fmus.scale import Scale
 from ...predictors import Model, WeakWindows
 from ...predictors.ship_model import of_run
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
+from ...runs.cleaning import BRIEF
 from ..most_likely import ENOUGH, STEPS, ridge, rise
 
 # N, N, N m; of CyberShip Enterprise 1, times the scale of the ship. Chosen: what a fit leaves is less
 # only by the arithmetic, or where it has more columns than windows.
 FLOOR = np.array([1e-3, 1e-3, 3e-4])
-
-# s, times the scale of the ship: by which change points move, and between rows of the signals in which
-# waves are looked for; a few samples, a fifth of the distance of windows.
-CELL = 0.1
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -338,7 +335,7 @@ def problem(
     """
     ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + w.width) for w in data]
     scale = model.ship.scale
-    cell = CELL * scale.time
+    cell = BRIEF * scale.time  # by which change points move: a fifth of the distance of windows
     counts = [int(np.ceil((last - first) / cell)) for first, last in ends]
     # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
     turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T

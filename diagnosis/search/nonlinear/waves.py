@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
 from fmus.vessel.vessel import State
@@ -21,8 +19,8 @@ from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
 from ...runs import Motion, Run, Smoothed, without_commands
+from ...runs.cleaning import BRIEF
 from ..map_regression import REPLICATES
-from .segmentation import CELL
 
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
@@ -73,8 +71,8 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     if not left or not noise:
         return None
     time = model.ship.scale.time
-    frequency, segments = segments_of(left, CELL * time)
-    floor = segments_of(noise, CELL * time)[1].mean(axis=-1)
+    frequency, segments = segments_of(left, BRIEF * time)
+    floor = segments_of(noise, BRIEF * time)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
     white = np.mean([part[2] for part in parts], axis=0)
     follows = followed(frequency, floor, white, model.reference_mass)
@@ -103,7 +101,7 @@ def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what drawn noise makes of that, and its noise (3,)."""
-    run, time, step = smoothed.track.run, smoothed.time, CELL * smoothed.scale.time
+    run, time, step = smoothed.track.run, smoothed.time, BRIEF * smoothed.scale.time
     motion = without_commands(smoothed)
     error, noise = model_error(run, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
@@ -116,7 +114,9 @@ def _signals(
 
 def segments_of(parts: Sequence[np.ndarray], step: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (m,) [Hz], and spectra (m, 3, segments) of signals (n, 3), a row each ``step`` [s]."""
-    length = round(SEGMENT / CELL)
+    from scipy.signal import spectrogram  # only now: it takes a while to import
+
+    length = round(SEGMENT / BRIEF)
     found = [spectrogram(x, 1.0 / step, nperseg=length, axis=0, detrend="linear")[2] for x in parts]
     return np.fft.rfftfreq(length, step), np.concatenate(found, axis=-1)
 
@@ -132,6 +132,8 @@ def followed(
         white: (3,), spectrum of the noise of the measurement [m2/Hz, m2/Hz, rad2/Hz].
         mass: (3, 3), mass matrix by which accelerations are forces.
     """
+    from scipy.ndimage import median_filter
+
     level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
     whole = np.diag(mass) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
     share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
@@ -155,6 +157,9 @@ def peak(
         floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
         band, around: (m, 3), where a peak counts, and width of the spectrum around [Hz].
     """
+    from scipy.ndimage import median_filter
+    from scipy.signal import find_peaks
+
     width = 2 * int(around / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
@@ -187,7 +192,7 @@ def stretches(error: np.ndarray, time: np.ndarray, step: float) -> list[np.ndarr
     found = []
     for first, end in edges.reshape(-1, 2):
         even = np.arange(float(time[first]), float(time[end - 1]), step)
-        if even.size <= SEGMENT / CELL:  # one is lost by the difference
+        if even.size <= SEGMENT / BRIEF:  # one is lost by the difference
             continue
         # Means over each interval: what is quicker must not pass for something slow.
         sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)

@@ -20,6 +20,7 @@ from ...predictors.weak_form import EVERY, WIDTH, kernel
 # the weak form, a longer one a bias.
 TIMES = np.geomspace(0.2, 12.0, 25)
 POINTS = 301  # of the kernel's integrals; chosen, a twentieth of the shortest of these times apart
+GAUSS = 4  # points of the integral of the noise between two instants; chosen, exact to its 8th power
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,20 +94,18 @@ def covariance(motion: Linear, at_start: np.ndarray, push: Push) -> np.ndarray:
 
 
 def _steps(motion: Linear, push: Push) -> tuple[np.ndarray, np.ndarray]:
-    """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds.
-
-    Both are blocks of one exponential (C. F. Van Loan, Computing integrals involving the matrix
-    exponential, IEEE Transactions on Automatic Control 23, 1978).
-    """
+    """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds."""
     A = np.zeros((*motion.slope.shape[:2], 9, 9))
     A[..., :6, :6], A[..., 3:6, 6:] = motion.slope, motion.by_mass
     A[..., 6:, 6:] = -np.diag(1.0 / push.time)
-    noise = np.zeros_like(A)
-    noise[..., range(6, 9), range(6, 9)] = (2.0 * push.size**2 / push.time)[..., None, :]
-    both = np.block([[-A, noise], [np.zeros_like(A), np.swapaxes(A, -1, -2)]])
-    found = _exponential(motion.every * both)
-    over = np.swapaxes(found[..., 9:, 9:], -1, -2)
-    return over, over @ found[..., :9, 9:]
+    if not push.size.any():
+        return _exponential(motion.every * A), np.zeros_like(A)
+    rate = np.broadcast_to(2.0 * push.size**2 / push.time, (len(A), 3))[:, None, None]
+    added = np.zeros_like(A)
+    for x, weight in zip(*np.polynomial.legendre.leggauss(GAUSS), strict=True):
+        G = _exponential(0.5 * motion.every * (x + 1.0) * A)[..., 6:]
+        added += 0.5 * motion.every * weight * (G * rate) @ np.swapaxes(G, -1, -2)
+    return _exponential(motion.every * A), added
 
 
 def _exponential(A: np.ndarray) -> np.ndarray:
