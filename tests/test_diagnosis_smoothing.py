@@ -166,7 +166,7 @@ def test_smoothness_has_the_largest_likelihood():
     time = 0.02 * np.arange(1000)
     z = 1e3 + np.sin(time)[:, None] + 1e-3 * np.random.default_rng(0).standard_normal((1000, 3))
     spline = Spline(grid, basis(grid, time), np.ones((3, 400)), Rates.none(grid))
-    p = Problem(np.arange(1000), z, np.full(3, 1e-3), 160, spline)
+    p = Problem(np.arange(1000), z, np.full(3, 1e-3), np.ones((1000, 3)), 160, spline)
     best = likeliest(p, np.ones(1000))
     again = likeliest(p, np.ones(1000), 30.0 * best)
     np.testing.assert_allclose(again, best, rtol=1e-7)

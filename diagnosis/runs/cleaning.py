@@ -30,6 +30,8 @@ MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spike
 # s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
+PLACE, HEADING = slice(0, 2), slice(2, 3)  # channels of the pose, each of one receiver
+FEWEST = 4  # samples, without which there is no third difference
 DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
 # Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
@@ -51,9 +53,10 @@ class Track:
 
     Attributes:
         run: its rows in the order of time, rows without a time of their own left out.
-        pose: (n, 3), pose [m, m, rad], heading continuous over turns; NaN where it is not valid.
+        pose: (n, 3), pose [m, m, rad], heading continuous over turns; NaN where it is not fresh.
+        fresh: (n, 3), which channels were measured anew in each row.
         frozen: (n,), all three channels repeat the measurement before.
-        dropped: (n,), NaN, infinite, or all three zero.
+        dropped: (n,), no position: NaN, infinite, or all three zero.
         between: (n,), rows of a log between two measurements of a slower measurement system.
         period: of the measurement [s].
         out: rows left out, as their time stamp is missing, repeated or goes backwards.
@@ -63,6 +66,7 @@ class Track:
 
     run: Run
     pose: np.ndarray
+    fresh: np.ndarray
     frozen: np.ndarray
     dropped: np.ndarray
     between: np.ndarray
@@ -73,13 +77,20 @@ class Track:
 
     def rows(self, keep: np.ndarray) -> "Track":
         """The track with some of its rows (n,) alone."""
-        judged = {name: getattr(self, name)[keep] for name in ("pose", "frozen", "dropped", "between")}
+        judged = {
+            name: getattr(self, name)[keep] for name in ("pose", "fresh", "frozen", "dropped", "between")
+        }
         return replace(self, run=self.run.rows(keep), **judged)
 
     @cached_property
     def valid(self) -> np.ndarray:
-        """(n,), rows with a new measurement."""
-        return ~(self.frozen | self.dropped | self.between)
+        """(n,), rows with a new measurement of the position."""
+        return self.fresh[:, 0]
+
+    @cached_property
+    def rounding(self) -> np.ndarray:
+        """(n, 3), standard deviation by rounding [m, m, rad]."""
+        return self.run.coarse / 12.0**0.5
 
     @cached_property
     def silences(self) -> np.ndarray:
@@ -121,15 +132,16 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         notes.append(f"{out} rows left out: time missing, repeated or backwards")
         run = run.rows(kept)
     row, seconds = refuse_short(run, scale)
-    dropped = lost(run.pose)
-    repeats = repeated(run.pose, ~dropped)
-    fresh = np.flatnonzero(~dropped & ~repeats)
-    if fresh.size < 4:
+    gone = lost(run.pose)
+    seen, repeats, between = updates(run, PLACE, gone)
+    turned, _, lined = updates(run, HEADING, gone)
+    # Where no heading is near, a place tells nothing of surge and sway.
+    apart = max(WIDTH * scale.time, LONG * row)
+    dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
+    fresh = np.flatnonzero(seen & ~dropped)
+    if fresh.size < FEWEST or turned.sum() < FEWEST:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
-    between = np.zeros_like(repeats)
-    between[fresh] = filled(run.time[fresh], run.pose[fresh, :2])
-    if between.any():
-        fresh = fresh[~between[fresh]]
+    if between.any() or lined.any():
         notes.append("rows between two measurements were filled by straight lines: they do not count")
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
@@ -144,23 +156,28 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         between |= repeats & (run.time - last < period - 0.5 * row)
         until = run.time[fresh][np.minimum(after, fresh.size - 1)] - last
         # Rows are empty between two measurements if no other one was due meanwhile.
-        between |= np.isnan(run.pose).all(axis=1) & (until < 2.0 * period)
+        between |= np.isnan(run.pose[:, :2]).all(axis=1) & (until < 2.0 * period)
         dropped &= ~between
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
-    pose = np.where((dropped | repeats | between)[:, None], np.nan, run.pose)
-    refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
+    measured = np.column_stack([seen, seen, turned]) & np.column_stack([~dropped, ~dropped, ~gone])
+    pose = np.where(measured, run.pose, np.nan)
     gap = long_gap(period, scale)
-    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], gap)
-    reach = np.diff(np.quantile(pose[fresh], (0.1, 0.9), axis=0), axis=0)[0]
-    if not (reach > 6.0 * noise(pose[fresh])).any():
+    of_heading = np.flatnonzero(measured[:, 2])
+    turning = np.interp(run.time[fresh], run.time[of_heading], run.pose[of_heading, 2])
+    as_read = np.column_stack([run.pose[fresh, :2], turning])
+    refuse_units(run.time[fresh], as_read, where, anyway, run.called or {})
+    pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
+    channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
+    reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])
+    if not (reach > [6.0 * noise(values[:, None])[0] for values in channels]).any():
         raise InputError(f"{where} does not move: its pose is noise around a place")
     steps = np.diff(run.time[fresh])
     if many := int((steps > gap).sum()):
         begin = run.time[fresh][steps.argmax()] - run.time[0]
         longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
-    return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
+    return Track(run, pose, measured, frozen, dropped, between, period, out, tuple(notes), scale)
 
 
 def long_gap(period: float, scale: Scale) -> float:
@@ -212,6 +229,43 @@ def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 def lost(pose: np.ndarray) -> np.ndarray:
     """(n,): where a pose (n, 3) is no measurement: NaN, infinite, or all zero."""
     return ~np.isfinite(pose).all(axis=1) | (pose == 0.0).all(axis=1)
+
+
+def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows in which channels of the pose of a run were measured, held, or filled by straight lines.
+
+    A value that repeats is no new sample, unless it would repeat by rounding alone: then the steps
+    between values are those of the rounding.
+
+    Args:
+        run: its rows in order.
+        channels: of the pose, of one receiver.
+        gone: (n,), rows that hold no pose.
+
+    Returns:
+        Three arrays (n,).
+    """
+    values, coarse = run.pose[:, channels], run.coarse[:, channels]
+    there = np.isfinite(values).all(axis=1) & ~gone
+    repeats = repeated(values, there)
+    rows = np.flatnonzero(there & ~repeats)
+    step = (np.abs(np.diff(values[rows], axis=0)) > 1.5 * coarse[rows[1:]]).any(axis=1)
+    after = np.searchsorted(rows, np.flatnonzero(repeats))  # the value that follows, where there is one
+    if after.size and step.size:
+        by_step = step[np.minimum(after, step.size) - 1]
+        if not by_step.mean() > 0.5:
+            repeats[repeats] = by_step
+    rows = np.flatnonzero(there & ~repeats)
+    between = np.zeros_like(there)
+    between[rows] = filled(run.time[rows], values[rows])
+    return there & ~repeats & ~between, repeats, between
+
+
+def near(time: np.ndarray, there: np.ndarray, apart: float) -> np.ndarray:
+    """(n,): which times (n,) [s] are at most ``apart`` [s] from one of those that are there (n,)."""
+    known = np.concatenate([[-np.inf], time[there], [np.inf]])
+    after = np.searchsorted(known, time)
+    return np.minimum(time - known[after - 1], known[after] - time) <= apart
 
 
 def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:

@@ -35,7 +35,8 @@ def thinned(track: Track) -> Track:
     pose = _by(part, seen).median().to_numpy()
     moved = np.nan_to_num(np.gradient(pose, time, axis=0))[part] * (run.time - time[part])[:, None]
     pose = _by(part, seen - moved).median().to_numpy()
-    gone = np.isnan(pose).any(axis=1)
+    fresh = ~np.isnan(pose)
+    gone = ~fresh[:, 0]
     frozen = gone & _by(part, track.frozen).max().to_numpy()[:, 0]
     dropped = gone & ~frozen & _by(part, track.dropped).max().to_numpy()[:, 0]
     commands = {
@@ -51,8 +52,9 @@ def thinned(track: Track) -> Track:
         "medians of the pose, means of the commands"
     )
     return Track(
-        replace(run, time=time, pose=pose, held=held, measured=measured, **commands),
+        replace(run, time=time, pose=pose, resolution=None, held=held, measured=measured, **commands),
         pose,
+        fresh,
         frozen,
         dropped,
         gone & ~frozen & ~dropped,

@@ -35,6 +35,7 @@ from ..columns.columns import (
 )
 from ..columns.unit_check import LARGEST, UNITS
 from .matlab_files import fits_matlab, read_matlab
+from .resolution import resolution
 from .tables import column_names, date_stamps, numbers, table_of_file
 
 LOGS = ("log.csv", "log.parquet")
@@ -63,6 +64,7 @@ class Run:
         noise: signal -> standard deviation that the file beside tells [SI].
         ship: that was measured; None: the default ship.
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
+        resolution: (n, 3), step to which the pose is rounded in the file [m, m, rad]; None: not at all.
     """
 
     name: str
@@ -81,6 +83,12 @@ class Run:
     noise: Mapping[str, float] = field(default_factory=dict)
     ship: Description | None = None
     trial: str | None = None
+    resolution: np.ndarray | None = None
+
+    @property
+    def coarse(self) -> np.ndarray:
+        """(n, 3), step to which the pose is rounded [m, m, rad], zero where it is not."""
+        return np.zeros_like(self.pose) if self.resolution is None else self.resolution
 
     @property
     def commanded(self) -> dict[str, np.ndarray]:
@@ -178,19 +186,25 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
     columns, noise, called, quantity = {}, {}, {}, quantities(of)
+    steps: dict[str, np.ndarray] = {}
     for signal in signals(layout, list(table.columns), where, of):
         column = layout.column(signal)
         cells = table[column.name]
         values = date_stamps(cells, f"'{path}'") if signal == "time" else None
         if values is None:
-            values = to_si(numbers(cells, path, layout), signal, column, quantity[signal])
+            read = numbers(cells, path, layout)
+            values = to_si(read, signal, column, quantity[signal])
+            if signal in POSE:
+                unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
+                steps[signal] = resolution(read) * abs(column.factor) * unit
         columns[signal] = values
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
         if column.name != signal:
             called[signal] = column.name
     run = _run(name, columns, where, of)
-    return replace(run, called=called or None, noise=noise, trial=layout.trial)
+    rounded = np.column_stack([steps[name] for name in POSE])
+    return replace(run, called=called or None, noise=noise, trial=layout.trial, resolution=rounded)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:

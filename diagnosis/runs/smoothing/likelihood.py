@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.optimize import toms748
 
-from .penalised import JERK, Equations, Problem, System, solve
+from .penalised import JERK, POSE, Equations, Problem, System, solve
 from .spline import third
 
 # Of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise (chosen).
@@ -33,7 +33,7 @@ DECADES = 8.0
 
 
 def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
-    """The smoothness (3,) with the largest restricted likelihood, for weights (n,) of the samples.
+    """The smoothness (3,) with the largest restricted likelihood, for weights (n, 3) of the samples.
 
     The search begins near a smoothness (3,), 1 by default.
     """
@@ -49,7 +49,7 @@ def deviance(p: Problem, weights: np.ndarray, smoothness: np.ndarray) -> float:
 
 
 def criteria(p: Problem, weights: np.ndarray) -> list["Criterion"]:
-    """-2 log L of each channel, for weights (n,) of the samples."""
+    """-2 log L of each channel, for weights (n, 3) of the samples."""
     return [Criterion(p, k, e) for k, e in enumerate(p.equations(weights))]
 
 
@@ -84,6 +84,17 @@ class Criterion:
             raise LinAlgError("the likelihood of its smoothness is not finite")
         return float(np.log(found / expected)) if found > 0.0 else -np.inf
 
+    def variance(self, decades: float) -> float:
+        """Likeliest variance of the noise, in units of the present one, all else given.
+
+        The sum of squares over the degrees of freedom that the spline leaves: there d(-2 log L) / d sigma
+        is zero.
+        """
+        system, off = self._solved(decades)
+        e = self._equations
+        of_pose = off[e.group == POSE]
+        return float(np.sum(of_pose**2)) / max(float(e.counts[POSE]) - system.trace(POSE), 1.0)
+
     def minimum(self, near: float) -> float:
         """Where it is least [decades]; searched downhill from nearby.
 
@@ -110,7 +121,7 @@ def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Prob
     """A problem with its penalty adapted to the jerk, and the likeliest smoothness (3,) then.
 
     The weight of each interval is the inverse of the local mean square of the jerk that a fit has, which
-    begins with an even penalty and its likeliest smoothness. Samples have weights (n,).
+    begins with an even penalty and its likeliest smoothness. Samples have weights (n, 3).
     """
     for _ in range(ROUNDS):
         square = third(p.spline.grid, solve(p, smoothness, weights).coefficients) ** 2
@@ -118,6 +129,27 @@ def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Prob
         local = running_mean(square, p.average)
         share = (local / mean + LEAST_JERK) / (1.0 + LEAST_JERK)
         p = p.adapted(stiffness=1.0 / share.T)
+        smoothness = likeliest(p, weights, smoothness)
+    return p, smoothness
+
+
+def with_noise(
+    p: Problem, smoothness: np.ndarray, weights: np.ndarray, least: np.ndarray
+) -> tuple[Problem, np.ndarray]:
+    """A problem with the likeliest noise, and its smoothness (3,) then; both in turn.
+
+    Args:
+        p: the problem, with a first guess.
+        smoothness: (3,), the likeliest with that.
+        weights: (n, 3), of the samples.
+        least: (3,), the noise is no smaller [m, m, rad]; infinite where it is given.
+    """
+    for _ in range(ROUNDS):
+        decades = np.log10(smoothness).tolist()
+        ratio = [c.variance(x) for c, x in zip(criteria(p, weights), decades, strict=True)]
+        sigma = np.where(np.isinf(least), p.sigma, np.maximum(p.sigma * np.sqrt(ratio), least))
+        smoothness = smoothness * (sigma / p.sigma) ** 2
+        p = p._replace(sigma=sigma)
         smoothness = likeliest(p, weights, smoothness)
     return p, smoothness
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from ..cleaning import Z95
 from ..sensors.evidence import FAR
-from .likelihood import adapt, likeliest
-from .penalised import Problem, solve
+from .likelihood import adapt, likeliest, with_noise
+from .penalised import Fit, Problem, solve
 from .spline import WIDTH
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
@@ -25,9 +25,9 @@ class Inliers(NamedTuple):
     """Which samples are no outliers, and the splines through them.
 
     Attributes:
-        problem: with its penalty adapted to the jerk.
+        problem: with the likeliest noise, and its penalty adapted to the jerk.
         smoothness: (3,), of its splines.
-        weights: (n,), 0 for an outlier, else 1.
+        weights: (n, 3), 0 for an outlier, else 1.
         even: (3,), smoothness with an even penalty.
     """
 
@@ -37,42 +37,48 @@ class Inliers(NamedTuple):
     even: np.ndarray
 
 
-def robust(p: Problem, local: np.ndarray) -> Inliers:
-    """Which samples are no outliers, and the smoothness of the spline through them.
+def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
+    """Which samples are no outliers, their noise, and the smoothness of the spline through them.
 
     The problem has an even penalty. With a local smoothness (3,) its spline follows a few samples, and
     outliers stick out.
+
+    Args:
+        p: with a first guess of the noise.
+        local: (3,), smoothness.
+        least: (3,), see :func:`.likelihood.with_noise`.
 
     Raises:
         TooFewError: in some stretch.
     """
     weights = outlier_test(p, local, robust_weights(p, local))
-    even = likeliest(p, weights)
+    p, even = with_noise(p, likeliest(p, weights), weights, least)
     p, smoothness = adapt(p, even, weights)
     return Inliers(p, smoothness, outlier_test(p, smoothness, weights), even)
 
 
 def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:
-    """Weights (n,) by iterative reweighting of Huber's M-estimator (1964): 1, and Z95 / |r| far off.
+    """Weights (n, 3) by iterative reweighting of Huber's M-estimator (1964): 1, and Z95 / |r| far off.
 
     It ends when the same samples are far off, as the outlier test follows.
     """
-    far = FAR * np.maximum(np.quantile(np.abs(p.z), 0.9, axis=0), p.sigma)
-    weights, same = (far / np.maximum(np.abs(p.z), far)).min(axis=1), np.zeros(0)
+    given = np.where(p.share > 0.0, np.abs(p.z), np.nan)
+    far = FAR * np.maximum(np.nanquantile(given, 0.9, axis=0), p.sigma)
+    weights, same = far / np.maximum(np.abs(p.z), far), np.zeros(0)
     for _ in range(REWEIGHTINGS):
-        off = np.abs(p.z - p.spline.b(solve(p, smoothness, weights).coefficients)) / p.sigma
-        weights = Z95 / np.maximum(off.max(axis=1), Z95)
-        before, same = same, np.flatnonzero(off.max(axis=1) > OUTLIER)
+        off = _deviations(p, solve(p, smoothness, weights))
+        weights = Z95 / np.maximum(off, Z95)
+        before, same = same, np.flatnonzero(off > OUTLIER)
         if np.array_equal(before, same):
             break
-    return weights
+    return _of_receivers(weights)
 
 
 def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """1 for each sample that agrees with all the others, 0 for an outlier, (n,).
+    """1 for each sample that agrees with all the others, 0 for an outlier, (n, 3).
 
     A sample that had a weight is compared with the fit without it: its deleted residual and the variance
-    of that follow from the fit with it and its leverage.
+    of that follow from the fit with it and its leverage. North and east are one sample.
 
     Raises:
         TooFewError: in some stretch.
@@ -81,15 +87,27 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
     stretch = np.searchsorted(p.spline.grid.first, b.first, side="right") - 1
     for _ in range(REWEIGHTINGS):
         fit = solve(p, smoothness, weights)
-        spread = b.variance(fit.covariance) / p.sigma**2
-        off = np.abs(p.z - b(fit.coefficients)) / p.sigma
-        leverage = np.minimum(weights[:, None] * spread, 0.999)
+        spread = p.share * b.variance(fit.covariance) / p.sigma**2
+        off = _deviations(p, fit)
+        leverage = np.minimum(weights * spread, 0.999)
         expected = np.where(leverage > 0.0, np.sqrt(1.0 - leverage), np.sqrt(1.0 + spread))
-        kept = (off <= OUTLIER * expected).all(axis=1).astype(float)
+        kept = _of_receivers((off <= OUTLIER * expected).astype(float))
         if (kept == weights).all():
             break
-        few = np.bincount(stretch, kept) < WIDTH  # a spline of degree 5 follows any six
+        agree = np.array([np.bincount(stretch, seen) for seen in (kept * (p.share > 0.0)).T])
+        few = (agree < WIDTH).any(axis=0)  # a spline of degree 5 follows any six
         if few.any():
             raise TooFewError(p.rows[few[stretch]])
         weights = kept
     return weights
+
+
+def _deviations(p: Problem, fit: Fit) -> np.ndarray:
+    """(n, 3), how far samples are from a fit, in their standard deviations."""
+    return np.sqrt(p.share) * np.abs(p.z - p.spline.b(fit.coefficients)) / p.sigma
+
+
+def _of_receivers(weights: np.ndarray) -> np.ndarray:
+    """Weights (n, 3) of which north and east, from one receiver, share the smaller one."""
+    position = weights[:, :2].min(axis=1)
+    return np.column_stack([position, position, weights[:, 2]])

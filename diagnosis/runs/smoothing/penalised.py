@@ -159,6 +159,7 @@ class Problem(NamedTuple):
         rows: (n,), indices of the measurements among the rows of the run.
         z: (n, 3), measurements about their median [m, m, rad].
         sigma: (3,), standard deviation of the noise [m, m, rad].
+        share: (n, 3), precision of each measurement, of that of this noise; 0 where none was made.
         average: intervals over which the squared jerk is averaged, where the penalty is adapted to it.
         spline: the splines.
     """
@@ -166,6 +167,7 @@ class Problem(NamedTuple):
     rows: np.ndarray
     z: np.ndarray
     sigma: np.ndarray
+    share: np.ndarray
     average: int
     spline: Spline
 
@@ -179,15 +181,16 @@ class Problem(NamedTuple):
         return np.vstack([z, rates, np.zeros((self.spline.grid.rank, z.shape[1]))])
 
     def equations(self, weights: np.ndarray) -> list[Equations]:
-        """Those of each channel, in standard deviations of the pose, for weights (n,) of the samples."""
-        rates, of_pose = self.spline.rates, self.spline.b.gram(weights)
+        """Those of each channel, in standard deviations of the pose, for weights (n, 3) of samples."""
+        rates, weights = self.spline.rates, weights * self.share
         of_rates, found = rates.b.gram(np.ones(len(rates.z))), []
         for k, (matrix, turned, penalty) in enumerate(self.spline.parts):
             share = float(self.sigma[k] / rates.sigma[k])
-            many, rank = weights.size + len(rates.z), self.spline.grid.rank
-            root = np.concatenate([np.sqrt(weights), np.full(len(rates.z), share), np.ones(rank)])
-            group = np.repeat([POSE, JERK], [many, rank])
-            normals = np.array([of_pose + share**2 * of_rates, penalty])
+            rows, rank = len(weights) + len(rates.z), self.spline.grid.rank
+            root = np.concatenate([np.sqrt(weights[:, k]), np.full(len(rates.z), share), np.ones(rank)])
+            group = np.repeat([POSE, JERK], [rows, rank])
+            normals = np.array([self.spline.b.gram(weights[:, k]) + share**2 * of_rates, penalty])
+            many = np.count_nonzero(weights[:, k]) + (len(rates.z) if share else 0)
             found.append(Equations(matrix, turned, root, group, normals, np.array([many, rank])))
         return found
 
@@ -214,7 +217,7 @@ class Fit(NamedTuple):
 
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
-    """The smoothing spline of each channel, for weights (n,) of the samples."""
+    """The smoothing spline of each channel, for weights (n, 3) of the samples."""
     systems = [
         System(e, p.precision(k, float(smoothness[k]))) for k, e in enumerate(p.equations(weights))
     ]

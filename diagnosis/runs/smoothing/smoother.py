@@ -1,9 +1,9 @@
 """Pose, velocity and acceleration of a measured run without any model of the ship.
 
 Each channel is modelled as a process driven by the commands (:mod:`.command_response`) and by white
-jerk, measured with white noise. The noise is estimated from third differences, the spectral density of
-the jerk by restricted maximum likelihood, and how it varies over time from the jerk that is found
-(:mod:`.likelihood`). A sample further than five standard deviations from its prediction by all others
+jerk, measured with white noise at the times at which that channel was updated. The noise is given, or
+estimated with the spectral density of the jerk by restricted maximum likelihood; how that varies over
+time follows from the jerk that is found (:mod:`.likelihood`). A sample further than five standard deviations from its prediction by all others
 is a spike.
 """
 
@@ -18,7 +18,8 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import BRIEF, HORIZON, LONG, WIDTH, Counts, Track, noise
+from ..cleaning import BRIEF, DIGITS, HORIZON, LONG, WIDTH, Counts, Track, noise
+from ..columns.columns import POSE
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
@@ -43,12 +44,14 @@ class PoseOnly(NamedTuple):
 
     Attributes:
         rows: of the run, that are tried.
-        weights: of those in a stretch: 1, and 0 for a spike.
+        weights: (n, 3), of those in a stretch: 1, and 0 for a spike.
+        sigma: (3,), noise.
         stiffness, smoothness: (3, intervals) and (3,), see :mod:`.penalised`.
     """
 
     rows: np.ndarray
     weights: np.ndarray
+    sigma: np.ndarray
     stiffness: np.ndarray
     smoothness: np.ndarray
 
@@ -67,8 +70,9 @@ class Smoothed:
     """A smoothed run. All arrays (n, 3) are NaN where too much is missing.
 
     Attributes:
-        track: the run with its samples judged.
-        spikes: (n,), samples refused by the outlier test.
+        track: the run with its samples judged; a heading that was not measured with a position, or is a
+            spike, is the smoothed one.
+        spikes: (n,), samples of the position refused by the outlier test.
         eta, eta_dot, eta_ddot: pose, heading continuous, and derivatives [m, m, rad; /s; /s2].
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
@@ -153,10 +157,10 @@ def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
         run: a smoothed run.
         pose: (n, 3), in place of the run's; the spline is as stiff as that of the run.
     """
-    rows, weights, stiffness, smoothness = run.pose_only
+    rows, weights, sigma, stiffness, smoothness = run.pose_only
     track = run.track if pose is None else replace(run.track, pose=pose)
     p, origin = _problem(track, rows)
-    p = p.adapted(stiffness=stiffness)
+    p = p._replace(sigma=sigma).adapted(stiffness=stiffness)
     grid, time = p.spline.grid, run.time - run.time[0]
     where = within(grid, time)
     coefficients = solve(p, smoothness, weights).coefficients
@@ -176,26 +180,50 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     time, scale = track.run.time - track.run.time[0], track.scale
     with np.errstate(over="ignore"):  # of poses that are no place on earth
         origin = np.nanmedian(track.pose, axis=0)
-    grid = knots(*stretches(rows, track), max(SPACING * scale.time, track.period))
+    spacing = max(SPACING * scale.time, float(np.median(np.diff(time[rows]))))
+    grid = knots(*stretches(rows[track.valid[rows]], track), spacing)
     dense = rows[within(grid, time[rows])]
     z = track.pose[dense] - origin
-    sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
+    given, least = given_noise(track), least_noise(track)
+    guess = [noise(z[there, k : k + 1])[0] for k, there in enumerate(track.fresh[dense].T)]
+    sigma = np.where(np.isnan(given), np.maximum(guess, least), given)
+    share = np.where(track.fresh[dense], _share(track, sigma, dense), 0.0)
     stiffness = np.ones((3, int(grid.intervals.sum())))
     # The squared jerk is averaged over a prediction window.
     average = max(1, round(HORIZON * scale.time / grid.spacing))
     spline = Spline(grid, basis(grid, time[dense]), stiffness, Rates.none(grid))
-    return Problem(dense, z, sigma, average, spline), origin
+    return Problem(dense, np.where(share > 0.0, z, 0.0), sigma, share, average, spline), origin
+
+
+def given_noise(track: Track) -> np.ndarray:
+    """(3,), standard deviations of the pose that the file states [m, m, rad]; NaN where it does not."""
+    return np.array([track.run.noise.get(name, np.nan) for name in POSE])
+
+
+def least_noise(track: Track) -> np.ndarray:
+    """(3,), standard deviation by rounding of the pose, or the least that is believed [m, m, rad]."""
+    least = np.multiply(LEAST_NOISE, (track.scale.length, track.scale.length, 1.0))
+    return np.maximum(least, np.median(track.rounding, axis=0))
+
+
+def _share(track: Track, sigma: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(n, 3), precision of rows by that of noise (3,): less where rounding grows with the value."""
+    more = track.rounding[rows] ** 2 - np.median(track.rounding, axis=0) ** 2
+    return 1.0 / np.maximum(1.0 + more / sigma**2, DIGITS)
 
 
 def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
     """Rows of a run in stretches that agree, their problem and origin, and the splines through them."""
-    rows = np.flatnonzero(track.valid)
+    rows, time = np.flatnonzero(track.fresh.any(axis=1)), track.run.time
+    least = np.where(np.isnan(given_noise(track)), least_noise(track), np.inf)
     while True:
         even, origin = _problem(track, rows)
         # A spline that follows a few samples: its time constant is two sampling periods.
-        local = np.full(3, 2.0 * (2.0 * track.period / even.spline.grid.spacing) ** DEGREE)
+        periods = [np.median(np.diff(time[there])) for there in track.fresh.T]
+        local = 2.0 * (2.0 * np.array(periods) / even.spline.grid.spacing) ** DEGREE
         try:
-            return rows, even, origin, robust(even, local)
+            alone = robust(even, local, least)
+            return rows, even._replace(sigma=alone.problem.sigma), origin, alone
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
 
@@ -205,7 +233,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     rows, even, origin, alone = _judged(track)
     p, smoothness, weights, _ = alone
     grid, dense, sigma = even.spline.grid, even.rows, even.sigma
-    pose_only = PoseOnly(rows, weights, p.spline.stiffness, smoothness)
+    pose_only = PoseOnly(rows, weights, sigma, p.spline.stiffness, smoothness)
     inside = within(grid, time)
     bases = [basis(grid, time[inside], k) for k in range(3)]
     fit = solve(p, smoothness, weights)
@@ -222,11 +250,14 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
-    spikes = track.valid.copy()
+    spikes = track.valid.copy()  # those of parts that agree with nothing
     spikes[rows] = False
-    spikes[dense] = weights == 0.0
+    spikes[dense] = track.valid[dense] & (weights[:, 0] == 0.0)
     known = zip(bases, response[:3], strict=True)
     motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
+    measured = np.zeros_like(track.fresh)
+    measured[dense] = (weights > 0.0) & track.fresh[dense]
+    track = replace(track, pose=np.where(measured | ~track.valid[:, None], track.pose, motion.eta))
     eta_std, eta_dot_std, eta_ddot_std = (spread(np.sqrt(b.variance(covariance)), inside) for b in bases)
     return Smoothed(
         track,
