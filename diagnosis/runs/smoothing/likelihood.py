@@ -87,8 +87,8 @@ class Criterion:
     def variance(self, decades: float) -> float:
         """Likeliest variance of the noise, in units of the present one, all else given.
 
-        The sum of squares over the degrees of freedom that the spline leaves: there d(-2 log L) / d sigma
-        is zero.
+        The sum of squares over the degrees of freedom that the spline leaves: d(-2 log L) / d sigma is
+        zero there.
         """
         system, off = self._solved(decades)
         e = self._equations

@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cleaning import Z95
+from ..cleaning import CHANCE, Z95
 from ..sensors.evidence import FAR
 from .likelihood import adapt, likeliest, with_noise
 from .penalised import Fit, Problem, solve
 from .spline import WIDTH
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
-REWEIGHTINGS = 10  # most rounds of reweighting, and of the outlier test; two or three are the rule
+REWEIGHTINGS = 10  # most rounds of reweighting, and of each test; two or three are the rule
 
 
 class TooFewError(Exception):
@@ -52,9 +52,13 @@ def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
         TooFewError: in some stretch.
     """
     weights = outlier_test(p, local, robust_weights(p, local))
-    p, even = with_noise(p, likeliest(p, weights), weights, least)
-    p, smoothness = adapt(p, even, weights)
-    return Inliers(p, smoothness, outlier_test(p, smoothness, weights), even)
+    for _ in range(REWEIGHTINGS):
+        p, even = with_noise(p, likeliest(p, weights), weights, least)
+        adapted, smoothness = adapt(p, even, weights)
+        before, weights = weights, outlier_test(adapted, smoothness, weights)
+        if np.mean(weights != before) < CHANCE:
+            break
+    return Inliers(adapted, smoothness, weights, even)
 
 
 def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:

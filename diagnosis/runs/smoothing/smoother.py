@@ -3,8 +3,8 @@
 Each channel is modelled as a process driven by the commands (:mod:`.command_response`) and by white
 jerk, measured with white noise at the times at which that channel was updated. The noise is given, or
 estimated with the spectral density of the jerk by restricted maximum likelihood; how that varies over
-time follows from the jerk that is found (:mod:`.likelihood`). A sample further than five standard deviations from its prediction by all others
-is a spike.
+time follows from the jerk that is found (:mod:`.likelihood`). A sample further than five standard
+deviations from its prediction by all others is a spike.
 """
 
 from collections.abc import Mapping
