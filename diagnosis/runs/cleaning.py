@@ -132,7 +132,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         notes.append(f"{out} rows left out: time missing, repeated or backwards")
         run = run.rows(kept)
     row, seconds = refuse_short(run, scale)
-    gone = lost(run.pose)
+    gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
     turned, _, lined = updates(run, HEADING, gone)
     # Where no heading is near, a place tells nothing of surge and sway.
@@ -246,6 +246,8 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
         Three arrays (n,).
     """
     values, coarse = run.pose[:, channels], run.coarse[:, channels]
+    if channels == HEADING:
+        values = np.unwrap(np.nan_to_num(values), axis=0) + 0.0 * values  # NaN where it was
     there = np.isfinite(values).all(axis=1) & ~gone
     repeats = repeated(values, there)
     rows = np.flatnonzero(there & ~repeats)
@@ -257,7 +259,7 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
             repeats[repeats] = by_step
     rows = np.flatnonzero(there & ~repeats)
     between = np.zeros_like(there)
-    between[rows] = filled(run.time[rows], values[rows])
+    between[rows] = filled(run.time[rows], values[rows], float(coarse.max(initial=0.0)))
     return there & ~repeats & ~between, repeats, between
 
 

@@ -15,7 +15,7 @@ from cosim import InputError
 from fmus.scale import Scale
 from fmus.ship import Ship, ship
 
-from .cleaning import MOST_WRONG, Track, clean, refuse_short
+from .cleaning import Track, clean, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
 from .sensors.further_channels import accelerations, receivers, through_water
@@ -55,7 +55,7 @@ class PreparedRun:
         """
         found = smooth(self.track, agreeing=self.sensors.agreeing)
         fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
-        if spikes > MOST_WRONG * fresh and not self.anyway:
+        if 2 * spikes > fresh and not self.anyway:
             raise InputError(
                 f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
                 "than five standard deviations from where all others say the ship is: something is "

@@ -10,25 +10,32 @@ import numpy as np
 # normal noise in two channels one row in two thousand is on a line by chance then. Chosen.
 ON_LINE = 0.03
 FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
+KINK = 2  # rows about a telegram that are on no line
 LONGEST = 8  # rows in a line that is no ship's steady motion without noise (chosen)
 
 
-def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
+def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndarray:
     """(n,): rows that a straight line between two measurements has filled; none in most logs.
 
-    Of the two rows about a telegram the one nearer to it stays. Times (n,) [s] are in order, positions
-    (n, 2) [m] finite.
+    Of the two rows about a telegram the one nearer to it stays.
+
+    Args:
+        time: (n,) [s], in order.
+        position: (n, k), channels of one receiver, finite.
+        step: to which they are rounded.
     """
     none = np.zeros(time.size, bool)
     if time.size < 2 * LONGEST:
         return none
     share = (np.diff(time)[:-1] / (time[2:] - time[:-2]))[:, None]
     off = np.abs(position[1:-1] - position[:-2] - share * (position[2:] - position[:-2])).max(axis=1)
-    rounding = max(_rounding(channel) for channel in position.T)
+    rounding = 1.05 * max(step, float(np.sqrt(np.finfo(float).eps) * np.ptp(position, axis=0).max()))
     on = none.copy()
     on[1:-1] = off <= rounding
-    too_long = np.mean([end - begin > LONGEST for begin, end in groups_of(on)] or [False]) > 0.1
-    if rounding > ON_LINE * np.quantile(off, 0.9) or on.mean() < FEWEST or too_long:
+    # A long line is a ship's steady motion, unless what is on no line are single kinks.
+    too_long = _often(on, LONGEST) and _often(~on[1:-1], KINK)
+    kinks = off[~on[1:-1]]
+    if not kinks.size or rounding > ON_LINE * np.median(kinks) or on.mean() < FEWEST or too_long:
         return none
     first = np.flatnonzero(~on & np.concatenate([[True], on[:-1]]))  # of each block of rows on no line
     rows = np.flatnonzero(~on)
@@ -38,18 +45,17 @@ def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
     slope = np.diff(position, axis=0) / np.diff(time)[:, None]
     before, after = slope[pair - 1], slope[pair + 1]
     channel = np.abs(before - after).argmax(axis=1)[:, None]
-    step = position[pair + 1] - position[pair] - after * (time[pair + 1] - time[pair])[:, None]
-    kink = np.take_along_axis(step, channel, 1) / np.take_along_axis(before - after, channel, 1)
+    ahead = position[pair + 1] - position[pair] - after * (time[pair + 1] - time[pair])[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):  # of lines that meet at no angle
+        kink = np.take_along_axis(ahead, channel, 1) / np.take_along_axis(before - after, channel, 1)
     nearer = kink[:, 0] < 0.5 * (time[pair + 1] - time[pair])
     on[np.where(nearer, pair + 1, pair)] = True
     return on
 
 
-def _rounding(values: np.ndarray) -> float:
-    """How far from a line rounding takes a row [m]: the step between values, and a little for digits."""
-    steps = np.diff(np.unique(values))
-    fuzz = float(np.sqrt(np.finfo(float).eps) * np.ptp(values))
-    return 1.05 * float(min(steps[steps > fuzz], default=fuzz))
+def _often(mask: np.ndarray, longest: int) -> bool:
+    """Whether more than a tenth of the groups of true values (n,) are longer than ``longest``."""
+    return bool(np.mean([end - begin > longest for begin, end in groups_of(mask)] or [False]) > 0.1)
 
 
 def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:

@@ -75,7 +75,7 @@ def evidence(run: Run) -> Evidence | None:
     if fresh.size < FEWEST:
         return None
     between = np.zeros(run.time.size, bool)
-    between[fresh] = filled(run.time[fresh], run.pose[fresh, :2])
+    between[fresh] = filled(run.time[fresh], run.pose[fresh, :2], float(run.coarse[:, :2].max()))
     rows = fresh[~between[fresh]]
     psi = np.interp(run.time, run.time[fresh], np.unwrap(run.pose[fresh, 2]))
     by = next((pair for pair in VELOCITIES if all(_given(run, name) for name in pair)), None)

@@ -8,10 +8,12 @@ from ..cleaning import CHANCE, Z95
 from ..sensors.evidence import FAR
 from .likelihood import adapt, likeliest, with_noise
 from .penalised import Fit, Problem, solve
-from .spline import WIDTH
+from .spline import DEGREE, WIDTH
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
 REWEIGHTINGS = 10  # most rounds of reweighting, and of each test; two or three are the rule
+
+HALVINGS = 4  # of the time constant of the first spline: to an eighth of a sampling period (chosen)
 
 
 class TooFewError(Exception):
@@ -40,18 +42,25 @@ class Inliers(NamedTuple):
 def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
     """Which samples are no outliers, their noise, and the smoothness of the spline through them.
 
-    The problem has an even penalty. With a local smoothness (3,) its spline follows a few samples, and
-    outliers stick out.
+    The problem has an even penalty. With a local smoothness its spline follows a few samples, and
+    outliers stick out; most samples do not, or its time constant is halved.
 
     Args:
         p: with a first guess of the noise.
-        local: (3,), smoothness.
+        local: (3,), smoothness to begin with.
         least: (3,), see :func:`.likelihood.with_noise`.
 
     Raises:
         TooFewError: in some stretch.
     """
-    weights = outlier_test(p, local, robust_weights(p, local))
+    for _ in range(HALVINGS):
+        weights = robust_weights(p, local)
+        outside = (weights < Z95 / OUTLIER) & (p.share > 0.0)
+        slow = 2 * np.count_nonzero(outside, axis=0) > np.count_nonzero(p.share, axis=0)
+        if not slow.any():
+            break
+        local = np.where(slow, local / 2.0**DEGREE, local)
+    weights = outlier_test(p, local, weights)
     for _ in range(REWEIGHTINGS):
         p, even = with_noise(p, likeliest(p, weights), weights, least)
         adapted, smoothness = adapt(p, even, weights)

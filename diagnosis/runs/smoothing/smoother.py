@@ -18,7 +18,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import BRIEF, DIGITS, HORIZON, LONG, WIDTH, Counts, Track, noise
+from ..cleaning import BRIEF, HORIZON, LONG, WIDTH, Counts, Track, noise
 from ..columns.columns import POSE
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
@@ -209,7 +209,7 @@ def least_noise(track: Track) -> np.ndarray:
 def _share(track: Track, sigma: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """(n, 3), precision of rows by that of noise (3,): less where rounding grows with the value."""
     more = track.rounding[rows] ** 2 - np.median(track.rounding, axis=0) ** 2
-    return 1.0 / np.maximum(1.0 + more / sigma**2, DIGITS)
+    return 1.0 / (1.0 + np.maximum(more, 0.0) / sigma**2)
 
 
 def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:

@@ -1,0 +1,98 @@
+"""How logs are read as others record them: ``python -m benchmarks.logs GOOD [--ship NAME]``.
+
+GOOD is a good log. It is recorded in some 60 ways: slower than its file, held or interpolated, filtered,
+rounded, with outliers, jumps of the clock, and a noise that is stated rightly or wrongly. Of each way:
+whether it is refused, the noise that is found over the one there is, and, with ``--learn``, the verdict
+and the error of the learned model on another good log, beside those of the good log itself.
+"""
+
+import argparse
+import json
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.predictors import ship_with
+from diagnosis.runs import prepare, table_of
+
+from .recorded import SURE, Good, Recorded, recorded
+from .ways import POSE, WAYS
+
+CLEAN = "clean"
+WITHIN = 0.3  # of the noise that there is; issue: the estimate counts as right
+
+
+def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
+    """A good log without channels beside pose and commands; stretches without a pose are cut off."""
+    craft = ship_with((), ship)
+    prepared = prepare(path, craft)
+    s = prepared.smoothed
+    run = s.track.run.rows(s.used)
+    table = table_of(run)[["time", *POSE, *run.commanded]]
+    table["time"] -= table["time"].iloc[0]
+    return Good(table, s.noise, ship, test)
+
+
+def line(o: Recorded, clean: Recorded | None) -> str:
+    """A row of the table that is printed."""
+    ratio = " ".join("-" if np.isnan(r) else f"{r:.2f}" for r in o.noise)
+    told = ", ".join(f"{e} {'-' if c is None else f'{c:.2f}'}" for e, c in o.found.items())
+    error = f"{o.error / clean.error:.2f}" if clean is not None and o.error > 0.0 else "-"
+    return f"| {o.way} | {o.refused or ratio} | {o.verdict} {told} | {error} | {o.seconds:.0f} |"
+
+
+def summary(found: Sequence[Recorded]) -> str:
+    """What there is to say of all ways together."""
+    read_ones = [o for o in found if not o.refused]
+    ratios = np.array([r for o in read_ones for r in o.noise if np.isfinite(r) and "times" not in o.way])
+    near = np.mean(np.abs(np.log(ratios)) < np.log1p(WITHIN)) if ratios.size else np.nan
+    text = [f"{len(read_ones)} of {len(found)} read; noise within {WITHIN:.0%}: {near:.0%} of channels"]
+    clean = next((o for o in found if o.way == CLEAN), None)
+    if clean is not None and clean.verdict:
+        others = [o for o in read_ones if o is not clean]
+        kept = [o for o in others if o.verdict == clean.verdict and {*o.found} == {*clean.found}]
+        sure = [
+            o for o in others if {e for e, c in o.found.items() if (c or 0.0) >= SURE} - {*clean.found}
+        ]
+        text.append(f"{len(kept)} of {len(others)} keep verdict and cause; sure of another: {len(sure)}")
+        if clean.error > 0.0:
+            errors = np.array([o.error for o in others]) / clean.error
+            text.append(
+                f"error on the test run: median {np.median(errors):.2f}, worst {errors.max():.2f}"
+            )
+    return "; ".join(text)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.logs", description=__doc__)
+    parser.add_argument("good", type=Path, metavar="GOOD", help="measurement, or folder of a run")
+    parser.add_argument("--ship", metavar="NAME|FILE", help="that was measured")
+    parser.add_argument("--only", nargs="+", choices=list(WAYS), metavar="WAY", help="of the ways")
+    parser.add_argument("--learn", action="store_true", help="look for the cause")
+    parser.add_argument("--test", type=Path, metavar="RUN", help="another good log, for the error")
+    parser.add_argument("--seed", type=int, default=0, help="of all that is random (0)")
+    parser.add_argument("--workers", type=int, default=1, help="processes (1)")
+    parser.add_argument("--out", type=Path, metavar="FILE.json", help="for the results")
+    options = parser.parse_args(arguments)
+    good = good_log(options.good, options.ship, options.test)
+    found: list[Recorded] = []
+    print("| way | noise found / there | cause | error / clean | s |\n|---|---|---|--:|--:|")
+    with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool:
+        ways = options.only or WAYS
+        tasks = [pool.submit(recorded, way, good, options.seed, options.learn) for way in ways]
+        for task in tasks:
+            found.append(task.result())
+            print(line(found[-1], found[0] if found[0].way == CLEAN else None), flush=True)
+    print(f"\n{summary(found)}")
+    if options.out:
+        options.out.write_text(json.dumps([asdict(o) for o in found], indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
