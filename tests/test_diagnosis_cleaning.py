@@ -41,11 +41,11 @@ def test_every_fault_is_counted_exactly():
     run = changed(run, 500, (np.inf, 1.0, 1.0))
     run = changed(run, slice(600, 605), (1.0, 2.0, np.nan))
     track = clean(run)
-    assert tuple(track.counts()) == (N, 20, 16, 0, N - 36)
-    assert np.flatnonzero(track.frozen).tolist() == list(range(100, 120))
-    assert not track.valid[300:307].any()
-    assert np.isnan(track.pose[~track.valid]).all()
-    assert np.isfinite(track.pose[track.valid]).all()
+    assert tuple(track.counts()) == (N, 24, 11, 0, N - 35)  # a position without a heading is one
+    assert np.flatnonzero(track.frozen).tolist() == [*range(100, 120), *range(601, 605)]
+    assert not track.fresh[300:307].any()
+    assert np.array_equal(np.isfinite(track.pose), track.fresh)
+    assert np.flatnonzero(track.valid & ~track.fresh[:, 2]).tolist() == [600]
 
 
 def test_freeze_with_a_dropout_in_it_is_one_freeze():

@@ -159,6 +159,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         between |= np.isnan(run.pose[:, :2]).all(axis=1) & (until < 2.0 * period)
         dropped &= ~between
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
+    between |= repeats & turned  # a position that is held while the heading goes on
     frozen = repeats & ~between
     measured = np.column_stack([seen, seen, turned]) & np.column_stack([~dropped, ~dropped, ~gone])
     pose = np.where(measured, run.pose, np.nan)
