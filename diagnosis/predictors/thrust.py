@@ -70,7 +70,8 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
         drive = layout.powered(drive, run.power.T)
     total = np.zeros((3, run.time.size))
     points = between[1:] if len(between) > 1 else between
-    now = layout.running(run.time, *nu.T, tuple(between[0]), drive)
+    u, v, r = nu.T
+    now = layout.running(run.time, u, v, r, tuple(between[0]), drive)
     for acting in points:
         force = layout.act(tuple(acting), now, drive)
         for axis in range(3):

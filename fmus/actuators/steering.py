@@ -10,8 +10,9 @@ law needs nothing but its force; a request out of reach gets what comes nearest.
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ..declare import Record
 from ..hull import Triple
 from ..ops import Number, clip, fmax, fmin, where
 from ..ship_description import Description
@@ -37,7 +38,7 @@ class Roles(NamedTuple):
 
 
 @cache
-def believed(ship: Description) -> tuple[Number, ...]:
+def believed(ship: Description) -> tuple[Record, ...]:
     """The parameters of a ship's actuators, as its description has them."""
     return tuple([parameters(ship, a, "", False)() for a in actuators(ship)])
 
@@ -72,7 +73,7 @@ def steerable(ship: Description) -> bool:
 
 
 def commands_at(
-    ship: Description, drive: Number, helm: Number, angle_max: Number, values: Any
+    ship: Description, drive: Number, helm: Number, angle_max: Number, values: Sequence[Record]
 ) -> tuple[Number, ...]:
     """The commands of two shares.
 
@@ -127,7 +128,7 @@ def steer(
     helm: Number,
     nu: Triple,
     angle_max: Number,
-    values: Any,
+    values: Sequence[Record],
 ) -> Given:
     """Commands that give a surge force and a yaw moment as nearly as the ship can.
 

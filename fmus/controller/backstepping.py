@@ -4,16 +4,16 @@ Convention: omega = -Phi(nu) phi + R^T omega_n is the model error, a force on th
 omega_hat is what the law compensates for. Every heading difference is wrapped.
 """
 
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from dataclasses import replace
+from typing import Annotated, NamedTuple
 
-from ..declare import bundle
+from ..declare import Declared, Record, bundle, redeclared
 from ..frames import rotate_to_body
 from ..hull import Inertia, Triple, inertia_force
 from ..ops import Number, choose, wrap
 from ..signals import Estimate, Force, Nothing, Target
-from .parametrisation import GAIN, Parametrisation, Regressors
+from .parametrisation import GAIN, B, Parametrisation, Regressors
 
 
 class Gains(NamedTuple):
@@ -89,15 +89,12 @@ class Energy(NamedTuple):
     lyapunov: Annotated[float, "1", "Lyapunov function of errors and estimates, (4.14)"] = 0.0
 
 
-def starting(base: type[Any], starts: Mapping[str, float]) -> Any:
+def starting(base: Declared, starts: Mapping[str, float]) -> Record:
     """A group of parameters in a class of its own, with other start values for those that are named."""
-    values = {**base._field_defaults, **{k: x for k, x in starts.items() if k in base._fields}}
-    made = namedtuple(base.__name__, list(values), defaults=list(values.values()))
-    made.__annotations__ = base.__annotations__
-    return made()
+    return redeclared(base, lambda v: replace(v, start=starts.get(v.name, v.start)))()
 
 
-def outputs(model: Parametrisation, learning: Any = Nothing()) -> type[Any]:  # noqa: B008 - immutable
+def outputs(model: Parametrisation, learning: tuple[object, ...] = Nothing()) -> type[Record]:
     """The outputs of a controller with this parametrisation, and what its way of learning shows."""
     return bundle("Outputs", Demand, phi_hat=model.hat(), energy=Energy(), learning=learning)
 
@@ -140,11 +137,11 @@ def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
 
 
 def control(
-    model: Parametrisation,
+    model: Parametrisation[B],
     nu: Triple,
     errors: tuple[Errors, Triple],
     k: Gains,
-    belief: Any,
+    belief: B,
     F: Regressors,
     phi: Sequence[Number],
     w: Triple,
@@ -186,7 +183,7 @@ def control(
     return Demand(Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN)
 
 
-def tracking_energy(z: Errors, inertia: Inertia) -> Any:
+def tracking_energy(z: Errors, inertia: Inertia) -> Number:
     """V2 = 1/2 z1^T z1 + 1/2 z2^T M z2, (4.8)."""
     MX, MY, MN = inertia_force(z.z2_u, z.z2_v, z.z2_r, inertia)
     return 0.5 * (

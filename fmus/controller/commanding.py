@@ -5,12 +5,12 @@ The surge force and the yaw moment that it asks for become shaft speeds and angl
 is over ground. What these commands give is the force that acts, for its integrals.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..actuators.actuation import actuators
 from ..actuators.command_variables import commands_of
 from ..actuators.steering import believed, steer
-from ..declare import Component, Range, bundle
+from ..declare import Component, Range, Record, bundle
 from ..ops import Number, choose
 from ..ship_description import Description
 from ..signals import Estimate, Force, Target
@@ -27,9 +27,9 @@ class Helm(NamedTuple):
 class State(NamedTuple):
     """The controller's own, the force of its last commands [N, N, N m], the share of the angle."""
 
-    own: Any
-    told: Any
-    helm: Any = 0.0
+    own: tuple[object, ...]
+    told: Record
+    helm: Number = 0.0
 
 
 class Inputs(NamedTuple):
@@ -56,21 +56,20 @@ def commanding(controller: Component, ship: Description) -> Component:
     names = [a.part.name for a in actuators(ship)]
     parts = bundle("Believed", None, **dict(zip(names, believed(ship), strict=True)))
     params = bundle("Params", own=controller.params(), believed=parts(), helm=Helm())
-    outputs: Any = bundle("Outputs", own=controller.outputs(), commands=commands(), force=Commanded())
+    outputs = bundle("Outputs", own=controller.outputs(), commands=commands(), force=Commanded())
     untold = controller.inputs().applied
-    law = controller.prepared_step or controller.step
 
-    def inputs(i: Inputs, told: Any) -> Any:
+    def inputs(i: Inputs, told: Record) -> tuple[object, ...]:
         return controller.inputs(i.estimate, i.target, told)
 
-    def init(i: Inputs, p: Any) -> State:
+    def init(i: Inputs, p: Record) -> State:
         return State(controller.init(inputs(i, untold), p.own), untold)
 
-    def prepare(p: Any) -> Any:
+    def prepare(p: Record) -> Record:
         return p._replace(own=controller.prepared(p.own))
 
-    def prepared_step(s: State, i: Inputs, b: Any, h: Number) -> tuple[State, Any]:
-        own, out = law(s.own, inputs(i, s.told), b.own, h)
+    def prepared_step(s: State, i: Inputs, b: Record, h: Number) -> tuple[State, Record]:
+        own, out = controller.law(s.own, inputs(i, s.told), b.own, h)
         asked: Force = out.demand.tau
         nu = i.estimate.u_hat, i.estimate.v_hat, i.estimate.r_hat
         given = steer(ship, asked.tau_X, asked.tau_N, s.helm, nu, b.helm.angle_max, b.believed)
@@ -78,7 +77,7 @@ def commanding(controller: Component, ship: Description) -> Component:
         kept = choose(h > 0.0, (after.told, after.helm), (s.told, s.helm))
         return State(own, *kept), outputs(out, commands(*given.commands), Commanded(*given.tau))
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Record, h: Number) -> tuple[State, Record]:
         return prepared_step(s, i, prepare(p), h)
 
     return Component(

@@ -6,9 +6,9 @@ the controller itself asked for last, which may be more than thrusters give. An 
 infinite keeps its last finite value.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from ..declare import POSITIVE, Component, DeclarationError
+from ..declare import POSITIVE, Component, DeclarationError, Record
 from ..hull import Triple
 from ..ops import Condition, Number, choose, not_, sqrt, when, where
 from ..signals import Force
@@ -46,7 +46,7 @@ class Learning(NamedTuple):
 
 
 class State(NamedTuple):
-    phi_hat: Any
+    phi_hat: Record
     omega: Triple
     tau: Force
     time: Number
@@ -77,7 +77,7 @@ def present(register: Register, now: Sample, span: Number, learns: Condition) ->
     return when(span > 0.0, delayed, lambda: Present(register, now, 1.0, learns))
 
 
-def explained(model: Parametrisation, sample: Sample, s: State, p: Any) -> tuple[Row, Triple]:
+def explained(model: Parametrisation, sample: Sample, s: State, p: Record) -> tuple[Row, Triple]:
     """A sample as it is stored, y or as printed eps, and eps = y - F phi_hat - R^T omega_hat, (4.33)."""
     F = model.regressors(sample.nu, sample.nu_dot, sample.tau, p.belief)
     y = model.error(sample.nu, sample.nu_dot, sample.tau, p.belief)
@@ -119,13 +119,13 @@ def concurrent(
     beginning = empty_store(model)
     no_integral = Memory(0.0, still, (still,) * len(model.coefficients))
 
-    def init(i: Inputs, p: Any) -> State:
+    def init(i: Inputs, p: Record) -> State:
         phi = model.hat._make(p.phi)
         s = State(phi, still, Force(), 0.0, beginning, Blocker(), Register(), no_integral, FixedPoint())
         _, out = step(s, i, p, 0.0)
         return s._replace(tau=out.tau)
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Record, h: Number) -> tuple[State, Record]:
         e = i.estimate
         nu, nu_dot = (e.u_hat, e.v_hat, e.r_hat), (e.u_dot_hat, e.v_dot_hat, e.r_dot_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)
@@ -146,7 +146,7 @@ def concurrent(
 
         omega_on = dot(p.disturbance, (1.0, 1.0, 1.0)) > 0.0
 
-        def smoothed_row() -> tuple[FixedPoint, Row, Any]:
+        def smoothed_row() -> tuple[FixedPoint, Row, Condition]:
             pose = (e.x_hat, e.y_hat, e.psi_hat)
             seen = learns & not_(e.frozen > 0.5)
             new = Now(time, pose, nu, acted)

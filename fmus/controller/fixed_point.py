@@ -16,12 +16,12 @@ measurement, its bandwidth w [rad/s] is all that is to be chosen: K = (2 w, 2 w^
 Butterworth. After the span T = 6/w, Sigma has fallen to e^-3 of P and x_j is taken as final.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple, accelerated, inverse_mass
 from ..ops import Condition, Number, choose, fmax, when
-from .parametrisation import Parametrisation
+from .parametrisation import B, Parametrisation
 from .smoothing import Sample
 
 # w T; w h stays below this part of 1, so that a step is short beside the filter.
@@ -72,13 +72,14 @@ def covariance(w: Number) -> tuple[Triple, Triple, Triple]:
     )
 
 
-def later(sigma: Any, K: Triple, h: Number) -> Any:
+def later(sigma: tuple[Triple, Triple, Triple], K: Triple, h: Number) -> tuple[Triple, Triple, Triple]:
     """Sigma after h [s] with the gain K."""
     a, b, c = K
-    return tuple([(x + h * (y - a * x), y + h * (z - b * x), z - h * c * x) for x, y, z in sigma])
+    i, j, k = [(x + h * (y - a * x), y + h * (z - b * x), z - h * c * x) for x, y, z in sigma]
+    return i, j, k
 
 
-def driving(model: Parametrisation, psi: Number, nu: Triple, tau: Triple, belief: Any) -> Triple:
+def driving(model: Parametrisation[B], psi: Number, nu: Triple, tau: Triple, belief: B) -> Triple:
     """Earth-fixed acceleration [m/s2, m/s2, rad/s2] by the force and what is known of the hull."""
     u, v, r = nu
     kX, kY, kN = model.known(u, v, r, belief)
@@ -104,14 +105,14 @@ def begun(now: Now) -> FixedPoint:
 
 
 def advanced(
-    model: Parametrisation,
-    belief: Any,
+    model: Parametrisation[B],
+    belief: B,
     s: FixedPoint,
     now: Now,
     span: Number,
     h: Number,
     usable: Condition,
-) -> tuple[FixedPoint, Sample, Number]:
+) -> tuple[FixedPoint, Sample, Condition]:
     """The smoother after a step of h [s].
 
     Args:
@@ -131,7 +132,7 @@ def advanced(
     P = covariance(w)
     K = P[0]
 
-    def stepped() -> tuple[FixedPoint, Sample, Number]:
+    def stepped() -> tuple[FixedPoint, Sample, Condition]:
         turn = s.axes[2]
         u, v = rotate_to_body(turn.p, s.axes[0].v, s.axes[1].v)
         push = driving(model, turn.p, (u, v, turn.v), now.tau, belief)
@@ -143,8 +144,7 @@ def advanced(
             axes.append(Axis(ahead + K[0] * e, axis.v + h * rate + K[1] * e, axis.d + K[2] * e))
             (a, _, _), (b, _, _), (c, _, _) = s.sigma
             smooth.append(Axis(old.p + a * e, old.v + b * e, old.d + c * e))
-        going: Any = tuple(axes)
-        fixed: Any = tuple(smooth)
+        going, fixed = (axes[0], axes[1], axes[2]), (smooth[0], smooth[1], smooth[2])
         age, ran = s.age + h, s.ran + h
         nu, nu_dot = body(fixed, s.driven)
         sample = Sample(s.time, fixed[2].p, nu, nu_dot, s.tau)
@@ -160,7 +160,7 @@ def advanced(
         begins = settled & (done | (s.age <= 0.0))
         return choose(begins, fresh, choose(s.age > 0.0, after, idle)), sample, done
 
-    def restarted() -> tuple[FixedPoint, Sample, Number]:
+    def restarted() -> tuple[FixedPoint, Sample, Condition]:
         return choose(usable, begun(now), FixedPoint()), Sample(), False
 
     return when(usable & (s.ran > 0.0), stepped, restarted)

@@ -33,10 +33,10 @@ ship that is nearer to the speed wanted than its reference takes that along.
 An input that is NaN or infinite keeps its last finite value.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..actuators.steering import steerable
-from ..declare import POSITIVE, Component, Range, component, group_of, variables
+from ..declare import POSITIVE, Component, Range, Record, component, group_of, variables
 from ..effects import EffectSet
 from ..frames import rotate_to_body
 from ..hull import Damping, Inertia, mass_matrix
@@ -75,7 +75,7 @@ class Params(NamedTuple):
     )
     u_least: Annotated[float, "m/s", "least speed of prime units", Range(0.001, 10.0)] = 0.1
     inertia: Inertia = Inertia()
-    damping: Any = KnownDamping()
+    damping: Record = KnownDamping()
     omega_wave: Annotated[float, "rad/s", "frequency of the waves as met; 0: no filter", POSITIVE] = 0.0
     zeta_wave: Annotated[float, "1", "share of the waves that the filter leaves", Range(0.0, 1.0)] = 0.1
 
@@ -83,11 +83,11 @@ class Params(NamedTuple):
 class Tuning(NamedTuple):
     """Frequencies and rates of the present speed [rad/s]."""
 
-    omega_psi: Any
-    omega_u: Any
-    omega_d: Any
-    r_max: Any
-    omega_u_d: Any
+    omega_psi: Number
+    omega_u: Number
+    omega_d: Number
+    r_max: Number
+    omega_u_d: Number
 
 
 class Reference(NamedTuple):

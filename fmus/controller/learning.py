@@ -13,8 +13,9 @@ With rho > 0, where the matrix is not symmetric, this holds for phi and omega_n 
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ..declare import Record
 from ..hull import Triple
 from ..ops import Condition, Number, fmax, sqrt, when, where
 from .adaptive import Disturbance, DisturbanceByError, climb, to_earth
@@ -78,8 +79,13 @@ def earth_slopes(memory: Memory, phi: Sequence[Number], omega: Triple, stale: Nu
 
 
 def information(
-    model: Parametrisation, gamma: Any, sums: Sums, F: Regressors, weight: Number, own: Number
-) -> Any:
+    model: Parametrisation,
+    gamma: Sequence[Number],
+    sums: Sums,
+    F: Regressors,
+    weight: Number,
+    own: Number,
+) -> Number:
     """Trace of Gamma Q, of ``weight`` times the store and ``own`` times the present sample."""
     total = 0.0
     for indices, gram, row in zip(model.pattern, sums.grams, F, strict=True):
@@ -105,15 +111,15 @@ class Drive(NamedTuple):
 
 def learned(
     model: Parametrisation,
-    estimates: tuple[Any, Triple],
-    gains: tuple[Any, Disturbance | DisturbanceByError],
+    estimates: tuple[Record, Triple],
+    gains: tuple[Record, Disturbance | DisturbanceByError],
     drive: Drive,
     by_eps: Number,
     sums: Sums,
     memory: Memory,
     options: StoreOptions,
     dt: Number,
-) -> tuple[Any, Triple, tuple[Number, Number]]:
+) -> tuple[Record, Triple, tuple[Number, Number]]:
     """The estimates after dt [s].
 
     Args:
@@ -153,7 +159,7 @@ def learned(
     return model.hat._make(phi), (a, b, c), rates
 
 
-def _norm(gamma: Any, slopes: Any, pace: Number, dt: Number) -> Any:
+def _norm(gamma: Sequence[Number], slopes: Sequence[Number], pace: Number, dt: Number) -> Number:
     """The norm of Gamma times slopes, as much slower as the step ``pace`` is shorter than dt [s]."""
     moves = [g * f for g, f in zip(gamma, slopes, strict=True)]
     return sqrt(dot(moves, moves)) * (pace / fmax(dt, 1e-300))

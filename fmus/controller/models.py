@@ -1,6 +1,6 @@
 """The parametrisations of the thesis, 2.2 and (7.1): each one object, which any law can learn by."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..declare import variables
 from ..hull import (
@@ -188,7 +188,7 @@ SCALED = Parametrisation(
     by_acceleration=True,
 )
 
-PARAMETRISATIONS: dict[str, Any] = {
+PARAMETRISATIONS: dict[str, Parametrisation] = {
     "rotational": ROTATIONAL,
     "surge": SURGE,
     "surge damping": SURGE_DAMPING,

@@ -45,7 +45,7 @@ def smoothed(taps: tuple[Tap, ...]) -> Sample:
     total = sum(KERNEL)
     weights = [w / total for w in KERNEL]
 
-    def mean(values: list[Any]) -> Any:
+    def mean(values: list[Number]) -> Number:
         return dot(weights, values)
 
     time = mean([t.time for t in taps])

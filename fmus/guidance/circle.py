@@ -28,7 +28,7 @@ def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Order]:
     t = s.t + h
     out = (p.release > 0.0) & begun(t, p.start + p.release, h)
     order = where(begun(t, p.start, h), where(out, 0.0, first_side(p.helm)), 0.0)
-    return Clock(t), given(order, p)
+    return Clock(t), given(order, p.angle, p.helm)
 
 
 COMPONENT = component(

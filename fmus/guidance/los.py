@@ -24,7 +24,7 @@ are zero. An input that is NaN or infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Range, component
+from ..declare import FIXED, Range, Record, component
 from ..frames import rotate_to_body
 from ..ops import Number, atan2, clip, cos, not_, pick, sin, sqrt, where, wrap
 from ..signals import Estimate, Target
@@ -46,9 +46,9 @@ class Params(NamedTuple):
     ] = 8.0
     integral: Annotated[float, "1", "kappa over the speed wanted; 0: no integral", Range(0.0, 1.0)] = 0.1
     u_given: Annotated[float, "1", "1: speeds u_k, 0: u_t everywhere", FLAG, FIXED] = 0.0
-    x: Any = Norths()
-    y: Any = Easts()
-    u: Any = Speeds()
+    x: Record = Norths()
+    y: Record = Easts()
+    u: Record = Speeds()
 
 
 class State(NamedTuple):
@@ -73,9 +73,9 @@ class Line(NamedTuple):
     x: Number
     y: Number
     course: Number
-    length: Any
-    ahead: Any
-    aside: Any
+    length: Number
+    ahead: Number
+    aside: Number
 
 
 def following(leg: Number, p: Params) -> Number:

@@ -1,6 +1,6 @@
 """How a target runs along its path: steadily, in pulses of speed, or as in the thesis' fault."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import FIXED, POSITIVE, Range
 from ..ops import Number, fmax, fmin
@@ -44,9 +44,9 @@ class Beat(NamedTuple):
         slope: its derivative [1/s].
     """
 
-    passed: Any
-    factor: Any
-    slope: Any
+    passed: Number
+    factor: Number
+    slope: Number
 
     def rates(self, rate: Number, acceleration: Number) -> tuple[Number, Number]:
         """First two derivatives in time of a path parameter, from those of the steady run."""

@@ -1,6 +1,6 @@
 """Smooth steps and what is made of them, each with its integral and derivatives in closed form."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..ops import Number, clip, floor, fmax, where
 
@@ -8,10 +8,10 @@ from ..ops import Number, clip, floor, fmax, where
 class Shape(NamedTuple):
     """A function of one variable at one place: integral from 0, value, first two derivatives."""
 
-    integral: Any
-    value: Any
+    integral: Number
+    value: Number
     rate: Number
-    curvature: Any
+    curvature: Number
 
 
 def smooth(q: Number) -> Number:

@@ -58,23 +58,23 @@ class Leg(NamedTuple):
         speed, gain: relative speed on the straight piece, and by how much the bend raises it [1].
     """
 
-    start: Any
+    start: Number
     x: Number
     y: Number
     course: Number
-    turn: Any
-    heading: Any
+    turn: Number
+    heading: Number
     swing: Number
-    straight: Any
-    bend: Any
+    straight: Number
+    bend: Number
     speed: Number
-    gain: Any
+    gain: Number
 
-    def span(self) -> Any:
+    def span(self) -> Number:
         """Way w that straight piece and bend take [m]."""
         return self.straight / self.speed + self.carry()
 
-    def carry(self) -> Any:
+    def carry(self) -> Number:
         """Way w that the bend takes, at the mean of both speeds [m]."""
         return self.bend / (self.speed + 0.5 * self.gain)
 
@@ -125,7 +125,7 @@ def lay_out(
     size = len(points)
     last = [inside[k] & not_(inside[k + 1]) for k in range(size - 1)] + [inside[size - 1]]
 
-    def following(values: Sequence[Number], k: int) -> Any:
+    def following(values: Sequence[Any], k: int) -> Any:
         """What belongs to the way point behind k."""
         return where(last[k], values[0], values[min(k + 1, size - 1)])
 

@@ -29,7 +29,7 @@ def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Order]:
     t = s.t + h
     plateau = clip(floor((t - p.start + 0.5 * h) / p.hold), 0.0, 4.0 * p.plateaus)
     order = first_side(p.helm) * (abs(plateau / p.plateaus - 2.0) - 1.0)
-    return Clock(t), given(where(begun(t, p.start, h), order, 0.0), p)
+    return Clock(t), given(where(begun(t, p.start, h), order, 0.0), p.angle, p.helm)
 
 
 COMPONENT = component(

@@ -11,7 +11,7 @@ A leg straight back on the one before leaves no room to turn: the target then tu
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Range, component, vector
+from ..declare import FIXED, Range, Record, component, vector
 from ..ops import Number, floor, where, wrap
 from ..signals import Nothing, Target
 from .pace import Clock, Pace, tick
@@ -24,7 +24,7 @@ NORTHS = (5.0, 6.5, 6.5, 5.0)
 EASTS = (2.0, 2.0, -1.0, -1.0)
 
 
-def _column(name: str, unit: str, text: str, start: tuple[float, ...], *extra: Any) -> Any:
+def _column(name: str, unit: str, text: str, start: tuple[float, ...], *extra: object) -> type[Record]:
     padded = start + start[-1:] * (SIZE - len(start))
     fields = [(f"{name}_{k}", unit, f"{text} {k}", padded[k - 1]) for k in range(1, SIZE + 1)]
     return vector(f"Column_{name}", fields, (*extra, FIXED))
@@ -54,17 +54,17 @@ class Params(NamedTuple):
     ] = 0.2
     psi_given: Annotated[float, "1", "1: headings psi_k, 0: along the path", FLAG, FIXED] = 0.0
     u_given: Annotated[float, "1", "1: speeds u_k, 0: u_t everywhere", FLAG, FIXED] = 0.0
-    x: Any = Norths()
-    y: Any = Easts()
-    psi: Any = Headings()
-    u: Any = Speeds()
+    x: Record = Norths()
+    y: Record = Easts()
+    psi: Record = Headings()
+    u: Record = Speeds()
     pace: Pace = Pace()
 
 
 class State(NamedTuple):
-    run: Any
+    run: Number
     clock: Clock
-    whole: Any
+    whole: Number
     legs: tuple[Leg, ...]
 
 

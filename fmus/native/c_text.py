@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
+from ..fmi.trace import Operand
 from .tape import Block, Branch, Call, Recording, Value
 
 INFIX = {
@@ -49,7 +49,7 @@ static inline double whole(double x) { return x - x == 0.0 ? floor(x) : x - x; }
 """
 
 
-def number(x: Any) -> str:
+def number(x: Operand) -> str:
     """A number or truth value of Python in C."""
     if isinstance(x, bool):
         return str(int(x))
@@ -73,7 +73,7 @@ class Writer:
         return self.function(head, recording, [("results", recording.results)])
 
     def function(
-        self, head: str, recording: Recording, targets: Iterable[tuple[str, Sequence[Any]]]
+        self, head: str, recording: Recording, targets: Iterable[tuple[str, Sequence[Operand]]]
     ) -> str:
         """A function that writes its results into arrays.
 
@@ -96,7 +96,7 @@ class Body:
         self.needed: set[int] = set()
         self.lines: list[str] = []
 
-    def text(self, recording: Recording, targets: Iterable[tuple[str, Sequence[Any]]]) -> str:
+    def text(self, recording: Recording, targets: Iterable[tuple[str, Sequence[Operand]]]) -> str:
         self.write_all(recording)
         for array, results in targets:
             self.lines += [f"    {array}[{k}] = {self.of(x)};" for k, x in enumerate(results)]
@@ -109,7 +109,7 @@ class Body:
             self._mark(statement)
         self._write(recording.body, 1)
 
-    def need(self, values: Iterable[Any]) -> None:
+    def need(self, values: Iterable[object]) -> None:
         self.needed.update(id(x) for x in values if isinstance(x, Value))
 
     def _mark(self, statement: Value | Branch | Call) -> bool:
@@ -133,7 +133,7 @@ class Body:
             self.need([statement.condition])
         return wanted
 
-    def of(self, x: Any) -> str:
+    def of(self, x: Operand) -> str:
         """How a value is written where it is used."""
         if not isinstance(x, Value):
             return number(x)

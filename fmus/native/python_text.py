@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
 
 from .. import ops
+from ..fmi.trace import Operand
+from ..ops import Number
 from .c_text import INFIX, Body
 from .tape import Branch, Call, Kernels, Recording, Value
 
@@ -31,7 +32,7 @@ _SPACE = {
 }
 
 
-def function(recording: Recording, kernels: Kernels, *given: str) -> Callable[..., tuple[Any, ...]]:
+def function(recording: Recording, kernels: Kernels, *given: str) -> Callable[..., tuple[Number, ...]]:
     """A recording as a function of what its variables are called after, which gives its results.
 
     Args:
@@ -56,7 +57,7 @@ class _PythonBody(Body):
         results = "".join(f"{self.of(x)}, " for x in recording.results)
         return [f"def {name}({', '.join(given)}):", *self.lines, f"    return ({results})"]
 
-    def of(self, x: Any) -> str:
+    def of(self, x: Operand) -> str:
         return super().of(x) if isinstance(x, Value) else f"({x!r})"
 
     def _operation(self, x: Value) -> Iterator[str]:

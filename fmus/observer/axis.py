@@ -10,7 +10,7 @@ sample, until they scatter again (a strong tracking filter).
 Written out for scalars, so that it needs no matrices.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range
 from ..ops import Number, clip, fmax, sqrt, where
@@ -39,12 +39,12 @@ class Learning(NamedTuple):
 class Rates(NamedTuple):
     """What is the same on every axis, computed once a step."""
 
-    memory: Any  # share of the present in the variance that is learnt
-    keep: Any  # share of the slope that is left after a step
-    noise: Any  # gain of its variance by one step, in variances
-    alert: Any  # growth of the covariance by one sample
-    mean: Any  # share of a sample in the mean innovation
-    scatter: Any  # squared mean innovation that is none
+    memory: Number  # share of the present in the variance that is learnt
+    keep: Number  # share of the slope that is left after a step
+    noise: Number  # gain of its variance by one step, in variances
+    alert: Number  # growth of the covariance by one sample
+    mean: Number  # share of a sample in the mean innovation
+    scatter: Number  # squared mean innovation that is none
 
 
 class Covariance(NamedTuple):
@@ -125,7 +125,7 @@ def later(a: Axis, drift: Number, k: Rates, h: Number) -> Axis:
     )
 
 
-def taken(a: Axis, innovation: Number, noise: Number, k: Rates) -> tuple[Axis, Any, Any]:
+def taken(a: Axis, innovation: Number, noise: Number, k: Rates) -> tuple[Axis, Number, Number]:
     """The axis after a sample, and the corrections of position and velocity.
 
     Args:

@@ -5,12 +5,14 @@ communication step above 0.02 s is divided. A force input that is NaN or infinit
 model effect on the hull, from outside, or in the measurement is off until a parameter says otherwise.
 """
 
+from collections.abc import Callable, Sequence
 from operator import add
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import (
     FIXED,
     Component,
+    Record,
     Variable,
     bundle,
     group_of,
@@ -36,7 +38,7 @@ from ..hull import (
     term_variable,
 )
 from ..hull_functions import FUNCTIONS
-from ..ops import Condition, Number, finite, when, wrap
+from ..ops import Condition, Number, Series, finite, when, wrap
 from ..ship_description import Description, Part, Value
 from ..signals import Force, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
@@ -55,6 +57,8 @@ class Start(NamedTuple):
 
 # eta, nu over ground, and time.
 State = Motion
+# (state, force, what is known of the ship) -> nu_dot [m/s2, m/s2, rad/s2]
+Acceleration = Callable[[State, Any, Any], Sequence[Series]]
 
 
 class Pose(NamedTuple):
@@ -80,7 +84,7 @@ class Outputs(NamedTuple):
     omega_star_N: Annotated[float, "N.m", "what control model (2.27) lacks in yaw"] = 0.0
 
 
-def hull(p: Any, effects: VesselEffects) -> Hull:
+def hull(p: Record, effects: VesselEffects) -> Hull:
     """The hull with the changes of its damping and inertia applied."""
     inertia = p.inertia
     for member in effects.inertia.members:
@@ -103,7 +107,7 @@ class Prepared(NamedTuple):
             current acts, the inertia is changed.
     """
 
-    params: Any
+    params: Record
     effects: VesselEffects
     hull: Hull
     changes: tuple[Condition, ...]
@@ -115,7 +119,7 @@ class Prepared(NamedTuple):
     heavier: Condition
 
 
-def prepared(p: Any, effects: VesselEffects) -> Prepared:
+def prepared(p: Record, effects: VesselEffects) -> Prepared:
     """Everything that a step needs of the parameters."""
     flows = effects.water.any_acts(p.water)
     return Prepared(
@@ -132,7 +136,7 @@ def prepared(p: Any, effects: VesselEffects) -> Prepared:
     )
 
 
-def through_water(s: State, b: Prepared) -> tuple[Motion, Any, Any]:
+def through_water(s: State, b: Prepared) -> tuple[Motion, Number, Number]:
     """The ship as the water sees it, and the water's body-fixed velocity [m/s, m/s]."""
     u_c: Number = 0.0
     v_c: Number = 0.0
@@ -165,7 +169,7 @@ def disturbed(s: State, tau: Force, b: Prepared) -> Triple:
     return u_dot + s.r * v_c, v_dot - s.r * u_c, r_dot
 
 
-def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = nominal) -> State:
+def integrate(s: State, tau: object, b: object, h: Number, law: Acceleration = nominal) -> State:
     """State after h [s] of constant force by one step of the classical Runge-Kutta method.
 
     The law gives nu_dot from state, force and b: :func:`nominal` with b a Hull, :func:`disturbed` with
@@ -196,14 +200,14 @@ def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = nominal) -> St
     )
 
 
-def change_forces(s: State, b: Prepared) -> Any:
+def change_forces(s: State, b: Prepared) -> Record:
     """The force of each change of a damping coefficient."""
     ship, _, _ = through_water(s, b)
     forces = forces_of(b.effects.changes, b.changes, b.params.change, ship)
     return b.effects.change_forces._make(forces)
 
 
-def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
+def outside_forces(s: State, tau: Force, b: Prepared) -> Record:
     """The force of each other effect on the hull."""
     ship, _, _ = through_water(s, b)
     forces = forces_of(
@@ -212,7 +216,7 @@ def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
     return b.effects.outside_forces._make(forces)
 
 
-def model_error(s: State, nu_dot: Triple, tau: Force, p: Any) -> Triple:
+def model_error(s: State, nu_dot: Triple, tau: Force, p: Record) -> Triple:
     """omega [N, N, N m]: what the nominal model lacks of the force on the hull, (2.36)."""
     MX, MY, MN = inertia_force(*nu_dot, p.inertia)
     CX, CY, CN = coriolis_force(s.u, s.v, s.r, p.inertia)
@@ -228,13 +232,15 @@ def measured(s: State, b: Prepared) -> Measurement:
     return Measurement(pose[0], pose[1], wrap(pose[2]))
 
 
-def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Triple]:
+def moved(
+    s: State, tau: Force, b: Hull | Prepared, h: Number, law: Acceleration
+) -> tuple[State, Triple]:
     """The state after h [s], and nu_dot there."""
     after = integrate(s, tau, b, h, law)
     return after, law(after, tau, b)
 
 
-def described(ship: Description) -> tuple[Number, Number, Number]:
+def described(ship: Description) -> tuple[Record, Record, Record]:
     """Inertia, damping and start of a described ship, with where their values come from."""
     given = ship.values()
 
@@ -247,12 +253,14 @@ def described(ship: Description) -> tuple[Number, Number, Number]:
     own = [v.name for v in variables(Terms)]
     further = [term_variable(v.name) for v in ship.terms if v.name not in own]
     terms = group_of("Terms", map(valued, [*variables(Terms), *further]))()
-    functions = bundle("HullFunctions", **{part.law: _function(part)() for part in ship.functions})()
+    functions = bundle(
+        "HullFunctions", None, **{part.law: _function(part)() for part in ship.functions}
+    )()
     start = redeclared(Start, ship.scale.of)()
     return redeclared(Inertia, valued)(), bundle("Damping", terms=terms, functions=functions)(), start
 
 
-def _function(part: Part) -> type[Any]:
+def _function(part: Part) -> type[Record]:
     """Parameters of a function of the hull, as a description gives them."""
     given = {v.name: v for v in part.values}
     declared = parameters_of(part.law, 3, FUNCTIONS[part.law])
@@ -284,13 +292,13 @@ def make(effects: EffectSet, ship: Description) -> Component:
     )
     outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
 
-    def init(i: Force, p: Any) -> State:
+    def init(i: Force, p: Record) -> State:
         return State(*p.start)
 
-    def prepare(p: Any) -> Prepared:
+    def prepare(p: Record) -> Prepared:
         return prepared(p, groups)
 
-    def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Any]:
+    def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Record]:
         p = b.params
         tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
         after, nu_dot = when(
@@ -323,7 +331,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
             outside,
         )
 
-    def step(s: State, i: Force, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Force, p: Record, h: Number) -> tuple[State, Record]:
         return prepared_step(s, i, prepare(p), h)
 
     return Component(

@@ -11,8 +11,8 @@ learned.
 The inputs are those of a controller; ``tau_cmd`` must be connected. The target is not used.
 """
 
-from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Annotated, NamedTuple
 
 from ..actuators.actuation import actuators, parameters
 from ..actuators.attack import Attack, attacking
@@ -20,7 +20,7 @@ from ..actuators.weighted_allocation import axes, components, solution
 from ..controller.backstepping import HELD, Inputs, acting
 from ..controller.eigen import dot
 from ..controller.models import FullBelief, everything
-from ..declare import POSITIVE, Component, Range, Variable, bundle, group_of
+from ..declare import POSITIVE, Component, Range, Record, Variable, bundle, group_of
 from ..effects import EffectSet
 from ..hull import inertia_force
 from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
@@ -64,7 +64,7 @@ class Told(NamedTuple):
     lost: tuple[Number, Number] = (0.0, 0.0)
 
 
-def outputs_of(ship: Description) -> type[Any]:
+def outputs_of(ship: Description) -> type[Record]:
     """The outputs of the detector of a ship."""
 
     def each(stem: str, text: str) -> list[Variable]:
@@ -116,8 +116,8 @@ class Usual(NamedTuple):
 
 class State(NamedTuple):
     time: Number
-    quiet: Any  # s since the last frozen measurement
-    waited: Any  # s since the last sample
+    quiet: Number  # s since the last frozen measurement
+    waited: Number  # s since the last sample
     nu: Triple
     rest: Triple
     f: Triple
@@ -126,7 +126,7 @@ class State(NamedTuple):
     told: Told
 
 
-def init(i: Inputs, p: Any) -> State:
+def init(i: Inputs, p: Record) -> State:
     e = i.estimate
     nu = (e.u_hat, e.v_hat, e.r_hat)
     return State(0.0, 0.0, 0.0, nu, STILL, STILL, (Row(),) * ROWS, Usual(), Told())
@@ -148,7 +148,7 @@ def unusual(row: Row, usual: Usual) -> Triple:
     return a, b, c
 
 
-def learned(usual: Usual, old: Row, p: Any) -> Usual:
+def learned(usual: Usual, old: Row, p: Record) -> Usual:
     """What is usual, with one more sample, by recursive least squares that forgets."""
     z = regressors(old.nu, old.f)
     keep = exp(-p.sample_time / p.memory)
@@ -179,7 +179,9 @@ def learned(usual: Usual, old: Row, p: Any) -> Usual:
     return Usual(P, weights, (a, b, c), (x, y), usual.learned + p.sample_time, judged)
 
 
-def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: Number) -> Any:
+def evidence(
+    rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: Number
+) -> tuple[Number, Number, Number, Number]:
     """Likelihood ratio of a loss on some of the axes of g: of the whole window, and the largest over the
     time of the failure, with the share lost and that time."""
     up, full, down, best, share, since = 0.0, 0.0, 1e-12, 0.0, 0.0, 0.0
@@ -200,7 +202,7 @@ def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: 
     return up * up / down, best, share, since
 
 
-def judged(rows: tuple[Row, ...], usual: Usual, p: Any) -> tuple[tuple[Number, Number], Told]:
+def judged(rows: tuple[Row, ...], usual: Usual, p: Record) -> tuple[tuple[Number, Number], Told]:
     """The likelihood ratios of the window, and what is told."""
     found = [evidence(rows, usual, axes, p.least_loss) for axes in AXES]
     (whole_a, best_a, lost_a, since_a), (whole_b, best_b, lost_b, since_b) = found
@@ -219,7 +221,7 @@ def judged(rows: tuple[Row, ...], usual: Usual, p: Any) -> tuple[tuple[Number, N
 
 
 def advanced(
-    s: State, i: Inputs, p: Any, h: Number, forces: Callable[[Any], Triple]
+    s: State, i: Inputs, p: Record, h: Number, forces: Callable[[Sequence[Number]], Triple]
 ) -> tuple[State, Told]:
     """The state after h [s]; ``forces(tau)``: the thrusters' forces [N] that give a force."""
     e = i.estimate
@@ -269,12 +271,12 @@ def make(effects: EffectSet, ship: Description) -> Component | None:
         "Params",
         Settings,
         belief=FullBelief(),
-        allocation=bundle("Allocation", **known)(),
+        allocation=bundle("Allocation", None, **known)(),
         attack=Attack(),
     )
     outputs = outputs_of(ship)
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Record, h: Number) -> tuple[State, Record]:
         values = attacking(p.allocation, p.attack)
         after, told = advanced(s, i, p, h, lambda tau: solution(ship, tau, values))
         return after, outputs(*told.failed, told.since, *told.lost)
