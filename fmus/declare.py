@@ -33,7 +33,7 @@ from .ops import Number
 
 if TYPE_CHECKING:
 
-    class Record(tuple[Any, ...]):
+    class Fields(tuple[Any, ...]):
         """Values of a NamedTuple class that is made at run time, so that no checker knows its fields.
 
         A field is a number, or a record where the class nests others.
@@ -42,14 +42,14 @@ if TYPE_CHECKING:
         _fields: ClassVar[tuple[str, ...]]
         _field_defaults: ClassVar[Mapping[str, Any]]
 
-        def __new__(cls, *fields: object, **named: object) -> "Record": ...
+        def __new__(cls, *fields: object, **named: object) -> "Fields": ...
         def __getattr__(self, name: str) -> Any: ...
-        def _replace(self, **fields: object) -> "Record": ...
+        def _replace(self, **fields: object) -> "Fields": ...
         @classmethod
-        def _make(cls, fields: Iterable[object]) -> "Record": ...
+        def _make(cls, fields: Iterable[object]) -> "Fields": ...
 
 else:
-    Record = tuple
+    Fields = tuple
 
 Declared = type[tuple[object, ...]]  # a declared NamedTuple class, written out or made at run time
 _T = TypeVar("_T", bound=tuple[object, ...])
@@ -106,7 +106,7 @@ class Estimate:
     change: bool = False
 
 
-class Outline(NamedTuple):
+class ShipOutline(NamedTuple):
     """A ship as tools draw it.
 
     Attributes:
@@ -139,9 +139,9 @@ class Variable:
     estimate: Estimate | None = None
 
 
-def _record_class(
+def _fields_class(
     typename: str, starts: Mapping[str, object], annotations: Mapping[str, object]
-) -> type[Record]:
+) -> type[Fields]:
     made: Any = namedtuple(typename, list(starts), defaults=list(starts.values()))
     made.__annotations__ = dict(annotations)
     return made
@@ -149,7 +149,7 @@ def _record_class(
 
 def vector(
     typename: str, fields: Sequence[tuple[Any, ...]], extra: Sequence[object] = ()
-) -> type[Record]:
+) -> type[Fields]:
     """A NamedTuple class of scalars that are made rather than written out.
 
     Args:
@@ -164,10 +164,10 @@ def vector(
         name: Annotated[(float, unit, description, *own, *extra)]
         for name, unit, description, _, *own in fields
     }
-    return _record_class(typename, {f[0]: f[3] for f in fields}, annotations)
+    return _fields_class(typename, {f[0]: f[3] for f in fields}, annotations)
 
 
-def bundle(typename: str, base: Declared | None = None, **groups: tuple[object, ...]) -> type[Record]:
+def bundle(typename: str, base: Declared | None = None, **groups: tuple[object, ...]) -> type[Fields]:
     """A NamedTuple class that nests declared NamedTuples, for classes that differ only in a part.
 
     Args:
@@ -176,14 +176,14 @@ def bundle(typename: str, base: Declared | None = None, **groups: tuple[object, 
         groups: field -> the nested tuple with its start values.
     """
     starts = {**(_starts(base) if base else {}), **groups}
-    annotations = {**(base.__annotations__ if base else {}), **dict.fromkeys(groups, Record)}
-    return _record_class(typename, starts, annotations)
+    annotations = {**(base.__annotations__ if base else {}), **dict.fromkeys(groups, Fields)}
+    return _fields_class(typename, starts, annotations)
 
 
-def group_of(typename: str, fields: Iterable[Variable]) -> type[Record]:
+def group_of(typename: str, fields: Iterable[Variable]) -> type[Fields]:
     """A NamedTuple class of scalars, declared by what :func:`variables` gives of such a class."""
     fields = list(fields)
-    return _record_class(
+    return _fields_class(
         typename, {v.name: v.start for v in fields}, {v.name: _annotation(v) for v in fields}
     )
 
@@ -193,7 +193,7 @@ def _annotation(v: Variable) -> object:
     return Annotated[(float, v.unit, v.description, v.range, *more)]
 
 
-def redeclared(cls: Declared, change: Callable[[Variable], Variable]) -> type[Record]:
+def redeclared(cls: Declared, change: Callable[[Variable], Variable]) -> type[Fields]:
     """A NamedTuple class with the same fields, each declared as ``change`` makes it of its declaration.
 
     Args:
@@ -212,8 +212,8 @@ def redeclared(cls: Declared, change: Callable[[Variable], Variable]) -> type[Re
             v = next(own)
             starts[name], annotations[name] = v.start, _annotation(v)
         else:
-            starts[name], annotations[name] = redeclared(inner, change)(), Record
-    return _record_class(cls.__name__, starts, annotations)
+            starts[name], annotations[name] = redeclared(inner, change)(), Fields
+    return _fields_class(cls.__name__, starts, annotations)
 
 
 def parameters_of(name: str, leading: int, function: Callable[..., object]) -> tuple[Variable, ...]:
@@ -436,7 +436,7 @@ class Component(Generic[_S, _I, _P, _O]):
     prepared_step: Step[_S, _I, Any, _O] | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
     any_ship: bool = True
-    outline: Outline | None = None
+    outline: ShipOutline | None = None
     trial: str = ""
 
     def starting(self, starts: Mapping[str, float]) -> "Component[_S, _I, _P, _O]":

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, NamedTuple
 
-from .declare import POSITIVE, Known, Record, Variable, bundle, group_of, variables
+from .declare import POSITIVE, Fields, Known, Variable, bundle, group_of, variables
 from .hull_functions import FUNCTIONS
 from .ops import Number, Series
 from .signals import Force
@@ -93,8 +93,8 @@ HullFunctions = bundle("HullFunctions")
 class Damping(NamedTuple):
     """All damping: coefficients of products of speeds by their names, and other functions."""
 
-    terms: Record = Terms()
-    functions: Record = HullFunctions()
+    terms: Fields = Terms()
+    functions: Fields = HullFunctions()
 
 
 def mass_matrix(p: Inertia) -> tuple[Triple, Triple, Triple]:
@@ -226,7 +226,7 @@ def _plan(names: tuple[str, ...]) -> tuple[Sequence[tuple[int, bool, int]], Sequ
     return tuple(steps), tuple(uses)
 
 
-def terms_force(u: Series, v: Series, r: Series, terms: Record) -> Triple:
+def terms_force(u: Series, v: Series, r: Series, terms: Fields) -> Triple:
     """Force on the hull [N, N, N m] by coefficients of products of speeds, named by them."""
     steps, uses = _plan(terms._fields)
     speeds, sizes = (u, v, r), (abs(u), abs(v), abs(r))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .actuators.actuation import command_units
 from .actuators.law import Law
-from .actuators.response import Layout, Prepared, layouts
+from .actuators.response import CommandLayout, PreparedThrusters, layouts
 from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
@@ -72,21 +72,21 @@ class Ship:
         }
 
     @cached_property
-    def nominal_drive(self) -> Prepared:
+    def nominal_drive(self) -> PreparedThrusters:
         """The thrusters, nothing wrong with them."""
         return self.thrusters.prepared(self.thrusters.params())
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> CommandLayout:
         """What commands the thrusters get, and how these become a force."""
         return self.nominal_drive.effects.layout
 
     @property
-    def layouts(self) -> tuple[Layout, ...]:
+    def layouts(self) -> tuple[CommandLayout, ...]:
         """How runs may have its commands: as the FMU does, and each unit of its actuators by its own."""
         return layouts(self.description)
 
-    def layout_of(self, commands: "np.ndarray | None") -> Layout:
+    def layout_of(self, commands: "np.ndarray | None") -> CommandLayout:
         """The layout of a run's commands (n, k); that of the FMU for None."""
         if commands is None:
             return self.layout

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from .declare import Known, Outline, Variable
+from .declare import Known, ShipOutline, Variable
 from .scale import REFERENCE_LENGTH, Scale
 
 
@@ -102,9 +102,9 @@ class Description(NamedTuple):
         return Scale(self.length / REFERENCE_LENGTH)
 
     @property
-    def drawn(self) -> Outline:
+    def drawn(self) -> ShipOutline:
         """What pictures need of it."""
-        return Outline(self.name, self.length, self.outline)
+        return ShipOutline(self.name, self.length, self.outline)
 
     def called(self, name: str) -> str:
         """The alias of a variable of its actuators, or its name where there is none."""

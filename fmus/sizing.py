@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from .declare import Component, Record, Variable, flatten, packer, redeclared, variables
+from .declare import Component, Fields, Variable, flatten, packer, redeclared, variables
 from .hull import Damping, Inertia
 from .ops import Number
 from .scale import REFERENCE, Scale
@@ -39,21 +39,21 @@ def sized(component: Component, ship: Description) -> Component:
     params, inputs = (_converted(group, scale, -1) for group in (component.params, component.inputs))
     outputs = _converted(component.outputs, scale, 1)
 
-    def init(i: Record, p: Record) -> tuple[object, ...]:
+    def init(i: Fields, p: Fields) -> tuple[object, ...]:
         return component.init(inputs(i), params(p))
 
-    def prepare(p: Record) -> Any:
+    def prepare(p: Fields) -> Any:
         return component.prepared(params(p))
 
     def prepared_step(
-        s: tuple[object, ...], i: Record, b: Record, h: Number
-    ) -> tuple[tuple[object, ...], Record]:
+        s: tuple[object, ...], i: Fields, b: Fields, h: Number
+    ) -> tuple[tuple[object, ...], Fields]:
         s, o = component.law(s, inputs(i), b, h / scale.time)
         return s, outputs(o)
 
     def step(
-        s: tuple[object, ...], i: Record, p: Record, h: Number
-    ) -> tuple[tuple[object, ...], Record]:
+        s: tuple[object, ...], i: Fields, p: Fields, h: Number
+    ) -> tuple[tuple[object, ...], Fields]:
         return prepared_step(s, i, prepare(p), h)
 
     return replace(
@@ -68,12 +68,12 @@ def sized(component: Component, ship: Description) -> Component:
     )
 
 
-def _converted(group: type[Record], scale: Scale, power: int) -> Callable[[Record], Record]:
+def _converted(group: type[Fields], scale: Scale, power: int) -> Callable[[Fields], Fields]:
     """The function that converts values of a group from the reference size to a ship's, or back (-1)."""
     factors = [scale.factor(v.unit) ** power for v in variables(group)]
     pack = packer(group)
 
-    def convert(values: Record) -> Record:
+    def convert(values: Fields) -> Fields:
         pairs = zip(flatten(values), factors, strict=True)
         return pack([x if f == 1.0 else x * f for x, f in pairs])
 

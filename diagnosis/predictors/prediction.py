@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.actuators.response import Prepared
+from fmus.actuators.response import PreparedThrusters
 from fmus.frames import rotate_to_body
 from fmus.ops import when, wrap
 from fmus.signals import Force
@@ -42,7 +42,7 @@ class Starts:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
 
-    def drive(self, model: Model) -> Prepared:
+    def drive(self, model: Model) -> PreparedThrusters:
         """The thrusters of a model, in the layout of the runs' commands."""
         return drive_of(self.runs[0][0].track.run, model)
 
@@ -196,7 +196,7 @@ def singles(model: Model) -> list[Model]:
     return [replace(model, thrusters={**model.thrusters, **one}) for one in each] or [model]
 
 
-def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.State:
+def moved(s: vessel.State, tau: Force, b: vessel.PreparedVessel, h: float) -> vessel.State:
     """The ship a step later."""
     return when(
         b.disturbed,
@@ -205,7 +205,7 @@ def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.S
     )
 
 
-def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
+def true_motion(eta: Any, eta_dot: Any, b: vessel.PreparedVessel) -> tuple[list[Any], list[Any]]:
     """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
     x, y, psi = true_pose(eta, b)
     ahead, astern = (true_pose(eta + h * eta_dot, b) for h in (LONGEST_STEP, -LONGEST_STEP))
@@ -213,7 +213,7 @@ def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], 
     return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 
 
-def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
+def true_pose(measured: Any, b: vessel.PreparedVessel) -> list[Any]:
     """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
     pose = [m[None] for m in measured]
     for _ in range(8):

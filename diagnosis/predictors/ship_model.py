@@ -14,7 +14,7 @@ from fmus.effects.linear_map import AXES, parameter
 from fmus.effects.measurement import CLOCK_OFFSET
 from fmus.hull import mass_matrix
 from fmus.ship import Ship, ship
-from fmus.vessel.vessel import Prepared
+from fmus.vessel.vessel import PreparedVessel
 
 Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
@@ -186,13 +186,13 @@ class Model:
         return self.measurement.get(CLOCK_OFFSET.id, 0.0)
 
     @cached_property
-    def hull(self) -> Prepared:
+    def hull(self) -> PreparedVessel:
         """The vessel, ready for a step."""
         return self.ship.vessel.prepared(parameters(self.ship.vessel, self.vessel))
 
     @cached_property
     def drive(self) -> Any:
-        """The thrusters, ready for a step, :class:`fmus.actuators.response.Prepared`."""
+        """The thrusters, ready for a step, :class:`fmus.actuators.response.PreparedThrusters`."""
         return self.ship.thrusters.prepared(parameters(self.ship.thrusters, self.thrusters))
 
     @cached_property

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.actuators.response import Prepared, at_rest, command_response, force_response
+from fmus.actuators.response import PreparedThrusters, at_rest, command_response, force_response
 from fmus.effects import Memory
 from fmus.vessel.vessel import State, water_velocity
 
@@ -29,7 +29,7 @@ LONGEST_STEP = 0.02
 FORGOTTEN = 60.0
 
 
-def drive_of(run: Run, model: Model) -> Prepared:
+def drive_of(run: Run, model: Model) -> PreparedThrusters:
     """The thrusters of a model, in the layout of a run's commands."""
     drive, layout = model.drive, model.ship.layout_of(run.commands)
     return drive._replace(effects=drive.effects._replace(layout=layout))

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.actuators.response import Layout
+from fmus.actuators.response import CommandLayout
 from fmus.effects import Effect, Motion
 from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
@@ -69,7 +69,7 @@ def given(p: Picture, m: Model, command: Any, u: Any = 0.0) -> Any:
     return (f.X if p.axis == "X" else f.Y)[p.members[0]]
 
 
-def _apart(m: Model) -> Layout:
+def _apart(m: Model) -> CommandLayout:
     """The layout in which each actuator has commands of its own."""
     return m.ship.layouts[-1]
 

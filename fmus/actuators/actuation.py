@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import cache
 
-from ..declare import POSITIVE, Known, Range, Record, Variable, group_of, variables
+from ..declare import POSITIVE, Fields, Known, Range, Variable, group_of, variables
 from ..effects import Thrust
 from ..hull import Triple
 from ..ops import Number, clip, wrap
@@ -85,7 +85,7 @@ def variable(command: str) -> str:
     return command.replace(".", "_")
 
 
-def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type[Record]:
+def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type[Fields]:
     """Parameters of an actuator: those of its law, and its place.
 
     Args:
@@ -117,13 +117,13 @@ def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type
     return group_of(f"{prefix}{name}", found)
 
 
-def law_of(a: Actuator, values: Record) -> tuple[Record, Number, Number]:
+def law_of(a: Actuator, values: Fields) -> tuple[Fields, Number, Number]:
     """Parameters of an actuator's law, and its place x, y [m, m]."""
     *own, x, y = values
     return a.law.Parameters._make(own), x, y
 
 
-def within(a: Actuator, commands: Sequence[Number], p: Record) -> tuple[Number, ...]:
+def within(a: Actuator, commands: Sequence[Number], p: Fields) -> tuple[Number, ...]:
     """Commands brought within their limits."""
     each = zip(commands, a.law.limits(p), a.round, strict=True)
     return tuple([clip(wrap(c) if angle else c, low, high) for c, (low, high), angle in each])
@@ -137,7 +137,7 @@ def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
 def water_at(
     ship: Description,
     a: Actuator,
-    every: Sequence[tuple[Record, Number, Number]],
+    every: Sequence[tuple[Fields, Number, Number]],
     commands: Sequence[Number],
     nu: Triple,
 ) -> Flow:
@@ -164,7 +164,7 @@ def forces(
     ship: Description,
     commands: Sequence[Number],
     nu: Triple,
-    values: Sequence[Record],
+    values: Sequence[Fields],
     settings: Sequence[Number] = (),
     apart: bool = False,
 ) -> Thrust:
@@ -215,7 +215,7 @@ def measurable(ship: Description) -> dict[str, str]:
 
 
 def output(
-    ship: Description, name: str, commands: Sequence[Number], nu: Triple, values: Sequence[Record]
+    ship: Description, name: str, commands: Sequence[Number], nu: Triple, values: Sequence[Fields]
 ) -> Number:
     """What is measured of an actuator beside its commands.
 
@@ -235,7 +235,7 @@ def output(
 
 
 def limits(
-    ship: Description, values: Sequence[Record], apart: bool = False
+    ship: Description, values: Sequence[Fields], apart: bool = False
 ) -> tuple[tuple[Number, Number], ...]:
     """The lowest and the highest value of each command, by the parameters of each actuator."""
     return tuple(

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from ..declare import Record
+from ..declare import Fields
 
 
 class Attack(NamedTuple):
@@ -19,7 +19,7 @@ class RealAttack(NamedTuple):
     plant_p_y: Annotated[float, "m", "real point of attack, to starboard"] = 0.0
 
 
-def attacking(values: Record, attack: Attack | RealAttack) -> Record:
+def attacking(values: Fields, attack: Attack | RealAttack) -> Fields:
     """Parameters of actuators, of which the last two are the place, with a point of attack."""
     p_x, p_y = attack
     return type(values)._make(

@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from ..declare import Range, Record, Variable, group_of
+from ..declare import Fields, Range, Variable, group_of
 from ..effects.curve import interpolate
 from ..ops import Number, clip, fmax
 from .law import Command, Flow, Law, Span
@@ -11,7 +11,7 @@ from .laws import SMALL
 NODES = 11  # of the table, from command -1 to 1
 
 
-def _forces(way: str) -> type[Record]:
+def _forces(way: str) -> type[Fields]:
     """The force at each node; a straight line of one newton as it starts."""
     at = [2.0 * k / (NODES - 1) - 1.0 for k in range(NODES)]
     fields = [
@@ -21,7 +21,7 @@ def _forces(way: str) -> type[Record]:
     return group_of("Forces", fields)
 
 
-class ForceTableAhead(Law[Record]):
+class ForceTableAhead(Law[Fields]):
     """Force ahead at the commands -1, -0.8 ... 1 as it was measured at rest; it must not fall."""
 
     name = "force_table_ahead"
@@ -31,20 +31,20 @@ class ForceTableAhead(Law[Record]):
     Parameters = _forces("ahead")
 
     @classmethod
-    def limits(cls, p: Record) -> tuple[Span, ...]:
+    def limits(cls, p: Fields) -> tuple[Span, ...]:
         return ((-1.0, 1.0),)
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Record) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, Number]:
         f = interpolate(commands[0], -1.0, 1.0, p)
         return f, 0.0 * f
 
     @classmethod
-    def reach(cls, flow: Flow, p: Record) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: Fields) -> tuple[Span, ...]:
         return ((p[0], p[-1]),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Record) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, ...]:
         # Each stretch between two nodes is gone as far as the force asks for.
         c: Number = -1.0
         for low, high in pairwise(p):
@@ -61,6 +61,6 @@ class ForceTableAside(ForceTableAhead):
     Parameters = _forces("to starboard")
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Record) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, Number]:
         f = interpolate(commands[0], -1.0, 1.0, p)
         return 0.0 * f, f

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..declare import Range, Record, Variable, variables
+from ..declare import Fields, Range, Variable, variables
 from ..effects.effect import Effect, Search, Wording, effect
 from ..effects.text import Found
 from ..hull_functions import Change
@@ -52,7 +52,7 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
         search=Search(differentiable=True),
         description=f"{change.text}: {title}",
     )
-    def function(plant: Record, *additions: Number) -> Record:
+    def function(plant: Fields, *additions: Number) -> Fields:
         for b in alike:
             own = plant[b.k]
             places = [b.law.Parameters._fields.index(p) for p in change.parameters]

@@ -351,31 +351,31 @@ class Rudder(Law[Foil]):
         return (0.5 * atan2(sine, sqrt(1.0 - sine * sine)),)
 
 
-class Given(NamedTuple):
+class LargestForces(NamedTuple):
     F_X: Annotated[float, "N", "largest force ahead and astern", DIVISOR] = 1.0
     F_Y: Annotated[float, "N", "largest force to starboard and port", DIVISOR] = 1.0
 
 
-class GivenForce(Law[Given]):
+class ExternalForce(Law[LargestForces]):
     """A force that is given, as a tug's or a winch's."""
 
     name = "given_force"
     commands = (Command("X", "N", "force ahead"), Command("Y", "N", "force to starboard"))
     components = "XY"
-    Parameters = Given
+    Parameters = LargestForces
 
     @classmethod
-    def limits(cls, p: Given) -> tuple[Span, ...]:
+    def limits(cls, p: LargestForces) -> tuple[Span, ...]:
         return ((-p.F_X, p.F_X), (-p.F_Y, p.F_Y))
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Given) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: LargestForces) -> tuple[Number, Number]:
         return commands[0], commands[1]
 
     @classmethod
-    def reach(cls, flow: Flow, p: Given) -> tuple[Span, ...]:
-        return GivenForce.limits(p)
+    def reach(cls, flow: Flow, p: LargestForces) -> tuple[Span, ...]:
+        return ExternalForce.limits(p)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Given) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: LargestForces) -> tuple[Number, ...]:
         return forces

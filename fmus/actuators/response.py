@@ -2,8 +2,8 @@
 
 Commands pass the effects with a memory of commands (a delay), the limit of their rate, the
 characteristic of the thrusters, and the effects with a memory of forces (a lag). What becomes of them
-then is of the ship: see :class:`Layout`. The functions run on floats, step by step in an FMU, and on
-arrays, which is how a diagnosis computes whole series with them.
+then is of the ship: see :class:`CommandLayout`. The functions run on floats, step by step in an FMU,
+and on arrays, by which a diagnosis computes whole series.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import NamedTuple
 
-from ..declare import Record
+from ..declare import Fields
 from ..effects import EffectSet, Memory, Running, Thrust
 from ..effects.all_thrusters import way
 from ..effects.group import Group, Member, group
@@ -46,7 +46,7 @@ def total(f: Thrust) -> Triple:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class CommandLayout:
     """How a ship's commands become a force, with the effects of its actuators.
 
     Attributes:
@@ -83,7 +83,13 @@ class Layout:
         return [(a, side) for a in ordered(self.ship) for side in (a.sides if self.apart else (0.0,))]
 
     def running(
-        self, t: Series, u: Series, v: Series, r: Series, commands: Sequence[Series], b: "Prepared"
+        self,
+        t: Series,
+        u: Series,
+        v: Series,
+        r: Series,
+        commands: Sequence[Series],
+        b: "PreparedThrusters",
     ) -> Running:
         """What the force of the actuators may depend on, at a time [s], velocity and commands."""
         p = b.params
@@ -97,7 +103,7 @@ class Layout:
         gains = [x for a, x in power for _ in a.sides]
         return Running(t, u, v, r, tuple(commands), tuple(each), tuple(gains))
 
-    def thrust(self, acting: Sequence[Number], now: Running, b: "Prepared") -> Thrust:
+    def thrust(self, acting: Sequence[Number], now: Running, b: "PreparedThrusters") -> Thrust:
         """The force of each unit by the commands that act, effects included."""
         p = b.params
         f = forces(self.ship, acting, (now.u, now.v, now.r), p.plant, p.power, self.apart)
@@ -105,30 +111,30 @@ class Layout:
             f = member.apply(acts, p.wrong, f, f, now)
         return f
 
-    def act(self, acting: Sequence[Number], now: Running, b: "Prepared") -> Triple:
+    def act(self, acting: Sequence[Number], now: Running, b: "PreparedThrusters") -> Triple:
         """tau [N, N, N m], effects included, of :meth:`thrust`."""
         return total(self.thrust(acting, now, b))
 
-    def nominal_force(self, commands: Sequence[Number], p: Record) -> Triple:
+    def nominal_force(self, commands: Sequence[Number], p: Fields) -> Triple:
         """tau [N, N, N m] that the allocation expects of commands at rest."""
         settings = p.power if self.apart else ()  # of a run are given with the commands of each unit
         return total(
             forces(allocating(self.ship), commands, AT_REST, p.allocation, settings, self.apart)
         )
 
-    def allocate(self, tau: Triple, p: Record) -> tuple[Number, ...]:
+    def allocate(self, tau: Triple, p: Fields) -> tuple[Number, ...]:
         """The commands that give a force, as nearly as they can."""
         return allocate(allocating(self.ship), tau, AT_REST, p.allocation, self.apart)
 
-    def full(self, p: Record) -> Triple:
+    def full(self, p: Fields) -> Triple:
         """The largest force and moment on each axis [N, N, N m]."""
         return largest(allocating(self.ship), p.allocation, self.apart)
 
-    def limits(self, p: Record) -> tuple[Span, ...]:
+    def limits(self, p: Fields) -> tuple[Span, ...]:
         """The lowest and the highest value of each command."""
         return limits(self.ship, p.plant, self.apart)
 
-    def powered(self, b: "Prepared", settings: Sequence[Number]) -> "Prepared":
+    def powered(self, b: "PreparedThrusters", settings: Sequence[Number]) -> "PreparedThrusters":
         """The actuators at settings of their power, of each that has one."""
         p = b.params
         power = p.power._make([x * s for x, s in zip(p.power, settings, strict=True)])
@@ -146,10 +152,10 @@ def allocating(ship: Description) -> Description:
 
 
 @cache
-def layouts(ship: Description) -> tuple[Layout, ...]:
+def layouts(ship: Description) -> tuple[CommandLayout, ...]:
     """How runs may have a ship's commands: as its FMU does, and each unit by its own."""
     each = any(len(a.sides) > 1 for a in actuators(ship))
-    return (Layout(ship), Layout(ship, apart=True)) if each else (Layout(ship),)
+    return (CommandLayout(ship), CommandLayout(ship, apart=True)) if each else (CommandLayout(ship),)
 
 
 class ThrusterEffects(NamedTuple):
@@ -164,7 +170,7 @@ class ThrusterEffects(NamedTuple):
             its place among the memories.
     """
 
-    layout: Layout
+    layout: CommandLayout
     dynamics: Group
     forces: Group
     remembering: Mapping[str, Sequence[tuple[int, Member, Memory]]]
@@ -172,7 +178,7 @@ class ThrusterEffects(NamedTuple):
 
 
 @cache
-def thruster_effects(effects: EffectSet, layout: Layout) -> ThrusterEffects:
+def thruster_effects(effects: EffectSet, layout: CommandLayout) -> ThrusterEffects:
     """The groups of a set of effects; those with a memory of commands come first."""
     actuator = [e for e in effects.of_kind("actuator") if e.function is not None]
     slow = [e for of in ("command", "force") for e in actuator if e.memory and e.memory.of == of]
@@ -203,7 +209,7 @@ def at_rest(effects: ThrusterEffects) -> Past:
     return Past(0.0, tuple([m.start(width) for m in memories if m is not None]), (0.0,) * width)
 
 
-class Prepared(NamedTuple):
+class PreparedThrusters(NamedTuple):
     """What follows from the parameters alone: which effects act.
 
     Attributes:
@@ -214,16 +220,16 @@ class Prepared(NamedTuple):
         any_acts: whether any of these acts.
     """
 
-    params: Record
+    params: Fields
     effects: ThrusterEffects
     slow: tuple[Condition, ...]
     acting: tuple[Condition, ...]
     any_acts: Condition
 
 
-def prepared(p: Record, effects: ThrusterEffects) -> Prepared:
+def prepared(p: Fields, effects: ThrusterEffects) -> PreparedThrusters:
     """Everything that a step needs of the parameters."""
-    return Prepared(
+    return PreparedThrusters(
         p,
         effects,
         effects.dynamics.acting(p.dynamics),
@@ -236,7 +242,7 @@ def remember(
     memories: tuple[tuple[object, ...], ...],
     signals: tuple[Number, ...],
     of: str,
-    b: Prepared,
+    b: PreparedThrusters,
     h: Number,
 ) -> tuple[tuple[tuple[object, ...], ...], tuple[Number, ...]]:
     """The memories a step later, and what they make of commands or of shares of full force.
@@ -266,7 +272,7 @@ def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle:
 
 
 def command_response(
-    s: Past, commands: tuple[Number, ...], b: Prepared, h: Number
+    s: Past, commands: tuple[Number, ...], b: PreparedThrusters, h: Number
 ) -> tuple[Past, tuple[Number, ...]]:
     """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
     memories, given = remember(s.memories, commands, "command", b, h)
@@ -285,7 +291,7 @@ def command_response(
 
 
 def force_response(
-    s: Past, shares: tuple[Number, ...], b: Prepared, h: Number
+    s: Past, shares: tuple[Number, ...], b: PreparedThrusters, h: Number
 ) -> tuple[Past, tuple[Number, ...]]:
     """The shares of full force that act after a step of h [s], for those of the characteristic."""
     memories, shares = remember(s.memories, shares, "force", b, h)

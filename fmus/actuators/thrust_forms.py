@@ -10,7 +10,7 @@ line commands are allocated.
 
 from collections.abc import Mapping, Sequence
 
-from ..declare import Range, Record, Variable, group_of, variables
+from ..declare import Fields, Range, Variable, group_of, variables
 from ..effects.curve import hats
 from ..ops import Number, signed_root
 from .law import Flow, Law
@@ -33,11 +33,11 @@ def squared(line: type[Law]) -> type[Law]:
         variants = {}  # noqa: RUF012
 
         @classmethod
-        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Record) -> tuple[Number, Number]:
+        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, Number]:
             return line.force(tuple([abs(c) * c for c in commands]), flow, p)
 
         @classmethod
-        def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Record) -> tuple[Number, ...]:
+        def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, ...]:
             return tuple([signed_root(c) for c in line.commanded(forces, flow, p)])
 
     return Squared
@@ -61,7 +61,7 @@ def tabulated(line: type[Law], tables: Mapping[str, str]) -> type[Law]:
         Parameters = group_of("Tabulated", [*variables(line.Parameters), *cells, TABLE_SPEED])
 
         @classmethod
-        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Record) -> tuple[Number, Number]:
+        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, Number]:
             first = len(p) - 1 - len(cells)
             shares = [
                 looked_up(c, abs(getattr(flow, speed)), p[first + k * NODES :][:NODES], p.table_speed)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
-from ..declare import Record
+from ..declare import Fields
 from ..hull import Triple
 from ..ops import Number, clip, where
 from ..ship_description import Description
@@ -17,7 +17,7 @@ TINY = 1e-9  # share by which a matrix that has no inverse gets one
 NOTHING = 1e-30  # N2, in place of zero where no actuator can push
 
 
-class Component(NamedTuple):
+class ForceComponent(NamedTuple):
     """A force that an actuator can be asked for: whose it is, and along which axis of the ship."""
 
     actuator: Actuator
@@ -25,9 +25,9 @@ class Component(NamedTuple):
 
 
 @cache
-def components(ship: Description) -> tuple[Component, ...]:
+def components(ship: Description) -> tuple[ForceComponent, ...]:
     """The forces that a ship's actuators can be asked for."""
-    return tuple([Component(a, axis) for a in actuators(ship) for axis in a.law.components])
+    return tuple([ForceComponent(a, axis) for a in actuators(ship) for axis in a.law.components])
 
 
 @cache
@@ -56,13 +56,13 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
     return sum(x * y for x, y in zip(a, b, strict=True))
 
 
-def _column(c: Component, x: Number, y: Number) -> Triple:
+def _column(c: ForceComponent, x: Number, y: Number) -> Triple:
     """tau [N, N, N m] of one newton along a component."""
     return (1.0, 0.0, -y) if c.along == "X" else (0.0, 1.0, x)
 
 
 def allocate(
-    ship: Description, tau: Sequence[Number], nu: Triple, values: Sequence[Record], apart: bool = False
+    ship: Description, tau: Sequence[Number], nu: Triple, values: Sequence[Fields], apart: bool = False
 ) -> tuple[Number, ...]:
     """Commands that give a force as nearly as the actuators can, within limits.
 
@@ -140,7 +140,7 @@ def _order(ship: Description) -> tuple[tuple[int, int], ...]:
     return tuple(found)
 
 
-def solution(ship: Description, tau: Sequence[Number], values: Sequence[Record]) -> Triple:
+def solution(ship: Description, tau: Sequence[Number], values: Sequence[Fields]) -> Triple:
     """The forces [N] of as many components as axes that give a force exactly, whatever their limits."""
     every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
     columns = [_column(c, *every[c.actuator.k][1:]) for c in components(ship)]
@@ -223,7 +223,7 @@ def sum_of(values: Sequence[Number]) -> Number:
     return found
 
 
-def largest(ship: Description, values: Sequence[Record], apart: bool = False) -> Triple:
+def largest(ship: Description, values: Sequence[Fields], apart: bool = False) -> Triple:
     """The largest force and moment on each axis [N, N, N m], of all actuators at rest together."""
     found = [0.0, 0.0, 0.0]
     for c in components(ship):

@@ -20,7 +20,7 @@ RUNS = ".//*[@type='cybership.run']/*[@name]"
 
 
 @dataclass(frozen=True)
-class Starts:
+class StartValues:
     """Start values for components.
 
     Attributes:
@@ -55,7 +55,7 @@ class Starts:
         return component.starting(starts)
 
 
-def read_starts(path: Path) -> Starts:
+def read_starts(path: Path) -> StartValues:
     """The values of a parameter set.
 
     Args:
@@ -88,7 +88,7 @@ def read_starts(path: Path) -> Starts:
         found[model][name] = value, entry.unit
     root = ElementTree.fromstring(content)
     notes = [f"{e.get('name')}: {e.get('description')}" for e in root.iterfind(BESIDE)]
-    return Starts(found, path, notes, [e.get("name", "") for e in root.iterfind(RUNS)])
+    return StartValues(found, path, notes, [e.get("name", "") for e in root.iterfind(RUNS)])
 
 
 def _check(value: float, unit: str | None, v: Variable, where: str) -> None:

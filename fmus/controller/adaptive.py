@@ -8,7 +8,7 @@ measurement is frozen.
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
-from ..declare import FIXED, Component, Range, Record, bundle
+from ..declare import FIXED, Component, Fields, Range, bundle
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple
 from ..ops import Condition, Number, choose, not_, where
@@ -17,7 +17,7 @@ from .backstepping import (
     HELD,
     Energy,
     Errors,
-    Gains,
+    FeedbackGains,
     Inputs,
     acting,
     control,
@@ -55,7 +55,7 @@ class OmegaTrue(NamedTuple):
 class Learner(NamedTuple):
     """Parameters of every controller that learns, whatever it learns."""
 
-    gains: Gains = Gains()
+    gains: FeedbackGains = FeedbackGains()
     disturbance: Disturbance = Disturbance()
     hold_frozen: Annotated[float, "1", "1: do not adapt while frozen", FIXED, Range(0.0, 1.0)] = 0.0
     omega_true: OmegaTrue = OmegaTrue()
@@ -64,12 +64,12 @@ class Learner(NamedTuple):
 class State(NamedTuple):
     """Estimates of phi and of the earth-fixed omega_n, and the force asked for last."""
 
-    phi_hat: Record
+    phi_hat: Fields
     omega: Triple = (0.0, 0.0, 0.0)
     tau: Force = Force()
 
 
-def parameters(model: Parametrisation, **more: tuple[object, ...]) -> type[Record]:
+def parameters(model: Parametrisation, **more: tuple[object, ...]) -> type[Fields]:
     """The Params class of a controller that learns a model."""
     groups = {"belief": model.belief, "phi": model.start(), "gamma": model.gamma()}
     return bundle("Params", Learner, **groups, truth=model.truth(), **more)
@@ -97,7 +97,7 @@ def climb(
     return tuple([x + dt * (g * f) for x, g, f in zip(values, gains, slopes, strict=True)])
 
 
-def energy(z: Errors, p: Record, phi: Sequence[Number], omega: Triple) -> Energy:
+def energy(z: Errors, p: Fields, phi: Sequence[Number], omega: Triple) -> Energy:
     """V3 of (4.14), corrected; an estimate whose gain is 0 is left out."""
     known = weighted(p.truth, phi, p.gamma) + weighted(p.omega_true, omega, p.disturbance)
     return Energy(tracking_energy(z, p.belief.inertia) + 0.5 * known)
@@ -116,10 +116,10 @@ def adaptive(name: str, description: str, model: Parametrisation) -> Component:
     """A component that tracks, and learns a model by its tracking error."""
     Outputs = outputs(model)
 
-    def init(i: Inputs, p: Record) -> State:
+    def init(i: Inputs, p: Fields) -> State:
         return State(model.hat._make(p.phi))
 
-    def step(s: State, i: Inputs, p: Record, h: Number) -> tuple[State, Record]:
+    def step(s: State, i: Inputs, p: Fields, h: Number) -> tuple[State, Fields]:
         e = i.estimate
         nu = (e.u_hat, e.v_hat, e.r_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)

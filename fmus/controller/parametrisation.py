@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from ..declare import Estimate, Range, Record, vector
+from ..declare import Estimate, Fields, Range, vector
 from ..hull import Inertia, TowedDamping, Triple, inertia_force
 from ..ops import Number, clip, cos, sin
 
@@ -20,7 +20,7 @@ LOSS = (-1.0, 0.8)
 Regressors = tuple[tuple[Number, ...], tuple[Number, ...], tuple[Number, ...]]
 
 
-class Coefficient(NamedTuple):
+class LearnedCoefficient(NamedTuple):
     """A parameter that is learned: its true value for the default vessel, and an adaptation gain.
 
     ``added`` is whether it is learned what is to be added to what the controller believes.
@@ -42,7 +42,7 @@ class Coefficient(NamedTuple):
         return Estimate(self.parameter, self.added)
 
 
-class Belief(NamedTuple):
+class ControllerModel(NamedTuple):
     """What the controller believes of the hull: M, C(nu) and g(nu) of (2.27)."""
 
     inertia: Inertia = Inertia()
@@ -80,12 +80,12 @@ class Parametrisation(Generic[B]):
         by_acceleration: True where F depends on the acceleration.
     """
 
-    coefficients: Sequence[Coefficient]
+    coefficients: Sequence[LearnedCoefficient]
     pattern: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
     regressors: Callable[[Triple, Triple, Triple, B], Regressors]
     known: Callable[[Number, Number, Number, B], Triple]
     blocks: tuple[tuple[int, ...], ...]
-    belief: B = field(default_factory=Belief)  # pyright: ignore[reportAssignmentType]
+    belief: B = field(default_factory=ControllerModel)  # pyright: ignore[reportAssignmentType]
     loss: tuple[int, int, int] | None = None
     by_acceleration: bool = False
 
@@ -93,9 +93,9 @@ class Parametrisation(Generic[B]):
         self,
         stem: str,
         text: str,
-        start: Callable[[Coefficient], float],
-        extra: Callable[[Coefficient], Sequence[object]] = lambda c: (),
-    ) -> type[Record]:
+        start: Callable[[LearnedCoefficient], float],
+        extra: Callable[[LearnedCoefficient], Sequence[object]] = lambda c: (),
+    ) -> type[Fields]:
         """A NamedTuple class with one scalar for each parameter."""
         name = stem.title().replace("_", "")
         fields = [
@@ -105,19 +105,19 @@ class Parametrisation(Generic[B]):
         return vector(name, fields)
 
     @cached_property
-    def start(self) -> type[Record]:
+    def start(self) -> type[Fields]:
         return self._vector("phi_0", "estimate at the start of", lambda c: 0.0, lambda c: (c.estimate,))
 
     @cached_property
-    def hat(self) -> type[Record]:
+    def hat(self) -> type[Fields]:
         return self._vector("phi_hat", "estimate of", lambda c: 0.0)
 
     @cached_property
-    def truth(self) -> type[Record]:
+    def truth(self) -> type[Fields]:
         return self._vector("phi_true", "for the output lyapunov only: true", lambda c: c.value)
 
     @cached_property
-    def gamma(self) -> type[Record]:
+    def gamma(self) -> type[Fields]:
         fields = [
             (f"gamma_{k}", "1", f"adaptation gain of {c.name}", c.gain)
             for k, c in enumerate(self.coefficients, 1)

@@ -32,7 +32,7 @@ class StoreOptions(NamedTuple):
     store_weight: Annotated[float, "1", "weight of the sum over the store, rho", POSITIVE] = 1.0
 
 
-class Row(NamedTuple):
+class StoredSample(NamedTuple):
     """A stored sample; ``target`` is y, or eps as it was with ``stale`` = 1."""
 
     filled: Number
@@ -57,21 +57,27 @@ class Sums(NamedTuple):
 
 
 class Store(NamedTuple):
-    rows: tuple[Row, ...]
+    rows: tuple[StoredSample, ...]
     last: Regressors
     sums: Sums
 
 
 # (model, rows, sums over them, new row) -> rows
-Storage = Callable[[Parametrisation, tuple[Row, ...], Sums, Row], tuple[Row, ...]]
+Storage = Callable[
+    [Parametrisation, tuple[StoredSample, ...], Sums, StoredSample], tuple[StoredSample, ...]
+]
 
 
-def window(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> tuple[Row, ...]:
+def window(
+    model: Parametrisation, rows: tuple[StoredSample, ...], sums: Sums, row: StoredSample
+) -> tuple[StoredSample, ...]:
     """Algorithm 1: a queue."""
     return (row, *rows[:-1])
 
 
-def singular(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> tuple[Row, ...]:
+def singular(
+    model: Parametrisation, rows: tuple[StoredSample, ...], sums: Sums, row: StoredSample
+) -> tuple[StoredSample, ...]:
     """Algorithm 2, corrected: fill up, then exchange the row that raises the smallest singular value of
     the stacked regressors most, on strict increase."""
     free: Number = -1.0
@@ -84,7 +90,9 @@ def singular(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row
     )
 
 
-def _worst(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> Number:
+def _worst(
+    model: Parametrisation, rows: tuple[StoredSample, ...], sums: Sums, row: StoredSample
+) -> Number:
     """Index of the row to exchange, -1 if none; an eigenvalue is only sought where it beats the best."""
     best, index = sums.least, -1.0
     gained = _added(sums.grams, row.F, 1.0)
@@ -105,8 +113,8 @@ def _added(grams: Grams, F: Regressors, sign: float) -> Grams:
     return _plus(grams, [[[sign * a * b for b in f] for a in f] for f in F])
 
 
-def empty_row(F: Regressors) -> Row:
-    return Row(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), tuple([tuple([0.0] * len(f)) for f in F]))  # pyright: ignore
+def empty_row(F: Regressors) -> StoredSample:
+    return StoredSample(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), tuple([tuple([0.0] * len(f)) for f in F]))  # pyright: ignore
 
 
 def empty_store(model: Parametrisation) -> Store:
@@ -116,7 +124,7 @@ def empty_store(model: Parametrisation) -> Store:
 
 
 @kernel
-def summed(omega_on: Condition, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
+def summed(omega_on: Condition, rows: tuple[StoredSample, ...], model: Parametrisation) -> Sums:
     """All sums anew; an empty row is zero and adds nothing."""
     count, oldest, newest = 0.0, NEVER, 0.0
     projected: tuple[Number, ...] = (0.0,) * len(model.coefficients)
@@ -167,7 +175,9 @@ def _gram(samples: list[tuple[Number, ...]]) -> tuple[tuple[Number, ...], ...]:
     return tuple([tuple([half[max(i, j)][min(i, j)] for j in size]) for i in size])
 
 
-def _earth_fixed(model: Parametrisation, rows: tuple[Row, ...]) -> tuple[Triple, tuple[Triple, ...]]:
+def _earth_fixed(
+    model: Parametrisation, rows: tuple[StoredSample, ...]
+) -> tuple[Triple, tuple[Triple, ...]]:
     """Sum of R target, and sum of F^T R^T."""
     turned: Triple = (0.0, 0.0, 0.0)
     cross: tuple[Triple, ...] = ((0.0, 0.0, 0.0),) * len(model.coefficients)
@@ -191,7 +201,7 @@ def offer(
     model: Parametrisation,
     storage: Storage,
     store: Store,
-    row: Row,
+    row: StoredSample,
     usable: Condition,
     now: Number,
     p: StoreOptions,

@@ -37,7 +37,7 @@ class Order(NamedTuple):
     tau_N: Annotated[float, "N.m", "the order as a moment"] = 0.0
 
 
-class Clock(NamedTuple):
+class TrialTime(NamedTuple):
     """State of a trial that goes by time alone [s]."""
 
     t: Number = 0.0

@@ -9,7 +9,7 @@ from typing import Any, TypeVar, cast
 from ..declare import Component, flatten, packer, rebuild, width
 from ..fmi.trace import Symbol, TraceError
 from ..ops import Number
-from .tape import Kernels, Recording, Tape, Value, is_condition, like
+from .tape import Kernels, RecordedFunction, RecordedValue, Tape, is_condition, like
 
 T = TypeVar("T", bound=tuple[object, ...])
 
@@ -28,10 +28,10 @@ class Program:
     """
 
     component: Component
-    init: Recording
-    prepare: Recording
-    step: Recording
-    kernels: list[Recording]
+    init: RecordedFunction
+    prepare: RecordedFunction
+    step: RecordedFunction
+    kernels: list[RecordedFunction]
     states: int
 
 
@@ -79,12 +79,12 @@ class _Kept:
     """The values that ``prepare`` computes, each once; it gives them in any tuples, lists and dicts."""
 
     def __init__(self) -> None:
-        self.values: dict[int, Value] = {}
+        self.values: dict[int, RecordedValue] = {}
 
     def gather(self, prepared: object) -> None:
         """Collect the values to keep between steps; a parameter is at hand anyway."""
 
-        def keep(x: Value) -> Value:
+        def keep(x: RecordedValue) -> RecordedValue:
             if x.operation != "variable":
                 self.values.setdefault(id(x), x)
             return x
@@ -95,7 +95,7 @@ class _Kept:
         """The same, as a step finds it."""
         places = {identity: k for k, identity in enumerate(self.values)}
 
-        def find(x: Value) -> Value:
+        def find(x: RecordedValue) -> RecordedValue:
             if x.operation == "variable":
                 return tape.variable(x.args[0])
             return tape.variable(f"prepared[{places[id(x)]}]", is_condition(x))
@@ -103,9 +103,9 @@ class _Kept:
         return _mapped(prepared, find)
 
 
-def _mapped(part: object, function: Callable[[Value], Value]) -> Any:
+def _mapped(part: object, function: Callable[[RecordedValue], RecordedValue]) -> Any:
     """Nested tuples, lists and dicts with a function applied to every value; all else stays."""
-    if isinstance(part, Value):
+    if isinstance(part, RecordedValue):
         return function(part)
     if isinstance(part, dict):
         return {key: _mapped(x, function) for key, x in part.items()}

@@ -23,7 +23,7 @@ _CONDITIONS = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "logic
 _DECIDED = {"and": False, "or": True}
 
 
-class Value(Symbol):
+class RecordedValue(Symbol):
     """A number or a condition that is known at run time only.
 
     Attributes:
@@ -53,7 +53,7 @@ class Value(Symbol):
         return self.tape.call(function, args)
 
 
-class Block(list["Value | Branch | Call"]):
+class Block(list["RecordedValue | Branch | Call"]):
     """Statements in their order; an operation is the value that it gives."""
 
 
@@ -68,9 +68,9 @@ class Branch:
         given: for each block what the results are.
     """
 
-    condition: Value
+    condition: RecordedValue
     blocks: tuple[Block, Block]
-    results: list[Value]
+    results: list[RecordedValue]
     given: tuple[list[Operand], list[Operand]]
 
 
@@ -78,13 +78,13 @@ class Branch:
 class Call:
     """A call of a kernel: its arguments, and the values that it gives."""
 
-    kernel: Recording
+    kernel: RecordedFunction
     args: list[Operand]
-    results: list[Value]
+    results: list[RecordedValue]
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class RecordedFunction:
     """A whole function.
 
     Attributes:
@@ -106,8 +106,8 @@ class Kernels:
             the objects among them from making way for others in their place.
     """
 
-    recordings: list[Recording] = field(default_factory=list)
-    known: dict[Hashable, tuple[Recording, Any, tuple[object, ...]]] = field(default_factory=dict)
+    recordings: list[RecordedFunction] = field(default_factory=list)
+    known: dict[Hashable, tuple[RecordedFunction, Any, tuple[object, ...]]] = field(default_factory=dict)
 
 
 class Tape:
@@ -122,29 +122,29 @@ class Tape:
         self.body = self.block = Block()
         self._open = {id(self.body)}
         # What has been done so far in the open blocks, the innermost first.
-        self._done: ChainMap[Hashable, Value] = ChainMap()
+        self._done: ChainMap[Hashable, RecordedValue] = ChainMap()
 
-    def variable(self, name: str, condition: bool = False) -> Value:
+    def variable(self, name: str, condition: bool = False) -> RecordedValue:
         """A value from outside."""
         return self._once("variable", (name,), condition)
 
-    def _once(self, name: str, args: Sequence[object], condition: bool) -> Value:
+    def _once(self, name: str, args: Sequence[object], condition: bool) -> RecordedValue:
         """The value of an operation: of the same one before, if there was one, else a new one."""
-        key = name, tuple([id(x) if isinstance(x, Value) else repr(x) for x in args])
+        key = name, tuple([id(x) if isinstance(x, RecordedValue) else repr(x) for x in args])
         value = self._done.get(key)
         if value is None:
-            value = self._done[key] = Value(self, name, args, condition)
+            value = self._done[key] = RecordedValue(self, name, args, condition)
             if name != "variable":
                 self.block.append(value)
         return value
 
-    def recording(self, results: Sequence[Operand]) -> Recording:
+    def recording(self, results: Sequence[Operand]) -> RecordedFunction:
         """All that is recorded, as a function with these results."""
         self._check(results)
-        return Recording(self.body, results)
+        return RecordedFunction(self.body, results)
 
     def operation(self, name: str, args: Sequence[Operand]) -> Operand:
-        """Record an operation, but for one with a known truth value."""
+        """Fields an operation, but for one with a known truth value."""
         self._check(args)
         if name in _DECIDED and any(isinstance(x, bool) for x in args):
             known, other = args if isinstance(args[0], bool) else args[::-1]
@@ -152,8 +152,8 @@ class Tape:
         condition = name in _CONDITIONS or (name == "where" and all(map(is_condition, args[1:])))
         return self._once(name, args, condition)
 
-    def branch(self, condition: Value, a: Callable[[], T], b: Callable[[], T]) -> T:
-        """Record a branch; gives what is there behind it, in the shape that both cases have."""
+    def branch(self, condition: RecordedValue, a: Callable[[], T], b: Callable[[], T]) -> T:
+        """Fields a branch; gives what is there behind it, in the shape that both cases have."""
         self._check([condition])
         first, one = self._inner(a)
         second, other = self._inner(b)
@@ -162,9 +162,9 @@ class Tape:
         def merged(x: Any, y: Any) -> Any:
             if isinstance(x, (tuple, list)):
                 return like(x, [merged(p, q) for p, q in zip(x, y, strict=True)])
-            if x is y or (not isinstance(x, Value) and repr(x) == repr(y)):
+            if x is y or (not isinstance(x, RecordedValue) and repr(x) == repr(y)):
                 return x
-            value = Value(self, "merged", (), is_condition(x) and is_condition(y))
+            value = RecordedValue(self, "merged", (), is_condition(x) and is_condition(y))
             branch.results.append(value)
             branch.given[0].append(x)
             branch.given[1].append(y)
@@ -187,7 +187,7 @@ class Tape:
             self.block, self._done = outer, before
 
     def call(self, function: Callable[..., T], args: tuple[object, ...]) -> T:
-        """Record a call of a kernel, which is recorded itself at its first call."""
+        """Fields a call of a kernel, which is recorded itself at its first call."""
         flat = list(leaves(args))
         self._check(flat)
         key = function, shape(args)
@@ -200,25 +200,27 @@ class Tape:
             self.kernels.recordings.append(recording)
             self.kernels.known[key] = recording, given, refilled_args
         recording, given, _ = self.kernels.known[key]
-        results = [Value(self, "called", (), is_condition(x)) for x in recording.results]
+        results = [RecordedValue(self, "called", (), is_condition(x)) for x in recording.results]
         self.block.append(Call(recording, flat, results))
         return refilled(given, iter(results))
 
     def _check(self, used: Iterable[object]) -> None:
         """Refuse a value that is not there: of another function, or of a branch that is over."""
         for x in used:
-            if isinstance(x, Symbol) and (not isinstance(x, Value) or id(x.block) not in self._open):
+            if isinstance(x, Symbol) and (
+                not isinstance(x, RecordedValue) or id(x.block) not in self._open
+            ):
                 raise TraceError("a value is used outside of the branch or the function that it is from")
 
 
 def is_condition(x: object) -> bool:
     """Whether something is a truth value, known or not."""
-    return x.condition if isinstance(x, Value) else isinstance(x, bool)
+    return x.condition if isinstance(x, RecordedValue) else isinstance(x, bool)
 
 
 def is_number(x: object) -> TypeGuard[Operand]:
     """Whether something is a number or a truth value, known or not."""
-    return isinstance(x, (Value, float, int))
+    return isinstance(x, (RecordedValue, float, int))
 
 
 def leaves(value: object) -> Iterator[Operand]:

@@ -14,13 +14,13 @@ FACTOR = re.compile(r"\|[uvr]\||[uvr]")  # of a product of speeds
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 
-class Strict(BaseModel):
+class StrictTable(BaseModel):
     """A table in which a key that is not known is an error."""
 
     model_config = ConfigDict(extra="forbid", strict=False)
 
 
-class Number(Strict):
+class Number(StrictTable):
     """A number, where it comes from, and its standard deviation."""
 
     value: Finite | None = Field(None, description="in SI units")

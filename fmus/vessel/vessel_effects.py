@@ -3,7 +3,7 @@
 from functools import cache
 from typing import NamedTuple
 
-from ..declare import Declared, Record, variables, vector
+from ..declare import Declared, Fields, variables, vector
 from ..effects import Effect, EffectSet, Loaded, Motion
 from ..effects.group import Group, group
 from ..hull import Damping
@@ -28,8 +28,8 @@ class VesselEffects(NamedTuple):
     outside: Group
     inertia: Group
     measurement: Group
-    change_forces: type[Record]
-    outside_forces: type[Record]
+    change_forces: type[Fields]
+    outside_forces: type[Fields]
 
 
 @cache
@@ -63,7 +63,7 @@ def _outputs_of(e: Effect) -> list[tuple[str, str, str, float]]:
 
 
 def forces_of(
-    group: Group, acting: tuple[Condition, ...], values: Record, ship: Motion | Loaded
+    group: Group, acting: tuple[Condition, ...], values: Fields, ship: Motion | Loaded
 ) -> list[Number]:
     """The force of each effect of a group [N, N m], on the axes that it acts on."""
     found: list[Number] = []
