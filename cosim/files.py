@@ -4,29 +4,16 @@ import errno
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
+
+from cybership.scratch_folder import atomic_write
 
 # Bytes that a file keeps for later; chosen: the status of a run, a message and numbers fit.
 ROOM = 4096
 # Characters that remain of a text where room is short; chosen: a fraction of ROOM in UTF-8.
 SHORT = 500
-
-
-@contextmanager
-def atomic_write(path: Path) -> Iterator[Path]:
-    """A scratch file to write, which replaces ``path`` when the block ends without an exception.
-
-    It lies in the same folder; a failure leaves ``path`` as it was and removes the scratch file.
-    """
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield scratch
-        os.replace(scratch, path)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

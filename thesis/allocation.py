@@ -7,7 +7,6 @@ point of attack p_o is moved until it does not, as was done by hand in the basin
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 import cosim
+from cosim.process import scratch_folder
 from studies.study_command import progress, run_study, study_parser
 from studies.study_report import Report
 
@@ -76,7 +76,7 @@ def scenario(p_x: float, hidden: float, push: Push, seed: int) -> Content:
 
 def headings(content: Content) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and measured heading [rad] of a push."""
-    with TemporaryDirectory() as folder:
+    with scratch_folder() as folder:
         result = cosim.simulate(cosim.load_scenario(content), folder)
         if result.status != "done":
             raise cosim.SimulationError(f"a push {result.status}: {result.message}")

@@ -7,7 +7,6 @@ ones where ``--data`` gives them.
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from rich.console import Console
 import cosim
 from cosim.command import BAD_INPUT, FAILED, run_command
 from cosim.dispatch import FinishedRun
+from cosim.process import scratch_folder
 from studies.measured.data_folder import measured_files
 from studies.study_command import progress, study_parser
 from studies.study_report import Report
@@ -105,7 +105,7 @@ def examples(report: Report, stop: float) -> None:
     logs = {}
     for name in ("rich", "ellipse"):
         scenario = cosim.load_scenario({**variants(stop)[name], "seed": 0})
-        with TemporaryDirectory() as folder:
+        with scratch_folder() as folder:
             log = cosim.read_log(cosim.simulate(scenario, folder).folder)
         logs[name] = log, {o: replay(observer(o), log) for o in OBSERVERS}
     report.heading("Pictures")

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel
 
+from cybership.scratch_folder import atomic_write
+
 from ..dispatch.job import Row
 from ..errors import InputError
-from ..files import atomic_write, write_all
+from ..files import write_all
 from ..results.performance import METRICS
 from ..trials.measures import EVERY
 from .design import Case

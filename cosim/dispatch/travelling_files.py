@@ -4,9 +4,10 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePath
 
+from cybership.scratch_folder import atomic_write
+
 from ..compiled.library import compiles
 from ..errors import InputError
-from ..files import atomic_write
 from ..fmu.fmu_model import Model
 from ..scenario.schema import Scenario
 from ..system.own_fmus import read_models

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..files import atomic_write
+from cybership.scratch_folder import atomic_write
+
 from .log import Log
 
 if TYPE_CHECKING:
