@@ -14,6 +14,8 @@ from cybership.scratch_folder import atomic_write
 ROOM = 4096
 # Characters that remain of a text where room is short; chosen: a fraction of ROOM in UTF-8.
 SHORT = 500
+# Characters of a file's name; chosen: half of what file systems take is left for its extension and more.
+STEM = 120
 
 
 def write_text(path: Path, text: str) -> None:
@@ -86,7 +88,7 @@ def file_stems(names: Sequence[str]) -> list[str]:
     """File names without extension: letters that every file system and URI takes, each name once."""
     found: list[str] = []
     for name in names:
-        stem = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:STEM]
         while stem.lower() in (other.lower() for other in found):
             stem += "_"
         found.append(stem)

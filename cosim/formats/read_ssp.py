@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from cybership.message_text import name_of
+
 from ..conversion import SAME, Conversion, conversion
 from ..errors import InputError, nearest
 from ..files import file_stems
@@ -40,8 +42,8 @@ class _Reader:
     def read(self) -> Imported:
         text = self.archive.read(SSP_STRUCTURE)
         root = parse(text, self.path, "SystemStructureDescription", SSP_SPACES["ssd"])
-        if root.get("version") not in ("1.0", "1.0.1"):
-            raise InputError(f"'{self.path}' is of SSP {root.get('version')}; this reader knows 1.0")
+        if (version := root.get("version", "")) not in ("1.0", "1.0.1"):
+            raise InputError(f"'{self.path}' is of SSP {name_of(version)}; this reader knows 1.0")
         system = root.find("ssd:System", NAMES)
         if system is None:
             raise InputError(f"'{self.path}' has no system")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from cybership.message_text import name_of
+
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import INT_LIMIT, Model, Value, Variable
 from ..formats.ssv import ParameterSet
@@ -39,7 +41,7 @@ def check_parameters(system: System, overrides: Overrides, beliefs: Overrides = 
             if parameter not in settable:
                 what = "cannot be set" if parameter in known else "does not exist"
                 hint = nearest(parameter, list(settable))
-                raise InputError(f"{where}: {name}.{parameter} {what}{hint}")
+                raise InputError(f"{where}: {name}.{name_of(parameter)} {what}{hint}")
             check_value(settable[parameter], value, f"{where}: {name}.{parameter}")
             system.parameters[name].append((settable[parameter], value))
 
