@@ -18,7 +18,7 @@ from cosim.process import scratch_folder
 from studies.study_command import progress, run_study, study_parser
 from studies.study_report import Report
 
-from .monte_carlo import Content, Interval, interval
+from .monte_carlo import Content, SampleMean, interval
 
 # Where the thrust of the hidden ships really acts, forward of where it is assumed [m].
 HIDDEN = (-0.05, 0.0, 0.05, 0.18)
@@ -147,7 +147,7 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
     rows = []
     for dx in hidden:
         each = interval(found[dx])
-        error = Interval(*(1000.0 * (x - dx - offset.mean + zero) for x in each))
+        error = SampleMean(*(1000.0 * (x - dx - offset.mean + zero) for x in each))
         rows.append([f"{dx:+.3f}", str(each), str(error)])
     header = ["thrust really acts at [m]", "p_o found [m]", "error against the shift [mm]"]
     report.table(header, rows)

@@ -20,7 +20,7 @@ from studies.measured.data_folder import measured_files
 from studies.study_command import progress, study_parser
 from studies.study_report import Report
 
-from .monte_carlo import Interval, interval, run_all, shipped, vary, without
+from .monte_carlo import SampleMean, interval, run_all, shipped, vary, without
 from .observers import basin, claims, pictures
 from .observers.estimates_replayed import (
     LOGGED,
@@ -73,7 +73,7 @@ def analyse(run: FinishedRun) -> Found:
     return {name: measures(log, replay(observer(name), log)) for name in OBSERVERS}
 
 
-def over_seeds(found: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+def over_seeds(found: Sequence[Found]) -> dict[str, dict[str, SampleMean]]:
     """Observer -> measure -> mean over the runs, with its interval."""
     return {
         name: {key: interval([run[name][key] for run in found]) for key in found[0][name]}
@@ -81,7 +81,7 @@ def over_seeds(found: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     }
 
 
-def error_tables(report: Report, tables: Mapping[str, Mapping[str, Mapping[str, Interval]]]) -> None:
+def error_tables(report: Report, tables: Mapping[str, Mapping[str, Mapping[str, SampleMean]]]) -> None:
     """One table of RMS errors for each simulated run; the least of a column is bold."""
     report.heading("Errors on simulated runs")
     report.text(

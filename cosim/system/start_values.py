@@ -8,7 +8,7 @@ from pathlib import Path
 from cybership.message_text import name_of
 
 from ..errors import InputError, nearest
-from ..fmu.fmu_model import INT_LIMIT, Model, Value, Variable
+from ..fmu.fmu_model import INT_LIMIT, FmuModel, FmuVariable, Value
 from ..formats.ssv import ParameterSet
 from .belief import Chosen, believe
 from .parameter_table import read_table, table_parameters
@@ -109,7 +109,7 @@ def _models_hint(system: System, wrong: str) -> str:
     return nearest(wrong, {model.name for model in system.models.values()})
 
 
-def _in_units_of(model: Model, path: Path, given: ParameterSet) -> dict[str, Value]:
+def _in_units_of(model: FmuModel, path: Path, given: ParameterSet) -> dict[str, Value]:
     """The values of a parameter set for one model, in the units of the FMU.
 
     Raises:
@@ -126,7 +126,7 @@ def _in_units_of(model: Model, path: Path, given: ParameterSet) -> dict[str, Val
     return found
 
 
-def _effects_hint(model: Model, wrong: str) -> str:
+def _effects_hint(model: FmuModel, wrong: str) -> str:
     """A hint for a parameter that an FMU lacks, and how one of this project would get it."""
     hint = nearest(wrong, [v.name for v in model.variables.values() if v.causality == "parameter"])
     if model.path.name != f"{model.name}.fmu":
@@ -137,7 +137,7 @@ def _effects_hint(model: Model, wrong: str) -> str:
     )
 
 
-def check_value(variable: Variable, value: Value | None, where: str) -> None:
+def check_value(variable: FmuVariable, value: Value | None, where: str) -> None:
     """Refuse a value that is not of a variable's type, or outside its range.
 
     Raises:
