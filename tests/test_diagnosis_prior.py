@@ -11,7 +11,7 @@ from cosim import InputError
 from diagnosis import Model, learn
 from diagnosis.search.findings import Findings
 from diagnosis.search.prior import MEASURED, NominalPrior, shares
-from diagnosis.search.refinement import Estimate
+from diagnosis.search.refinement import RefinedModel
 from fmus.declare import variables
 from fmus.hull import Damping, Inertia
 from fmus.ship import ship
@@ -54,7 +54,7 @@ def test_a_lag_of_a_ships_file_is_as_uncertain_as_it_says_and_never_negative():
     prior = NominalPrior.of(OTTER)
     assert [prior.mean["lag_port"], prior.std["lag_port"]] == [1.0, 0.5]
     assert "lag" not in prior.mean, "no number of the file, but what may be missing"
-    at = Estimate.at(OTTER, prior)
+    at = RefinedModel.at(OTTER, prior)
     for off, lag in ((-1.0, 0.5), (-4.0, 0.0)):
         moved = at.plus({}, off * np.array([n == "lag_port" for n in prior.mean]))
         assert moved.model(prior).value("lag_port") == pytest.approx(lag)
@@ -66,7 +66,7 @@ def test_coefficients_are_held_to_where_they_come_from_not_to_the_search(share, 
     offset = 4.0 * np.array([n == "X_u" for n in searched.mean])
     found = Findings(
         moved={"X_u": 4.0},
-        estimate=Estimate(Model(), offset),
+        estimate=RefinedModel(Model(), offset),
         searched=searched,
     )
     assert not found.plausible

@@ -285,7 +285,7 @@ def test_pace_waits_in_short_sleeps_and_measures_how_late_it_is(monkeypatch):
 
     monkeypatch.setattr(real_time.time, "perf_counter", lambda: now[0])
     monkeypatch.setattr(real_time.time, "sleep", sleep)
-    pace = real_time.Pace(2.0, 0.1, lambda: False, started=100.0)
+    pace = real_time.RealTimePace(2.0, 0.1, lambda: False, started=100.0)
     pace.wait(0.3)
     assert max(slept) == real_time.LONGEST_SLEEP
     assert now[0] == pytest.approx(100.15 + 0.01)
@@ -296,7 +296,7 @@ def test_pace_waits_in_short_sleeps_and_measures_how_late_it_is(monkeypatch):
     assert found["deadline_misses"] == 1, "more than half of 0.1 s late"
     assert found["lateness_max"] == pytest.approx(0.8)
     assert found["jitter_rms"] == pytest.approx(0.5 * (0.8 - 0.01))
-    stopped = real_time.Pace(1.0, 0.1, lambda: True, started=100.0)
+    stopped = real_time.RealTimePace(1.0, 0.1, lambda: True, started=100.0)
     stopped.wait(1000.0)
     assert now[0] == 101.0, "who has stopped a run does not wait"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ..errors import InputError, nearest
-from ..fmu.fmu_model import Model, Variable
+from ..fmu.fmu_model import FmuModel, FmuVariable
 from .documents import local, parse, read_file
 from .namespaces import OSP_MODELS
 
@@ -45,7 +45,7 @@ QUANTITIES = (
 GREEK = {"phi": "φ", "theta": "θ", "psi": "ψ"}
 
 
-def variable_groups(model: Model) -> dict[str, tuple[Quantity, list[str]]]:
+def variable_groups(model: FmuModel) -> dict[str, tuple[Quantity, list[str]]]:
     """Groups of inputs and outputs: name -> quantity, and the variables along x, y, z.
 
     A name that inputs and outputs share ends in ``_in`` or ``_out``.
@@ -69,7 +69,7 @@ def variable_groups(model: Model) -> dict[str, tuple[Quantity, list[str]]]:
     return groups
 
 
-def _units(model: Model) -> dict[str, tuple[int, int, int, int]]:
+def _units(model: FmuModel) -> dict[str, tuple[int, int, int, int]]:
     """SI exponents of the FMU's units that need no factor, by name."""
     found: dict[str, tuple[int, int, int, int]] = {}
     for unit in model.description.unitDefinitions:
@@ -79,7 +79,7 @@ def _units(model: Model) -> dict[str, tuple[int, int, int, int]]:
     return found
 
 
-def _place(v: Variable, quantity: Quantity) -> tuple[int, list[str]] | None:
+def _place(v: FmuVariable, quantity: Quantity) -> tuple[int, list[str]] | None:
     """Which axis a variable lies along (0, 1, 2), and the other parts of its name."""
     parts = v.name.split("_")
     for part, rest in ((parts[0], parts[1:]), (parts[-1], parts[:-1])):
@@ -90,7 +90,7 @@ def _place(v: Variable, quantity: Quantity) -> tuple[int, list[str]] | None:
     return None
 
 
-def osp_model_description(model: Model) -> Element | None:
+def osp_model_description(model: FmuModel) -> Element | None:
     """``<modelName>_OspModelDescription.xml``, or None where the FMU has no groups."""
     groups = variable_groups(model)
     if not groups:
@@ -103,7 +103,7 @@ def osp_model_description(model: Model) -> Element | None:
                 group = SubElement(listed, quantity.tag, name=name)
                 for variable in variables:
                     unit = model.variables[variable].unit
-                    SubElement(group, "Variable", ref=variable, unit=unit.name if unit else "")
+                    SubElement(group, "FmuVariable", ref=variable, unit=unit.name if unit else "")
     return root
 
 
@@ -114,7 +114,7 @@ def variables_of_group(file: Path, name: str) -> list[str]:
         InputError: no model description, or it has no such group.
     """
     root = parse(read_file(file), file, "OspModelDescription")
-    groups = {g.get("name", ""): g for g in root.iter() if g is not root and local(g) != "Variable"}
+    groups = {g.get("name", ""): g for g in root.iter() if g is not root and local(g) != "FmuVariable"}
     if name not in groups:
         raise InputError(f"'{file}' has no variable group '{name}'{nearest(name, groups)}")
-    return [v.get("ref", "") for v in groups[name].iter() if local(v) == "Variable"]
+    return [v.get("ref", "") for v in groups[name].iter() if local(v) == "FmuVariable"]

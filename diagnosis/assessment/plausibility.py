@@ -33,7 +33,7 @@ from ..runs.columns.columns import POSE, TAU
 from ..runs.columns.side_car import Change
 from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
-from .gains import Gains, gains
+from .gains import ThrustGains, gains
 from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
 from .settings import SETTINGS
 
@@ -90,7 +90,7 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
     return f"{seen}; it seems that {reading.mistake}", reading.changes, None
 
 
-def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None:
+def likeliest_unit(w: WeakWindows, model: Model, given: ThrustGains) -> Reading | None:
     """The reading in which the commands give the accelerations that they should, if there is any.
 
     Of several that in which the model's error is the least part of the commands: the median of the axes

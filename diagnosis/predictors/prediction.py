@@ -25,7 +25,7 @@ UNSURE = 3.0  # standard deviations of a speed within which it may be none
 
 
 @dataclass(frozen=True, eq=False)
-class Starts:
+class WindowStarts:
     """Windows, of one run or more with commands in one layout, that are predicted together.
 
     Attributes:
@@ -100,7 +100,7 @@ def at_rest(smoothed: Smoothed) -> bool:
     return bool((np.abs(smoothed.nu[first]) < still).all())
 
 
-def predict(starts: Starts, model: Model) -> np.ndarray:
+def predict(starts: WindowStarts, model: Model) -> np.ndarray:
     """The measured pose as a model predicts it.
 
     Args:
@@ -121,7 +121,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         return np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull)), axis=1)
 
 
-def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
+def arriving(starts: WindowStarts, model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Commands that arrive and shares of full force that act, each (steps, k, p or 1, w)."""
     found = [starts.arriving(single) for single in singles(model)]
     given, acting = (np.concatenate(part, axis=2) for part in zip(*found, strict=True))
@@ -129,7 +129,7 @@ def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def propagate(
-    starts: Starts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
+    starts: WindowStarts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
 ) -> Iterator[vessel.State]:
     """The state at the start and after each step of the integration; arrays (p, w) or like them.
 

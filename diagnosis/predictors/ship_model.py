@@ -20,7 +20,7 @@ Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
 
 
-class GivenForce(NamedTuple):
+class SampledForce(NamedTuple):
     """A force on the hull over the samples of a run, linear in pose and velocity over ground.
 
     Attributes:
@@ -103,7 +103,7 @@ class Model:
     ship: Ship = field(default_factory=ship)
     origin: "Model | None" = None
     runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    given: Mapping[str, GivenForce] = field(default_factory=dict)
+    given: Mapping[str, SampledForce] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         parts = (*self.ship.parameters, "measurement")

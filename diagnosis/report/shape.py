@@ -16,7 +16,7 @@ from ..assessment.settings import SETTINGS
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..predictors.thrust import commanded_shares
-from .reported_effect import Coefficient, ReportedEffect
+from .reported_effect import ReportedCoefficient, ReportedEffect
 
 POINTS = 401  # of a curve; chosen, so that its corners are seen
 
@@ -159,7 +159,7 @@ def _curve(
     data = np.concatenate([s.data(e) for e in evaluations])
     x = np.linspace(*(s.reach or (data.min(), data.max())), POINTS)
 
-    def by(value: Callable[[Coefficient], float]) -> np.ndarray:
+    def by(value: Callable[[ReportedCoefficient], float]) -> np.ndarray:
         wanted = {name: value(c) for name, c in found.coefficients.items() if name in of_effect}
         learned = model.plus({name: v - model.value(name) for name, v in wanted.items()})
         return np.broadcast_to(s.force(x, learned), x.shape)
