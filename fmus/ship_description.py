@@ -11,6 +11,8 @@ from typing import NamedTuple
 from .declare import Known, ShipOutline, Variable
 from .scale import REFERENCE_LENGTH, Scale
 
+GUESSED = "guessed"  # origin of a number of which a file gives none
+
 
 class Value(NamedTuple):
     """A number of a description, and how well it is known.
@@ -28,8 +30,12 @@ class Value(NamedTuple):
     share: float
 
     def of(self, v: Variable, group: str) -> Variable:
-        """The declaration of a parameter that starts at this value."""
-        known = None if self.value == 0.0 else Known(group, self.origin, self.share)
+        """The declaration of a parameter that starts at this value.
+
+        A zero stays zero; one of stated origin is a coefficient where another model of the ship has it.
+        """
+        stated = self.value != 0.0 or self.origin != GUESSED
+        known = Known(group, self.origin, self.share) if stated else None
         return replace(v, start=self.value, known=known)
 
 

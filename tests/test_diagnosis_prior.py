@@ -18,6 +18,7 @@ from fmus.ship import ship
 from fmus.ships.ship_file import read_ship
 
 KNOWN = ship().coefficients
+OTTER = Model(ship=ship(description=read_ship("otter")))
 
 
 def std(**given):
@@ -27,11 +28,16 @@ def std(**given):
 
 
 def test_each_nominal_coefficient_says_where_it_comes_from():
-    names = [
-        v.name for group in (Inertia, Damping, type(THRUSTERS.params().plant)) for v in variables(group)
-    ]
-    assert sorted(KNOWN) == sorted(n for n in names if Model().value(n))  # zero stays zero
+    plant = [v.name for v in variables(type(THRUSTERS.params().plant)) if v.start]  # zero stays zero
+    names = [v.name for group in (Inertia, Damping) for v in variables(group)]
+    assert sorted(KNOWN) == sorted([*names, *plant])
     assert all(k.origin and k.group and 0.0 < k.share <= 1.0 for k in KNOWN.values())
+
+
+def test_a_zero_of_stated_origin_is_a_coefficient_of_a_model_that_has_it():
+    of_file, other = (NominalPrior.of(Model(vessel=v)) for v in ({}, {"Y_uv": -3.0, "Y_rdot": -0.1}))
+    assert other.std == of_file.std | {"Y_uv": 3.0, "Y_rdot": 0.05}
+    assert "Y_rdot" not in OTTER.ship.coefficients, "a plain zero is nobody's"
 
 
 def test_what_was_weighed_is_known_better_than_what_was_borrowed():
@@ -45,9 +51,6 @@ def test_the_search_believes_in_each_to_a_tenth():
     found = std(most=MEASURED)
     assert found["m"] == 0.01, "what is known better stays so"
     assert found["N_r"] == found["plant_F_vsp"] == MEASURED
-
-
-OTTER = Model(ship=ship(description=read_ship("otter")))
 
 
 def test_a_lag_of_a_ships_file_is_as_uncertain_as_it_says_and_never_negative():
@@ -92,7 +95,7 @@ def test_a_common_prior_leaves_what_was_measured_at_a_tenth():
     ("prior", "said"),
     [
         ({"trust": 0.5}, "did you mean 'thrust'"),
-        ({"X_vv_": 0.5}, "did you mean 'X_vv'"),
+        ({"X_uu_": 0.5}, "did you mean 'X_uu'"),
         ({"mass": -0.5}, "zero or more"),
         ({"mass": float("nan")}, "zero or more"),
         (-0.1, "zero or more"),

@@ -42,7 +42,7 @@ def run(name, use, size=1.0, notes=(), faults=(), learned=True):
         after=after if learned else before,
         smoothed=smoothed,
         windows=SimpleNamespace(length=8.0),
-        weak_windows=SimpleNamespace(horizon=8.0, width=3.0),
+        weak_windows=SimpleNamespace(horizon=8.0, width=3.0, run=SimpleNamespace(commands=None)),
     )
 
 

@@ -194,7 +194,7 @@ def test_out_that_cannot_be_a_folder_is_refused(scenario, tmp_path):
 def test_warning_goes_to_stderr(scenario, ellipse):
     connections = [c for c in ellipse["connections"] if c[1] != "thrusters.*"]
     done = command(scenario(connections=connections, stop=0.1), "--no-plots", "--out", "/dev/null/x")
-    assert "warning: thrusters: input u, v, r not connected" in done.stderr
+    assert "warning: thrusters: input u, v, r, u_c, v_c not connected" in done.stderr
 
 
 def test_failed_simulation_is_exit_3_with_the_log_kept(scenario, tmp_path):

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat,
 
 from ..base_units import base_exponents
 from ..declare import DeclarationError
-from ..ship_description import Value
+from ..ship_description import GUESSED, Value
 
 FACTOR = re.compile(r"\|[uvr]\||[uvr]")  # of a product of speeds
 
@@ -25,7 +25,7 @@ class Number(StrictTable):
 
     value: Finite | None = Field(None, description="in SI units")
     prime: Finite | None = Field(None, description="in place of value: in prime units, see prime")
-    origin: str = Field("guessed", description="weighed, tank test, borrowed, guessed, or a publication")
+    origin: str = Field(GUESSED, description="weighed, tank test, borrowed, guessed, or a publication")
     std: PositiveFloat | None = Field(
         None, description="standard deviation in the number's unit", allow_inf_nan=False
     )

@@ -39,7 +39,7 @@ from ..hull import (
 )
 from ..hull_functions import FUNCTIONS
 from ..ops import Condition, Number, Series, finite, when, wrap
-from ..ship_description import Description, Part, Value
+from ..ship_description import GUESSED, Description, Part, Value
 from ..signals import Force, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
@@ -248,7 +248,7 @@ def described(ship: Description) -> tuple[Fields, Fields, Fields]:
     groups_of = {v.name: v.known.group for v in variables(Inertia) if v.known is not None}
 
     def valued(v: Variable) -> Variable:
-        start = given.get(v.name, Value(v.name, 0.0, "", 0.0))
+        start = given.get(v.name, Value(v.name, 0.0, GUESSED, 0.0))
         return start.of(v, groups_of.get(v.name, "damping"))
 
     own = [v.name for v in variables(Terms)]
