@@ -226,6 +226,22 @@ def _plan(names: tuple[str, ...]) -> tuple[Sequence[tuple[int, bool, int]], Sequ
     return tuple(steps), tuple(uses)
 
 
+def without_zeros(c: Damping) -> Damping:
+    """The same damping without coefficients that are zero: the force is the same, in fewer products."""
+    kept = {name: x for name, x in zip(c.terms._fields, c.terms, strict=True) if _acts(x)}
+    return c._replace(terms=_terms(tuple(kept))._make(kept.values()))
+
+
+def _acts(x: Series) -> bool:
+    return bool(x) if isinstance(x, float) else True
+
+
+@cache
+def _terms(names: tuple[str, ...]) -> type[Fields]:
+    """The class of coefficients of some products of speeds."""
+    return group_of("Terms", [term_variable(name) for name in names])
+
+
 def terms_force(u: Series, v: Series, r: Series, terms: Fields) -> Triple:
     """Force on the hull [N, N, N m] by coefficients of products of speeds, named by them."""
     steps, uses = _plan(terms._fields)

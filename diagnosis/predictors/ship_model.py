@@ -12,7 +12,7 @@ from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
 from fmus.effects.linear_map import AXES, parameter
 from fmus.effects.measurement import CLOCK_OFFSET
-from fmus.hull import mass_matrix
+from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
 from fmus.vessel.vessel import PreparedVessel
 
@@ -188,7 +188,8 @@ class Model:
     @cached_property
     def hull(self) -> PreparedVessel:
         """The vessel, ready for a step."""
-        return self.ship.vessel.prepared(parameters(self.ship.vessel, self.vessel))
+        b = self.ship.vessel.prepared(parameters(self.ship.vessel, self.vessel))
+        return b._replace(hull=b.hull._replace(damping=without_zeros(b.hull.damping)))
 
     @cached_property
     def drive(self) -> Any:
