@@ -94,7 +94,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FirstEstimate:
     """What a parameter is the first estimate of, from which an adaptive law learns.
 
     Attributes:
@@ -136,7 +136,7 @@ class Variable:
     range: Range = Range()
     fixed: bool = False
     known: Known | None = None
-    estimate: Estimate | None = None
+    estimate: FirstEstimate | None = None
 
 
 def _fields_class(
@@ -269,7 +269,7 @@ def variables(cls: type) -> tuple[Variable, ...]:
                 more.get(Range, Range()),
                 FIXED in meta[2:],
                 more.get(Known),
-                more.get(Estimate),
+                more.get(FirstEstimate),
             )
         )
     return tuple(found)

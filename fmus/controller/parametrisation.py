@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from ..declare import Estimate, Fields, Range, vector
+from ..declare import Fields, FirstEstimate, Range, vector
 from ..hull import Inertia, TowedDamping, Triple, inertia_force
 from ..ops import Number, clip, cos, sin
 
@@ -38,8 +38,8 @@ class LearnedCoefficient(NamedTuple):
         return f"{self.parameter}, added" if self.added else self.parameter
 
     @property
-    def estimate(self) -> Estimate:
-        return Estimate(self.parameter, self.added)
+    def estimate(self) -> FirstEstimate:
+        return FirstEstimate(self.parameter, self.added)
 
 
 class ControllerModel(NamedTuple):
