@@ -103,7 +103,7 @@ def osp_model_description(model: FmuModel) -> Element | None:
                 group = SubElement(listed, quantity.tag, name=name)
                 for variable in variables:
                     unit = model.variables[variable].unit
-                    SubElement(group, "FmuVariable", ref=variable, unit=unit.name if unit else "")
+                    SubElement(group, "Variable", ref=variable, unit=unit.name if unit else "")
     return root
 
 
@@ -114,7 +114,7 @@ def variables_of_group(file: Path, name: str) -> list[str]:
         InputError: no model description, or it has no such group.
     """
     root = parse(read_file(file), file, "OspModelDescription")
-    groups = {g.get("name", ""): g for g in root.iter() if g is not root and local(g) != "FmuVariable"}
+    groups = {g.get("name", ""): g for g in root.iter() if g is not root and local(g) != "Variable"}
     if name not in groups:
         raise InputError(f"'{file}' has no variable group '{name}'{nearest(name, groups)}")
-    return [v.get("ref", "") for v in groups[name].iter() if local(v) == "FmuVariable"]
+    return [v.get("ref", "") for v in groups[name].iter() if local(v) == "Variable"]
