@@ -26,11 +26,11 @@ from diagnosis import Model, clean, diagnose, evaluate, load, smooth, weak_windo
 from diagnosis.predictors import LEVELS
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prediction_fit.fit import Fitted, fit_predictions, shootings
-from diagnosis.search.prediction_fit.joint_posterior import Posterior
+from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
 from diagnosis.search.prediction_fit.refit import fit_model_error
 from diagnosis.search.prior import NominalPrior
-from diagnosis.search.refinement import Estimate
+from diagnosis.search.refinement import RefinedModel
 from fmus.ship import ship
 
 from .hidden_effects.__main__ import PROBLEMS
@@ -88,7 +88,9 @@ def fitted(problem: Problem) -> tuple[Fitted, NominalPrior, list]:
     train = runs[:-1]
     names = [n for d in problem.hidden if d.values for n in ship().effects[d.plain].coefficients]
     prior = NominalPrior.of(Model(), problem.prior)
-    at = Estimate(Model(), np.zeros(prior.size), dict.fromkeys(names, 0.0), np.zeros((len(names),) * 2))
+    at = RefinedModel(
+        Model(), np.zeros(prior.size), dict.fromkeys(names, 0.0), np.zeros((len(names),) * 2)
+    )
     for _ in range(2):  # the second time with what the first leaves as noise
         sigma = np.sqrt(np.mean(model_error(train, at.model(prior)) ** 2, axis=0))
         at, _ = fit_model_error(at, sigma, train, prior)
@@ -105,7 +107,7 @@ def simulated(seeds: Sequence[int], noise: str, folder: Path) -> Found:
         if problem.note:
             continue
         fit, prior, runs = fitted(problem)
-        posterior, model = Posterior.of(fit, prior), fit.estimate.model(prior)
+        posterior, model = JointPosterior.of(fit, prior), fit.estimate.model(prior)
         names = [n.partition(".")[2] for n in posterior.names]
         held, damping = off_by(problem, names, posterior.mean, posterior.covariance)
         found.inside += held

@@ -26,7 +26,13 @@ from diagnosis.search.gram import noise
 from diagnosis.search.most_likely import ENOUGH, most_likely
 from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, shootings, whitened
 from diagnosis.search.prior import MEASURED, NominalPrior
-from diagnosis.search.refinement import Estimate, Refinement, Start, TrainingSet, nuisance_of
+from diagnosis.search.refinement import (
+    CandidateStart,
+    RefinedModel,
+    Refinement,
+    TrainingSet,
+    nuisance_of,
+)
 
 from .learning_time import simulated
 
@@ -60,11 +66,11 @@ def scipy_fit(residual: Callable[[np.ndarray], np.ndarray], slopes: Any, x: np.n
 def refinement(runs: Sequence[WeakWindows], driver: str) -> Tally:
     """The candidate refined along with all nominal coefficients, on the model error."""
     model, count = Model(), Counter[str]()
-    prior, at = (p := NominalPrior.of(model, None, MEASURED)), Estimate.at(model, p)
+    prior, at = (p := NominalPrior.of(model, None, MEASURED)), RefinedModel.at(model, p)
     base = model_error(runs, model)
     nuisance = nuisance_of(TrainingSet(runs, None, prior), at, base)
     t = TrainingSet(runs, noise(base, nuisance.columns, FLOOR), prior)
-    problem = Refinement(t, at, nuisance, Start({EFFECT: 0.0}, [EFFECT], np.zeros((1, 1))))
+    problem = Refinement(t, at, nuisance, CandidateStart({EFFECT: 0.0}, [EFFECT], np.zeros((1, 1))))
     begun, begin, L = time.process_time(), problem.begin(), root(problem.precision)
     first = problem.theta(begin.estimate)
 
@@ -99,7 +105,7 @@ def prediction(runs: Sequence[WeakWindows], driver: str) -> Tally:
     """The drag and all nominal coefficients, fitted to predictions."""
     model, count = Model(), Counter[str]()
     prior = NominalPrior.of(model)
-    at = Estimate(model, np.zeros(prior.size), {EFFECT: 0.0}, np.zeros((1, 1)))
+    at = RefinedModel(model, np.zeros(prior.size), {EFFECT: 0.0}, np.zeros((1, 1)))
     problem = PredictionFit(runs, shootings(runs), at, prior)
     L, first, begun = root(problem.precision), problem.theta(at), time.process_time()
     if driver == DRIVERS[0]:
@@ -109,7 +115,7 @@ def prediction(runs: Sequence[WeakWindows], driver: str) -> Tally:
             count["residuals"] += 1
             return cost(*given)
 
-        def counted_information(at: Estimate) -> Any:
+        def counted_information(at: RefinedModel) -> Any:
             count["slopes"] += 1
             return information(at)
 

@@ -1,9 +1,10 @@
+from cybership.scratch_folder import atomic_write as atomic_write
+
 from .campaign.conduct import run_campaign as run_campaign
 from .conversion import BASE_UNITS as BASE_UNITS
 from .conversion import Unit as Unit
 from .errors import InputError as InputError
 from .errors import SimulationError as SimulationError
-from .files import atomic_write as atomic_write
 from .formats.ssv import Parameter as Parameter
 from .formats.ssv import ParameterSet as ParameterSet
 from .formats.ssv import read_parameters as read_parameters

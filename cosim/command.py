@@ -49,6 +49,7 @@ EXTRAS = {
     "pysindy": "analysis",
     "scipy": "diagnosis",
     "sklearn": "analysis",
+    "threadpoolctl": "diagnosis",
     "ziglang": "native",
 }
 

@@ -3,6 +3,8 @@
 import difflib
 from collections.abc import Iterable
 
+from cybership.message_text import LONGEST_VALUE, PrintableError
+
 __all__ = ["InputError", "SimulationError", "most_alike", "nearest"]
 
 # Similarity (difflib's ratio, 0 to 1) above which a known name is suggested; chosen: lower ones mislead.
@@ -11,11 +13,11 @@ SIMILAR = 0.5
 LISTED = 8
 
 
-class InputError(Exception):
+class InputError(PrintableError):
     """The user's input cannot be used; the message says what, where and what was near. Exit code 2."""
 
 
-class SimulationError(Exception):
+class SimulationError(PrintableError):
     """The simulation itself failed; what was logged is kept. Exit code 3."""
 
 
@@ -45,5 +47,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
         return f"; did you mean '{near}'?"
     if not known:
         return ""
-    shown = ", ".join(known[:LISTED]) + (", ..." if len(known) > LISTED else "")
+    shown = ", ".join(each[:LONGEST_VALUE] for each in known[:LISTED]) + (
+        ", ..." if len(known) > LISTED else ""
+    )
     return f"; there is {shown}" if len(known) == 1 else f"; there are {shown}"

@@ -4,29 +4,18 @@ import errno
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
+
+from cybership.scratch_folder import atomic_write
 
 # Bytes that a file keeps for later; chosen: the status of a run, a message and numbers fit.
 ROOM = 4096
 # Characters that remain of a text where room is short; chosen: a fraction of ROOM in UTF-8.
 SHORT = 500
-
-
-@contextmanager
-def atomic_write(path: Path) -> Iterator[Path]:
-    """A scratch file to write, which replaces ``path`` when the block ends without an exception.
-
-    It lies in the same folder; a failure leaves ``path`` as it was and removes the scratch file.
-    """
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield scratch
-        os.replace(scratch, path)
-    finally:
-        scratch.unlink(missing_ok=True)
+# Characters of a file's name; chosen: half of what file systems take is left for its extension and more.
+STEM = 120
 
 
 def write_text(path: Path, text: str) -> None:
@@ -99,7 +88,7 @@ def file_stems(names: Sequence[str]) -> list[str]:
     """File names without extension: letters that every file system and URI takes, each name once."""
     found: list[str] = []
     for name in names:
-        stem = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:STEM]
         while stem.lower() in (other.lower() for other in found):
             stem += "_"
         found.append(stem)

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 from .command import BAD_INPUT, Output, command_parser, complain, printable, run_command
 from .errors import InputError
-from .fmu.fmu_model import Variable
+from .fmu.fmu_model import FmuVariable
 from .scenario.load import load_scenario
 from .system.preparation import prepare
 from .system.system import System
@@ -52,7 +52,7 @@ def _section(system: System, name: str) -> str:
     sinks: dict[str, list[str]] = {}
     for c in system.connections:
         sinks.setdefault(c.source.name, []).append(c.target.name)
-    groups: dict[str, list[Variable]] = {"input": [], "output": []}
+    groups: dict[str, list[FmuVariable]] = {"input": [], "output": []}
     for v in model.variables.values():
         groups.setdefault(v.causality, []).append(v)
     lines = [f"## `{name}`: {model.name}", "", f"{model.description.description or ''}.", ""]
@@ -72,7 +72,7 @@ def _section(system: System, name: str) -> str:
     return "\n".join(lines)
 
 
-def _table(kind: str, way: str, rows: Iterable[tuple[Variable, str]]) -> list[str]:
+def _table(kind: str, way: str, rows: Iterable[tuple[FmuVariable, str]]) -> list[str]:
     """Lines of a table, and an empty one."""
     lines = [f"| {kind} | unit | what it is | {way} |", "|---|---|---|---|"]
     for v, ends in rows:
@@ -81,7 +81,7 @@ def _table(kind: str, way: str, rows: Iterable[tuple[Variable, str]]) -> list[st
     return [*lines, ""]
 
 
-def _names(variables: Iterable[Variable]) -> str:
+def _names(variables: Iterable[FmuVariable]) -> str:
     return ", ".join(f"`{v.name}`" for v in variables)
 
 

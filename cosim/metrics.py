@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from cybership.scratch_folder import atomic_write
+
 from .command import BAD_INPUT, Output, command_parser, complain, run_command
 from .errors import InputError
-from .files import atomic_write
 from .results.log import CSV, Log, read_log
 from .results.performance import MetricsError, compute, over_time, table
 from .results.run_options import read_options

@@ -41,9 +41,10 @@ def main() -> int:
     own = SUBCOMMANDS.get(name)
     modules = all_modules() if own is None else {name: own.module}
     if name not in modules:
+        from cosim.command import complain
         from cosim.errors import nearest
 
-        print(f"error: no command '{name}'{nearest(name, modules)}", file=sys.stderr)
+        complain(f"no command '{name}'{nearest(name, modules)}")
         return 2
     sys.argv = [f"cybership {name}", *sys.argv[2:]]
     try:

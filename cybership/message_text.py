@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
     from pydantic import ValidationError
 
+# A value between quotes, which an apostrophe of a word is not; with a separator it may be a path.
+VALUE = re.compile(r"(?<!\w)'([^'/\\]*)'(?!\w)")
 Location = tuple[int | str, ...]  # the keys and indices that lead to a place in a file
 
 # Characters of what a message repeats of a file, and of what it says of it; chosen: a few lines in all.
@@ -25,7 +27,15 @@ def printable(text: str) -> str:
     Names in files and messages of FMUs may hold control characters, which would move the cursor or
     change colours, or be very long: these are shown as Python writes them, and cut.
     """
+    text = VALUE.sub(lambda value: f"'{name_of(value[1])}'", text)
     return _cut(_words_cut(_one_line(text), LONGEST_WORD), LONGEST_LINE)
+
+
+class PrintableError(Exception):
+    """An error whose message, whatever it repeats of a file, is :func:`printable`."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 def brief(text: str) -> str:
@@ -37,6 +47,11 @@ def brief(text: str) -> str:
 def quoted(value: object) -> str:
     """A value of a file as a message repeats it: as Python writes it, and cut."""
     return _cut(repr(value), LONGEST_VALUE)
+
+
+def name_of(text: str) -> str:
+    """A name in a file as a message says it between its own quotes or without: on one line, and cut."""
+    return _cut(_one_line(text), LONGEST_VALUE)
 
 
 def first_fault(
@@ -70,7 +85,7 @@ def first_fault(
         if isinstance(part, int):
             place += f"[{part}]"
         elif not hidden(part):
-            place += ("." if place else "") + _cut(_one_line(part), LONGEST_VALUE)
+            place += ("." if place else "") + name_of(part)
     return (f"{place}: " if place else "") + brief(text.removeprefix("Value error, "))
 
 

@@ -1,15 +1,20 @@
-"""Scratch folders named by their process, and the removal of those that killed processes have left."""
+"""Scratch folders and files named by their process; removal of what killed processes have left."""
 
+import glob
 import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 PREFIX = "cybership_"
 LOCK = "lock"  # file in the folder, locked by its owner for as long as that lives
+# Age from which a file is left over, as its owner may be alive unseen in another container [s]; chosen:
+# no write pauses as long.
+STALE = 60.0
 
 
 class Scratch:
@@ -48,6 +53,35 @@ def scratch_folder() -> Iterator[Path]:
         yield scratch.path
     finally:
         scratch.remove()
+
+
+@contextmanager
+def atomic_write(path: Path) -> Iterator[Path]:
+    """A scratch file to write, which replaces ``path`` when the block ends without an exception.
+
+    It lies in the same folder; a failure leaves ``path`` as it was and removes the scratch file. What
+    killed processes have left of the same file goes as well.
+    """
+    sweep_parts(path.parent.glob(f".{glob.escape(path.name)}.*.part"))
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def sweep_parts(parts: Iterable[Path]) -> None:
+    """Remove those scratch files of :func:`atomic_write` whose processes have ended.
+
+    Args:
+        parts: files whose names end in ``.part``.
+    """
+    with suppress(OSError):
+        for part in parts:
+            owner = re.search(r"\.(\d+)\.part$", part.name)
+            if owner and not _runs(int(owner[1])) and time.time() - part.lstat().st_mtime > STALE:
+                part.unlink(missing_ok=True)
 
 
 def environment_with(folder: Path) -> dict[str, str]:
@@ -102,6 +136,8 @@ def _runs(pid: int) -> bool:
     """Whether there is such a process; on Windows, where asking would end it, only the lock tells."""
     if os.name == "nt":
         return False
+    with suppress(OSError):  # Linux: one that has ended, and that nobody has waited for, is still listed
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -15,7 +15,7 @@ import numpy as np
 from cosim import InputError
 from cosim.command import command_parser, printable, run_command
 from cosim.results import read_options
-from cosim.trials import KINDS, Outcome, draw_trial, executes, outcome, sheet, simulated_trial
+from cosim.trials import KINDS, TrialOutcome, draw_trial, executes, outcome, sheet, simulated_trial
 
 from .commands.command_line import Done, anyway_option, out_options, run, ship_option
 from .execution.progress import Advance
@@ -45,7 +45,7 @@ def trial(options: argparse.Namespace, advance: Advance) -> Done:
     return Done(0, [sheet(found, title), *map(printable, [*notes, written])])
 
 
-def _measured(options: argparse.Namespace, advance: Advance) -> tuple[Outcome, list[str]]:
+def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutcome, list[str]]:
     """A measured trial, smoothed, and what its channels show of the measurement.
 
     The whole run is prepared, as for all commands; the trial is the part of it between two times of the

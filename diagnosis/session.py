@@ -35,7 +35,7 @@ from .search.gram import PARTS
 from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
-from .verdict.judging import Verdict, judge
+from .verdict.judging import DecidedFindings, judge
 from .verdict.pruning_criteria import USUAL, criterion
 from .verdict.validation_data import ValidationData
 
@@ -74,7 +74,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis(Verdict):
+class Diagnosis(DecidedFindings):
     """A verdict, and what it rests on.
 
     Attributes:
@@ -218,7 +218,7 @@ def diagnose(
 
 
 def _predicted(
-    verdict: Verdict,
+    verdict: DecidedFindings,
     predictor: Predictor,
     runs: Sequence[WeakWindows],
     data: ValidationData,

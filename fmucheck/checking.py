@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from cybership.message_text import printable
+from cybership.scratch_folder import sweep
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
 from fmus.interruption import program
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fmus, code = _open(options.files)
     if not fmus:
         return code
+    sweep()
     outcomes = _examine_all(fmus, chosen, options)
     if options.json:
         print(json.dumps(as_json(fmus, chosen, outcomes), indent=1))

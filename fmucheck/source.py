@@ -8,6 +8,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+from cybership.message_text import PrintableError
+
 DAMAGED = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 MOST_ENTRIES = 50_000
 MOST_BYTES = 4 << 30  # unpacked, which ...
@@ -16,7 +18,7 @@ SMALL = 64 << 20  # unless it is no more than this
 DEEPEST = 100  # elements within elements; the standard needs 5, annotations may want some more
 
 
-class BadFileError(Exception):
+class BadFileError(PrintableError):
     """What was given is no FMU that can be checked here; the message says why."""
 
 

@@ -11,6 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from cybership.scratch_folder import scratch_folder
+
 from .fmu import Fmu
 from .registry import Outcome, Rule
 
@@ -35,8 +37,9 @@ def attempt(rule: Rule, fmu: Fmu, timeout: float, stopped: threading.Event) -> O
     """
     # Reports lie apart from the folder that an FMU may take for its own.
     with (
-        TemporaryDirectory(prefix="fmu_", ignore_cleanup_errors=True) as place,
-        TemporaryDirectory(ignore_cleanup_errors=True) as reports,
+        scratch_folder() as work,
+        TemporaryDirectory(dir=work, ignore_cleanup_errors=True) as place,
+        TemporaryDirectory(dir=work, ignore_cleanup_errors=True) as reports,
     ):
         folder, desk = Path(place, "fmu"), Path(place, "desk")  # it may leave files where it runs
         report, note = Path(reports, "report"), Path(reports, "note")

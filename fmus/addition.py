@@ -11,11 +11,11 @@ itself, over its last step. An acceleration input gets M^-1 of that.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .declare import Component, Variable, bundle, flatten, group_of, packer, variables, width
+from .declare import Component, Fields, Variable, bundle, flatten, group_of, packer, variables, width
 from .frames import rotate_to_body, rotate_to_earth
-from .hull import accelerated, inertia_force
+from .hull import Triple, accelerated, inertia_force
 from .ops import Number, fmax, where, wrap
 from .ship import Ship
 from .signals import Force, VelocityInCurrent
@@ -89,10 +89,10 @@ def addition(
     )
     acts = [v.name for v in variables(drive.outputs)].index("tau_act_X")
 
-    def init(i: Any, p: Any) -> Any:
+    def init(i: Fields, p: Params) -> Fields:
         return state()
 
-    def moving(s: Any, i: Any, h: Number) -> tuple[Any, tuple[Number, Number, Number]]:
+    def moving(s: Fields, i: Fields, h: Number) -> tuple[State, Triple]:
         """The FMU's state, and its acceleration over the last step."""
         raw = dict(zip(columns, flatten(i)[len(commands) :], strict=True))
         now = {n: x.gain * raw[n] + x.offset if isinstance(x, Line) else x for n, x in told.items()}
@@ -109,7 +109,7 @@ def addition(
         ship = State(now["x"], now["y"], now["psi"], now["u"], now["v"], now["r"], s.t)
         return ship, (nu_dot[0], nu_dot[1], nu_dot[2])
 
-    def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Number, Number]:
+    def step(s: Fields, i: Fields, p: Params, h: Number) -> tuple[Fields, Fields]:
         ship, nu_dot = moving(s, i, h)
         given_now = flatten(i)[: len(commands)]
         asked = packer(drive.inputs)([*given_now, ship.u, ship.v, ship.r, 0.0, 0.0])
@@ -147,6 +147,6 @@ def addition(
     )
 
 
-def _params(component: Component, values: Mapping[str, float]) -> Any:
+def _params(component: Component, values: Mapping[str, float]) -> Fields:
     declared = variables(component.params)
     return packer(component.params)([float(values.get(v.name, v.start)) for v in declared])

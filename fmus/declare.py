@@ -14,7 +14,45 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from inspect import signature
-from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+from types import ModuleType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Generic,
+    NamedTuple,
+    Protocol,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from .ops import Number
+
+if TYPE_CHECKING:
+
+    class Fields(tuple[Any, ...]):
+        """Values of a NamedTuple class that is made at run time, so that no checker knows its fields.
+
+        A field is a number, or a record where the class nests others.
+        """
+
+        _fields: ClassVar[tuple[str, ...]]
+        _field_defaults: ClassVar[Mapping[str, Any]]
+
+        def __new__(cls, *fields: object, **named: object) -> "Fields": ...
+        def __getattr__(self, name: str) -> Any: ...
+        def _replace(self, **fields: object) -> "Fields": ...
+        @classmethod
+        def _make(cls, fields: Iterable[object]) -> "Fields": ...
+
+else:
+    Fields = tuple
+
+Declared = type[tuple[object, ...]]  # a declared NamedTuple class, written out or made at run time
+_T = TypeVar("_T", bound=tuple[object, ...])
 
 
 class DeclarationError(Exception):
@@ -56,7 +94,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FirstEstimate:
     """What a parameter is the first estimate of, from which an adaptive law learns.
 
     Attributes:
@@ -68,7 +106,7 @@ class Estimate:
     change: bool = False
 
 
-class Outline(NamedTuple):
+class ShipOutline(NamedTuple):
     """A ship as tools draw it.
 
     Attributes:
@@ -98,10 +136,20 @@ class Variable:
     range: Range = Range()
     fixed: bool = False
     known: Known | None = None
-    estimate: Estimate | None = None
+    estimate: FirstEstimate | None = None
 
 
-def vector(typename: str, fields: Sequence[tuple[Any, ...]], extra: Sequence[Any] = ()) -> type[Any]:
+def _fields_class(
+    typename: str, starts: Mapping[str, object], annotations: Mapping[str, object]
+) -> type[Fields]:
+    made: Any = namedtuple(typename, list(starts), defaults=list(starts.values()))
+    made.__annotations__ = dict(annotations)
+    return made
+
+
+def vector(
+    typename: str, fields: Sequence[tuple[Any, ...]], extra: Sequence[object] = ()
+) -> type[Fields]:
     """A NamedTuple class of scalars that are made rather than written out.
 
     Args:
@@ -112,15 +160,14 @@ def vector(typename: str, fields: Sequence[tuple[Any, ...]], extra: Sequence[Any
     Returns:
         The class, declared like a hand-written one.
     """
-    made = namedtuple(typename, [f[0] for f in fields], defaults=[f[3] for f in fields])
-    made.__annotations__ = {
+    annotations = {
         name: Annotated[(float, unit, description, *own, *extra)]
         for name, unit, description, _, *own in fields
     }
-    return made
+    return _fields_class(typename, {f[0]: f[3] for f in fields}, annotations)
 
 
-def bundle(typename: str, base: type[Any] | None = None, **groups: Any) -> type[Any]:
+def bundle(typename: str, base: Declared | None = None, **groups: tuple[object, ...]) -> type[Fields]:
     """A NamedTuple class that nests declared NamedTuples, for classes that differ only in a part.
 
     Args:
@@ -128,26 +175,25 @@ def bundle(typename: str, base: type[Any] | None = None, **groups: Any) -> type[
         base: a declared NamedTuple class whose fields come first.
         groups: field -> the nested tuple with its start values.
     """
-    starts = {**(base._field_defaults if base else {}), **groups}
-    made = namedtuple(typename, list(starts), defaults=list(starts.values()))
-    made.__annotations__ = {**(base.__annotations__ if base else {}), **dict.fromkeys(groups, Any)}
-    return made
+    starts = {**(_starts(base) if base else {}), **groups}
+    annotations = {**(base.__annotations__ if base else {}), **dict.fromkeys(groups, Fields)}
+    return _fields_class(typename, starts, annotations)
 
 
-def group_of(typename: str, fields: Iterable[Variable]) -> type[Any]:
+def group_of(typename: str, fields: Iterable[Variable]) -> type[Fields]:
     """A NamedTuple class of scalars, declared by what :func:`variables` gives of such a class."""
     fields = list(fields)
-    made = namedtuple(typename, [v.name for v in fields], defaults=[v.start for v in fields])
-    made.__annotations__ = {v.name: _annotation(v) for v in fields}
-    return made
+    return _fields_class(
+        typename, {v.name: v.start for v in fields}, {v.name: _annotation(v) for v in fields}
+    )
 
 
-def _annotation(v: Variable) -> Any:
+def _annotation(v: Variable) -> object:
     more = [extra for extra in (v.known, v.estimate, FIXED if v.fixed else None) if extra is not None]
     return Annotated[(float, v.unit, v.description, v.range, *more)]
 
 
-def redeclared(cls: type[Any], change: Callable[[Variable], Variable]) -> type[Any]:
+def redeclared(cls: Declared, change: Callable[[Variable], Variable]) -> type[Fields]:
     """A NamedTuple class with the same fields, each declared as ``change`` makes it of its declaration.
 
     Args:
@@ -157,21 +203,20 @@ def redeclared(cls: type[Any], change: Callable[[Variable], Variable]) -> type[A
     nested = _shape(cls)
     if not any(nested):
         return group_of(cls.__name__, map(change, variables(cls)))
-    own = iter(change(v) for v in variables(cls) if v.name in cls._fields)
-    groups: dict[str, Any] = {}
-    annotations: dict[str, Any] = {}
-    for name, inner in zip(cls._fields, nested, strict=True):
+    names: tuple[str, ...] = getattr(cls, "_fields")  # noqa: B009 - of every NamedTuple class
+    own = iter(change(v) for v in variables(cls) if v.name in names)
+    starts: dict[str, object] = {}
+    annotations: dict[str, object] = {}
+    for name, inner in zip(names, nested, strict=True):
         if inner is None:
             v = next(own)
-            groups[name], annotations[name] = v.start, _annotation(v)
+            starts[name], annotations[name] = v.start, _annotation(v)
         else:
-            groups[name], annotations[name] = redeclared(inner, change)(), Any
-    made = namedtuple(cls.__name__, list(groups), defaults=list(groups.values()))
-    made.__annotations__ = annotations
-    return made
+            starts[name], annotations[name] = redeclared(inner, change)(), Fields
+    return _fields_class(cls.__name__, starts, annotations)
 
 
-def parameters_of(name: str, leading: int, function: Callable[..., Any]) -> tuple[Variable, ...]:
+def parameters_of(name: str, leading: int, function: Callable[..., object]) -> tuple[Variable, ...]:
     """The parameters that a function declares in its signature.
 
     Args:
@@ -188,7 +233,7 @@ def parameters_of(name: str, leading: int, function: Callable[..., Any]) -> tupl
         name,
         (),
         {
-            "__annotations__": {a.name: hints.get(a.name, Any) for a in arguments},
+            "__annotations__": {a.name: hints.get(a.name, object) for a in arguments},
             "_field_defaults": {a.name: a.default for a in arguments if a.default is not a.empty},
         },
     )
@@ -196,14 +241,14 @@ def parameters_of(name: str, leading: int, function: Callable[..., Any]) -> tupl
 
 
 @cache
-def variables(cls: type[Any]) -> tuple[Variable, ...]:
+def variables(cls: type) -> tuple[Variable, ...]:
     """The scalars of a declared NamedTuple class, nested ones included, in order.
 
     Raises:
         DeclarationError: a field without start value, unit or description.
     """
     found: list[Variable] = []
-    defaults = getattr(cls, "_field_defaults", {})
+    defaults = _starts(cls)
     for name, hint in get_type_hints(cls, include_extras=True).items():
         nested = _nested(cls, name, hint)
         if nested is not None:
@@ -224,53 +269,61 @@ def variables(cls: type[Any]) -> tuple[Variable, ...]:
                 more.get(Range, Range()),
                 FIXED in meta[2:],
                 more.get(Known),
-                more.get(Estimate),
+                more.get(FirstEstimate),
             )
         )
     return tuple(found)
 
 
-def _nested(cls: type[Any], name: str, hint: Any) -> type[Any] | None:
+def _starts(cls: type) -> Mapping[str, Any]:
+    return getattr(cls, "_field_defaults", {})
+
+
+def _nested(cls: type, name: str, hint: object) -> Declared | None:
     """The NamedTuple class behind a field, if it is one by its hint or by its start value."""
     if isinstance(hint, type) and hasattr(hint, "_fields"):
         return hint
-    start = getattr(cls, "_field_defaults", {}).get(name)
-    return type(start) if hasattr(start, "_fields") else None
+    start = _starts(cls).get(name)
+    return type(start) if isinstance(start, tuple) and hasattr(start, "_fields") else None
 
 
-def _shape(cls: type[Any]) -> list[type[Any] | None]:
+def _shape(cls: Declared) -> list[Declared | None]:
     """For each field the NamedTuple class behind it, None for a scalar."""
     return [_nested(cls, name, hint) for name, hint in get_type_hints(cls).items()]
 
 
 @cache
-def width(cls: type[Any]) -> int:
+def width(cls: Declared) -> int:
     """How many scalars a NamedTuple class holds, nested ones included."""
     return sum(1 if nested is None else width(nested) for nested in _shape(cls))
 
 
-@cache
-def packer(cls: type[Any]) -> Callable[[Sequence[Any]], Any]:
+def packer(cls: type[_T]) -> Callable[[Sequence[object]], _T]:
     """A function that turns a flat sequence of scalars into an instance of the class."""
+    return _packer(cls)
+
+
+@cache
+def _packer(cls: Any) -> Callable[[Sequence[object]], Any]:
     shape = _shape(cls)
     if not any(shape):
         return cls._make
-    parts: list[tuple[int, int, Callable[[Sequence[Any]], Any] | None]] = []
+    parts: list[tuple[int, int, Callable[[Sequence[object]], object] | None]] = []
     start = 0
     for nested in shape:
         size = 1 if nested is None else width(nested)
         parts.append((start, start + size, None if nested is None else packer(nested)))
         start += size
 
-    def pack(flat: Sequence[Any]) -> Any:
+    def pack(flat: Sequence[object]) -> object:
         return cls._make([flat[a] if sub is None else sub(flat[a:b]) for a, b, sub in parts])
 
     return pack
 
 
-def flatten(value: Any) -> list[Any]:
+def flatten(value: Iterable[Any]) -> list[Number]:
     """The scalars of a nested tuple in order: the inverse of :func:`packer`."""
-    flat: list[Any] = []
+    flat: list[Number] = []
     for item in value:
         if item.__class__ is float:  # the usual case, and the quickest to tell
             flat.append(item)
@@ -281,11 +334,11 @@ def flatten(value: Any) -> list[Any]:
     return flat
 
 
-def rebuild(template: Any, flat: Sequence[Any]) -> Any:
+def rebuild(template: _T, flat: Sequence[object]) -> _T:
     """The flat scalars in the shape of a nested tuple, of whatever kinds its tuples are."""
     scalars = iter(flat)
 
-    def like(part: Any) -> Any:
+    def like(part: object) -> Any:
         if not isinstance(part, tuple):
             return next(scalars)
         items = [like(item) for item in part]
@@ -294,17 +347,63 @@ def rebuild(template: Any, flat: Sequence[Any]) -> Any:
     return like(template)
 
 
+_I = TypeVar("_I", bound=tuple[object, ...])
+_P = TypeVar("_P", bound=tuple[object, ...])
+_S = TypeVar("_S", bound=tuple[object, ...])
+_O = TypeVar("_O", bound=tuple[object, ...])
+_I_in = TypeVar("_I_in", bound=tuple[object, ...], contravariant=True)
+_P_in = TypeVar("_P_in", contravariant=True)
+_S_out = TypeVar("_S_out", bound=tuple[object, ...], covariant=True)
+_O_out = TypeVar("_O_out", bound=tuple[object, ...], covariant=True)
+
+
+class Init(Protocol[_I_in, _P_in, _S_out]):
+    """``init(inputs, params) -> state``: the state in which a component begins.
+
+    Receives the inputs and parameters at the start of the simulation, as instances of the declared
+    classes. Returns nested tuples of numbers; their shape, that of every later state, does not depend on
+    values. Pure: it reads nothing but its arguments and changes nothing.
+    """
+
+    def __call__(self, inputs: _I_in, params: _P_in, /) -> _S_out: ...
+
+
+class Prepare(Protocol[_P_in]):
+    """``prepare(params) -> prepared``: what follows from the parameters alone.
+
+    Receives the parameters; is called again where one of them has changed, and before the first step.
+    Returns what the ``prepared_step`` of the same component gets in their place: numbers in any nested
+    tuples, lists and dicts, and constants. Pure, as :class:`Init` is.
+    """
+
+    def __call__(self, params: _P_in, /) -> Any: ...
+
+
+class Step(Protocol[_S, _I_in, _P_in, _O_out]):
+    """``step(state, inputs, params, h) -> (state, outputs)``: h [s] later.
+
+    Receives the state that :class:`Init` or the last step gave, the inputs that hold during the step,
+    the parameters (or what :class:`Prepare` gave), and h >= 0. Returns the next state in the shape of
+    the last one, and the outputs as an instance of the declared class. With h = 0 the outputs are those
+    of the present state, and the next step gives what it would give without this one. Pure: the same
+    arguments give the same numbers, and no argument is changed, so that a step may be repeated and
+    rolled back. It never branches on a value, which may be a float, an array or a symbol
+    (:data:`fmus.ops.Number`).
+    """
+
+    def __call__(self, state: _S, inputs: _I_in, params: _P_in, h: Number, /) -> tuple[_S, _O_out]: ...
+
+
 @dataclass(frozen=True, eq=False)
-class Component:
+class Component(Generic[_S, _I, _P, _O]):
     """A component's name, its four NamedTuple classes and its two pure functions.
 
     Attributes:
         name: name of the FMU.
         description: one line for people.
         params, state, inputs, outputs: NamedTuple classes.
-        init: ``init(inputs, params) -> state``.
-        step: ``step(state, inputs, params, h) -> (state, outputs)``; h [s] = 0 gives the outputs at
-            the present state and changes nothing.
+        init: see :class:`Init`.
+        step: see :class:`Step`.
         sampled: True for a law that acts at its sampling instants, so that an output may use the
             input of the same instant; False for a plant in continuous time, where the input acts
             through the integral (and through direct feedthrough, found by tracing).
@@ -313,8 +412,7 @@ class Component:
         hold_nonfinite: True where an input that is NaN or infinite keeps its last finite value; False
             for a component that makes its own sense of such a value.
         max_step: a longer communication step [s] is divided into equal parts no longer than this.
-        prepare: ``prepare(params)`` gives what follows from the parameters alone, where computing it
-            anew in every step would cost time.
+        prepare: see :class:`Prepare`; where computing it anew in every step would cost time.
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
         starts: start values of parameters and inputs that are not those of the declaration.
         any_ship: whether it serves every ship; False where it serves the default one alone.
@@ -324,43 +422,47 @@ class Component:
 
     name: str
     description: str
-    params: type[Any]
-    state: type[Any]
-    inputs: type[Any]
-    outputs: type[Any]
-    init: Callable[[Any, Any], Any]
-    step: Callable[[Any, Any, Any, Any], tuple[Any, Any]]
+    params: type[_P]
+    state: type[_S]
+    inputs: type[_I]
+    outputs: type[_O]
+    init: Init[_I, _P, _S]
+    step: Step[_S, _I, _P, _O]
     sampled: bool = True
     max_step: float | None = None
     hold_nonfinite: bool = True
     held: tuple[str, ...] = ()
-    prepare: Callable[[Any], Any] | None = None
-    prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
+    prepare: Prepare[_P] | None = None
+    prepared_step: Step[_S, _I, Any, _O] | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
     any_ship: bool = True
-    outline: Outline | None = None
+    outline: ShipOutline | None = None
     trial: str = ""
 
-    def starting(self, starts: Mapping[str, float]) -> "Component":
+    def starting(self, starts: Mapping[str, float]) -> "Component[_S, _I, _P, _O]":
         """The same component with other start values of some parameters or inputs."""
         return replace(self, starts={**self.starts, **starts})
 
-    def prepared(self, params: Any) -> Any:
+    def prepared(self, params: _P) -> Any:
         """What :meth:`advance` wants of the parameters: to be kept while they stay the same."""
         return params if self.prepare is None else self.prepare(params)
 
-    def advance(self, state: Any, inputs: Any, prepared: Any, h: float) -> tuple[Any, Any]:
+    @property
+    def law(self) -> Step[_S, _I, Any, _O]:
+        """The step that takes what :meth:`prepared` gives."""
+        return self.prepared_step or self.step
+
+    def advance(self, state: _S, inputs: _I, prepared: Any, h: float) -> tuple[_S, _O]:
         """One communication step of h [s], in parts where it is longer than ``max_step``."""
-        step = self.prepared_step or self.step
+        step = self.law
         if self.max_step is None or h <= self.max_step * (1.0 + 1e-9):
             return step(state, inputs, prepared, h)
         if h > MOST_PARTS * self.max_step:
             raise ValueError(f"a step of {h} s is too long: {self.max_step} s are integrated at once")
         parts = -int(-h / self.max_step // 1.0)
-        outputs = None
-        for _ in range(parts):
-            state, outputs = step(state, inputs, prepared, h / parts)
-        return state, outputs
+        for _ in range(parts - 1):
+            state, _ = step(state, inputs, prepared, h / parts)
+        return step(state, inputs, prepared, h / parts)
 
     @cached_property
     def variables(self) -> list[Variable]:
@@ -384,10 +486,10 @@ KINDS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 def component(
     name: str,
     description: str,
-    init: Callable[[Any, Any], Any],
-    step: Callable[[Any, Any, Any, Any], tuple[Any, Any]],
+    init: Init[_I, _P, _S],
+    step: Step[_S, _I, _P, _O],
     **more: Any,
-) -> Component:
+) -> Component[_S, _I, _P, _O]:
     """A component of the classes that its functions say they take and give.
 
     Args:
@@ -411,11 +513,19 @@ def component(
     return Component(name, description, params, state, inputs, outputs, init, step, **more)
 
 
-def discover(ship: Any) -> Iterator[tuple[str, Component]]:
+class ComponentMaker(Protocol):
+    """A ship, as far as :func:`discover` needs it."""
+
+    def component(self, component: Component | None, module: ModuleType, /) -> Component | None:
+        """A component of a module, made for this ship; None: it has none for such a ship."""
+        ...
+
+
+def discover(ship: ComponentMaker) -> Iterator[tuple[str, Component]]:
     """Every (module name, component) of this project, found by importing the modules of all kinds.
 
     Args:
-        ship: a :class:`~fmus.ship.Ship` that the components are to be made for.
+        ship: that the components are to be made for.
     """
     root = __package__ or "fmus"
     for kind in KINDS:

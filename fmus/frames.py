@@ -3,19 +3,17 @@
 Of numbers at an instant, or of whole time series.
 """
 
-from typing import Any
-
-from .ops import cos, sin
+from .ops import Series, cos, sin
 
 
-def rotate_to_body(psi: Any, x: Any, y: Any) -> tuple[Any, Any]:
+def rotate_to_body(psi: Series, x: Series, y: Series) -> tuple[Series, Series]:
     """R^T(psi) of an earth-fixed vector."""
     c = cos(psi)
     s = sin(psi)
     return c * x + s * y, c * y - s * x
 
 
-def rotate_to_earth(psi: Any, x: Any, y: Any) -> tuple[Any, Any]:
+def rotate_to_earth(psi: Series, x: Series, y: Series) -> tuple[Series, Series]:
     """R(psi) of a body-fixed vector, (2.1)."""
     c = cos(psi)
     s = sin(psi)

@@ -8,11 +8,11 @@ and a controller's belief about it are two separate sets of these parameters.
 import re
 from collections.abc import Sequence
 from functools import cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from .declare import POSITIVE, Known, Variable, group_of, variables
+from .declare import POSITIVE, Fields, Known, Variable, bundle, group_of, variables
 from .hull_functions import FUNCTIONS
-from .ops import Number
+from .ops import Number, Series
 from .signals import Force
 
 Triple = tuple[Number, Number, Number]
@@ -86,17 +86,15 @@ EXTRA = (
     Variable("N_uv", "N.s2/m", "yaw moment, u v", 0.0),
 )
 Terms = group_of("Terms", [*variables(TowedDamping), *variables(RotationalDamping), *EXTRA])
-
-
-class HullFunctions(NamedTuple):
-    """Parameters of damping that is no product of speeds, which a ship's description adds."""
+# Parameters of damping that is no product of speeds, which a ship's description adds.
+HullFunctions = bundle("HullFunctions")
 
 
 class Damping(NamedTuple):
     """All damping: coefficients of products of speeds by their names, and other functions."""
 
-    terms: Any = Terms()
-    functions: Any = HullFunctions()
+    terms: Fields = Terms()
+    functions: Fields = HullFunctions()
 
 
 def mass_matrix(p: Inertia) -> tuple[Triple, Triple, Triple]:
@@ -228,21 +226,37 @@ def _plan(names: tuple[str, ...]) -> tuple[Sequence[tuple[int, bool, int]], Sequ
     return tuple(steps), tuple(uses)
 
 
-def terms_force(u: Any, v: Any, r: Any, terms: Any) -> Triple:
+def without_zeros(c: Damping) -> Damping:
+    """The same damping without coefficients that are zero: the force is the same, in fewer products."""
+    kept = {name: x for name, x in zip(c.terms._fields, c.terms, strict=True) if _acts(x)}
+    return c._replace(terms=_terms(tuple(kept))._make(kept.values()))
+
+
+def _acts(x: Series) -> bool:
+    return bool(x) if isinstance(x, float) else True
+
+
+@cache
+def _terms(names: tuple[str, ...]) -> type[Fields]:
+    """The class of coefficients of some products of speeds."""
+    return group_of("Terms", [term_variable(name) for name in names])
+
+
+def terms_force(u: Series, v: Series, r: Series, terms: Fields) -> Triple:
     """Force on the hull [N, N, N m] by coefficients of products of speeds, named by them."""
     steps, uses = _plan(terms._fields)
     speeds, sizes = (u, v, r), (abs(u), abs(v), abs(r))
-    products: list[Any] = []
+    products: list[Series] = []
     for before, sign, k in steps:
         factor = sizes[k] if sign else speeds[k]
         products.append(factor if before < 0 else products[before] * factor)
-    found: list[Any] = [0.0, 0.0, 0.0]
+    found: list[Series] = [0.0, 0.0, 0.0]
     for (axis, k), c in zip(uses, terms, strict=True):
         found[axis] = found[axis] + c * products[k]
     return found[0], found[1], found[2]
 
 
-def damping_force(u: Any, v: Any, r: Any, c: Any) -> Triple:
+def damping_force(u: Series, v: Series, r: Series, c: Damping) -> Triple:
     """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected.
 
     The coefficients c are a Damping, or a tuple of terms and functions.
@@ -263,7 +277,7 @@ class Hull(NamedTuple):
     damping: Damping
 
 
-def accelerated(inverse: Inverse, X: Any, Y: Any, N: Any) -> tuple[Any, Any, Any]:
+def accelerated(inverse: Inverse, X: Series, Y: Series, N: Series) -> tuple[Series, Series, Series]:
     """M^-1 tau [m/s2, m/s2, rad/s2] by the inverse of the mass matrix; of whole time series, too."""
     i11, i22, i23, i32, i33 = inverse
     return i11 * X, i22 * Y + i23 * N, i32 * Y + i33 * N

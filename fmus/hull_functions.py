@@ -6,7 +6,7 @@ A function gets u, v and r through the water [m/s, m/s, rad/s] and then its para
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from .declare import POSITIVE, DeclarationError
 from .ops import Number, atan2, fmax, sqrt, where
@@ -174,7 +174,9 @@ def drift_polynomial(
     X = where(u < 0.0, R_0_prime, -R_0_prime) * speed * speed
     X = X + X_vv_prime * vv + X_vr_prime * vr + X_rr_prime * rr + X_vvvv_prime * vv * vv / (over * over)
 
-    def across(c_0: Any, c_v: Any, c_r: Any, vvv: Any, vvr: Any, vrr: Any, rrr: Any) -> Any:
+    def across(
+        c_0: Number, c_v: Number, c_r: Number, vvv: Number, vvr: Number, vrr: Number, rrr: Number
+    ) -> Number:
         linear = (c_v * v + c_r * turn) * speed
         cubic = ((vvv * v + vvr * turn) * vv + (vrr * v + rrr * turn) * rr) / over
         return c_0 * u * abs(u) + linear + cubic

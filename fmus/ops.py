@@ -9,19 +9,26 @@ an infinity instead of raising.
 import math
 from collections.abc import Callable, Sequence
 from functools import wraps
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
-# What floats, arrays and traced symbols share: checkers hold physics to floats and bools, whose places
-# arrays and symbols take at run time.
+# A number and a truth value of a component: a float and a bool in an FMU, arrays of them for whole
+# series, traced symbols for code generation. Checkers take all of them for floats and bools, whose
+# operations arrays and symbols have, too.
 Number = float
 Condition = bool
+# A number, or an array of one for each instant, of functions that a diagnosis calls on whole series:
+# what goes in decides what comes out, which checkers cannot say of both.
+Series = Any
+
+P = ParamSpec("P")
+T = TypeVar("T")  # a number, or nested tuples of numbers
 
 TWO_PI = 2.0 * math.pi
 TINY = 1e-300  # in place of zero, of which there is no logarithm
 _SCALARS = (float, int, bool)
 
 
-def _call(name: str, *args: Any) -> Any:
+def _call(name: str, *args: object) -> Any:
     """Apply ``name`` to arguments of which at least one is not a float."""
     for arg in args:
         apply = getattr(arg, "apply_operation", None)
@@ -78,17 +85,21 @@ def where(condition: Condition, a: Number, b: Number) -> Number:
     return _call("where", condition, a, b)
 
 
-def choose(condition: Condition, a: Any, b: Any) -> Any:
+def choose(condition: Condition, a: T, b: T) -> T:
     """:func:`where` for two numbers, or two nested tuples of numbers of the same shape."""
     if condition.__class__ is bool:
         return a if condition else b
+    return _chosen(condition, a, b)
+
+
+def _chosen(condition: Condition, a: Any, b: Any) -> Any:
     if not isinstance(a, tuple):
         return a if a is b else where(condition, a, b)
-    items = [choose(condition, x, y) for x, y in zip(a, b, strict=True)]
+    items = [_chosen(condition, x, y) for x, y in zip(a, b, strict=True)]
     return type(a)._make(items) if hasattr(a, "_make") else tuple(items)  # pyright: ignore
 
 
-def when(condition: Condition, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
+def when(condition: Condition, a: Callable[[], T], b: Callable[[], T]) -> T:
     """What ``a`` gives where the condition holds, else what ``b`` gives: for rare, costly work.
 
     Both give numbers in the same nested tuples. On a bool only the one that counts is called, and so it
@@ -100,29 +111,29 @@ def when(condition: Condition, a: Callable[[], Any], b: Callable[[], Any]) -> An
     return choose(condition, a(), b()) if branch is None else branch(a, b)
 
 
-def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Marks a pure function of nested tuples or lists of numbers as heavy work that is done often.
 
     Generated code has it once, as a function of its own, in place of a copy for each call.
     """
 
     @wraps(function)
-    def called(*args: Any) -> Any:
-        first: Any = args
+    def called(*args: P.args, **named: P.kwargs) -> T:
+        first: object = args
         while first.__class__ is not float and isinstance(first, (tuple, list)):
             first = first[0]
         call = getattr(first, "call_kernel", None)
-        return function(*args) if call is None else call(function, args)
+        return function(*args, **named) if call is None else call(function, args)
 
     return called
 
 
-def put(rows: tuple[Any, ...], index: Number, row: Any) -> tuple[Any, ...]:
+def put(rows: tuple[T, ...], index: Number, row: T) -> tuple[T, ...]:
     """The rows with another one at a place that may be a number; -1 is nowhere."""
     return tuple([choose(index == float(k), row, old) for k, old in enumerate(rows)])
 
 
-def pick(rows: Sequence[Any], index: Number) -> Any:
+def pick(rows: Sequence[T], index: Number) -> T:
     """The row whose place is nearest to ``index``; the first or last one beyond the ends."""
     if index.__class__ is float:
         return rows[min(max(int(index + 0.5), 0), len(rows) - 1)]
@@ -194,6 +205,6 @@ def finite(x: Number, otherwise: Number) -> Number:
     return where(x - x == 0.0, x, otherwise)
 
 
-def wrap(angle: Any) -> Any:
+def wrap(angle: Series) -> Series:
     """The angle [rad] brought to (-pi, pi]."""
     return angle + TWO_PI * floor((math.pi - angle) / TWO_PI)

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING
 
 from .actuators.actuation import command_units
-from .actuators.actuator_layout import layouts
 from .actuators.law import Law
-from .actuators.response import Layout, Prepared
+from .actuators.response import CommandLayout, PreparedThrusters, layouts
 from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
@@ -23,6 +22,9 @@ from .ships.naming import DEFAULT, described_ship
 from .sizing import sized
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,21 +72,21 @@ class Ship:
         }
 
     @cached_property
-    def nominal_drive(self) -> Prepared:
+    def nominal_drive(self) -> PreparedThrusters:
         """The thrusters, nothing wrong with them."""
         return self.thrusters.prepared(self.thrusters.params())
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> CommandLayout:
         """What commands the thrusters get, and how these become a force."""
         return self.nominal_drive.effects.layout
 
     @property
-    def layouts(self) -> tuple[Layout, ...]:
+    def layouts(self) -> tuple[CommandLayout, ...]:
         """How runs may have its commands: as the FMU does, and each unit of its actuators by its own."""
         return layouts(self.description)
 
-    def layout_of(self, commands: Any) -> Layout:
+    def layout_of(self, commands: "np.ndarray | None") -> CommandLayout:
         """The layout of a run's commands (n, k); that of the FMU for None."""
         if commands is None:
             return self.layout
@@ -100,7 +102,7 @@ class Ship:
         """The same for each of :attr:`layouts`."""
         return tuple([command_units(self.description, k > 0) for k in range(len(self.layouts))])
 
-    def form_of(self, commands: Any) -> Mapping[str, str]:
+    def form_of(self, commands: "np.ndarray | None") -> Mapping[str, str]:
         """The names and units of a run's commands (n, k)."""
         return self.command_forms[self.layouts.index(self.layout_of(commands))]
 
@@ -120,7 +122,9 @@ class Ship:
         """Whether its thrusters can be asked for a force on every axis."""
         return self.description.allocates and len(axes(self.description)) == 3
 
-    def commanded_force(self, commands: Any, settings: Any = None) -> Any:
+    def commanded_force(
+        self, commands: "np.ndarray", settings: "np.ndarray | None" = None
+    ) -> "np.ndarray":
         """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands at rest.
 
         Args:
@@ -133,7 +137,7 @@ class Ship:
         drive = (
             self.nominal_drive if settings is None else layout.powered(self.nominal_drive, settings.T)
         )
-        force = layout.believed(tuple(commands.T), drive.params)
+        force = layout.nominal_force(tuple(commands.T), drive.params)
         return np.column_stack(np.broadcast_arrays(*force, commands[:, 0]))[:, :3]
 
     @cached_property

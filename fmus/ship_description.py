@@ -8,8 +8,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from .declare import Known, Outline, Variable
+from .declare import Known, ShipOutline, Variable
 from .scale import REFERENCE_LENGTH, Scale
+
+GUESSED = "guessed"  # origin of a number of which a file gives none
 
 
 class Value(NamedTuple):
@@ -28,8 +30,12 @@ class Value(NamedTuple):
     share: float
 
     def of(self, v: Variable, group: str) -> Variable:
-        """The declaration of a parameter that starts at this value."""
-        known = None if self.value == 0.0 else Known(group, self.origin, self.share)
+        """The declaration of a parameter that starts at this value.
+
+        A zero stays zero; one of stated origin is a coefficient where another model of the ship has it.
+        """
+        stated = self.value != 0.0 or self.origin != GUESSED
+        known = Known(group, self.origin, self.share) if stated else None
         return replace(v, start=self.value, known=known)
 
 
@@ -102,9 +108,9 @@ class Description(NamedTuple):
         return Scale(self.length / REFERENCE_LENGTH)
 
     @property
-    def drawn(self) -> Outline:
+    def drawn(self) -> ShipOutline:
         """What pictures need of it."""
-        return Outline(self.name, self.length, self.outline)
+        return ShipOutline(self.name, self.length, self.outline)
 
     def called(self, name: str) -> str:
         """The alias of a variable of its actuators, or its name where there is none."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from .declare import Component, Variable, flatten, packer, redeclared, variables
+from .declare import Component, Fields, Variable, flatten, packer, redeclared, variables
 from .hull import Damping, Inertia
 from .ops import Number
 from .scale import REFERENCE, Scale
@@ -38,19 +38,22 @@ def sized(component: Component, ship: Description) -> Component:
         return replace(component, params=declared)
     params, inputs = (_converted(group, scale, -1) for group in (component.params, component.inputs))
     outputs = _converted(component.outputs, scale, 1)
-    law = component.prepared_step or component.step
 
-    def init(i: Any, p: Any) -> Any:
+    def init(i: Fields, p: Fields) -> tuple[object, ...]:
         return component.init(inputs(i), params(p))
 
-    def prepare(p: Any) -> Any:
+    def prepare(p: Fields) -> Any:
         return component.prepared(params(p))
 
-    def prepared_step(s: Any, i: Any, b: Any, h: Number) -> tuple[Any, Any]:
-        s, o = law(s, inputs(i), b, h / scale.time)
+    def prepared_step(
+        s: tuple[object, ...], i: Fields, b: Fields, h: Number
+    ) -> tuple[tuple[object, ...], Fields]:
+        s, o = component.law(s, inputs(i), b, h / scale.time)
         return s, outputs(o)
 
-    def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Any, Any]:
+    def step(
+        s: tuple[object, ...], i: Fields, p: Fields, h: Number
+    ) -> tuple[tuple[object, ...], Fields]:
         return prepared_step(s, i, prepare(p), h)
 
     return replace(
@@ -65,12 +68,12 @@ def sized(component: Component, ship: Description) -> Component:
     )
 
 
-def _converted(group: type[Any], scale: Scale, power: int) -> Callable[[Any], Any]:
+def _converted(group: type[Fields], scale: Scale, power: int) -> Callable[[Fields], Fields]:
     """The function that converts values of a group from the reference size to a ship's, or back (-1)."""
     factors = [scale.factor(v.unit) ** power for v in variables(group)]
     pack = packer(group)
 
-    def convert(values: Any) -> Any:
+    def convert(values: Fields) -> Fields:
         pairs = zip(flatten(values), factors, strict=True)
         return pack([x if f == 1.0 else x * f for x, f in pairs])
 

@@ -19,7 +19,7 @@ from diagnosis.search import shares
 
 from .measured import bollard, ship_tables
 from .measured.data_folder import measured_files
-from .measured.leave_one_out import Fold, gather, leave_out
+from .measured.leave_one_out import LeftOutRun, gather, leave_out
 from .study_command import run_study, study_parser
 from .study_report import Report
 
@@ -29,7 +29,7 @@ LEFT_OUT = {"where", "where_after"}
 
 def learned(
     runs: Sequence[WeakWindows], prior: float | None, quick: bool, advance: Advance
-) -> list[Fold]:
+) -> list[LeftOutRun]:
     """Each run left out in turn; the first alone for a first look."""
 
     def without(name: str) -> Advance:
@@ -39,10 +39,10 @@ def learned(
     return [leave_out(runs, k, prior, without(w.run.name)) for k, w in enumerate(chosen)]
 
 
-def with_all(folds: Sequence[Fold], found: Diagnosis) -> list[Fold]:
+def with_all(folds: Sequence[LeftOutRun], found: Diagnosis) -> list[LeftOutRun]:
     """The folds with the errors on their run when it is among the training runs."""
     seen = {e.name: e for e in found.comparison.evaluations}
-    return [Fold(f.found, seen[f.name]) for f in folds]
+    return [LeftOutRun(f.found, seen[f.name]) for f in folds]
 
 
 def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:

@@ -20,7 +20,7 @@ from diagnosis.predictors import free_runs, ship_with
 from diagnosis.runs import Examined, Run, examine
 from diagnosis.search import Method
 
-from .ship_folds import Fold, folds_command, learn_folds, read, titled, write_folds
+from .ship_folds import ShipFold, folds_command, learn_folds, read, titled, write_folds
 from .study_report import Report
 
 HORIZON = 60.0  # s, of predictions: the ship goes ten lengths
@@ -110,7 +110,7 @@ def steady(time: np.ndarray, pose: np.ndarray) -> tuple[float, float]:
     return float(way / seconds), float(abs(psi[-1] - psi[0]) / seconds)
 
 
-def circles(report: Report, folds: Sequence[Fold], model: Model) -> None:
+def circles(report: Report, folds: Sequence[ShipFold], model: Model) -> None:
     """Speed and yaw rate of the circles left out, from a free run with the measured commands."""
     rows = []
     for fold in folds:

@@ -25,7 +25,7 @@ from .study_command import run_study, study_parser
 from .study_report import Report
 
 
-class Fold(NamedTuple):
+class ShipFold(NamedTuple):
     """What was learned without some runs: names of those, the diagnosis, and its content."""
 
     left_out: Sequence[str]
@@ -109,7 +109,7 @@ def learn_folds(
     model: Model,
     by: str | Method,
     advance: Advance,
-) -> Iterator[Fold]:
+) -> Iterator[ShipFold]:
     """Learn from the runs of all folds but one, for each fold.
 
     Args:
@@ -129,10 +129,10 @@ def learn_folds(
         out = [w for i, w in enumerate(runs) if i % count == k]
         rest = [w for i, w in enumerate(runs) if i % count != k]
         found = diagnosis.diagnose(rest, out, model=model, advance=advance, by=by)
-        yield Fold([w.run.name for w in out], found, diagnosis_content(found, None, []))
+        yield ShipFold([w.run.name for w in out], found, diagnosis_content(found, None, []))
 
 
-def write_folds(report: Report, folds: Sequence[Fold]) -> None:
+def write_folds(report: Report, folds: Sequence[ShipFold]) -> None:
     """Tables of errors before and after on the runs left out, and of what was found each time."""
     errors = [e for fold in folds for e in fold.errors]
     report.heading("Runs left out in turn")
@@ -169,7 +169,7 @@ def write_folds(report: Report, folds: Sequence[Fold]) -> None:
     report.items(dict.fromkeys(_open(folds)))
 
 
-def _windows(report: Report, folds: Sequence[Fold]) -> str:
+def _windows(report: Report, folds: Sequence[ShipFold]) -> str:
     """The medians over all windows of the runs left out, before and after."""
     found = []
     for e in (e for fold in folds for e in fold.found.comparison.evaluations if e.held_out):
@@ -201,7 +201,7 @@ def _share(confidence: float | None) -> str:
     return "–" if confidence is None else f"{100.0 * confidence:.0f} %"
 
 
-def _open(folds: Sequence[Fold]) -> Iterator[str]:
+def _open(folds: Sequence[ShipFold]) -> Iterator[str]:
     """What the data leave open, a sentence each."""
     for fold in folds:
         yield from fold.content.inseparable

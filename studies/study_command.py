@@ -1,7 +1,6 @@
 """The command line that the studies share."""
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,15 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import cosim
-from cosim.command import BAD_INPUT, FAILED, command_parser, folder_name, run_command, whole_number
+from cosim.command import (
+    BAD_INPUT,
+    FAILED,
+    command_parser,
+    complain,
+    folder_name,
+    run_command,
+    whole_number,
+)
 
 
 def study_parser(
@@ -66,10 +73,10 @@ def run_study(study: Callable[[], Path]) -> NoReturn:
         try:
             print(study())
         except cosim.InputError as error:
-            print(f"error: {error}", file=sys.stderr)
+            complain(error)
             return BAD_INPUT
         except cosim.SimulationError as error:
-            print(f"error: {error}", file=sys.stderr)
+            complain(error)
             return FAILED
         return 0
 

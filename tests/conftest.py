@@ -17,7 +17,7 @@ from support.shared import keep_in, once, shared_folder
 from support.slow_tests import NODE, PROCESSOR, slow_tests
 
 from cosim.dispatch import analyse_runs
-from cosim.fmu import LocalInstance, Model, archive_check
+from cosim.fmu import FmuModel, LocalInstance, archive_check
 from cosim.master import loop_surroundings
 from cosim.system import own_fmus
 from fmus.build import build
@@ -123,7 +123,7 @@ def _session_cache(shared):
 @pytest.fixture(autouse=True, scope="session")
 def _first_library(_session_cache):
     """The first pythonfmu library of a process is one that the master finalises (see Component.free)."""
-    model = Model(build(["vessel"])[0])
+    model = FmuModel(build(["vessel"])[0])
     LocalInstance("first", model, print).free()
     model.close()
 
@@ -182,7 +182,7 @@ def _ask_the_builder_once(_session_cache):
 @pytest.fixture(autouse=True, scope="session")
 def _unpack_once(shared):
     """Our FMUs are unpacked once for all runs, where the byte code of their modules stays, too."""
-    own, unpack = cache_folder(), Model.unpack
+    own, unpack = cache_folder(), FmuModel.unpack
 
     def unpacked(model):
         if model._folder is None and own in model.path.parents:
@@ -194,7 +194,7 @@ def _unpack_once(shared):
         return unpack(model)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Model, "unpack", unpacked)
+        patch.setattr(FmuModel, "unpack", unpacked)
         yield
 
 

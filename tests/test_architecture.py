@@ -411,6 +411,20 @@ def test_file_names_are_unique(package):
     assert not set(names) & set(others) - ALSO_ELSEWHERE
 
 
+# A component has classes of these names, see CONTRIBUTING.md.
+OF_COMPONENTS = {"Inputs", "Outputs", "Params", "State"}
+
+
+def test_a_class_name_has_one_meaning():
+    homes: dict[str, list[str]] = {}
+    for package in ("fmus", "cosim", "cybership", "diagnosis", "studies", "thesis"):
+        for module, path in sources(package).items():
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.ClassDef):
+                    homes.setdefault(node.name, []).append(module)
+    assert {n: m for n, m in homes.items() if len(m) > 1 and n not in OF_COMPONENTS} == {}
+
+
 # cosim.command is a public path; thesis.allocation, benchmarks.constants and benchmarks.ellipse are commands,
 # fmus and diagnosis have files of these names.
 ALSO_ELSEWHERE = {"command", "allocation", "constants", "ellipse"}

@@ -9,6 +9,7 @@ import time
 import zipfile
 
 import pytest
+from support.command import without_progress
 from support.project import ROOT
 
 from cybership.scratch_folder import scratch_folder
@@ -150,7 +151,7 @@ def test_builds_and_checks_end_in_one_line_at_any_time(command, tmp_path):
         process = started(k)
         time.sleep(lasts * rng.uniform(0.5, 1.0))
         process.send_signal(signal.SIGINT)
-        _, stderr = process.communicate(timeout=60)
+        stderr = without_progress(process.communicate(timeout=60)[1])
         ended.add(process.returncode)
         if process.returncode == 130:
             assert stderr == "interrupted\n"

@@ -10,7 +10,7 @@ from cosim import InputError
 from cosim.campaign import differences, pareto
 from cosim.campaign.comparison import FEWEST_PAIRS, StopRule, check_request, interval
 from cosim.campaign.design import Case
-from cosim.dispatch.job import Row
+from cosim.dispatch.job import RunRow
 
 
 def grid(controllers, seeds):
@@ -21,7 +21,7 @@ def grid(controllers, seeds):
 
 def outcome(cases, value):
     """Number -> row, where ``value(case)`` is the metric W."""
-    return {case.number: Row("done", "", 0.0, {"W": value(case)}, {}) for case in cases}
+    return {case.number: RunRow("done", "", 0.0, {"W": value(case)}, {}) for case in cases}
 
 
 def test_interval_is_that_of_student():
@@ -80,7 +80,7 @@ def test_interval_of_the_rule_holds_the_difference_as_often_as_it_says():
 def test_shares_are_of_the_ratio_and_failed_pairs_are_left_out():
     cases = grid("ab", range(12))
     rows = outcome(cases, lambda c: 2.0 * (1.1 if c.values["c"] == "b" else 1.0))
-    rows[3] = Row("failed", "broke", 0.0, {}, {})
+    rows[3] = RunRow("failed", "broke", 0.0, {}, {})
     told = StopRule("c W 1%", cases, 0).verdict(rows.get)
     assert told["ratio_less_one"]["b"] == pytest.approx([0.1] * 3)
     assert FEWEST_PAIRS <= told["pairs"] <= 11

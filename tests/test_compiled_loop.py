@@ -227,8 +227,8 @@ def one_of_each(rng):
     yield operations.Add([0, 1], lambda t: draws[next(at)])
     yield operations.Replace([0, 1], lambda t: [1.0, math.nan] if chance[round(t)] else None)
     yield operations.Hold([0, 1], lambda t: bool(chance[round(t)]))
-    yield operations.Delay([0, 1], 3)
-    yield operations.Wrap([0, 1])
+    yield operations.DelayOperation([0, 1], 3)
+    yield operations.WrapOperation([0, 1])
     yield operations.Convert([0, 1], [1, 2], [(2.0, 1.0), (0.5, -1.0)])
 
 

@@ -10,7 +10,7 @@ from support.project import COMPONENTS
 from fmus.controller import abs as abs_module
 from fmus.controller import bs, pid
 from fmus.controller.adaptive import Disturbance
-from fmus.controller.backstepping import Gains, Inputs, control_errors
+from fmus.controller.backstepping import FeedbackGains, Inputs, control_errors
 from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
 from fmus.frames import rotate_to_body
 from fmus.hull import Damping, Inertia, RotationalDamping, Terms, mass_matrix
@@ -25,7 +25,7 @@ H = 0.002
 
 
 def test_gains_are_those_of_table_5_1():
-    assert {f"K_{name}": gain for name, gain in SOFT.items()} == Gains()._asdict()
+    assert {f"K_{name}": gain for name, gain in SOFT.items()} == FeedbackGains()._asdict()
 
 
 @pytest.mark.parametrize("name", ["controller_cl_win_eps_scaled", "controller_cl_improved"])
@@ -190,7 +190,7 @@ def test_nothing_is_learned_while_frozen_if_so_chosen():
 
 
 def test_gains_default_to_table_5_1():
-    assert tuple(Gains()) == (0.4, 1.0, 0.2, 1.0, 5.0, 1.0)
+    assert tuple(FeedbackGains()) == (0.4, 1.0, 0.2, 1.0, 5.0, 1.0)
     assert ROTATIONAL_GAINS == (8.0, 4.0, 8.0, 8.0, 8.0, 4.0, 8.0, 8.0)
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from cosim import InputError, SimulationError
-from cosim.dispatch.job import Job, Row, own_version
+from cosim.dispatch.job import Job, RunRow, own_version
 
 dask_workers = pytest.importorskip("cosim.dispatch.dask_workers")
 
@@ -31,7 +31,7 @@ class Client:
                 raise self.fails
             if set(names) & set(self.deadly):
                 raise dask_workers.KilledWorker("task", None, 1)
-            return [Row("done", name, 0.04) for name in names]
+            return [RunRow("done", name, 0.04) for name in names]
 
         future = SimpleNamespace(key=len(self.asked), result=result)
         future.add_done_callback = lambda then: then(future)

@@ -18,7 +18,7 @@ from diagnosis.search.prediction_fit.coefficient_calibration import (
 )
 from diagnosis.search.prediction_fit.fit import fit_to, shootings
 from diagnosis.search.prior import NominalPrior
-from diagnosis.search.refinement import Estimate
+from diagnosis.search.refinement import RefinedModel
 from diagnosis.verdict.coefficients import calibrated
 from diagnosis.verdict.validation_data import ValidationData
 
@@ -53,7 +53,7 @@ def fit():
 
 
 def nothing_found(sigma=1.0):
-    return Findings(sigma=np.full(3, sigma), estimate=Estimate.at(Model(), PRIOR), searched=PRIOR)
+    return Findings(sigma=np.full(3, sigma), estimate=RefinedModel.at(Model(), PRIOR), searched=PRIOR)
 
 
 def test_what_a_model_leaves_out_is_zero_give_or_take_its_size():

@@ -15,7 +15,7 @@ from diagnosis.predictors.evaluation import Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
 from diagnosis.search.conclusion import interval, laplace_std, suspected
-from diagnosis.search.effect_evidence import Evidence, evidence, variation
+from diagnosis.search.effect_evidence import EffectEvidence, evidence, variation
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import Nuisance
 from diagnosis.search.nonlinear.multistart import Landscape, linear_ones
@@ -36,10 +36,10 @@ def drawn(*shape, seed=0):
 
 
 def test_confidence_is_even_odds_where_a_third_is_left_or_the_size_varies_by_as_much():
-    assert probability(Evidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
+    assert probability(EffectEvidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
     third = 4.6 / 14.0
     for left, varies in ((third, 0.0), (0.0, third), (0.5 * third, 0.5 * third)):
-        assert probability(Evidence(0.8, left, varies)) == pytest.approx(0.4)
+        assert probability(EffectEvidence(0.8, left, varies)) == pytest.approx(0.4)
 
 
 def test_what_is_left_counts_beyond_the_noise_and_by_how_far_the_effect_acts_on_an_axis():

@@ -12,7 +12,7 @@ from support.command import command
 from support.measured import DATA, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Run, compare, read, weak_windows
-from diagnosis.assessment.gains import Gains, _own, gains
+from diagnosis.assessment.gains import ThrustGains, _own, gains
 from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -96,7 +96,7 @@ def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_p
 )
 def test_gains_beyond_two_and_a_half_or_of_hardly_anything_are_wrong(value, told, wrong, close):
     value = np.array(value)
-    g = Gains(value, np.abs(value) * [0.01, 0.04, 0.02], np.array(told, bool))
+    g = ThrustGains(value, np.abs(value) * [0.01, 0.04, 0.02], np.array(told, bool))
     assert g.wrong.tolist() == [bool(w) for w in wrong]
     assert g.wrong.any() == any(wrong)
     assert g.close == close

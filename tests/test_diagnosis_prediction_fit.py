@@ -17,14 +17,14 @@ from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.prediction_fit import disturbance as pushes
-from diagnosis.search.prediction_fit.disturbance import Push, covariance, estimate
+from diagnosis.search.prediction_fit.disturbance import ForceDisturbance, covariance, estimate
 from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
 from diagnosis.search.prediction_fit.fit import fit_predictions, shootings
-from diagnosis.search.prediction_fit.joint_posterior import Posterior
+from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
 from diagnosis.search.prediction_fit.refit import fit_model_error, to_predictions
 from diagnosis.search.prior import NominalPrior
-from diagnosis.search.refinement import Estimate
+from diagnosis.search.refinement import RefinedModel
 from fmus.vessel import vessel
 
 STEPS = {
@@ -38,7 +38,7 @@ STEPS = {
 DRAG = -2.0  # N s/m, hidden
 LIGHTLY_DAMPED = -0.62  # N m s/rad, hidden
 DRAGGED = Model({"delta_X_u": DRAG})
-NO_PUSH = Push(np.zeros(3), np.ones(3))
+NO_PUSH = ForceDisturbance(np.zeros(3), np.ones(3))
 
 
 def pushed(t, axis, size, seconds=2.0):
@@ -82,7 +82,7 @@ def as_modelled():
 @cache
 def fitted():
     prior = NominalPrior.of(Model(), {"damping": 0.1})
-    at = Estimate(Model(), np.zeros(prior.size), {"delta_X_u": -0.5}, np.zeros((1, 1)))
+    at = RefinedModel(Model(), np.zeros(prior.size), {"delta_X_u": -0.5}, np.zeros((1, 1)))
     return fit_predictions([hidden()], shootings([hidden()]), at, prior), prior
 
 
@@ -138,7 +138,9 @@ def test_lasting_push_moves_a_ship_at_rest_by_half_the_acceleration_times_time_s
     slope = np.zeros((1, 8, 6, 6))
     slope[:, :, [0, 1, 2], [3, 4, 5]] = 1.0
     motion = Linear(slope, np.diag([0.1, 0.2, 0.5]), 0.25)
-    V = covariance(motion, np.zeros((1, 6)), Push(np.array([1.0, 2.0, 3.0]), np.full(3, 1e9)))
+    V = covariance(
+        motion, np.zeros((1, 6)), ForceDisturbance(np.array([1.0, 2.0, 3.0]), np.full(3, 1e9))
+    )
     moved = 0.5 * np.array([0.1, 0.4, 1.5]) * 2.0**2
     np.testing.assert_allclose(np.sqrt(np.diag(V[0, -1, :, -1])), moved, rtol=1e-5)
     at_half = V[0, 3, :, -1] / V[0, -1, :, -1].diagonal()
@@ -146,7 +148,7 @@ def test_lasting_push_moves_a_ship_at_rest_by_half_the_acceleration_times_time_s
 
 
 def test_unrecorded_force_stays_as_large_as_it_is_and_is_forgotten_in_its_time():
-    push, every = Push(np.array([1.0, 2.0, 3.0]), np.array([0.2, 2.0, 12.0])), 0.5
+    push, every = ForceDisturbance(np.array([1.0, 2.0, 3.0]), np.array([0.2, 2.0, 12.0])), 0.5
     motion = Linear(np.zeros((1, 3, 6, 6)), np.zeros((3, 3)), every)
     over, added = pushes._steps(motion, push)
     kept = over[0, 0, 6:, 6:]
@@ -156,7 +158,7 @@ def test_unrecorded_force_stays_as_large_as_it_is_and_is_forgotten_in_its_time()
         push.size**2, rel=1e-3
     )
     assert not added[0, 0, :6, :6].any(), "nothing else is pushed"
-    apart = Push(np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]), push.time)
+    apart = ForceDisturbance(np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]), push.time)
     _, each = pushes._steps(Linear(np.zeros((2, 3, 6, 6)), np.zeros((3, 3)), every), apart)
     assert each[0] == pytest.approx(added[0])
     assert not each[1].any()
@@ -235,7 +237,7 @@ def test_an_effect_that_predictions_take_back_to_nothing_is_none():
     values = {"delta_X_u": -0.5, "lag": 0.3}
     names = {"X_u": "delta_X_u", "lag": "lag"}
     prior = NominalPrior.of(Model(), 0.0)
-    at = Estimate(Model(), np.zeros(prior.size), values, np.zeros((2, 2)))
+    at = RefinedModel(Model(), np.zeros(prior.size), values, np.zeros((2, 2)))
     effects = [Finding(i, {n: values[n]}, {}, 0.9, [], 0.5, 0.5, Model()) for i, n in names.items()]
     learned = to_predictions(Findings(effects, estimate=at, searched=prior), [w], prior, True).findings
     assert [f.id for f in learned.effects] == ["X_u"]
@@ -256,7 +258,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
         run = sail(300.0, 0.05, {"N_r": LIGHTLY_DAMPED}, seed=seed, given=partial(jolted, seed=seed))[0]
         data.append(weak_windows(smoothed(replace(run, tau_cmd=straight_on(run.time)))))
     prior = NominalPrior.of(Model(), 0.0)
-    at = Estimate(Model(), np.zeros(prior.size), {"delta_N_r": 0.0}, np.zeros((1, 1)))
+    at = RefinedModel(Model(), np.zeros(prior.size), {"delta_N_r": 0.0}, np.zeros((1, 1)))
     for _ in range(2):  # the second time with what the first leaves as noise
         sigma = np.sqrt(np.mean(model_error(data, at.model(prior)) ** 2, axis=0))
         at, std = fit_model_error(at, sigma, data, prior)
@@ -271,7 +273,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
 
 def test_posterior_has_total_values_by_the_names_of_the_fmus(tmp_path):
     fit, prior = fitted()
-    posterior = Posterior.of(fit, prior)
+    posterior = JointPosterior.of(fit, prior)
     posterior.write(tmp_path / "posterior.json")
     read = json.loads((tmp_path / "posterior.json").read_text())
     mean = dict(zip(read["names"], read["mean"], strict=True))
@@ -286,14 +288,14 @@ def test_value_that_an_effect_and_a_coefficient_are_of_stands_once_as_their_sum(
     fit, prior = fitted()
     names = ["X_u", "m", "X_u"]
     covariance = np.array([[4.0, 0.1, -3.0], [0.1, 1.0, 0.2], [-3.0, 0.2, 9.0]])
-    posterior = Posterior.of(replace(fit, names=names, covariance=covariance), prior)
+    posterior = JointPosterior.of(replace(fit, names=names, covariance=covariance), prior)
     assert posterior.names == ["vessel.X_u", "vessel.m"]
     np.testing.assert_allclose(posterior.covariance, [[7.0, 0.3], [0.3, 1.0]])
 
 
 def test_pair_that_is_correlated_at_98_percent_is_known_only_together():
     covariance = np.array([[1.0, 0.98 * 3.0, 0.0], [0.98 * 3.0, 9.0, 0.1], [0.0, 0.1, 4.0]])
-    posterior = Posterior(["vessel.a", "vessel.b", "vessel.c"], ["1"] * 3, np.zeros(3), covariance)
+    posterior = JointPosterior(["vessel.a", "vessel.b", "vessel.c"], ["1"] * 3, np.zeros(3), covariance)
     assert posterior.together == [["vessel.a", "vessel.b"]]
     assert posterior.std == {"a": 1.0, "b": 3.0, "c": 2.0}
 
@@ -301,9 +303,11 @@ def test_pair_that_is_correlated_at_98_percent_is_known_only_together():
 def test_bands_hold_what_they_say_and_widen_with_a_push():
     fit, prior = fitted()
     run, model = hidden().smoothed, fit.estimate.model(prior)
-    posterior, seen = Posterior.of(fit, prior), Windows([hidden().smoothed])
+    posterior, seen = JointPosterior.of(fit, prior), Windows([hidden().smoothed])
     narrow = prediction_bands(run, seen, model, posterior, fit.push)
-    wide = prediction_bands(run, seen, model, posterior, Push(np.full(3, 0.5), np.full(3, 2.0)))
+    wide = prediction_bands(
+        run, seen, model, posterior, ForceDisturbance(np.full(3, 0.5), np.full(3, 2.0))
+    )
     assert narrow is not None
     assert wide is not None
     residuals = seen.residuals(model)
@@ -316,7 +320,7 @@ def test_bands_hold_what_they_say_and_widen_with_a_push():
 
 
 def test_fits_that_differ_are_told():
-    w, some = hidden(), Push(np.array([0.1, 0.0, 0.1]), np.ones(3))
+    w, some = hidden(), ForceDisturbance(np.array([0.1, 0.0, 0.1]), np.ones(3))
     agree = unrecorded([w], DRAGGED, some, {}).sentence
     assert "0.1 N in surge over 1 s, 0.1 N m in yaw" in agree
     assert "sway" not in agree

@@ -11,13 +11,14 @@ from cosim import InputError
 from diagnosis import Model, learn
 from diagnosis.search.findings import Findings
 from diagnosis.search.prior import MEASURED, NominalPrior, shares
-from diagnosis.search.refinement import Estimate
+from diagnosis.search.refinement import RefinedModel
 from fmus.declare import variables
 from fmus.hull import Damping, Inertia
 from fmus.ship import ship
 from fmus.ships.ship_file import read_ship
 
 KNOWN = ship().coefficients
+OTTER = Model(ship=ship(description=read_ship("otter")))
 
 
 def std(**given):
@@ -27,11 +28,16 @@ def std(**given):
 
 
 def test_each_nominal_coefficient_says_where_it_comes_from():
-    names = [
-        v.name for group in (Inertia, Damping, type(THRUSTERS.params().plant)) for v in variables(group)
-    ]
-    assert sorted(KNOWN) == sorted(n for n in names if Model().value(n))  # zero stays zero
+    plant = [v.name for v in variables(type(THRUSTERS.params().plant)) if v.start]  # zero stays zero
+    names = [v.name for group in (Inertia, Damping) for v in variables(group)]
+    assert sorted(KNOWN) == sorted([*names, *plant])
     assert all(k.origin and k.group and 0.0 < k.share <= 1.0 for k in KNOWN.values())
+
+
+def test_a_zero_of_stated_origin_is_a_coefficient_of_a_model_that_has_it():
+    of_file, other = (NominalPrior.of(Model(vessel=v)) for v in ({}, {"Y_uv": -3.0, "Y_rdot": -0.1}))
+    assert other.std == of_file.std | {"Y_uv": 3.0, "Y_rdot": 0.05}
+    assert "Y_rdot" not in OTTER.ship.coefficients, "a plain zero is nobody's"
 
 
 def test_what_was_weighed_is_known_better_than_what_was_borrowed():
@@ -47,14 +53,11 @@ def test_the_search_believes_in_each_to_a_tenth():
     assert found["N_r"] == found["plant_F_vsp"] == MEASURED
 
 
-OTTER = Model(ship=ship(description=read_ship("otter")))
-
-
 def test_a_lag_of_a_ships_file_is_as_uncertain_as_it_says_and_never_negative():
     prior = NominalPrior.of(OTTER)
     assert [prior.mean["lag_port"], prior.std["lag_port"]] == [1.0, 0.5]
     assert "lag" not in prior.mean, "no number of the file, but what may be missing"
-    at = Estimate.at(OTTER, prior)
+    at = RefinedModel.at(OTTER, prior)
     for off, lag in ((-1.0, 0.5), (-4.0, 0.0)):
         moved = at.plus({}, off * np.array([n == "lag_port" for n in prior.mean]))
         assert moved.model(prior).value("lag_port") == pytest.approx(lag)
@@ -66,7 +69,7 @@ def test_coefficients_are_held_to_where_they_come_from_not_to_the_search(share, 
     offset = 4.0 * np.array([n == "X_u" for n in searched.mean])
     found = Findings(
         moved={"X_u": 4.0},
-        estimate=Estimate(Model(), offset),
+        estimate=RefinedModel(Model(), offset),
         searched=searched,
     )
     assert not found.plausible
@@ -92,7 +95,7 @@ def test_a_common_prior_leaves_what_was_measured_at_a_tenth():
     ("prior", "said"),
     [
         ({"trust": 0.5}, "did you mean 'thrust'"),
-        ({"X_vv_": 0.5}, "did you mean 'X_vv'"),
+        ({"X_uu_": 0.5}, "did you mean 'X_uu'"),
         ({"mass": -0.5}, "zero or more"),
         ({"mass": float("nan")}, "zero or more"),
         (-0.1, "zero or more"),

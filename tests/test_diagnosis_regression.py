@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search import candidates
-from diagnosis.search.candidates import Candidate, Shape, scaled, smoothness
+from diagnosis.search.candidates import Candidate, CandidateShape, scaled, smoothness
 from diagnosis.search.gram import Nuisance, block_folds, gram_table, noise
 from diagnosis.search.map_regression import Scored, held_out_loss, regression, score
 from diagnosis.search.nonlinear import profile
@@ -28,12 +28,12 @@ def drawn(*shape, seed=0):
 
 
 def shape(columns, fitted=("a", "b"), **others):
-    return Shape({}, fitted, None, columns, np.ones(columns.shape[2]), **others)
+    return CandidateShape({}, fitted, None, columns, np.ones(columns.shape[2]), **others)
 
 
 PLAIN = shape(drawn(K, 3, 2))
 CURVED = shape(drawn(K, 3, 2, seed=1), precision=np.array([[40.0, 5.0], [5.0, 30.0]]))
-GIVEN = Shape({"a": 0.7, "c": 2.0}, ["a"], drawn(K, 3, seed=2), drawn(K, 3, 1, seed=3), np.ones(1), np.array([0.2, 0.9]))  # fmt: skip
+GIVEN = CandidateShape({"a": 0.7, "c": 2.0}, ["a"], drawn(K, 3, seed=2), drawn(K, 3, 1, seed=3), np.ones(1), np.array([0.2, 0.9]))  # fmt: skip
 FORCED = drawn(K, 3, 2, seed=4)
 Y = PLAIN.columns @ [1.0, -2.0] + GIVEN.offset + FORCED @ [0.3, -0.4] + 0.3 * SIGMA * drawn(K, 3, seed=5)
 NUISANCE = Nuisance(FORCED, PRIOR, np.array([0.5, -1.5]), np.ones(2))

@@ -10,8 +10,8 @@ from scipy.sparse import csc_matrix
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search.most_likely import rise
 from diagnosis.search.nonlinear.segmentation import (
-    Problem,
-    Section,
+    RunCells,
+    SegmentationProblem,
     around,
     intervals,
     likely,
@@ -23,7 +23,7 @@ from diagnosis.search.nonlinear.segmentation import (
 from fmus.scale import REFERENCE
 
 PAIRS = [("start_1", "end_1"), ("start_2", "end_2")]
-A, B = Section("a", 2.0, 0, 240, PAIRS), Section("b", -1.0, 240, 600, PAIRS)
+A, B = RunCells("a", 2.0, 0, 240, PAIRS), RunCells("b", -1.0, 240, 600, PAIRS)
 SPANS = [(60, 110), (150, 200), (300, 420)]
 TIMES = {
     "start_1@a": 8.0,
@@ -51,7 +51,7 @@ def problem(noise=0.0, spans=SPANS, b=(0.0, 0.0), **changes):
     Z = rng.standard_normal((columns.shape[0], 2))
     y = columns @ dead + Z @ np.array(b) + noise * rng.standard_normal(len(Z))
     work = np.concatenate([np.full(240, 1.0 / 240), np.full(360, 1.0 / 360)])
-    made = Problem([A, B], False, 0.1, y, csc_matrix(columns), middles, Z, np.diag([4.0, 1.0]), np.array([0.3, -0.2]), np.ones(2), work, REFERENCE)  # fmt: skip
+    made = SegmentationProblem([A, B], False, 0.1, y, csc_matrix(columns), middles, Z, np.diag([4.0, 1.0]), np.array([0.3, -0.2]), np.ones(2), work, REFERENCE)  # fmt: skip
     return replace(made, **changes)
 
 

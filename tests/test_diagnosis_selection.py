@@ -10,7 +10,7 @@ from diagnosis.predictors import Model, omega, weak_windows
 from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
 from diagnosis.search import forward_selection, method
 from diagnosis.search.prior import NominalPrior
-from diagnosis.search.refinement import Estimate, TrainingSet
+from diagnosis.search.refinement import RefinedModel, TrainingSet
 from diagnosis.search.shortlist import NEW, novelty, rank
 from diagnosis.verdict.confidence import probability
 
@@ -157,7 +157,7 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     curve = dict(zip(names, 0.1 * np.linspace(-1.0, 1.0, len(names)) ** 3, strict=True))
     prior = NominalPrior.of(Model(), 0.1)
     free = np.zeros((len(names), len(names)))
-    at = Estimate(Model(), np.zeros(prior.size), curve, free)
+    at = RefinedModel(Model(), np.zeros(prior.size), curve, free)
     step = rank(TrainingSet([w], None, prior), at, {effect.id})
     new = {
         c.effect.id: novelty(step.table, k, len(names)) * step.size >= NEW

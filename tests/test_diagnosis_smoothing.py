@@ -11,7 +11,7 @@ from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoot
 from diagnosis import InputError, Run, clean, read, smooth
 from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
-from diagnosis.runs.smoothing.penalised import Problem, Rates, Spline, System
+from diagnosis.runs.smoothing.penalised import LinearSystem, Problem, Rates, Spline
 from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, roughness, third
 
 pytestmark = pytest.mark.numerical
@@ -179,7 +179,7 @@ def test_smoothness_has_the_largest_likelihood():
         at, h = np.log10(s) + 0.5, 1e-3
         slope = (f.cost(at + h) - f.cost(at - h)) / (2.0 * h * np.log(10.0))
         expected = slope / np.expm1(f.excess(at))  # of the roughness; the slope is what is beyond it
-        system = System(p.equations(np.ones(1000))[found.index(f)], p.precision(0, 10.0**at))
+        system = LinearSystem(p.equations(np.ones(1000))[found.index(f)], p.precision(0, 10.0**at))
         assert grid.rank - system.trace(PENALTY) == pytest.approx(expected, rel=1e-4)
 
 

@@ -13,7 +13,7 @@ from diagnosis.assessment.clusters import cluster_mean, welch_p_value
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME, YAW_RATE
 from diagnosis.assessment.regions import Region, _Design, find_regions
 from diagnosis.predictors import omega, weak_windows
-from diagnosis.predictors.ship_model import GivenForce
+from diagnosis.predictors.ship_model import SampledForce
 from diagnosis.predictors.weak_form import halfway
 
 
@@ -60,7 +60,7 @@ def test_a_force_is_as_uncertain_as_its_velocity_whether_a_coefficient_or_given(
     w = windows(run)
     slope = np.zeros((run.time.size, 3, 6))
     slope[:, 2, 4] = 5.0  # N m by v
-    given = Model(given={run.name: GivenForce(np.zeros((run.time.size, 3)), slope)})
+    given = Model(given={run.name: SampledForce(np.zeros((run.time.size, 3)), slope)})
     a, b, without = (omega_std(w, m) for m in (given, Model({"delta_N_v": 5.0}), Model()))
     np.testing.assert_allclose(a, b, rtol=1e-6)
     assert (a[:, 2] > without[:, 2]).all()

@@ -5,7 +5,7 @@ import pytest
 
 import cosim
 from cosim.dispatch import analyse_runs, measured_run
-from cosim.dispatch.job import Job, Row
+from cosim.dispatch.job import Job, RunRow
 from cosim.results import MetricsError
 
 
@@ -19,13 +19,13 @@ def short(ellipse):
 def test_a_run_without_metrics_is_done_and_says_why(monkeypatch):
     made = measured_run.Measured()
     monkeypatch.setattr(measured_run, "run_in_memory", lambda pool, scenario: {"W": 1.0})
-    assert made(None, None) == Row("done", "", 0.0, {"W": 1.0}, {})
+    assert made(None, None) == RunRow("done", "", 0.0, {"W": 1.0}, {})
 
     def none(pool, scenario):
         raise MetricsError("the log has no rows")
 
     monkeypatch.setattr(measured_run, "run_in_memory", none)
-    assert made(None, None) == Row("done", "no metrics: the log has no rows", 0.0, {}, {})
+    assert made(None, None) == RunRow("done", "no metrics: the log has no rows", 0.0, {}, {})
 
 
 def test_a_run_is_known_by_what_its_numbers_follow_from():

@@ -23,7 +23,7 @@ from fmus.frames import rotate_to_earth
 from fmus.hull import Inertia, damping_force
 from fmus.signals import Force, VelocityInCurrent
 from fmus.thrusters import propeller, table
-from fmus.vessel.vessel import Start, State, hull
+from fmus.vessel.vessel import State, VesselStart, hull
 from fmus.vessel.vessel_effects import vessel_effects
 
 CONTRACT = [
@@ -214,9 +214,9 @@ def test_earth_force_pushes_the_same_way_on_every_heading(psi, F_n, F_e):
 def test_constant_current_is_a_change_of_the_frame():
     """Galileo: in a frame that moves with the water, everything is as in still water."""
     V_n, V_e, seconds = 0.07, -0.04, 20.0
-    still, _ = sail(Params(start=Start(psi_0=0.7, u_0=0.1)), seconds)
+    still, _ = sail(Params(start=VesselStart(psi_0=0.7, u_0=0.1)), seconds)
     c, s = math.cos(0.7), math.sin(0.7)
-    start = Start(psi_0=0.7, u_0=0.1 + c * V_n + s * V_e, v_0=c * V_e - s * V_n)
+    start = VesselStart(psi_0=0.7, u_0=0.1 + c * V_n + s * V_e, v_0=c * V_e - s * V_n)
     flowing, _ = sail(with_params(COMPONENT, V_n=V_n, V_e=V_e)._replace(start=start), seconds)
     assert flowing.psi == pytest.approx(still.psi, abs=1e-7)
     assert flowing.x - still.x == pytest.approx(V_n * seconds, abs=1e-7)

@@ -14,7 +14,7 @@ import pandas
 import pytest
 from filelock import FileLock
 from support import ccode
-from support.command import command
+from support.command import command, without_progress
 from support.project import ROOT
 
 import cosim
@@ -48,7 +48,7 @@ def started(*arguments, **environment):
 def ended(process, within=60.0):
     """Exit code and lines on standard error of a process that ends within some time [s]."""
     _, stderr = process.communicate(timeout=within)
-    return process.returncode, stderr.splitlines()
+    return process.returncode, without_progress(stderr).splitlines()
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from cosim import InputError
 from cosim.export import export_fmu, export_osp, export_ssp
 from cosim.export.__main__ import main as export
 from cosim.files import file_stems
-from cosim.fmu import Model
+from cosim.fmu import FmuModel
 from cosim.formats.elements import write_document
 from cosim.formats.groups import osp_model_description, variable_groups, variables_of_group
 from cosim.formats.namespaces import SSP_SPACES
@@ -34,7 +34,7 @@ def test_parameters_are_baked_into_our_fmus(own, tmp_path):
                 taken += 1
     assert taken == 1
     tree.write(structure)
-    starts = Model(tmp_path / "osp" / "vessel.fmu").variables
+    starts = FmuModel(tmp_path / "osp" / "vessel.fmu").variables
     assert float(starts["delta_X_u"].start) == -3.0
     _, before = log_of(own, tmp_path / "before")
     _, after = log_of(tmp_path / "osp", tmp_path / "after")
@@ -301,7 +301,7 @@ def test_file_names_are_safe_and_differ():
 def test_variable_groups_hold_what_belongs_together(fmus):
     """Along the axes, one causality and one unit in each, nothing twice."""
     for path in fmus.values():
-        model = Model(path)
+        model = FmuModel(path)
         groups = variable_groups(model)
         for name, (quantity, names) in groups.items():
             members = [model.variables[n] for n in names]
@@ -311,7 +311,7 @@ def test_variable_groups_hold_what_belongs_together(fmus):
             assert name.startswith(quantity.word)
         names = [n for _, (_, members) in groups.items() for n in members]
         assert len(names) == len(set(names))
-    vessel = variable_groups(Model(fmus["vessel"]))
+    vessel = variable_groups(FmuModel(fmus["vessel"]))
     assert vessel["force_tau"][1] == ["tau_X", "tau_Y"]
     assert vessel["torque_tau"][1] == ["tau_N"]
     assert vessel["linear_velocity"][1] == ["u", "v"]
@@ -319,7 +319,7 @@ def test_variable_groups_hold_what_belongs_together(fmus):
 
 
 def test_the_written_groups_are_of_the_standard_and_are_read_back(fmus, tmp_path):
-    model, file = Model(fmus["vessel"]), tmp_path / "vessel.xml"
+    model, file = FmuModel(fmus["vessel"]), tmp_path / "vessel.xml"
     root = osp_model_description(model)
     write_document(root, file)
     groups = variable_groups(model)

@@ -15,7 +15,7 @@ from support.measured import sail
 
 import diagnosis
 from cosim import InputError, Unit
-from cosim.fmu import Variable
+from cosim.fmu import FmuVariable
 from diagnosis import Fmu, Run, compare, learn
 from diagnosis.predictors import UnmatchedError
 from diagnosis.predictors.fmu.variable_map import completed, propose, signal_lines
@@ -267,7 +267,7 @@ def test_an_fmu_without_forces_has_nothing_to_compare(runs, tmp_path):
 
 
 def variable(name, causality, unit):
-    return Variable(name, "Real", 0, causality, "continuous", unit, "", None, None, None)
+    return FmuVariable(name, "Real", 0, causality, "continuous", unit, "", None, None, None)
 
 
 def test_names_and_units_that_an_fmu_declares_are_matched():

@@ -20,7 +20,7 @@ from fmus.hull import (
     mass_matrix,
 )
 from fmus.signals import Force
-from fmus.vessel.vessel import Start, State, integrate, motion
+from fmus.vessel.vessel import State, VesselStart, integrate, motion
 
 speed = st.floats(-1.0, 1.0)
 NO_DAMPING = Damping(Terms._make([0.0] * len(Terms._fields)))
@@ -126,7 +126,7 @@ def test_energy_balance_with_force_and_damping():
 
 
 def test_convergence_is_of_fourth_order():
-    tau, p = Force(1.0, -0.8, 0.4), Params(start=Start(u_0=0.3, v_0=-0.1, r_0=0.2))
+    tau, p = Force(1.0, -0.8, 0.4), Params(start=VesselStart(u_0=0.3, v_0=-0.1, r_0=0.2))
 
     def end(h):
         s = VESSEL.init(None, p)

@@ -12,7 +12,7 @@ from support.exchanged import log_of, write
 import cosim
 from cosim import InputError
 from cosim.export import export_osp, export_ssp
-from cosim.fmu import Model
+from cosim.fmu import FmuModel
 from cosim.formats.namespaces import SSM
 from cosim.scenario import load_scenario
 from cosim.system import prepare
@@ -288,7 +288,7 @@ def test_connected_groups_are_their_variables_connected_in_turn(chain, tmp_path,
         )
     structure.write_text(text.replace("VariableConnection", "VariableGroupConnection"))
     for end, members in (("ramp", first), ("gain", second)):
-        name = Model(tmp_path / "osp" / f"{end}.fmu").name
+        name = FmuModel(tmp_path / "osp" / f"{end}.fmu").name
         if members is not None:
             (tmp_path / "osp" / f"{name}_OspModelDescription.xml").write_text(GROUPS.format(members))
     if message is None:

@@ -10,7 +10,7 @@ from support.project import COMPONENTS
 import cosim
 from fmus.declare import flatten, packer, variables
 from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
-from fmus.observer.axis import MOST_DISTURBANCE, Axis, Learning, later, rates, taken
+from fmus.observer.axis import MOST_DISTURBANCE, DisturbedAxis, NoiseLearning, later, rates, taken
 from fmus.signals import Force
 from thesis.monte_carlo import shipped, vary, without
 from thesis.observers.estimates_replayed import LOGGED, OBSERVERS, SIGNALS, errors, observer, replay
@@ -242,11 +242,11 @@ def test_ship_at_rest_is_harmless():
 def test_covariance_is_that_of_the_matrices(h):
     """F P F^T + Q and (I - K H) P, with a noise that does not change."""
     drift, noise, T = 0.02, 1e-6, 5.0
-    k = rates(Learning(change_time=T, alert=0.0), h, h)
+    k = rates(NoiseLearning(change_time=T, alert=0.0), h, h)
     F = np.eye(4) + np.diag([h] * 3, 1) + np.diag([0.5 * h * h] * 2, 2)
     F[3, 3] = T / (T + h)
     H = np.array([[1.0, 0.0, 0.0, 0.0]])
-    P, axis = np.diag([1.0, 0.01, 0.0025, 0.0]), Axis()
+    P, axis = np.diag([1.0, 0.01, 0.0025, 0.0]), DisturbedAxis()
     for _ in range(50):
         P = F @ P @ F.T + np.diag([0.0, 0.0, 0.0, h * drift * drift + k.noise * axis.variance])
         K = P @ H.T / (P[0, 0] + noise)
@@ -260,7 +260,7 @@ def test_covariance_is_that_of_the_matrices(h):
 def test_covariance_stays_one(seed):
     """Positive semidefinite and bounded, however odd the innovations and long the pauses."""
     rng = random.Random(seed)
-    k, axis = rates(Learning(), 0.01, 0.01), Axis()
+    k, axis = rates(NoiseLearning(), 0.01, 0.01), DisturbedAxis()
     for _ in range(3000):
         for _ in range(rng.choice([1, 1, 1, 100])):
             axis = later(axis, 1e-4, k, 0.01)
@@ -277,7 +277,7 @@ def test_covariance_stays_one(seed):
 
 def filtered(disturbance, seconds, h=0.01):
     """An axis after it has seen positions [m] of a body under an unknown acceleration [m/s2]."""
-    rng, k, axis = random.Random(0), rates(Learning(), h, h), Axis()
+    rng, k, axis = random.Random(0), rates(NoiseLearning(), h, h), DisturbedAxis()
     x = v = x_hat = v_hat = 0.0
     for j in range(round(seconds / h)):
         known = axis.d + 0.5 * h * axis.slope

@@ -11,8 +11,8 @@ from fmus.controller.adaptive import Disturbance, adaptive, to_body
 from fmus.controller.concurrent import explained
 from fmus.controller.learning import Drive, learned, remembered
 from fmus.controller.models import PARAMETRISATIONS, ROTATIONAL, SURGE
-from fmus.controller.smoothing import Sample
-from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, summed
+from fmus.controller.smoothing import LearningSample
+from fmus.controller.store import SIZE, StoredSample, StoreOptions, empty_store, summed
 from fmus.declare import variables
 from fmus.hull import RotationalDamping
 from fmus.signals import Force
@@ -141,7 +141,7 @@ def store_of(model, rng, count=SIZE, noise=0.0, phi=None):
         nu, tau = rng.uniform(-1.0, 1.0, 3), rng.uniform(-1.0, 1.0, 3)
         F = model.regressors(tuple(nu), tuple(rng.uniform(-1, 1, 3)), tuple(tau), model.belief)
         y = tuple(np.array(model.force(F, phi)) + noise * rng.normal(size=3))
-        rows.append(Row(1.0, 0.0, rng.uniform(-3, 3), y, F))
+        rows.append(StoredSample(1.0, 0.0, rng.uniform(-3, 3), y, F))
     return tuple(rows) + empty_store(model).rows[count:]
 
 
@@ -334,7 +334,7 @@ def test_defaults_of_the_combinations():
 def test_what_is_stored_is_the_whole_force_or_what_was_left_to_explain_then():
     """y with which errors are formed anew; as printed eps, which is y less what was known already."""
     component = COMPONENTS["controller_cl_win_eps"]
-    sample = Sample(0.0, 0.7, (0.3, -0.1, 0.2), (0.05, -0.02, 0.1), Force(1.0, -0.5, 0.2))
+    sample = LearningSample(0.0, 0.7, (0.3, -0.1, 0.2), (0.05, -0.02, 0.1), Force(1.0, -0.5, 0.2))
     s = component.init(component.inputs(), component.params())
     s = s._replace(phi_hat=type(s.phi_hat)(*np.linspace(-2.0, 3.0, 8)), omega=(0.3, -0.2, 0.1))
     targets = []

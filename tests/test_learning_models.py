@@ -164,11 +164,11 @@ USERS = '''"""Learns the yaw damping alone, from a store of its own kind."""
 
 from fmus.controller.concurrent import concurrent
 from fmus.controller.models import towed_and_coriolis
-from fmus.controller.parametrisation import Coefficient, Parametrisation
+from fmus.controller.parametrisation import LearnedCoefficient, Parametrisation
 from fmus.controller.store import singular
 
 YAW = Parametrisation(
-    coefficients=(Coefficient("N_r", "N.m.s/rad", "yaw moment, r", -1.9, 100.0),),
+    coefficients=(LearnedCoefficient("N_r", "N.m.s/rad", "yaw moment, r", -1.9, 100.0),),
     pattern=((), (), (0,)),
     regressors=lambda nu, nu_dot, tau, belief: ((), (), (nu[2],)),
     known=towed_and_coriolis,

@@ -13,7 +13,7 @@ from fmus.controller.blocker import Blocker, BlockerOptions, blocked, exceeds
 from fmus.controller.eigen import exceed, smallest, tridiagonal
 from fmus.controller.models import ROTATIONAL
 from fmus.controller.smoothing import TAPS, Register, Tap, shifted
-from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, offer, singular, window
+from fmus.controller.store import SIZE, StoredSample, StoreOptions, empty_store, offer, singular, window
 from fmus.declare import flatten, packer, variables
 from fmus.fmi.trace import trace_step, variable
 from fmus.ops import choose, put, when
@@ -94,7 +94,7 @@ def test_store_is_that_of_brute_force(storage, age_limit):
     kept = 0
     for k in range(300):
         f, time = rng.normal(size=4) * [0.1, 0.3, 0.1, 0.2], 0.1 * (k + 1)
-        row = Row(1.0, time, 0.0, (0.0, 1.0, 2.0), ((), tuple(f.tolist()), tuple(f.tolist())))
+        row = StoredSample(1.0, time, 0.0, (0.0, 1.0, 2.0), ((), tuple(f.tolist()), tuple(f.tolist())))
         store = offer(ROTATIONAL, storage, store, row, True, time, p, False)
         reference.offer(time, f, storage is window)
         times = [r.time if r.filled else None for r in store.rows]
@@ -110,7 +110,7 @@ def test_sums_are_those_of_the_rows():
     store, p = empty_store(ROTATIONAL), StoreOptions(store_change=0.0)
     for k in range(30):
         f = tuple(rng.normal(size=4).tolist())
-        row = Row(
+        row = StoredSample(
             1.0, float(k), float(rng.uniform(-3, 3)), tuple(rng.normal(size=3).tolist()), ((), f, f)
         )
         store = offer(ROTATIONAL, window, store, row, True, float(k), p, True)

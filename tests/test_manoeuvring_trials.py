@@ -17,7 +17,7 @@ import cosim
 from cosim.metrics import main as metrics_main
 from cosim.trials import MEASURES, executes, measure, outcome, passage, sheet
 from cosim.trials.measures import limits
-from cosim.trials.trial_outcome import Outcome
+from cosim.trials.trial_outcome import TrialOutcome
 from cosim.trials.trial_picture import draw_trial
 from fmus.declare import flatten, packer, variables
 from fmus.ship import ship
@@ -118,7 +118,7 @@ def straight_then(order, psi, length=2.0, kind="circle", **measures):
     t = np.arange(0.0, 60.0, 0.1)
     course = psi(t) + 0.0 * t
     x, y = (5.0 + np.cumsum(0.1 * f(course)) for f in (np.cos, np.sin))
-    return Outcome(kind, passage(t, x, y, course, order(t)), length, measures, {})
+    return TrialOutcome(kind, passage(t, x, y, course, order(t)), length, measures, {})
 
 
 @pytest.mark.parametrize("length", [2.0, 0.0])

@@ -6,6 +6,7 @@ from typing import Annotated
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+import cosim
 from cybership.message_text import (
     LONGEST_FAULT,
     LONGEST_VALUE,
@@ -14,6 +15,8 @@ from cybership.message_text import (
     first_fault,
     printable,
 )
+from fmucheck.source import BadFileError
+from fmus.build import BuildError
 
 
 class Inner(BaseModel):
@@ -81,3 +84,16 @@ def test_what_is_short_stays():
     text = "actuator 'port': there is no law 'propeler'; did you mean 'fixed_propeller'?"
     assert brief(text) == printable(text) == text
     assert len(printable("x" * 5000)) == LONGEST_WORD - 1
+
+
+@pytest.mark.parametrize("error", [cosim.InputError, cosim.SimulationError, BuildError, BadFileError])
+def test_messages_of_errors_repeat_no_value_whole(error):
+    """To who catches them in Python, too; a path stays whole, and what two apostrophes enclose."""
+    path = "/a/folder" * 20
+    text = f"'{path}': no unit '{'x y ' * 1000}\x1b[2J\n' of the ship's speed, {'which is long ' * 6}, or the hull's"
+    says = str(error(text))
+    assert says.isprintable()
+    assert says.startswith(f"'{path}': no unit 'x y x y")
+    assert says.endswith(text[text.index("of the ship's") :])
+    assert len(says) == len(text) - 4000 - len("\x1b[2J\n") + LONGEST_VALUE - 1
+    assert str(error(says)) == says

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cosim.formats.outline import Outline
+from cosim.formats.outline import AnnotatedOutline
 from cosim.metrics import main
 from cosim.plots import main as plots_main
 from cosim.results import (
@@ -24,7 +24,7 @@ from cosim.results.run_options import RunOptions
 from cosim.scenario import Roles
 
 ROLES = Roles()
-ARROW = Outline("arrow", 3.0, ((2.0, 0.0), (-1.0, 0.5), (-1.0, -0.5)))
+ARROW = AnnotatedOutline("arrow", 3.0, ((2.0, 0.0), (-1.0, 0.5), (-1.0, -0.5)))
 
 KEYS = [
     "e_pos_rms",
@@ -377,7 +377,7 @@ class TestPlots:
     def test_lost_thrust_is_part_of_the_model_error(self):
         """(7.7): what was commanded and did not act is missing too; without its columns the hull's stays."""
         log = wild()
-        run = canvas.Run("a", log, {}, ROLES, None, None)
+        run = canvas.DrawnRun("a", log, {}, ROLES, None, None)
         for axis, found in zip("XYN", lines.missing_force(run), strict=True):
             lost = log[f"thrusters.tau_act_{axis}"] - log[f"thrusters.tau_cmd_{axis}"]
             assert found == pytest.approx(log[f"vessel.omega_star_{axis}"] + lost)
@@ -432,7 +432,7 @@ class TestPlots:
             axis, (label, log) = "XYN"[k // 2], [*logs.items()][k % 2]
             true, estimate, *_ = panel.get_lines()
             assert true.get_ydata() == pytest.approx(
-                lines.missing_force(canvas.Run(label, log, {}, ROLES))[k // 2]
+                lines.missing_force(canvas.DrawnRun(label, log, {}, ROLES))[k // 2]
             )
             assert estimate.get_ydata() == pytest.approx(log[f"controller.omega_hat_{axis}"])
             assert (true.get_color(), estimate.get_color()) == ("black", ("blue", "green")[k % 2])
@@ -546,7 +546,7 @@ class TestPlots:
     def test_hull_points_where_the_ship_heads(self):
         log = {"time": np.array([0.0, 1.0]), "vessel.x": np.zeros(2), "vessel.y": np.zeros(2)}
         log["vessel.psi"] = np.full(2, np.pi / 2.0)
-        (east,) = track.outlines(canvas.Run("", log, {}, ROLES), ARROW, 0.5)
+        (east,) = track.outlines(canvas.DrawnRun("", log, {}, ROLES), ARROW, 0.5)
         assert east[0] == pytest.approx([1.0, 0.0])
         assert east[1, 1] < 0.0  # starboard of a ship to the east is south
 

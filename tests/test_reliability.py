@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +30,9 @@ from benchmarks.reliability.judgement import faults
 from cosim import files
 from cosim.command import printable
 from cosim.results.log import LogWriter
+from cybership import scratch_folder
 from cybership.message_text import LONGEST_WORD
+from fmus.build.cached_fmu import make_folder
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no binary for this test here")
 
@@ -310,6 +313,43 @@ def test_scratch_folders_of_killed_runs_are_swept_and_those_of_others_not(
     cosim.simulate(cosim.load_scenario(ellipse | {"stop": 0.1}), tmp_path / "out")
     left = {path.name for path in tmp_path.iterdir()}
     assert left == {f"cybership_{os.getpid()}_b", "cybership_mine", "other", "out"}
+
+
+@linux_only
+def test_scratch_folders_of_a_process_that_nobody_has_waited_for_are_swept(tmp_path):
+    """As in a container whose first process waits for nobody."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    while Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
+        time.sleep(0.01)
+    (tmp_path / f"cybership_{process.pid}_a").mkdir()
+    assert scratch_folder.sweep(tmp_path) == 1
+    assert process.wait() == 0
+
+
+def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_path, monkeypatch):
+    """A young file stays, as its process may be alive in another container, and that of a living one."""
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    own, other, young, alive = (
+        tmp_path / f".{name}.part"
+        for name in (
+            f"a.fmu.{ended.pid}",
+            f"b.fmu.{ended.pid}",
+            "a.fmu.99999999",
+            f"a.fmu.{os.getppid()}",
+        )
+    )
+    for each in (own, other, young, alive):
+        each.write_text("")
+        if each != young:
+            os.utime(each, (0, 0))
+    with scratch_folder.atomic_write(tmp_path / "a.fmu") as part:
+        part.write_text("whole")
+    assert (tmp_path / "a.fmu").read_text() == "whole"
+    assert {*tmp_path.iterdir()} == {tmp_path / "a.fmu", other, young, alive}
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
+    make_folder(tmp_path / "hash")
+    assert {*tmp_path.glob(".*")} == {young, alive}
 
 
 @pytest.mark.slow

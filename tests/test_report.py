@@ -34,8 +34,8 @@ from diagnosis.report import (
     write_report,
 )
 from diagnosis.report.content import coefficients
-from diagnosis.report.reported_effect import Coefficient
-from diagnosis.search.prediction_fit.joint_posterior import Posterior
+from diagnosis.report.reported_effect import ReportedCoefficient
+from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from fmus.ship import ship
 from fmus.ships.naming import described_ship
 
@@ -66,7 +66,7 @@ def compared(evaluations, **before):
 
 def found(evaluations):
     """A diagnosis with one effect."""
-    values = {n: Coefficient(v, "1", (v - 0.01, v + 0.01), None) for n, v in HIDDEN.items()}
+    values = {n: ReportedCoefficient(v, "1", (v - 0.01, v + 0.01), None) for n, v in HIDDEN.items()}
     effect = reported.effect(
         "thrust_curve",
         0.97,
@@ -255,7 +255,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_is_that_of_the_effect(name, evaluations, tmp_path):
-    given = {n: Coefficient(v, "1", (v - 0.1, v + 0.1), None) for n, v in SHAPES[name].items()}
+    given = {n: ReportedCoefficient(v, "1", (v - 0.1, v + 0.1), None) for n, v in SHAPES[name].items()}
     drawn = [*curves([reported.effect(name, 0.9, coefficients=given)], evaluations)]
     assert drawn
     for c in drawn:
@@ -269,7 +269,7 @@ def test_a_shape_is_that_of_the_effect(name, evaluations, tmp_path):
 
 
 def test_dead_band_is_seen_in_its_shape(evaluations):
-    given = {"deadband": Coefficient(0.05, "1", None, None)}
+    given = {"deadband": ReportedCoefficient(0.05, "1", None, None)}
     (vsp, bow) = curves([reported.effect("deadband", 0.9, coefficients=given)], evaluations)
     for c in (vsp, bow):
         assert np.allclose(c.learned[np.abs(c.x) < 0.05], 0.0)
@@ -424,7 +424,7 @@ def test_a_whole_run_is_predicted_from_its_first_state(data):
 
 def test_all_coefficients_before_and_after_as_files(evaluations, tmp_path):
     learned = Model().plus({"Y_r": -0.5, "thrust_curve_deadband": 0.1})
-    posterior = Posterior(
+    posterior = JointPosterior(
         ["vessel.Y_r", "thrusters.thrust_curve_deadband"],
         ["kg.m/s", "1"],
         np.zeros(2),

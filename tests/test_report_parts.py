@@ -255,13 +255,13 @@ def test_a_curve_is_grey_where_no_data_are():
     ],
 )
 def test_ticks_are_round_and_differ(ends, texts):
-    found = chart.Axis().ticks(ends, 6)
+    found = chart.ChartAxis().ticks(ends, 6)
     assert [text for _, text in found] == texts
     assert all(ends[0] <= x <= ends[1] for x, _ in found)
 
 
 def test_ticks_of_a_logarithmic_axis_are_the_roundest_that_have_room():
-    axis = chart.Axis(scale=np.log10)
+    axis = chart.ChartAxis(scale=np.log10)
     ends = axis.ends([np.array([1.0, 1000.0])])
     assert {t for _, t in axis.ticks(ends, 5)} == {"1", "10", "100", "1000"}
     within = axis.ticks((np.log10(1.5), np.log10(8.0)), 5)
@@ -270,7 +270,7 @@ def test_ticks_of_a_logarithmic_axis_are_the_roundest_that_have_room():
 
 def test_a_chart_is_the_same_in_each_format():
     """Points at the same places by SVG and by matplotlib; what is interrupted has two parts."""
-    panel = chart.Panel(chart.Axis("x", (0.0, 10.0)), chart.Axis("y <1>", (0.0, 1.0)))
+    panel = chart.Panel(chart.ChartAxis("x", (0.0, 10.0)), chart.ChartAxis("y <1>", (0.0, 1.0)))
     x = np.array([0.0, 5.0, np.nan, 6.0, 10.0])
     panel.draw(x, 0.1 * x, chart.AFTER, "line")
     panel.fill(x, 0.0 * x, 0.1 * x, chart.BAND, "area")

@@ -42,7 +42,7 @@ def run(name, use, size=1.0, notes=(), faults=(), learned=True):
         after=after if learned else before,
         smoothed=smoothed,
         windows=SimpleNamespace(length=8.0),
-        weak_windows=SimpleNamespace(horizon=8.0, width=3.0),
+        weak_windows=SimpleNamespace(horizon=8.0, width=3.0, run=SimpleNamespace(commands=None)),
     )
 
 
@@ -294,7 +294,7 @@ def test_pictures_of_a_notebook_are_those_of_their_run(drawn, learned):
 
 
 def test_a_picture_can_be_saved_in_each_format(tmp_path):
-    picture = notebook.Picture(Chart(100.0, [Panel()]))
+    picture = notebook.NotebookChart(Chart(100.0, [Panel()]))
     for name in ("a.png", "a.svg", "a.pdf"):
         assert picture.save(tmp_path / name).stat().st_size > 1000
 

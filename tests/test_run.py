@@ -194,7 +194,7 @@ def test_out_that_cannot_be_a_folder_is_refused(scenario, tmp_path):
 def test_warning_goes_to_stderr(scenario, ellipse):
     connections = [c for c in ellipse["connections"] if c[1] != "thrusters.*"]
     done = command(scenario(connections=connections, stop=0.1), "--no-plots", "--out", "/dev/null/x")
-    assert "warning: thrusters: input u, v, r not connected" in done.stderr
+    assert "warning: thrusters: input u, v, r, u_c, v_c not connected" in done.stderr
 
 
 def test_failed_simulation_is_exit_3_with_the_log_kept(scenario, tmp_path):
@@ -285,7 +285,7 @@ def test_pace_waits_in_short_sleeps_and_measures_how_late_it_is(monkeypatch):
 
     monkeypatch.setattr(real_time.time, "perf_counter", lambda: now[0])
     monkeypatch.setattr(real_time.time, "sleep", sleep)
-    pace = real_time.Pace(2.0, 0.1, lambda: False, started=100.0)
+    pace = real_time.RealTimePace(2.0, 0.1, lambda: False, started=100.0)
     pace.wait(0.3)
     assert max(slept) == real_time.LONGEST_SLEEP
     assert now[0] == pytest.approx(100.15 + 0.01)
@@ -296,7 +296,7 @@ def test_pace_waits_in_short_sleeps_and_measures_how_late_it_is(monkeypatch):
     assert found["deadline_misses"] == 1, "more than half of 0.1 s late"
     assert found["lateness_max"] == pytest.approx(0.8)
     assert found["jitter_rms"] == pytest.approx(0.5 * (0.8 - 0.01))
-    stopped = real_time.Pace(1.0, 0.1, lambda: True, started=100.0)
+    stopped = real_time.RealTimePace(1.0, 0.1, lambda: True, started=100.0)
     stopped.wait(1000.0)
     assert now[0] == 101.0, "who has stopped a run does not wait"
 

@@ -230,7 +230,8 @@ def test_group_connects_all_that_agree(ellipse):
     assert pairs["vessel.tau_X"] == "thrusters.tau_act_X"
     assert pairs["controller.psi_t_ddot"] == "guidance.psi_t_ddot"
     assert pairs["controller.frozen"] == "observer.frozen"
-    assert len(pairs) == 3 + 3 + 10 + 9 + 3 + 3 + 3 + 3  # the last ones are optional
+    assert {pairs[f"thrusters.{c}"] for c in ("u_c", "v_c")} == {"vessel.u_c", "vessel.v_c"}
+    assert len(pairs) == 3 + 3 + 10 + 9 + 3 + 3 + 3 + 3 + 2  # the last ones are optional
 
 
 @pytest.mark.parametrize(

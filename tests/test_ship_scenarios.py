@@ -10,8 +10,8 @@ from support.project import COMPONENTS, ROOT
 
 import cosim
 from cosim.campaign.__main__ import main as campaign_main
-from cosim.fmu import Model
-from cosim.formats.outline import Outline, read_outline
+from cosim.fmu import FmuModel
+from cosim.formats.outline import AnnotatedOutline, read_outline
 from cosim.results import read_options
 from cosim.run import main as run_main
 from diagnosis.compare import main as compare_main
@@ -42,7 +42,7 @@ def test_the_log_names_the_ship_and_holds_its_commands(otter):
     told = json.loads((otter / "log.json").read_text())
     assert told["scenario"]["ship"] == "otter"
     assert {"thrusters.port_n", "thrusters.starboard_n"} <= told["columns"].keys()
-    assert read_options(otter).outline == Outline("otter", OTTER.length, OTTER.outline)
+    assert read_options(otter).outline == AnnotatedOutline("otter", OTTER.length, OTTER.outline)
 
 
 @pytest.mark.parametrize("path", ["vessel.fmu", "thrusters.fmu", "controller_pid.fmu"])
@@ -51,7 +51,7 @@ def test_bare_names_are_the_fmus_of_the_ship(otter, path):
     (used,) = [fmu["guid"] for fmu in told if fmu["path"].endswith(path)]
     (theirs,) = build(path, ship=OTTER)
     (usual,) = build(path)
-    assert used == Model(theirs).description.guid != Model(usual).description.guid
+    assert used == FmuModel(theirs).description.guid != FmuModel(usual).description.guid
 
 
 def test_python_and_native_fmus_have_the_same_numbers(tmp_path):
@@ -100,7 +100,7 @@ def test_mistakes_are_one_line(tmp_path, arguments, message):
 def test_the_annotation_of_a_vessel_is_its_outline(described):
     made = ship(description=described).vessel
     root = model_description(made, guid_of("0"), "1")
-    assert read_outline(root.find("VendorAnnotations")) == Outline(*made.outline)
+    assert read_outline(root.find("VendorAnnotations")) == AnnotatedOutline(*made.outline)
     corners = np.array(made.outline.corners)
     assert np.ptp(corners[:, 0]) == pytest.approx(made.outline.length, rel=0.1)
     assert sorted(corners[:, 1]) == pytest.approx(sorted(-corners[:, 1]))

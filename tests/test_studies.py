@@ -14,7 +14,7 @@ from studies.study_command import study_parser
 from studies.study_report import Report, Verdict, seeds_line
 from thesis import monte_carlo
 from thesis.monte_carlo import (
-    Interval,
+    SampleMean,
     interval,
     paired,
     ratio,
@@ -175,7 +175,7 @@ def test_report_holds_what_was_put_in(tmp_path):
     report.table(["name", "|e| [m]"], [["x|y", 0.123456], ["none", float("nan")]])
     report.figure("picture", Figure(), "What is seen")
     report.verdicts("claims", [Verdict("said", "reproduced", "1 to 2")], "numbers and cause")
-    report.result("error", {"x": Interval(1.0, 0.5, 1.5), "y": np.array([1.0, np.nan])})
+    report.result("error", {"x": SampleMean(1.0, 0.5, 1.5), "y": np.array([1.0, np.nan])})
     text = report.write().read_text()
     assert "Seeds 0-2." in text
     assert "| x\\|y | 0.1235 |" in text

@@ -211,7 +211,7 @@ def left_out(
     )
     other = SimpleNamespace(name="learned from")
     comparison = SimpleNamespace(evaluations=[other, e], omega_std=[None, np.array(std)])
-    return leave_one_out.Fold(
+    return leave_one_out.LeftOutRun(
         SimpleNamespace(comparison=comparison, learned=SimpleNamespace(model="learned"))
     )
 
@@ -227,7 +227,7 @@ def test_a_fold_is_judged_on_the_run_that_it_leaves_out():
 
 
 def test_falls_have_all_that_bounds_them(monkeypatch):
-    shares = leave_one_out.Commanded(np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6]))
+    shares = leave_one_out.CommandedShares(np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6]))
     monkeypatch.setattr(ship_tables, "commanded", lambda e, model: shares)
     fold = left_out(std=((1.0, 1.0, 1.0),))
     first, *_, last = ship_tables.falls(replace(fold, seen=left_out(after=(1.0, 1.0, 1.0)).evaluation))

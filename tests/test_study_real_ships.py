@@ -269,7 +269,7 @@ def fold(name, scale, accepted=(), **content):
     made = SimpleNamespace(
         errors=[errors(name, scale), errors("learned from", 99.0, held_out=False)], accepted=list(accepted), **(rest | content)
     )  # fmt: skip
-    return ship_folds.Fold([name], SimpleNamespace(comparison=SimpleNamespace(evaluations=of)), made)
+    return ship_folds.ShipFold([name], SimpleNamespace(comparison=SimpleNamespace(evaluations=of)), made)
 
 
 def test_errors_of_runs_left_out_are_told_with_their_root_mean_square_and_median(tmp_path):

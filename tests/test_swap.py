@@ -87,10 +87,10 @@ def test_signs_are_as_the_page_says(tmp_path, force, moves):
 
 @pytest.mark.parametrize("kind", ["controller", "observer"])
 def test_all_of_a_kind_have_the_inputs_of_the_page(fmus, kind):
-    from cosim.fmu import Model
+    from cosim.fmu import FmuModel
 
     def inputs(path):
-        return {v.name for v in Model(path).variables.values() if v.causality == "input"}
+        return {v.name for v in FmuModel(path).variables.values() if v.causality == "input"}
 
     expected = inputs(fmus["controller_abs" if kind == "controller" else "observer_mdf"])
     for name, path in fmus.items():

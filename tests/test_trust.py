@@ -15,7 +15,7 @@ from support.project import ROOT
 
 import cosim
 from cosim.errors import InputError
-from cosim.fmu.archive_check import Limits, check_archive, unpack
+from cosim.fmu.archive_check import ArchiveLimits, check_archive, unpack
 from cosim.formats.ssv import read_parameters
 
 MODEL = '<fmiModelDescription fmiVersion="2.0"/>'
@@ -94,7 +94,7 @@ def test_duplicates_backslashes_and_encryption_are_refused(tmp_path):
 
 def test_bombs_are_refused_before_anything_is_unpacked(tmp_path):
     zeros = bytes(1 << 20)
-    small = Limits(files=10, size=8 << 20, ratio=100.0, always=1 << 20)
+    small = ArchiveLimits(files=10, size=8 << 20, ratio=100.0, always=1 << 20)
     high = archive(tmp_path / "ratio.fmu", *((f"{k}", zeros) for k in range(4)))
     with pytest.raises(InputError, match="100 times the size"):
         unpack(high, tmp_path / "out", small)

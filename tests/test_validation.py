@@ -29,8 +29,8 @@ from diagnosis.acceptance.pdf import laid_out
 from diagnosis.acceptance.predictions import Predictions, difference, judged
 from diagnosis.acceptance.statistics import independent, root_mean_square, share
 from diagnosis.acceptance.validity import window_means
-from diagnosis.report.document import Section, Table
-from diagnosis.search.prediction_fit.disturbance import Push
+from diagnosis.report.document import ReportSection, Table
+from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
 from diagnosis.verify import main as verify_main
 
 cryptography = pytest.importorskip("cryptography")
@@ -220,7 +220,9 @@ def test_parameters_and_process_noise(predictions):
         posterior = Posterior(
             names=["vessel.X_u"], units=["N.s/m"], mean=[0.0], covariance=[[(0.01 * factor) ** 2]]
         )
-        found.append(sources_of(predictions, Learned(posterior, Push(factor * size, np.ones(3)), ())))
+        found.append(
+            sources_of(predictions, Learned(posterior, ForceDisturbance(factor * size, np.ones(3)), ()))
+        )
     (changed,) = predictions.motions([predictions.model.plus({"X_u": 0.01})])
     expected = judged("position", difference(changed, predictions.motion))
     assert np.sqrt(found[0].parameters["position"]) == pytest.approx(expected, rel=1e-3)
@@ -361,7 +363,7 @@ def test_a_signature_is_of_criteria(tmp_path, capsys):
 
 def test_tables_fit_into_their_lines():
     table = Table(("head", "what it is"), [("a" * 30, "words " * 40)])
-    lines = laid_out("title", [Section("heading", ["[b]", "words " * 40], [table])], 60)
+    lines = laid_out("title", [ReportSection("heading", ["[b]", "words " * 40], [table])], 60)
     assert max(map(len, lines)) <= 60
     assert "".join(lines).count("words") == 80
     assert "[b]" in lines

@@ -7,7 +7,6 @@ point of attack p_o is moved until it does not, as was done by hand in the basin
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -15,10 +14,11 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 import cosim
+from cosim.process import scratch_folder
 from studies.study_command import progress, run_study, study_parser
 from studies.study_report import Report
 
-from .monte_carlo import Content, Interval, interval
+from .monte_carlo import Content, SampleMean, interval
 
 # Where the thrust of the hidden ships really acts, forward of where it is assumed [m].
 HIDDEN = (-0.05, 0.0, 0.05, 0.18)
@@ -76,7 +76,7 @@ def scenario(p_x: float, hidden: float, push: Push, seed: int) -> Content:
 
 def headings(content: Content) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and measured heading [rad] of a push."""
-    with TemporaryDirectory() as folder:
+    with scratch_folder() as folder:
         result = cosim.simulate(cosim.load_scenario(content), folder)
         if result.status != "done":
             raise cosim.SimulationError(f"a push {result.status}: {result.message}")
@@ -147,7 +147,7 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
     rows = []
     for dx in hidden:
         each = interval(found[dx])
-        error = Interval(*(1000.0 * (x - dx - offset.mean + zero) for x in each))
+        error = SampleMean(*(1000.0 * (x - dx - offset.mean + zero) for x in each))
         rows.append([f"{dx:+.3f}", str(each), str(error)])
     header = ["thrust really acts at [m]", "p_o found [m]", "error against the shift [mm]"]
     report.table(header, rows)

@@ -19,7 +19,7 @@ from studies.study_command import progress, run_study, study_parser
 from studies.study_report import Report
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
-from .tracking.outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
+from .tracking.outcome import LEARNED_FROM, PHI, TrackingOutcome, columns, outcome, true_states
 from .tracking.store_verdicts import store_claims
 from .tracking.verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
 
@@ -44,7 +44,7 @@ UNTOLD: Content = {"optional_connections": []}
 STALE = {"controller.stale": 1.0}
 FOOTNOTE = {"controller.store_weight": 0.1}
 
-Table = Mapping[str, Mapping[str, list[Outcome]]]
+Table = Mapping[str, Mapping[str, list[TrackingOutcome]]]
 
 
 def needed(name: str) -> list[str]:
@@ -104,7 +104,7 @@ def run(seeds: Sequence[int], seconds: float | None, jobs: int | None) -> Mappin
     some = {key: seeds_of(key[1], seeds) for key in todo}
     with progress(sum(map(len, some.values())), "chapter 5") as advance:
         outcomes = run_each(todo, some, outcome, processes=jobs, advance=advance)
-    found: dict[str, dict[str, dict[str, list[Outcome]]]] = {}
+    found: dict[str, dict[str, dict[str, list[TrackingOutcome]]]] = {}
     for (path, condition, controller), each in outcomes.items():
         found.setdefault(path, {}).setdefault(condition, {})[controller] = each
     return found

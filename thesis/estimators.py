@@ -7,7 +7,6 @@ ones where ``--data`` gives them.
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,12 @@ from rich.console import Console
 import cosim
 from cosim.command import BAD_INPUT, FAILED, run_command
 from cosim.dispatch import FinishedRun
+from cosim.process import scratch_folder
 from studies.measured.data_folder import measured_files
 from studies.study_command import progress, study_parser
 from studies.study_report import Report
 
-from .monte_carlo import Interval, interval, run_all, shipped, vary, without
+from .monte_carlo import SampleMean, interval, run_all, shipped, vary, without
 from .observers import basin, claims, pictures
 from .observers.estimates_replayed import (
     LOGGED,
@@ -73,7 +73,7 @@ def analyse(run: FinishedRun) -> Found:
     return {name: measures(log, replay(observer(name), log)) for name in OBSERVERS}
 
 
-def over_seeds(found: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+def over_seeds(found: Sequence[Found]) -> dict[str, dict[str, SampleMean]]:
     """Observer -> measure -> mean over the runs, with its interval."""
     return {
         name: {key: interval([run[name][key] for run in found]) for key in found[0][name]}
@@ -81,7 +81,7 @@ def over_seeds(found: Sequence[Found]) -> dict[str, dict[str, Interval]]:
     }
 
 
-def error_tables(report: Report, tables: Mapping[str, Mapping[str, Mapping[str, Interval]]]) -> None:
+def error_tables(report: Report, tables: Mapping[str, Mapping[str, Mapping[str, SampleMean]]]) -> None:
     """One table of RMS errors for each simulated run; the least of a column is bold."""
     report.heading("Errors on simulated runs")
     report.text(
@@ -105,7 +105,7 @@ def examples(report: Report, stop: float) -> None:
     logs = {}
     for name in ("rich", "ellipse"):
         scenario = cosim.load_scenario({**variants(stop)[name], "seed": 0})
-        with TemporaryDirectory() as folder:
+        with scratch_folder() as folder:
             log = cosim.read_log(cosim.simulate(scenario, folder).folder)
         logs[name] = log, {o: replay(observer(o), log) for o in OBSERVERS}
     report.heading("Pictures")

@@ -20,7 +20,7 @@ from studies.study_report import Report, Verdict
 
 from .basin_trials import sysid4
 from .error_models.lap_pictures import errors_picture, force_picture
-from .monte_carlo import Content, Interval, interval, paired, run_all, run_each, shipped, vary
+from .monte_carlo import Content, SampleMean, interval, paired, run_all, run_each, shipped, vary
 from .tracking.outcome import AXES, Log, missing, rms, true_states
 from .tracking.verdict import finite_ratio, listed
 
@@ -216,7 +216,7 @@ def study(out: Path, seeds: Sequence[int], seconds: float, jobs: int | None) -> 
 
 def lap_row(sense: str, name: str, laps: Sequence[Lap]) -> list[str]:
     """A line of the table of last laps."""
-    cells: list[Interval] = [interval(column(laps, key)) for key in ("mean", "size", "aside")]
+    cells: list[SampleMean] = [interval(column(laps, key)) for key in ("mean", "size", "aside")]
     cells += [interval([lap.error[k] for lap in laps]) for k in range(3)]
     return [sense, name.removeprefix("controller_"), *map(str, cells)]
 

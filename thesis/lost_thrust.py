@@ -40,7 +40,7 @@ ESTIMATES = {
 }
 
 
-class Place(NamedTuple):
+class PassResult(NamedTuple):
     """Where the passes stand: delta_N [1], N_r [N m s/rad], R² of the model error in yaw."""
 
     delta_N: float
@@ -138,17 +138,17 @@ def samples(log: Log, source: str, suffix: str, late: float) -> Samples:
     return Samples(run, log["time"][rows], nu, nu_dot, tau, model_error(nu, nu_dot, tau))
 
 
-def places(s: Samples, pace: float) -> Iterator[Place]:
+def places(s: Samples, pace: float) -> Iterator[PassResult]:
     """Where the estimate stands after each number of PASSES, with the gains of delta times a pace."""
     made, phi = material(s), np.zeros(GAMMA.size)
     gamma = GAMMA * np.where(np.arange(GAMMA.size) > 10, pace, 1.0)
     for count in range(1, PASSES[-1] + 1):
         phi = one_pass(phi, made, gamma)
         if count in PASSES:
-            yield Place(float(phi[DELTA_N]), float(phi[N_R]), float(explained([s], phi)[2]))
+            yield PassResult(float(phi[DELTA_N]), float(phi[N_R]), float(explained([s], phi)[2]))
 
 
-def analyse(run: FinishedRun) -> dict[str, list[Place]]:
+def analyse(run: FinishedRun) -> dict[str, list[PassResult]]:
     """Estimates and pace -> places."""
     run.demand()
     return {

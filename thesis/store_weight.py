@@ -14,7 +14,7 @@ from studies.study_report import Report
 
 from .chapter5 import PATHS, UNGATED, needed
 from .monte_carlo import Content, run_all, shipped, vary
-from .tracking.outcome import Outcome, outcome, true_states
+from .tracking.outcome import TrackingOutcome, outcome, true_states
 from .tracking.store_verdicts import FULL
 from .tracking.verdict import CONTROLLERS, FOUR, ORDERS, in_order, short
 
@@ -50,7 +50,7 @@ def variants(path: str, seconds: float | None) -> dict[str, Content]:
     return found
 
 
-def tables(report: Report, path: str, found: Mapping[str, Sequence[Outcome]]) -> None:
+def tables(report: Report, path: str, found: Mapping[str, Sequence[TrackingOutcome]]) -> None:
     """The position errors of one path, and whether they are in the thesis' order for it."""
     plain = {short(k.split("|")[0]): o[0].position for k, o in found.items() if PLAIN in k}
     report.heading(path.capitalize())

@@ -167,7 +167,7 @@ class Fleet:
         force = f.tau_act_X, f.tau_act_Y, f.tau_act_N
         omega = s.omega_X, s.omega_Y, s.omega_N
         commands = f.tau_cmd_X, f.tau_cmd_Y, f.tau_cmd_N
-        speed = *s.velocity, s.u_dot, s.v_dot, s.r_dot
+        speed = *s.velocity[:3], s.u_dot, s.v_dot, s.r_dot  # over ground
         return [*s.pose, *speed, *force, *omega, *self._measurement, *commands]
 
     def step(self, k: int) -> None:

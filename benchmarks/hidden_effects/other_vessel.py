@@ -22,7 +22,9 @@ class Drag(NamedTuple):
 Params = bundle("Params", ship=SHIP.params(), drag=Drag())
 
 
-def motion(s: vessel.State, tau: Force, p: Any, b: vessel.Prepared) -> tuple[Number, Number, Number]:
+def motion(
+    s: vessel.State, tau: Force, p: Any, b: vessel.PreparedVessel
+) -> tuple[Number, Number, Number]:
     """nu_dot [m/s2, m/s2, rad/s2]."""
     drag = p.drag.drag_1_5 * s.u * sqrt(abs(s.u))
     return vessel.disturbed(s, tau._replace(tau_X=tau.tau_X - drag), b)

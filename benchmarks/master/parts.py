@@ -55,12 +55,12 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
 
     import numpy as np
 
-    from cosim.fmu import LocalInstance, Model
+    from cosim.fmu import FmuModel, LocalInstance
 
     pointer, size = ctypes.c_void_p.from_param, ctypes.c_size_t.from_param
     used = {*plan["signals"], *(source for source, _ in plan["connections"])}
     sources = {target: source for source, target in plan["connections"]}
-    models = {name: Model(Path(path)) for name, path in plan["fmus"].items()}
+    models = {name: FmuModel(Path(path)) for name, path in plan["fmus"].items()}
     got = [f"{n}.{v}" for n, m in models.items() for v in m.variables if f"{n}.{v}" in used - {*sources}]
     set_ = [f"{n}.{v}" for n, m in models.items() for v in m.variables if f"{n}.{v}" in sources]
     outputs, inputs = np.zeros(len(got)), np.zeros(len(set_))

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
+from cybership.scratch_folder import atomic_write
+
 from ..command import (
     BAD_INPUT,
     FAILED,
@@ -30,7 +32,6 @@ from ..command import (
 )
 from ..compiled.library import NATIVE
 from ..errors import InputError, SimulationError
-from ..files import atomic_write
 from ..process.run_state import STATE
 from ..process.spawned import mute_started_processes
 from ..trials.measures import EVERY

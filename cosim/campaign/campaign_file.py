@@ -13,7 +13,7 @@ from ..scenario.load import load_scenario
 from ..scenario.schema import Scenario
 from ..scenario.setting import place_of
 from ..scenario.shipped import find_scenario
-from ..scenario.strict import Strict
+from ..scenario.strict import StrictModel
 from ..trials.measures import EVERY
 
 # Columns of the table that are no axes.
@@ -26,7 +26,7 @@ MOST_RUNS = 1_000_000
 Pair = tuple[float, float]
 
 
-class Axis(Strict):
+class CampaignAxis(StrictModel):
     """One quantity that differs from run to run: where it is set, and which values it takes."""
 
     set: str | Annotated[list[str], Field(min_length=1)] = Field(
@@ -44,7 +44,7 @@ class Axis(Strict):
     )
 
     @model_validator(mode="after")
-    def _check(self) -> "Axis":
+    def _check(self) -> "CampaignAxis":
         kinds = ("values", *DISTRIBUTIONS)
         given = [kind for kind in kinds if getattr(self, kind) is not None]
         if len(given) != 1:
@@ -76,26 +76,28 @@ class Axis(Strict):
         return [self.set] if isinstance(self.set, str) else self.set
 
 
-class Latin(Strict):
+class Latin(StrictModel):
     """A Latin hypercube sample: each axis is divided in as many strata as there are samples."""
 
     latin: PositiveInt = Field(le=MOST_RUNS, description="number of samples")
 
 
-class Sobol(Strict):
+class Sobol(StrictModel):
     """A scrambled Sobol sequence."""
 
     sobol: PositiveInt = Field(le=MOST_RUNS, description="number of samples, best a power of two")
 
 
-class Campaign(Strict):
+class Campaign(StrictModel):
     """Many runs: a scenario, what differs between them, and how the values are combined."""
 
     scenario: str = Field(
         min_length=1,
         description="path, relative to the campaign file, or the name of a shipped scenario",
     )
-    axes: dict[str, Axis] = Field(min_length=1, description="by the name of their column in the table")
+    axes: dict[str, CampaignAxis] = Field(
+        min_length=1, description="by the name of their column in the table"
+    )
     design: Literal["grid", "list"] | Latin | Sobol = Field(
         "grid", description="all combinations, the k-th value of each axis together, or a sample"
     )
@@ -103,7 +105,7 @@ class Campaign(Strict):
 
     @field_validator("axes")
     @classmethod
-    def _free_names(cls, axes: dict[str, Axis]) -> dict[str, Axis]:
+    def _free_names(cls, axes: dict[str, CampaignAxis]) -> dict[str, CampaignAxis]:
         for name in axes:
             if name in TAKEN or not name.strip() or not name.isprintable():
                 raise ValueError(f"'{name}' cannot be an axis: the table has a column of that name")
@@ -188,7 +190,9 @@ def _message(error: ValidationError, name: str) -> str:
     """The first error in one line."""
 
     def hint(location: Location) -> str:
-        return nearest(str(location[-1]), (Axis if location[0] == "axes" else Campaign).model_fields)
+        return nearest(
+            str(location[-1]), (CampaignAxis if location[0] == "axes" else Campaign).model_fields
+        )
 
     def special(_: str, location: Location, __: object) -> str:
         return 'is "grid", "list", {"latin": N} or {"sobol": N}' if location[:1] == ("design",) else ""

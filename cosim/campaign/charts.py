@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cybership.scratch_folder import atomic_write
+
 from ..errors import InputError
-from ..files import atomic_write
 from ..trials.measures import EVERY
 from .comparison import differences
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..dispatch.job import Row
+from ..dispatch.job import RunRow
 from ..errors import InputError, nearest
 from ..trials.measures import EVERY
 from .design import Case
@@ -24,22 +24,22 @@ FEWEST_PAIRS = 10
 UNPAIRED = "no two runs differ in '{}' alone, so that nothing can be compared"
 
 
-class Interval(NamedTuple):
+class MeanInterval(NamedTuple):
     """A mean and the half width of the interval that holds the true one with probability LEVEL."""
 
     mean: float
     half: float
 
 
-def interval(values: Sequence[float]) -> Interval:
+def interval(values: Sequence[float]) -> MeanInterval:
     """Student's t interval of the mean of independent values."""
     x = np.asarray(values, float)
     if x.size < 2:
-        return Interval(float(x.mean()) if x.size else math.nan, math.inf)
+        return MeanInterval(float(x.mean()) if x.size else math.nan, math.inf)
     from scipy.special import stdtrit  # takes less time to import than scipy.stats
 
     half = float(stdtrit(x.size - 1, 0.5 + 0.5 * LEVEL) * x.std(ddof=1) / math.sqrt(x.size))
-    return Interval(float(x.mean()), half)
+    return MeanInterval(float(x.mean()), half)
 
 
 def _demand_axis(axis: str, axes: Sequence[str]) -> None:
@@ -145,7 +145,7 @@ class StopRule:
         order = np.random.default_rng(seed).permutation(len(blocks))
         return [{name: blocks[k][name] for name in values} for k in order]
 
-    def satisfied(self, row: Callable[[int], Row | None]) -> bool:
+    def satisfied(self, row: Callable[[int], RunRow | None]) -> bool:
         """Whether the difference is known.
 
         Args:
@@ -177,13 +177,13 @@ class StopRule:
             )
         return math.log(other / first)
 
-    def counted(self, row: Callable[[int], Row | None]) -> set[int] | None:
+    def counted(self, row: Callable[[int], RunRow | None]) -> set[int] | None:
         """Numbers of the runs from which the difference is known; None if it is not: then all count."""
         if not self.satisfied(row):
             return None
         return {case.number for block in self._blocks[: self._seen] for case in block.values()}
 
-    def verdict(self, row: Callable[[int], Row | None]) -> dict[str, Any]:
+    def verdict(self, row: Callable[[int], RunRow | None]) -> dict[str, Any]:
         """What is known, for campaign.json: differences from the first value, or ratios less one."""
         told: dict[str, Any] = {"known": self.satisfied(row), "pairs": self._seen - self._failed}
         told |= {"axis": self.axis, "metric": self.metric, "against": next(iter(self._blocks[0]))}

@@ -21,9 +21,9 @@ from filelock import FileLock, Timeout
 from cybership.scratch_folder import sweep
 
 from ..compiled.library import kind_of, prepare_library
-from ..dispatch.job import Job, Row
+from ..dispatch.job import Job, RunRow
 from ..dispatch.measured_run import Measured
-from ..dispatch.places import Place, check_address, check_workers, place_for
+from ..dispatch.places import RunPlace, check_address, check_workers, place_for
 from ..dispatch.travelling_files import Files
 from ..errors import InputError, SimulationError
 from ..files import update_json, write_roomy_json
@@ -200,7 +200,7 @@ class _Work:
         self.known |= {case.number: (case, h) for case, h in pairs if h in self.journal.rows}
 
     def run(
-        self, place: Callable[[], Place], told: dict[str, Any], progress: Progress
+        self, place: Callable[[], RunPlace], told: dict[str, Any], progress: Progress
     ) -> pandas.DataFrame:
         """Make the runs that are missing; journal, table and summary agree however that ends."""
         self.started, self.told = time.time(), told
@@ -237,7 +237,7 @@ class _Work:
                     STATE.write(CAMPAIGN, "")
         return made
 
-    def _take(self, rows: Iterator[tuple[Job, Row]], progress: Progress) -> None:
+    def _take(self, rows: Iterator[tuple[Job, RunRow]], progress: Progress) -> None:
         for job, row in rows:
             if row.log:
                 keep_log(self.folder, job.hash, row.log)
@@ -299,11 +299,11 @@ class _Work:
             if self.waiting[job.hash] == 1:
                 yield job
 
-    def _count(self, row: Row, runs: int) -> None:
+    def _count(self, row: RunRow, runs: int) -> None:
         self.ended += runs
         self.failed += runs * (row.status != "done")
 
-    def _row(self, number: int) -> Row | None:
+    def _row(self, number: int) -> RunRow | None:
         known = self.known.get(number)
         return None if known is None else self.journal.finished(known[1])
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from .campaign_file import MOST_RUNS, Axis, Campaign, Latin
+from .campaign_file import MOST_RUNS, Campaign, CampaignAxis, Latin
 
 # Drawn shares stay this far from 0 and 1, where a normal distribution has no finite value; the spacing
 # of doubles below 1.
@@ -58,13 +58,15 @@ def cases(campaign: Campaign) -> list[Case]:
     ]
 
 
-def _choices(axis: Axis) -> list[tuple[Any, Any]]:
+def _choices(axis: CampaignAxis) -> list[tuple[Any, Any]]:
     """The values of an axis, each with what the table shows of it."""
     values = axis.values or []
     return list(zip(values, axis.labels or values, strict=True))
 
 
-def _crossed(samples: Iterator[dict[str, Any]], crossed: Mapping[str, Axis]) -> Iterator[dict[str, Any]]:
+def _crossed(
+    samples: Iterator[dict[str, Any]], crossed: Mapping[str, CampaignAxis]
+) -> Iterator[dict[str, Any]]:
     for sample in samples:
         for row in product(*map(_choices, crossed.values())):
             yield sample | dict(zip(crossed, row, strict=True))
@@ -86,7 +88,7 @@ def _samples(campaign: Campaign, size: int) -> Iterator[dict[str, tuple[Any, Any
         yield {name: _drawn(axis, float(u)) for (name, axis), u in zip(drawn.items(), row, strict=True)}
 
 
-def _drawn(axis: Axis, share: float) -> tuple[Any, Any]:
+def _drawn(axis: CampaignAxis, share: float) -> tuple[Any, Any]:
     """The value of an axis below which this share of its distribution lies."""
     if axis.uniform is not None:
         low, high = axis.uniform

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.table import Table
 
+from cybership.scratch_folder import atomic_write
+
 from ..errors import InputError, SimulationError, nearest
-from ..files import atomic_write
 from ..results.log import read_log
 from ..scenario.schema import LogOptions, Scenario
 from ..scenario.shipped import find_parameters

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel
 
-from ..dispatch.job import Row
+from cybership.scratch_folder import atomic_write
+
+from ..dispatch.job import RunRow
 from ..errors import InputError
-from ..files import atomic_write, write_all
+from ..files import write_all
 from ..results.performance import METRICS
 from ..trials.measures import EVERY
 from .design import Case
@@ -27,7 +29,7 @@ LOGS = "logs"
 DIGITS = 16
 
 
-class Told(BaseModel, extra="allow"):
+class JournalLine(BaseModel, extra="allow"):
     """A line of the journal."""
 
     hash: str
@@ -55,7 +57,7 @@ class Journal:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.rows: dict[str, Row] = {}
+        self.rows: dict[str, RunRow] = {}
         self.unread = 0
         self.new: list[str] = []
         path = folder / JOURNAL
@@ -72,18 +74,18 @@ class Journal:
 
     def _remember(self, line: bytes) -> None:
         try:
-            told = Told.model_validate_json(line, strict=True)
+            told = JournalLine.model_validate_json(line, strict=True)
         except ValueError:
             self.unread += line.endswith(b"\n")
             return
-        self.rows[told.hash] = Row(told.status, told.message, told.wall_s, told.metrics, {})
+        self.rows[told.hash] = RunRow(told.status, told.message, told.wall_s, told.metrics, {})
 
-    def finished(self, hash_: str) -> Row | None:
+    def finished(self, hash_: str) -> RunRow | None:
         """What is kept of a run that need not be made again; one that was lost may go well next time."""
         row = self.rows.get(hash_)
         return None if row is None or row.status == "lost" else row
 
-    def add(self, hash_: str, row: Row) -> None:
+    def add(self, hash_: str, row: RunRow) -> None:
         """A run has ended.
 
         Raises:
@@ -134,7 +136,7 @@ def log_folder(folder: Path, hash_: str) -> Path:
     return folder / LOGS / hash_[:DIGITS]
 
 
-def table(cases: Iterable[tuple[Case, str]], rows: Mapping[str, Row]) -> pandas.DataFrame:
+def table(cases: Iterable[tuple[Case, str]], rows: Mapping[str, RunRow]) -> pandas.DataFrame:
     """One row for each run that has ended, in the order of the design.
 
     Args:

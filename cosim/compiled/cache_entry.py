@@ -10,7 +10,7 @@ import shutil
 import stat
 from pathlib import Path
 
-from ..files import atomic_write
+from cybership.scratch_folder import atomic_write
 
 SEAL = ".sha256"  # ends the name of the file beside an entry with its size [bytes] and SHA-256
 

@@ -113,7 +113,7 @@ def _compiles_itself() -> bool:
     return done.returncode == 0 and done.stdout.strip() != ""
 
 
-class Found(NamedTuple):
+class FoundLibrary(NamedTuple):
     """The library, or the reason why there is none, and what the user should know."""
 
     library: ctypes.CDLL | None
@@ -131,30 +131,32 @@ def _cache_folder() -> Path | None:
 
 
 @cache
-def _found(with_zig: bool) -> Found:
+def _found(with_zig: bool) -> FoundLibrary:
     """The library, or why there is none: asked once in a process."""
     content = b"".join((FOLDER / name).read_bytes() for name in SOURCES)
     key = repr((content, OPTIONS, platform.machine(), sysconfig.get_platform()))
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     if (folder := _cache_folder()) is None:
-        return Found(None, "this user has no home folder; CYBERSHIP_CACHE may name one for the loop")
+        return FoundLibrary(
+            None, "this user has no home folder; CYBERSHIP_CACHE may name one for the loop"
+        )
     path = folder / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
     note = ""
     try:
         make_folder(folder)
         if why := refusal(path):
-            return Found(None, why, f"{why}; the plain step loop runs")
+            return FoundLibrary(None, why, f"{why}; the plain step loop runs")
         if not is_whole(path):
             with FileLock(folder / "loop.lock", timeout=PATIENCE):
                 if not is_whole(path):
                     if path.exists():
                         note = f"the step loop in the cache was damaged, and is compiled again: '{path}'"
                     _compile(path, with_zig)
-        return Found(ctypes.CDLL(str(path)), note=note)
+        return FoundLibrary(ctypes.CDLL(str(path)), note=note)
     except NoLibraryError as error:
-        return Found(None, str(error), note)
+        return FoundLibrary(None, str(error), note)
     except (OSError, Timeout, subprocess.SubprocessError) as error:
-        return Found(None, f"the library of C functions cannot be made or loaded: {error}", note)
+        return FoundLibrary(None, f"the library of C functions cannot be made or loaded: {error}", note)
 
 
 def _compile(path: Path, with_zig: bool) -> None:

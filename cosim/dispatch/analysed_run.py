@@ -19,7 +19,7 @@ from ..results.log import LogInMemory, read_log
 from ..scenario.load import load_scenario
 from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
-from .job import Job, Row, job_of
+from .job import Job, RunRow, job_of
 from .measured_run import run_in_memory
 from .places import check_workers, place_for
 from .travelling_files import Files
@@ -72,16 +72,16 @@ class Analysed:
     content: dict[str, Any]
     folder: Path | None
 
-    def __call__(self, pool: InstancePool, scenario: Scenario) -> Row:
+    def __call__(self, pool: InstancePool, scenario: Scenario) -> RunRow:
         run = FinishedRun(self.content, self.folder)
         try:
             if self.folder is None:
                 _in_memory(pool, scenario, run)
             else:
                 _in_folder(pool, scenario, run, self.folder)
-            return Row("done", "", value=self.analyse(run))
+            return RunRow("done", "", value=self.analyse(run))
         except Exception as error:  # told where the runs were asked for
-            return Row("failed", str(error), value=error)
+            return RunRow("failed", str(error), value=error)
 
 
 def _in_memory(pool: InstancePool, scenario: Scenario, run: FinishedRun) -> None:

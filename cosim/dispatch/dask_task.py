@@ -13,7 +13,7 @@ from distributed import Worker, WorkerPlugin, get_worker
 
 from ..errors import InputError, SimulationError
 from ..process.spawned import end_with_parent
-from .job import Row, Task, own_version
+from .job import RunRow, Task, own_version
 from .travelling_files import put
 from .workplace import Workplace
 
@@ -64,7 +64,7 @@ _workplaces: dict[Path, Workplace] = {}
 _making = threading.Lock()
 
 
-def run_on_worker(request: Request) -> list[Row]:
+def run_on_worker(request: Request) -> list[RunRow]:
     """A task on a worker."""
     if request.version != (own := own_version()):
         raise InputError(f"a worker has cybership {own}, and here it is {request.version}")

@@ -30,7 +30,7 @@ from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
 from ..process.spawned import without_program
 from .dask_task import OneFile, Request, run_on_worker
-from .job import Job, Row, own_version
+from .job import Job, RunRow, own_version
 from .travelling_files import Files
 
 # Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is one or two
@@ -56,7 +56,7 @@ LIGHT = {
 LOST, KEPT = "the workers were lost", "finished runs are kept"
 
 
-def _rows_of(future: Future) -> list[Row] | None:
+def _rows_of(future: Future) -> list[RunRow] | None:
     """What a task has made; None if its workers died.
 
     Raises:
@@ -128,7 +128,7 @@ class DaskWorkers:
         self._walls: deque[float] = deque(maxlen=20)
         self._sent: set[str] = set()
 
-    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, RunRow], None, None]:
         waiting = iter(jobs)
         # Dask counts a worker's death against every task that it had. Those that it gives up go again at
         # the end, each alone, to find the one that ends its process.
@@ -159,7 +159,7 @@ class DaskWorkers:
                     suspects.extend(batch)
                     found = []
                 elif found is None:
-                    found = [Row("lost", "it ended every process that ran it")]
+                    found = [RunRow("lost", "it ended every process that ran it")]
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()

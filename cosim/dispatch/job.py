@@ -16,7 +16,7 @@ from .travelling_files import Files
 WITHOUT_EFFECT = ("name", "description", "log", "native", "ship")
 
 
-class Row(NamedTuple):
+class RunRow(NamedTuple):
     """What is kept of a run.
 
     Attributes:
@@ -37,7 +37,7 @@ class Row(NamedTuple):
 
 
 # Makes a run on the FMUs of a process; it is pickled on its way there.
-Task = Callable[[InstancePool, Scenario], Row]
+Task = Callable[[InstancePool, Scenario], RunRow]
 
 
 @cache

@@ -22,7 +22,7 @@ from ..results.log import LogInMemory
 from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
-from .job import Row
+from .job import RunRow
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,14 @@ class Measured:
 
     keep_log: bool = False
 
-    def __call__(self, pool: InstancePool, scenario: Scenario) -> Row:
+    def __call__(self, pool: InstancePool, scenario: Scenario) -> RunRow:
         if self.keep_log:
             return _logged(pool, scenario)
         try:
             metrics = run_in_memory(pool, scenario)
         except performance.MetricsError as error:
-            return Row("done", f"no metrics: {error}")
-        return Row("done", "", metrics=metrics)
+            return RunRow("done", f"no metrics: {error}")
+        return RunRow("done", "", metrics=metrics)
 
 
 def run_in_memory(
@@ -109,7 +109,7 @@ def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -
         raise
 
 
-def _logged(pool: InstancePool, scenario: Scenario) -> Row:
+def _logged(pool: InstancePool, scenario: Scenario) -> RunRow:
     notes: list[str] = []
     with scratch_folder() as scratch:
         result = simulate(scenario, scratch, show=notes.append, pool=pool)
@@ -119,4 +119,4 @@ def _logged(pool: InstancePool, scenario: Scenario) -> Row:
     message = result.message
     if result.status == "done" and not result.metrics:
         message = next((n.removeprefix("note: ") for n in notes if "no metrics" in n), "")
-    return Row(result.status, message, 0.0, result.metrics if result.status == "done" else {}, log)
+    return RunRow(result.status, message, 0.0, result.metrics if result.status == "done" else {}, log)

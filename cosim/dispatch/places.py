@@ -7,17 +7,17 @@ from typing import Protocol
 from cybership.scratch_folder import Scratch
 
 from ..errors import InputError
-from .job import Job, Row
+from .job import Job, RunRow
 from .travelling_files import Files, copy_all
 from .workplace import Workplace
 
 ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9a-fA-F:.]+\]|[\w.-]+):\d{1,5}")
 
 
-class Place(Protocol):
+class RunPlace(Protocol):
     """Where runs are made."""
 
-    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, RunRow], None, None]:
         """Make runs; gives each as it ends, in any order; :meth:`close` abandons the others."""
         ...
 
@@ -34,7 +34,7 @@ class ThisProcess:
         self._scratch = Scratch()
         self._work = Workplace(self._scratch.path)
 
-    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, RunRow], None, None]:
         for job in jobs:
             copy_all(self._work.folder, [(name, self._files.paths[name]) for name in job.files])
             for name in self._files.fmus.keys() & set(job.files):
@@ -69,7 +69,7 @@ def check_workers(workers: int | None) -> None:
         raise InputError(f"workers = {workers}: needs a whole number from zero on")
 
 
-def place_for(files: Files, scheduler: str | None, workers: int | None) -> Place:
+def place_for(files: Files, scheduler: str | None, workers: int | None) -> RunPlace:
     """Where the runs of a campaign are made.
 
     Args:

@@ -4,10 +4,11 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePath
 
+from cybership.scratch_folder import atomic_write
+
 from ..compiled.library import compiles
 from ..errors import InputError
-from ..files import atomic_write
-from ..fmu.fmu_model import Model
+from ..fmu.fmu_model import FmuModel
 from ..scenario.schema import Scenario
 from ..system.own_fmus import read_models
 
@@ -29,10 +30,10 @@ class Files:
         self.paths: dict[str, Path] = {}
         self.resettable: set[str] = set()
         self.origins: dict[str, str] = {}
-        self.fmus: dict[str, Model] = {}
+        self.fmus: dict[str, FmuModel] = {}
         self.identities: dict[str, str] = {}
         # By path, ship, and whether the project's own FMUs are compiled.
-        self._models: dict[tuple[str, str | None, bool], Model] = {}
+        self._models: dict[tuple[str, str | None, bool], FmuModel] = {}
         self._tables: dict[Path, str] = {}
 
     def read(self, scenarios: Sequence[Scenario]) -> list[str]:
@@ -56,7 +57,7 @@ class Files:
                     self._add(path, model, alike[0].folder)
         return notes
 
-    def _add(self, path: str, model: Model, folder: Path) -> None:
+    def _add(self, path: str, model: FmuModel, folder: Path) -> None:
         name = f"{model.sha256}.fmu"
         self.paths[name], self.fmus[name] = model.path, model
         self.origins[model.sha256] = path
@@ -64,7 +65,7 @@ class Files:
             self.resettable.add(model.sha256)
             self.identities[name] = f"{model.name} {model.description.guid}"
 
-    def models(self, scenario: Scenario) -> dict[str, Model]:
+    def models(self, scenario: Scenario) -> dict[str, FmuModel]:
         """The FMU of each instance; :meth:`read` has read them."""
         return {name: self._models[(e.path, *_kind(scenario))] for name, e in scenario.fmus.items()}
 

@@ -10,7 +10,7 @@ from ..errors import InputError, SimulationError
 from ..scenario.load import load_scenario
 from ..system.instance_pool import InstancePool
 from .freed_memory import keep_freed_memory
-from .job import Row, Task
+from .job import RunRow, Task
 
 
 class Workplace:
@@ -27,7 +27,7 @@ class Workplace:
         # FMUs of one process share its working directory, modules and signals.
         self._alone = threading.Lock()
 
-    def run(self, content: dict[str, Any], task: Task) -> Row:
+    def run(self, content: dict[str, Any], task: Task) -> RunRow:
         """Run a scenario whose FMUs and tables are in the folder.
 
         Raises:
@@ -40,9 +40,9 @@ class Workplace:
             try:
                 row = task(self.pool, scenario)
             except (InputError, SimulationError) as error:
-                row = Row("failed", str(error))
+                row = RunRow("failed", str(error))
             except Exception as error:  # of this computer, as a full disk, or of this program
-                row = Row("lost", repr(error))
+                row = RunRow("lost", repr(error))
             finally:
                 os.chdir(here)
             return row._replace(wall_s=time.perf_counter() - started)

@@ -12,11 +12,15 @@ from ..formats.documents import parse
 from ..formats.elements import value_text, write_document
 from ..system.preparation import newest_first
 from ..system.system import System
-from .portable import Part
+from .portable import ExportedInstance
 
 
 def write_container(
-    system: System, parts: Sequence[Part], folder: Path, fmu: Path, expose: Collection[str] = ()
+    system: System,
+    parts: Sequence[ExportedInstance],
+    folder: Path,
+    fmu: Path,
+    expose: Collection[str] = (),
 ) -> None:
     """Write the container; it keeps the order of stepping.
 
@@ -73,7 +77,7 @@ def write_container(
         logger.setLevel(level)
 
 
-def _convention(parts: Sequence[Part]) -> str:
+def _convention(parts: Sequence[ExportedInstance]) -> str:
     """Naming convention of the container: is ``instance.variable`` a structured name in FMI?"""
     structured = all(
         re.fullmatch(r"[A-Za-z_]\w*", part.name, re.ASCII)
@@ -98,7 +102,9 @@ def _without_claims(toolbox_container: Any, convention: str) -> Any:
     return Container
 
 
-def _add_ports(container: Any, system: System, part: Part, file: str, expose: Collection[str]) -> None:
+def _add_ports(
+    container: Any, system: System, part: ExportedInstance, file: str, expose: Collection[str]
+) -> None:
     """Ports of the container, and start values."""
     fed = {c.target.name for c in system.connections}
     given = {v.name for v, _ in system.parameters[part.name]}

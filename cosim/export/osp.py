@@ -10,10 +10,10 @@ from ..formats.elements import type_name, value_text, write_document
 from ..formats.groups import osp_model_description
 from ..formats.namespaces import OSP_SCENARIOS, OSP_SPACE, OSP_STRUCTURE
 from ..system.system import System
-from .portable import Part, converts
+from .portable import ExportedInstance, converts
 
 
-def write_osp(system: System, parts: Sequence[Part], folder: Path) -> list[str]:
+def write_osp(system: System, parts: Sequence[ExportedInstance], folder: Path) -> list[str]:
     """Write structure, scenario and model descriptions beside the FMUs.
 
     Args:
@@ -32,7 +32,7 @@ def write_osp(system: System, parts: Sequence[Part], folder: Path) -> list[str]:
     return notes
 
 
-def _describe(parts: Sequence[Part], folder: Path) -> list[str]:
+def _describe(parts: Sequence[ExportedInstance], folder: Path) -> list[str]:
     """Write the model descriptions. libcosim finds them by the model's name, so that models of one name
     have one or none."""
     by_file: dict[str, dict[bytes, Element | None]] = {}
@@ -50,7 +50,7 @@ def _describe(parts: Sequence[Part], folder: Path) -> list[str]:
     return notes
 
 
-def _structure(system: System, parts: Sequence[Part]) -> Element:
+def _structure(system: System, parts: Sequence[ExportedInstance]) -> Element:
     """OspSystemStructure.xml. The end of the run has no place in it that every version knows."""
     root = Element("OspSystemStructure", xmlns=OSP_SPACE, version="0.1")
     SubElement(root, "StartTime").text = "0.0"

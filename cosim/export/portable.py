@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..files import file_stems
-from ..fmu.fmu_model import Model, Value, Variable
+from ..fmu.fmu_model import FmuModel, FmuVariable, Value
 from ..formats.elements import parameter_set, write_document
 from ..system.own_fmus import builder_options, run_builder
 from ..system.system import Connection, System
@@ -42,7 +42,7 @@ CONTAINER = Format("a container FMU", order=True)
 
 
 @dataclass(frozen=True)
-class Part:
+class ExportedInstance:
     """One instance of an exported system.
 
     Attributes:
@@ -54,9 +54,9 @@ class Part:
     """
 
     name: str
-    model: Model
+    model: FmuModel
     file: str
-    values: tuple[tuple[Variable, Value], ...]
+    values: tuple[tuple[FmuVariable, Value], ...]
     baked: bool
 
 
@@ -152,7 +152,7 @@ def converts(connection: Connection) -> bool:
     return (connection.conversion.factor, connection.conversion.offset) != (1.0, 0.0)
 
 
-def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
+def pack(system: System, folder: Path) -> tuple[list[ExportedInstance], list[str]]:
     """Put the FMUs of a system into a folder, the project's own with the scenario's parameters baked in.
 
     The start values of other FMUs are in their binaries.
@@ -164,14 +164,14 @@ def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
     Returns:
         The exported instances, and notes on parameters that are stored outside of their FMUs.
     """
-    parts: list[Part] = []
+    parts: list[ExportedInstance] = []
     notes: list[str] = []
     own = system.own
     for name, stem in zip(system.models, file_stems(list(system.models)), strict=True):
         model = system.models[name]
         values = tuple(pair for pair in system.parameters[name] if not _is_start(*pair))
         baked = name in own
-        part = Part(name, model, f"{stem}.fmu", values, baked)
+        part = ExportedInstance(name, model, f"{stem}.fmu", values, baked)
         if values and baked:
             _bake(part, folder, builder_options(system.scenario, system.scenario.native is True))
         else:
@@ -186,7 +186,7 @@ def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
     return parts, notes
 
 
-def _is_start(variable: Variable, value: Value) -> bool:
+def _is_start(variable: FmuVariable, value: Value) -> bool:
     """Whether a value is the FMU's own start value."""
     if variable.start is None:
         return False
@@ -197,7 +197,7 @@ def _is_start(variable: Variable, value: Value) -> bool:
     return float(variable.start) == float(value)
 
 
-def _bake(part: Part, folder: Path, options: Sequence[str]) -> None:
+def _bake(part: ExportedInstance, folder: Path, options: Sequence[str]) -> None:
     """Build the project's FMU again, with other start values and options of the builder."""
     names = {f"{part.model.name}.{v.name}": (v, value) for v, value in part.values}
     work = folder / f".{part.file}"

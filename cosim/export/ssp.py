@@ -7,18 +7,18 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ..conversion import BASE_UNITS
-from ..fmu.fmu_model import Model
+from ..fmu.fmu_model import FmuModel
 from ..formats.elements import parameter_set, write_document
 from ..formats.namespaces import FMU_TYPE, OSP_ANNOTATION, SSP_RESOURCES, SSP_SPACES, SSP_STRUCTURE
 from ..system.system import Signal, System
-from .portable import Part
+from .portable import ExportedInstance
 
 # A fixed date makes archives repeatable; this is the earliest that zip files can hold.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 SET_NAME = "start"
 
 
-def write_ssp(system: System, parts: Sequence[Part], folder: Path, archive: Path) -> None:
+def write_ssp(system: System, parts: Sequence[ExportedInstance], folder: Path, archive: Path) -> None:
     """Write the archive.
 
     Args:
@@ -40,7 +40,7 @@ def write_ssp(system: System, parts: Sequence[Part], folder: Path, archive: Path
             target.writestr(info, (folder / file).read_bytes())
 
 
-def _structure(system: System, parts: Sequence[Part]) -> Element:
+def _structure(system: System, parts: Sequence[ExportedInstance]) -> Element:
     """SystemStructure.ssd. libcosim finds its step in an annotation, and reads the sets of parameters of
     components only; Ecos wants them inline, and by one name; FMPy ignores them."""
     scenario = system.scenario
@@ -86,7 +86,7 @@ def _structure(system: System, parts: Sequence[Part]) -> Element:
     return root
 
 
-def _component(system: System, part: Part, units: dict[str, dict[str, str]]) -> Element:
+def _component(system: System, part: ExportedInstance, units: dict[str, dict[str, str]]) -> Element:
     component = Element(
         "ssd:Component",
         name=part.name,
@@ -112,7 +112,7 @@ def _component(system: System, part: Part, units: dict[str, dict[str, str]]) -> 
     return component
 
 
-def _common_units(models: Iterable[Model]) -> dict[str, dict[str, str]]:
+def _common_units(models: Iterable[FmuModel]) -> dict[str, dict[str, str]]:
     """Definition of each unit that all FMUs define alike."""
     found: dict[str, dict[str, str]] = {}
     unlike: set[str] = set()
@@ -123,7 +123,7 @@ def _common_units(models: Iterable[Model]) -> dict[str, dict[str, str]]:
     return {name: found[name] for name in sorted(found) if name not in unlike}
 
 
-def _units(model: Model) -> dict[str, dict[str, str]]:
+def _units(model: FmuModel) -> dict[str, dict[str, str]]:
     """Units of an FMU, by name, as attributes of a BaseUnit."""
     found: dict[str, dict[str, str]] = {}
     for unit in model.description.unitDefinitions:

@@ -14,11 +14,11 @@ from ..system.system import System
 from . import portable
 from .container import write_container
 from .osp import write_osp
-from .portable import Format, Part
+from .portable import ExportedInstance, Format
 from .ssp import write_ssp
 
 EXPORT = ".export_"  # begins the names of scratch folders
-Write = Callable[[System, Sequence[Part], Path, Path], None]
+Write = Callable[[System, Sequence[ExportedInstance], Path, Path], None]
 
 
 def export_ssp(system: System, archive: Path, drop: bool = False, overwrite: bool = False) -> list[str]:

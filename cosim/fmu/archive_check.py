@@ -27,7 +27,7 @@ XML = (".xml", ".ssd", ".ssv", ".ssm")
 
 
 @dataclass(frozen=True)
-class Limits:
+class ArchiveLimits:
     """How large an archive may become; the values are chosen well above the largest FMUs in use.
 
     Attributes:
@@ -44,7 +44,7 @@ class Limits:
     xml: int = 128 * 2**20
 
 
-LIMITS = Limits()
+LIMITS = ArchiveLimits()
 # What zipfile raises for a file that is no archive, is damaged, or uses an unknown compression.
 DAMAGED = (
     zipfile.BadZipFile,
@@ -62,7 +62,7 @@ REAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 INTEGER = re.compile(r"[+-]?\d{1,30}", re.ASCII)
 
 
-def check_archive(path: Path, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
+def check_archive(path: Path, limits: ArchiveLimits = LIMITS) -> list[zipfile.ZipInfo]:
     """Entries of an archive that can be unpacked anywhere without harm.
 
     Args:
@@ -147,7 +147,7 @@ def _key(name: str) -> str:
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
-def unpack(path: Path, folder: Path, limits: Limits = LIMITS) -> None:
+def unpack(path: Path, folder: Path, limits: ArchiveLimits = LIMITS) -> None:
     """Unpack an archive into an empty folder, after :func:`check_archive`.
 
     Raises:

@@ -9,10 +9,10 @@ import ctypes
 from collections.abc import Callable, Sequence
 
 from ..errors import SimulationError
-from .component import DISCARD, Component
+from .component import DISCARD, FmuComponent
 from .fmu_model import INT_LIMIT
 from .instance import Access, DirectCalls, DirectTransfer
-from .memory import Memory, Port
+from .memory import DoubleMemory, Port
 from .stepping import Steps, redoing_steps, single_steps
 
 _SETTERS = {
@@ -42,7 +42,12 @@ class Transfer:
     """
 
     def __init__(
-        self, component: Component, kind: str, ports: Sequence[Port], memory: Memory, setting: bool
+        self,
+        component: FmuComponent,
+        kind: str,
+        ports: Sequence[Port],
+        memory: DoubleMemory,
+        setting: bool,
     ) -> None:
         what, c_type = _SETTERS[kind][not setting], _SETTERS[kind][2]
         self._component, self._ports, self._values = component, ports, memory.values
@@ -87,7 +92,7 @@ class Transfer:
 
 
 def _direct(
-    component: Component, sets: Sequence[Transfer], gets: Sequence[Transfer], steps: Steps
+    component: FmuComponent, sets: Sequence[Transfer], gets: Sequence[Transfer], steps: Steps
 ) -> DirectCalls:
     return DirectCalls(
         component.pointer,
@@ -104,7 +109,11 @@ def _direct(
 
 
 def bind(
-    component: Component, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float
+    component: FmuComponent,
+    inputs: Sequence[Port],
+    outputs: Sequence[Port],
+    memory: DoubleMemory,
+    h: float,
 ) -> Access:
     """Access to an FMU in this process.
 
@@ -142,7 +151,7 @@ def bind(
 
 
 def _transfers(
-    component: Component, ports: Sequence[Port], memory: Memory, setting: bool
+    component: FmuComponent, ports: Sequence[Port], memory: DoubleMemory, setting: bool
 ) -> list[Transfer]:
     """What sets or gets some variables of one FMU: a call for each type."""
     of_kind = {kind: [p for p in ports if p.variable.type == kind] for kind in _SETTERS}

@@ -22,7 +22,7 @@ from fmpy.logging import addLoggerProxy
 
 from ..errors import InputError, SimulationError
 from ..process.run_state import STATE
-from .fmu_model import PYTHON_SYMBOL, Model
+from .fmu_model import PYTHON_SYMBOL, FmuModel
 from .instance import OnMessage
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -91,7 +91,7 @@ def _classes(module: ModuleType, folder: Path) -> list[type]:
     return list(defined | own)
 
 
-class Component:
+class FmuComponent:
     """An instantiated FMU as its library sees it.
 
     Args:
@@ -113,7 +113,7 @@ class Component:
         InputError: no binary for this platform, or instantiation refused.
     """
 
-    def __init__(self, name: str, model: Model, on_message: OnMessage) -> None:
+    def __init__(self, name: str, model: FmuModel, on_message: OnMessage) -> None:
         self.name = name
         self.model = model
         folder = model.unpack()
@@ -264,7 +264,7 @@ class Component:
             clear()
 
 
-def _tool_hint(model: Model, folder: Path) -> str:
+def _tool_hint(model: FmuModel, folder: Path) -> str:
     """A possible reason why an FMU does not start; a Python FMU's tool is Python, which is there."""
     cs = model.description.coSimulation
     if cs is None or not cs.needsExecutionTool or (folder / SLAVE_MODULE).is_file():

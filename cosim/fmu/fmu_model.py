@@ -42,7 +42,7 @@ def _annotations(xml: bytes) -> ElementTree.Element | None:
 
 
 @dataclass(frozen=True)
-class Variable:
+class FmuVariable:
     """A variable of an FMU.
 
     Attributes:
@@ -66,7 +66,7 @@ class Variable:
     start: str | None
 
 
-class Model:
+class FmuModel:
     """An FMU file, checked and described.
 
     Args:
@@ -112,13 +112,13 @@ class Model:
         self._folder = folder
         self._scratch: Scratch | None = None
 
-    def copied_to(self, path: Path) -> "Model":
+    def copied_to(self, path: Path) -> "FmuModel":
         """The same FMU in a copy of its file, which need not be read again."""
         model = copy.copy(self)
         model.path, model._folder, model._scratch = path, None, None
         return model
 
-    def _read_variables(self) -> dict[str, Variable]:
+    def _read_variables(self) -> dict[str, FmuVariable]:
         """All variables by name, in the order of the description."""
         units = {
             u.name: Unit(str(u.name))
@@ -128,7 +128,7 @@ class Model:
             )
             for u in self.description.unitDefinitions
         }
-        found: dict[str, Variable] = {}
+        found: dict[str, FmuVariable] = {}
         for v in self.description.modelVariables:
             declared = v.declaredType
             unit = v.unit or (declared.unit if declared is not None else None)
@@ -138,7 +138,7 @@ class Model:
                 high = declared.max if high is None else high
             if v.name in found:
                 raise ValueError(f"two variables are called '{v.name}'")
-            found[v.name] = Variable(
+            found[v.name] = FmuVariable(
                 v.name,
                 v.type,
                 int(v.valueReference),
@@ -159,7 +159,7 @@ class Model:
         exact = (v for v in listed if v.initial == "exact" and v.variability != "constant")
         return frozenset(v.name for v in exact if (v.causality or "local") == "local")
 
-    def can_be_set(self, variable: Variable) -> bool:
+    def can_be_set(self, variable: FmuVariable) -> bool:
         """Whether a variable takes a value before the simulation."""
         return variable.causality in ("parameter", "input") or variable.name in self.exact
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from .fmu_model import Model, Value, Variable
-from .memory import Memory, Port
+from .fmu_model import FmuModel, FmuVariable, Value
+from .memory import DoubleMemory, Port
 
 # Receives (instance, status, text) of each message that an FMU logs; the status is that of FMI.
 OnMessage = Callable[[str, int, str], None]
@@ -107,11 +107,13 @@ class Instance(Protocol):
         ...
 
     @property
-    def model(self) -> Model:
+    def model(self) -> FmuModel:
         """The FMU that runs."""
         ...
 
-    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+    def bind(
+        self, inputs: Sequence[Port], outputs: Sequence[Port], memory: DoubleMemory, h: float
+    ) -> Access:
         """The calls of the step loop, bound to a memory.
 
         Args:
@@ -126,11 +128,11 @@ class Instance(Protocol):
         """Announce an experiment from 0 to ``stop`` [s], with the tolerance that the FMU suggests."""
         ...
 
-    def set_value(self, variable: Variable, value: Value) -> None:
+    def set_value(self, variable: FmuVariable, value: Value) -> None:
         """Set one variable, outside of the step loop."""
         ...
 
-    def get_value(self, variable: Variable) -> float:
+    def get_value(self, variable: FmuVariable) -> float:
         """Value of one numeric variable, outside of the step loop."""
         ...
 

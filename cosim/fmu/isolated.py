@@ -18,9 +18,9 @@ from typing import Any, NoReturn
 from ..errors import InputError, SimulationError
 from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
 from .component import WARNING
-from .fmu_model import Model, Value, Variable
+from .fmu_model import FmuModel, FmuVariable, Value
 from .instance import Access, OnMessage
-from .memory import Memory, Port
+from .memory import DoubleMemory, Port
 
 # Longest wall time of one call [s] where the scenario gives none. Instantiation, for which a process is
 # started, may always take that long. Chosen: loading a large tool may take tens of seconds.
@@ -49,7 +49,7 @@ class IsolatedInstance:
     def __init__(
         self,
         name: str,
-        model: Model,
+        model: FmuModel,
         on_message: OnMessage,
         timeout: float = TIMEOUT,
     ) -> None:
@@ -179,10 +179,10 @@ class IsolatedInstance:
             self._asked = what
             self._give_up(is_garbled=True)
 
-    def set_value(self, variable: Variable, value: Value) -> None:
+    def set_value(self, variable: FmuVariable, value: Value) -> None:
         self._call(f"setting {variable.name} = {value}", "set_value", variable.name, value)
 
-    def get_value(self, variable: Variable) -> float:
+    def get_value(self, variable: FmuVariable) -> float:
         return float(self._call(f"getting {variable.name}", "get_value", variable.name))
 
     def set_up(self, stop: float) -> None:
@@ -194,7 +194,9 @@ class IsolatedInstance:
     def exit_initialization(self) -> None:
         self._call("fmi2ExitInitializationMode", "exit_initialization")
 
-    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+    def bind(
+        self, inputs: Sequence[Port], outputs: Sequence[Port], memory: DoubleMemory, h: float
+    ) -> Access:
         names = [[port.variable.name for port in ports] for ports in (inputs, outputs)]
         self._call("the choice of its variables", "bind", *names, h)
         own_inputs, own_outputs = _part(inputs, memory), _part(outputs, memory)
@@ -249,7 +251,7 @@ class IsolatedInstance:
         self._process.wait()
 
 
-def _part(ports: Sequence[Port], memory: Memory) -> memoryview:
+def _part(ports: Sequence[Port], memory: DoubleMemory) -> memoryview:
     """The part of a memory that holds some variables."""
     first = ports[0].slot if ports else 0
     return memory.octets[8 * first : 8 * (first + len(ports))]

@@ -7,10 +7,10 @@ from fmpy.fmi1 import FMICallException
 from ..errors import SimulationError
 from ..process.run_state import STATE
 from . import calls
-from .component import ERROR, Component
-from .fmu_model import Model, Value, Variable
+from .component import ERROR, FmuComponent
+from .fmu_model import FmuModel, FmuVariable, Value
 from .instance import Access, OnMessage
-from .memory import Memory, Port
+from .memory import DoubleMemory, Port
 
 
 class LocalInstance:
@@ -25,13 +25,15 @@ class LocalInstance:
         InputError: no binary for this platform, or instantiation refused.
     """
 
-    def __init__(self, name: str, model: Model, on_message: OnMessage) -> None:
+    def __init__(self, name: str, model: FmuModel, on_message: OnMessage) -> None:
         self.name = name
         self.model = model
-        self.component = Component(name, model, on_message)
+        self.component = FmuComponent(name, model, on_message)
         self._slave = self.component.slave
 
-    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+    def bind(
+        self, inputs: Sequence[Port], outputs: Sequence[Port], memory: DoubleMemory, h: float
+    ) -> Access:
         return calls.bind(self.component, inputs, outputs, memory, h)
 
     def _call(self, what: str, action: Callable[[], object]) -> None:
@@ -60,7 +62,7 @@ class LocalInstance:
             ),
         )
 
-    def set_value(self, variable: Variable, value: Value) -> None:
+    def set_value(self, variable: FmuVariable, value: Value) -> None:
         def action() -> None:
             references = [variable.reference]
             if variable.type == "Real":
@@ -74,7 +76,7 @@ class LocalInstance:
 
         self._call(f"setting {variable.name} = {value}", action)
 
-    def get_value(self, variable: Variable) -> float:
+    def get_value(self, variable: FmuVariable) -> float:
         references = [variable.reference]
         values: list[float] = []
 

@@ -3,10 +3,10 @@
 import ctypes
 from dataclasses import dataclass
 
-from .fmu_model import Variable
+from .fmu_model import FmuVariable
 
 
-class Memory:
+class DoubleMemory:
     """Doubles that FMUs read and write.
 
     Args:
@@ -24,5 +24,5 @@ class Memory:
 class Port:
     """A variable and its place in a memory."""
 
-    variable: Variable
+    variable: FmuVariable
     slot: int

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from .component import DISCARD, PENDING, Component
+from .component import DISCARD, PENDING, FmuComponent
 
 DO_STEP_STATUS, LAST_SUCCESSFUL_TIME, TERMINATED = 0, 2, 3  # of fmi2StatusKind
 # Wall time between two polls for the end of an asynchronous step [s]; chosen: well below a usual step.
@@ -36,7 +36,7 @@ class Steps(NamedTuple):
     saves: bool
 
 
-def single_steps(component: Component, h: float) -> Steps:
+def single_steps(component: FmuComponent, h: float) -> Steps:
     """Steps of length h [s]; one that does not succeed ends the run."""
     do_step, now = component.function("fmi2DoStep"), ctypes.c_double()
     arguments = (
@@ -58,7 +58,7 @@ def single_steps(component: Component, h: float) -> Steps:
     return Steps(step, settle, False)
 
 
-def redoing_steps(component: Component, h: float) -> Steps:
+def redoing_steps(component: FmuComponent, h: float) -> Steps:
     """The same for an FMU whose state can be restored: a discarded step is repeated in shorter ones."""
     do_step = component.function("fmi2DoStep")
     save, restore = component.function("fmi2GetFMUstate"), component.function("fmi2SetFMUstate")
@@ -101,7 +101,7 @@ def redoing_steps(component: Component, h: float) -> Steps:
     return Steps(step, settle, True)
 
 
-def _awaited(component: Component, status: int) -> int:
+def _awaited(component: FmuComponent, status: int) -> int:
     """Status of a step that the FMU may still be computing after fmi2DoStep has returned."""
     if status != PENDING:
         return status
@@ -113,7 +113,7 @@ def _awaited(component: Component, status: int) -> int:
     return found.value
 
 
-def _refuse(component: Component, t: float, status: int) -> None:
+def _refuse(component: FmuComponent, t: float, status: int) -> None:
     """End the run because of a step from t [s], with what the FMU reports of it."""
     note, complaint = "", component.complaint
     if status == DISCARD and not component.is_python:  # pythonfmu cannot report more, and logs so
@@ -126,7 +126,7 @@ def _refuse(component: Component, t: float, status: int) -> None:
     component.check(f"the step from t = {t} s", status, note)
 
 
-def _progress(component: Component) -> tuple[float | None, bool]:
+def _progress(component: FmuComponent) -> tuple[float | None, bool]:
     """After a discarded step: how far the FMU got [s], if it reports that; whether it asks to end."""
     pointer, last, done = ctypes.c_void_p(component.pointer), ctypes.c_double(), ctypes.c_int()
     reached = component.function("fmi2GetRealStatus")(pointer, LAST_SUCCESSFUL_TIME, ctypes.byref(last))

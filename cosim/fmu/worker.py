@@ -15,9 +15,9 @@ from pathlib import Path
 from ..errors import InputError, SimulationError
 from ..process.spawned import end_with_parent
 from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
-from .fmu_model import Model, Value
+from .fmu_model import FmuModel, Value
 from .local import LocalInstance
-from .memory import Memory, Port
+from .memory import DoubleMemory, Port
 
 
 class Worker:
@@ -55,7 +55,7 @@ class Worker:
         return json.dumps(action(*arguments)).encode()
 
     def _start(self, name: str, path: str, folder: str) -> None:
-        self._model = Model(Path(path), Path(folder))
+        self._model = FmuModel(Path(path), Path(folder))
         self._instance = LocalInstance(name, self._model, self._log)
 
     def _log(self, _: str, status: int, text: str) -> None:
@@ -71,7 +71,7 @@ class Worker:
         """Lay out a memory: the inputs, then the outputs."""
         known = self._model.variables
         ports = [Port(known[name], k) for k, name in enumerate([*inputs, *outputs])]
-        memory, middle = Memory(len(ports)), len(inputs)
+        memory, middle = DoubleMemory(len(ports)), len(inputs)
         self._access = self._instance.bind(ports[:middle], ports[middle:], memory, h)
         self._inputs = memory.octets[: 8 * middle]
         self._outputs = memory.octets[8 * middle : 8 * len(ports)]

@@ -17,7 +17,7 @@ NAMES = {**SSP_SPACES, "ssm": SSM}
 
 
 @dataclass(frozen=True)
-class Given:
+class BoundValue:
     """A start value.
 
     Attributes:
@@ -43,13 +43,13 @@ class Bindings:
         self.archive = archive
         self.notes = notes
 
-    def read(self, owner: Element, where: str) -> dict[str, Given]:
+    def read(self, owner: Element, where: str) -> dict[str, BoundValue]:
         """Parameter -> value of all bindings of a component or of the system; the last one counts.
 
         Raises:
             InputError: a file is missing, or uses a feature that this reader lacks.
         """
-        found: dict[str, Given] = {}
+        found: dict[str, BoundValue] = {}
         for binding in owner.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMES):
             if binding.get("type", SET_TYPE) != SET_TYPE or binding.get("sourceBase", "SSD") != "SSD":
                 raise InputError(f"{where}: this kind of parameter binding is not supported")
@@ -58,24 +58,26 @@ class Bindings:
             found |= values if mapping is None else self._mapped(mapping, values, where)
         return found
 
-    def _values(self, binding: Element, where: str) -> dict[str, Given]:
+    def _values(self, binding: Element, where: str) -> dict[str, BoundValue]:
         root = self._content(binding, "ssd:ParameterValues/ssv:ParameterSet", SSP_SPACES["ssv"], where)
         if root is None:
             raise InputError(f"{where}: a parameter binding without values")
         prefix = binding.get("prefix", "")
-        values: dict[str, Given] = {}
+        values: dict[str, BoundValue] = {}
         for entry in root.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
             name = prefix + need(entry, "name", where)
             typed = next(iter(entry), None)
             if typed is None:
                 raise InputError(f"{where}: the parameter '{name}' has no value")
-            values[name] = Given(start_value(typed, f"{where}: {name}"), typed.get("unit"), where)
+            values[name] = BoundValue(start_value(typed, f"{where}: {name}"), typed.get("unit"), where)
         return values
 
-    def _mapped(self, mapping: Element, values: dict[str, Given], where: str) -> dict[str, Given]:
+    def _mapped(
+        self, mapping: Element, values: dict[str, BoundValue], where: str
+    ) -> dict[str, BoundValue]:
         root = self._content(mapping, "ssm:ParameterMapping", SSM, where)
         entries: Iterable[Element] = () if root is None else root.iterfind("ssm:MappingEntry", NAMES)
-        found: dict[str, Given] = {}
+        found: dict[str, BoundValue] = {}
         for entry in entries:
             name, target = need(entry, "source", where), need(entry, "target", where)
             given = values.get(name)

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from ..errors import InputError, nearest
 from ..fmu.archive_check import check_xml, integer, real
-from ..fmu.fmu_model import Model, Value, Variable
+from ..fmu.fmu_model import FmuModel, FmuVariable, Value
 
 # Longest URI of a file [characters]: PATH_MAX of Linux.
 LONGEST = 4096
@@ -85,7 +85,7 @@ def start_value(element: Element, where: str) -> Value:
     raise InputError(f"{where}: values of type {kind} are not supported")
 
 
-def variable(models: Mapping[str, Model], instance: str, name: str, where: str) -> Variable:
+def variable(models: Mapping[str, FmuModel], instance: str, name: str, where: str) -> FmuVariable:
     """The variable at one end of a connection; * is a wildcard in scenarios only.
 
     Raises:

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
-from ..fmu.fmu_model import Value, Variable
+from ..fmu.fmu_model import FmuVariable, Value
 from .namespaces import SSV
 
 
 def parameter_set(
-    name: str, values: Mapping[str, tuple[Variable, Value]], root: bool = False
+    name: str, values: Mapping[str, tuple[FmuVariable, Value]], root: bool = False
 ) -> Element:
     """An SSP 1.0 parameter set.
 
@@ -31,12 +31,12 @@ def parameter_set(
     return outer
 
 
-def type_name(variable: Variable) -> str:
+def type_name(variable: FmuVariable) -> str:
     """The type of a variable in other formats, which set enumerations as integers."""
     return "Integer" if variable.type == "Enumeration" else variable.type
 
 
-def value_text(variable: Variable, value: Value) -> str:
+def value_text(variable: FmuVariable, value: Value) -> str:
     """A value as text; reading it restores the value to the bit."""
     if variable.type == "Real":
         return repr(float(value))

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ..errors import InputError, nearest
-from ..fmu.fmu_model import Model, Variable
+from ..fmu.fmu_model import FmuModel, FmuVariable
 from .documents import local, parse, read_file
 from .namespaces import OSP_MODELS
 
@@ -45,7 +45,7 @@ QUANTITIES = (
 GREEK = {"phi": "φ", "theta": "θ", "psi": "ψ"}
 
 
-def variable_groups(model: Model) -> dict[str, tuple[Quantity, list[str]]]:
+def variable_groups(model: FmuModel) -> dict[str, tuple[Quantity, list[str]]]:
     """Groups of inputs and outputs: name -> quantity, and the variables along x, y, z.
 
     A name that inputs and outputs share ends in ``_in`` or ``_out``.
@@ -69,7 +69,7 @@ def variable_groups(model: Model) -> dict[str, tuple[Quantity, list[str]]]:
     return groups
 
 
-def _units(model: Model) -> dict[str, tuple[int, int, int, int]]:
+def _units(model: FmuModel) -> dict[str, tuple[int, int, int, int]]:
     """SI exponents of the FMU's units that need no factor, by name."""
     found: dict[str, tuple[int, int, int, int]] = {}
     for unit in model.description.unitDefinitions:
@@ -79,7 +79,7 @@ def _units(model: Model) -> dict[str, tuple[int, int, int, int]]:
     return found
 
 
-def _place(v: Variable, quantity: Quantity) -> tuple[int, list[str]] | None:
+def _place(v: FmuVariable, quantity: Quantity) -> tuple[int, list[str]] | None:
     """Which axis a variable lies along (0, 1, 2), and the other parts of its name."""
     parts = v.name.split("_")
     for part, rest in ((parts[0], parts[1:]), (parts[-1], parts[:-1])):
@@ -90,7 +90,7 @@ def _place(v: Variable, quantity: Quantity) -> tuple[int, list[str]] | None:
     return None
 
 
-def osp_model_description(model: Model) -> Element | None:
+def osp_model_description(model: FmuModel) -> Element | None:
     """``<modelName>_OspModelDescription.xml``, or None where the FMU has no groups."""
     groups = variable_groups(model)
     if not groups:

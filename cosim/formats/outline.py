@@ -11,7 +11,7 @@ ESTIMATE = "Tool[@name='cybership']/Estimates/Estimate"
 MOST_CORNERS = 1000
 
 
-class Outline(NamedTuple):
+class AnnotatedOutline(NamedTuple):
     """A ship as it is drawn.
 
     Attributes:
@@ -25,7 +25,7 @@ class Outline(NamedTuple):
     corners: tuple[tuple[float, float], ...]
 
     @classmethod
-    def read(cls, told: Mapping[str, Any]) -> "Outline | None":
+    def read(cls, told: Mapping[str, Any]) -> "AnnotatedOutline | None":
         """An outline from the entries of JSON; None if these are of none."""
         try:
             corners = tuple((float(x), float(y)) for x, y in told["corners"])
@@ -37,16 +37,16 @@ class Outline(NamedTuple):
         return made if usable and made.length > 0.0 else None
 
 
-def read_outline(annotations: Element | None) -> Outline | None:
+def read_outline(annotations: Element | None) -> AnnotatedOutline | None:
     """The outline in the vendor annotations of an FMU; None where there is none."""
     ship = None if annotations is None else annotations.find(SHIP)
     if ship is None:
         return None
     corners = [corner.split(",") for corner in ship.get("outline", "").split()]
-    return Outline.read({**ship.attrib, "corners": corners})
+    return AnnotatedOutline.read({**ship.attrib, "corners": corners})
 
 
-class Trial(NamedTuple):
+class AnnotatedTrial(NamedTuple):
     """A manoeuvring trial.
 
     Attributes:
@@ -58,13 +58,13 @@ class Trial(NamedTuple):
     order: str
 
 
-def read_trial(annotations: Element | None, instance: str) -> Trial | None:
+def read_trial(annotations: Element | None, instance: str) -> AnnotatedTrial | None:
     """The trial that an FMU conducts, by its output ``order``; None: it conducts none."""
     trial = None if annotations is None else annotations.find(TRIAL)
-    return None if trial is None else Trial(trial.get("kind", ""), f"{instance}.order")
+    return None if trial is None else AnnotatedTrial(trial.get("kind", ""), f"{instance}.order")
 
 
-class Estimate(NamedTuple):
+class AnnotatedEstimate(NamedTuple):
     """What a parameter is the first estimate of.
 
     Attributes:
@@ -76,7 +76,10 @@ class Estimate(NamedTuple):
     change: bool
 
 
-def read_estimates(annotations: Element | None) -> dict[str, Estimate]:
+def read_estimates(annotations: Element | None) -> dict[str, AnnotatedEstimate]:
     """The parameters of an FMU that are estimates of a plant's, by name."""
     told = [] if annotations is None else annotations.findall(ESTIMATE)
-    return {e.get("parameter", ""): Estimate(e.get("of", ""), e.get("change") == "true") for e in told}
+    return {
+        e.get("parameter", ""): AnnotatedEstimate(e.get("of", ""), e.get("change") == "true")
+        for e in told
+    }

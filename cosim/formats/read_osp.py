@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from ..conversion import SAME, conversion
 from ..errors import InputError, nearest
-from ..fmu.fmu_model import Model
+from ..fmu.fmu_model import FmuModel
 from .documents import file_of, local, need, number, parse, read_file, start_value, variable
 from .groups import variables_of_group
 from .imported import Imported
@@ -40,10 +40,10 @@ def read_osp(path: Path) -> Imported:
     if not file.exists():
         raise InputError(f"'{path}' is a folder without {OSP_STRUCTURE}")
     root = parse(read_file(file), file, "OspSystemStructure", OSP_SPACE)
-    return _Reader(file, root).read()
+    return _OspReader(file, root).read()
 
 
-class _Reader:
+class _OspReader:
     """One pass over a system structure."""
 
     def __init__(self, file: Path, root: Element) -> None:
@@ -51,7 +51,7 @@ class _Reader:
         self.folder = file.parent.resolve()
         self.root = root
         self.notes: list[str] = []
-        self.models: dict[str, Model] = {}
+        self.models: dict[str, FmuModel] = {}
 
     def read(self) -> Imported:
         start = number(self.text("StartTime", "0"), f"'{self.file}': StartTime")
@@ -93,7 +93,7 @@ class _Reader:
                 raise InputError(f"{where} stands there twice")
             path = self.folder / file_of(need(simulator, "source", where), where)
             fmus[name] = {"path": str(path), "parameters": {}}
-            self.models[name] = Model(path)
+            self.models[name] = FmuModel(path)
             if simulator.get("stepSize") is not None:
                 fmus[name]["step"] = number(simulator.get("stepSize"), f"{where}: stepSize")
             for entry in simulator.iterfind("osp:InitialValues/osp:InitialValue", NAMES):

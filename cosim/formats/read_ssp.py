@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from cybership.message_text import name_of
+
 from ..conversion import SAME, Conversion, conversion
 from ..errors import InputError, nearest
 from ..files import file_stems
 from ..fmu.archive_check import Archive
-from ..fmu.fmu_model import Model, Value, Variable
-from .bindings import NAMES, Bindings, Given, file_inside, is_unit_kept, linear
+from ..fmu.fmu_model import FmuModel, FmuVariable, Value
+from .bindings import NAMES, Bindings, BoundValue, file_inside, is_unit_kept, linear
 from .documents import need, number, parse, variable
 from .imported import Imported, Unpacked
 from .namespaces import FMU_TYPE, OSP_ANNOTATION, SSP_SPACES, SSP_STRUCTURE
@@ -22,10 +24,10 @@ def read_ssp(path: Path) -> Imported:
     Raises:
         InputError: no SSP 1.0 archive, or it uses a feature that this master lacks.
     """
-    return _Reader(Archive(path)).read()
+    return _SspReader(Archive(path)).read()
 
 
-class _Reader:
+class _SspReader:
     """One pass over an archive."""
 
     def __init__(self, archive: Archive) -> None:
@@ -35,13 +37,13 @@ class _Reader:
         self.notes: list[str] = []
         self.bindings = Bindings(archive, self.notes)
         self.values: dict[str, dict[str, Value]] = {}
-        self.models: dict[str, Model] = {}
+        self.models: dict[str, FmuModel] = {}
 
     def read(self) -> Imported:
         text = self.archive.read(SSP_STRUCTURE)
         root = parse(text, self.path, "SystemStructureDescription", SSP_SPACES["ssd"])
-        if root.get("version") not in ("1.0", "1.0.1"):
-            raise InputError(f"'{self.path}' is of SSP {root.get('version')}; this reader knows 1.0")
+        if (version := root.get("version", "")) not in ("1.0", "1.0.1"):
+            raise InputError(f"'{self.path}' is of SSP {name_of(version)}; this reader knows 1.0")
         system = root.find("ssd:System", NAMES)
         if system is None:
             raise InputError(f"'{self.path}' has no system")
@@ -101,18 +103,18 @@ class _Reader:
                 self.set(name, parameter, given)
         return fmus
 
-    def unpack(self, source: str, file: str, where: str) -> Model:
+    def unpack(self, source: str, file: str, where: str) -> FmuModel:
         """The FMU that a component names, written to the scratch folder."""
         inside = file_inside(source, where)
         path = self.unpacked.path / file
         path.write_bytes(self.archive.read(inside))
         try:
-            return Model(path)
+            return FmuModel(path)
         except InputError as error:
             # The user knows the path of the archive, not that of the scratch folder.
             raise InputError(str(error).replace(str(path), f"{self.path}/{inside}")) from None
 
-    def set(self, instance: str, parameter: str, given: Given) -> None:
+    def set(self, instance: str, parameter: str, given: BoundValue) -> None:
         """Set a start value; its unit may not differ from the FMU's."""
         known = self.models[instance].variables.get(parameter)
         unit = known.unit if known is not None else None
@@ -150,7 +152,7 @@ class _Reader:
                 }
         return found, transformations
 
-    def conversion(self, a: Variable, b: Variable, where: str) -> Conversion:
+    def conversion(self, a: FmuVariable, b: FmuVariable, where: str) -> Conversion:
         """The conversion of units that precedes a transformation."""
         how = conversion(a.unit, b.unit, where)
         if how is None:

@@ -1,5 +1,6 @@
 """Systems of other tools: SSP archives and OSP directories."""
 
+import os
 from pathlib import Path
 
 from ..errors import InputError
@@ -10,7 +11,7 @@ from .read_ssp import read_ssp
 
 def is_system(path: Path) -> bool:
     """Whether a path names a system for :func:`read_system`, and not a scenario file."""
-    return path.suffix in (".ssp", ".xml") or path.is_dir()
+    return path.suffix in (".ssp", ".xml") or os.path.isdir(path)
 
 
 def read_system(path: Path) -> Imported:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..fmu.component import WARNING
-from ..fmu.fmu_model import Variable
+from ..fmu.fmu_model import FmuVariable
 from ..fmu.instance import Instance
 from ..process.run_state import INSTANCE, STATE, Owner
 from ..scenario.plans import TIME_TOLERANCE
@@ -147,7 +147,7 @@ class Master:
             else:
                 self._change_parameter(stepper.instance, signal.variable, event)
 
-    def _change_parameter(self, instance: Instance, variable: Variable, event: Event) -> None:
+    def _change_parameter(self, instance: Instance, variable: FmuVariable, event: Event) -> None:
         name = f"{instance.name}.{variable.name}"
         original = self._originals.setdefault(name, instance.get_value(variable))
         if event.action == "reset":

@@ -18,7 +18,7 @@ from ..results.log_table import log_frame
 from ..results.picture_files import Drawn
 from ..results.run_options import RunOptions, read_options
 from ..system.system import System
-from ..trials.trial_outcome import Outcome, outcome_of_log
+from ..trials.trial_outcome import TrialOutcome, outcome_of_log
 from .loop_surroundings import paused_collector
 from .recorder import Recorder
 
@@ -56,7 +56,7 @@ class Result:
     loop: str = ""
     loop_reason: str = ""
     native: bool | None = None
-    trial: Outcome | None = None
+    trial: TrialOutcome | None = None
 
     def __repr__(self) -> str:
         told = [f"{self.status}: {self.rows} rows in '{self.folder}'", self.message]
@@ -120,7 +120,7 @@ def interrupted_late(result: Result) -> None:
             update_json(path, json.loads(path.read_text("utf-8")), {"status": result.status})
 
 
-def trial_of(system: System, columns: logs.Log) -> Outcome | None:
+def trial_of(system: System, columns: logs.Log) -> TrialOutcome | None:
     """The manoeuvring trial that a run is, measured; None: it is none.
 
     Raises:
@@ -133,7 +133,7 @@ def trial_of(system: System, columns: logs.Log) -> Outcome | None:
     return outcome_of_log(columns, system.trial, roles, length, window.start, window.stop)
 
 
-def metrics_of(system: System, columns: logs.Log, trial: Outcome | None) -> dict[str, float]:
+def metrics_of(system: System, columns: logs.Log, trial: TrialOutcome | None) -> dict[str, float]:
     """What metrics.json holds: the measures of a trial, or the performance.
 
     Raises:

@@ -10,7 +10,7 @@ LONGEST_SLEEP = 0.05
 
 
 @dataclass
-class Pace:
+class RealTimePace:
     """Keeps simulated time at a multiple of wall time, and measures the lateness.
 
     Args:

@@ -28,7 +28,7 @@ from .algorithm import Master
 from .ending import Result, finish, interrupted_late, not_written, writing
 from .loop_surroundings import interruptible, quiet_collector
 from .loops.chosen_loop import ChosenLoop, choose_loop
-from .real_time import Pace
+from .real_time import RealTimePace
 from .recorder import Recorder, demand_memory
 from .run_record import describe
 
@@ -207,13 +207,17 @@ def _record(
     STATE.numbers[LOGGING] = 1
     steps = choose_loop(master, recorder.pending, realtime is not None, UPDATE_INTERVAL)
     result.loop, result.loop_reason = steps.loop, steps.reason
-    pace: Pace | None = None
+    pace: RealTimePace | None = None
     result.status = "failed"  # until the loop has ended otherwise
     try:
         try:
             with quiet_collector():
                 # Starts here: the collection before takes the time of several steps.
-                pace = None if realtime is None else Pace(realtime, system.scenario.step, interrupted)
+                pace = (
+                    None
+                    if realtime is None
+                    else RealTimePace(realtime, system.scenario.step, interrupted)
+                )
                 stopped = _loop(system, steps, recorder, pace, interrupted, progress)
             result.status = "interrupted" if stopped else "done"
         except (SimulationError, OSError, KeyboardInterrupt) as error:
@@ -251,7 +255,7 @@ def _loop(
     system: System,
     steps: ChosenLoop,
     recorder: Recorder,
-    pace: Pace | None,
+    pace: RealTimePace | None,
     interrupted: Callable[[], bool],
     progress: Callable[[float], None],
 ) -> bool:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..fmu.memory import Memory
+from ..fmu.memory import DoubleMemory
 from ..system.system import Signal
 
 
-class ValueTable(Memory):
+class ValueTable(DoubleMemory):
     """One double for each signal, in a memory that FMUs read and write.
 
     Args:

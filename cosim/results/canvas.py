@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..files import atomic_write
+from cybership.scratch_folder import atomic_write
+
 from .log import Log
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..formats.outline import Outline
+    from ..formats.outline import AnnotatedOutline
     from ..scenario.roles import Roles
 
 DPI = 120  # chosen
@@ -34,7 +35,7 @@ LABEL = 5.0  # from the panel to its label
 POINTS = 72.0  # in an inch
 
 
-class Run(NamedTuple):
+class DrawnRun(NamedTuple):
     """One run in a picture.
 
     Attributes:
@@ -52,10 +53,10 @@ class Run(NamedTuple):
     roles: Roles
     start: float | None = None
     stop: float | None = None
-    outline: Outline | None = None
+    outline: AnnotatedOutline | None = None
 
 
-Runs = Sequence[Run]
+Runs = Sequence[DrawnRun]
 
 
 def thin(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,7 +151,7 @@ def legend(figure: Figure, panel: Axes, entries: int) -> None:
     )
 
 
-def plot(panel: Axes, run: Run, values: np.ndarray, **line: Any) -> None:
+def plot(panel: Axes, run: DrawnRun, values: np.ndarray, **line: Any) -> None:
     """Draw one value of a run over time; ``line`` overrides properties of the run's lines."""
     time, values = thin(run.log["time"], values)
     panel.plot(time, values, **{"label": run.label, **run.line, **line})

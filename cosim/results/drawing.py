@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..scenario.roles import Roles
-from .canvas import Run, Runs, save
+from .canvas import DrawnRun, Runs, save
 from .lines import errors, forces, metrics, model_error
 from .log import Log
 from .performance import MetricsError
@@ -31,7 +31,7 @@ USUAL = PictureOptions()
 NOTHING: Mapping[str, RunOptions] = MappingProxyType({})
 
 
-class Picture(NamedTuple):
+class RunPicture(NamedTuple):
     """A picture.
 
     Attributes:
@@ -45,17 +45,17 @@ class Picture(NamedTuple):
 
 # By file name.
 PICTURES = {
-    "trajectory": Picture((("pose", "target"), ("pose",)), trajectory),
-    "errors": Picture((("pose", "target"),), errors),
-    "metrics": Picture(
+    "trajectory": RunPicture((("pose", "target"), ("pose",)), trajectory),
+    "errors": RunPicture((("pose", "target"),), errors),
+    "metrics": RunPicture(
         (
             ("pose", "velocity", "target", "force"),
             ("pose", "velocity", "target", "requested_force"),
         ),
         metrics,
     ),
-    "forces": Picture((("linear_force", "nonlinear_force", "requested_force"),), forces),
-    "model_error": Picture(
+    "forces": RunPicture((("linear_force", "nonlinear_force", "requested_force"),), forces),
+    "model_error": RunPicture(
         (("model_error", "estimate", "force", "acting_force"), ("model_error", "estimate")), model_error
     ),
 }
@@ -102,13 +102,13 @@ def figures(
     """Name and figure of the pictures for which at least one log has the columns; see :func:`draw`."""
     for name in names:
         picture = PICTURES[name]
-        able: list[Run] = []
+        able: list[DrawnRun] = []
         for k, (label, log) in enumerate(runs.items()):
             own = told.get(label, RunOptions())
             part = _usable(log, picture.choices, own.roles)
             if part is not None:
                 named = label.replace("$", r"\$")
-                able.append(Run(named, part, _line(k), own.roles, own.start, own.stop, own.outline))
+                able.append(DrawnRun(named, part, _line(k), own.roles, own.start, own.stop, own.outline))
         if not able:
             continue
         try:

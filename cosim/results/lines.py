@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .canvas import WIDTH, Run, Runs, finish, legend, plot, stacked
+from .canvas import WIDTH, DrawnRun, Runs, finish, legend, plot, stacked
 from .log import Log
 from .performance import AXES, cross_track, over_time, wrap
 
@@ -77,7 +77,7 @@ def forces(runs: Runs) -> "Figure":
     return finish(figure, panels, runs)
 
 
-def missing_force(run: Run) -> list[np.ndarray]:
+def missing_force(run: DrawnRun) -> list[np.ndarray]:
     """The model error (7.7) on each axis [N, N, N m]: that of the hull, and the thrust that was lost.
 
     Of the latter only where the log tells it.

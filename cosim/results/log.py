@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import orjson
 
+from cybership.scratch_folder import atomic_write
+
 from ..compiled.row_text import Lines, Rows, compiled_lines
 from ..errors import InputError, nearest
-from ..files import atomic_write, write_all
+from ..files import write_all
 from ..process.run_state import Owner
 
 CSV = "log.csv"

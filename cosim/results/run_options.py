@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from ..formats.outline import Outline, Trial
+from ..formats.outline import AnnotatedOutline, AnnotatedTrial
 from ..scenario.roles import DEFAULT_ROLES, Roles
 from .log import SIDECAR
 
@@ -23,9 +23,9 @@ class RunOptions(NamedTuple):
     start: float | None = None
     stop: float | None = None
     roles: Roles = DEFAULT_ROLES
-    outline: Outline | None = None
+    outline: AnnotatedOutline | None = None
     ship: str | None = None
-    trial: Trial | None = None
+    trial: AnnotatedTrial | None = None
 
 
 def read_options(folder: Path) -> RunOptions:
@@ -34,8 +34,10 @@ def read_options(folder: Path) -> RunOptions:
         told = json.loads((folder / SIDECAR).read_text())
         scenario, window = told["scenario"], told["scenario"]["metrics"]
         roles = Roles.model_validate(scenario.get("roles", {}))
-        outline = Outline.read(told.get("ship") or {})
-        trial = told.get("trial") and Trial(str(told["trial"]["kind"]), str(told["trial"]["order"]))
+        outline = AnnotatedOutline.read(told.get("ship") or {})
+        trial = told.get("trial") and AnnotatedTrial(
+            str(told["trial"]["kind"]), str(told["trial"]["order"])
+        )
         return RunOptions(
             window["from"], window["to"], roles, outline, scenario.get("ship"), trial or None
         )

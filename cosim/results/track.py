@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..formats.outline import Outline
+from ..formats.outline import AnnotatedOutline
 from ..scenario.roles import Columns
-from .canvas import WIDTH, Run, Runs, arrange, blank, grid, legend
+from .canvas import WIDTH, DrawnRun, Runs, arrange, blank, grid, legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,7 +78,7 @@ def hulls(poses: np.ndarray, outline: "ArrayLike") -> np.ndarray:
     return np.stack([east, north], axis=2)
 
 
-def outlines(run: Run, outline: Outline, scale: float) -> np.ndarray:
+def outlines(run: DrawnRun, outline: AnnotatedOutline, scale: float) -> np.ndarray:
     """Hulls at equal distances in time, except where one is drawn already.
 
     Args:
@@ -160,7 +160,7 @@ def trajectory(runs: Runs) -> "Figure":
     return arrange(figure)
 
 
-def _path(run: Run, columns: Columns) -> Path:
+def _path(run: DrawnRun, columns: Columns) -> Path:
     return run.log[columns[0]], run.log[columns[1]]
 
 

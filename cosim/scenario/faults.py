@@ -17,8 +17,8 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from . import operations
 from .operations import Add, Hold, Replace, Values
-from .plans import WhiteNoise, Windows, Within
-from .strict import Strict
+from .plans import TimeSpans, WhiteNoise, Within
+from .strict import StrictModel
 
 Effect = Callable[[Values, float], None]
 Times = Annotated[float, Field(ge=0.0)]
@@ -27,7 +27,7 @@ Span = tuple[Times, Times]
 KINDS: dict[str, type["Fault"]] = {}
 
 
-class Fault(Strict):
+class Fault(StrictModel):
     """A fault, with the signals on which it acts together."""
 
     stage: ClassVar[int]
@@ -81,9 +81,9 @@ class Timed(Fault):
             raise ValueError("the shortest duration comes first")
         return self
 
-    def windows(self, step: float, rng: np.random.Generator) -> Windows:
+    def windows(self, step: float, rng: np.random.Generator) -> TimeSpans:
         """When the fault is active."""
-        return Windows(self.at, self.rate or 0.0, lambda: self._draw_duration(step, rng), rng)
+        return TimeSpans(self.at, self.rate or 0.0, lambda: self._draw_duration(step, rng), rng)
 
     def _draw_duration(self, step: float, rng: np.random.Generator) -> float:
         """How long the fault lasts this time [s]: at least a sample."""
@@ -146,7 +146,7 @@ class Wrap(Fault):
     stage = 4
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        return operations.Wrap(slots)
+        return operations.WrapOperation(slots)
 
 
 class Delay(Fault):
@@ -157,7 +157,7 @@ class Delay(Fault):
     time: float = Field(ge=0.0, le=1e6, description="how late [s], rounded to samples")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        return operations.Delay(slots, int(self.time / step + 0.5))
+        return operations.DelayOperation(slots, int(self.time / step + 0.5))
 
 
 class Freeze(Timed):

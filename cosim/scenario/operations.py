@@ -15,7 +15,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from .plans import Plan, Windows, Within, ask_ahead
+from .plans import Plan, TimeSpans, Within, ask_ahead
 
 
 class Values(Protocol):
@@ -115,7 +115,7 @@ class Hold(Operation):
     code = 2
 
     def __init__(self, slots: Sequence[int], active: Callable[[float], bool]) -> None:
-        within = Within(active, tuple) if isinstance(active, Windows) else None
+        within = Within(active, tuple) if isinstance(active, TimeSpans) else None
         super().__init__(slots, within or (lambda t: () if active(t) else None))
         self.width = 0
         self.memory = array("d", bytes(8 * len(slots)))
@@ -130,7 +130,7 @@ class Hold(Operation):
             self.calls[0] = 1
 
 
-class Delay(Operation):
+class DelayOperation(Operation):
     """Gives the values of ``samples`` calls ago; until there are as many, those of the first call."""
 
     code = 3
@@ -161,7 +161,7 @@ class Delay(Operation):
         self.calls[0] = call + 1
 
 
-class Wrap(Operation):
+class WrapOperation(Operation):
     """Takes angles to (-pi, pi]."""
 
     code = 4
@@ -196,4 +196,4 @@ class Convert(Operation):
 
 
 # Those that the compiled loop knows; of a class derived from one it would not know what that changes.
-OPERATIONS = (Add, Replace, Hold, Delay, Wrap, Convert)
+OPERATIONS = (Add, Replace, Hold, DelayOperation, WrapOperation, Convert)

@@ -105,7 +105,7 @@ class WhiteNoise(PlanAhead):
             k += taken
 
 
-class Windows:
+class TimeSpans:
     """Spans of time, given or random.
 
     Args:
@@ -161,7 +161,7 @@ class Within(PlanAhead):
         row: ``row()`` is what is applied at a call then.
     """
 
-    def __init__(self, windows: Windows, row: Callable[[], Sequence[float]]) -> None:
+    def __init__(self, windows: TimeSpans, row: Callable[[], Sequence[float]]) -> None:
         self._windows, self._row = windows, row
 
     def __call__(self, t: float) -> Sequence[float] | None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import ConfigDict, Field
 
-from .strict import Strict
+from .strict import StrictModel
 
 # Surge, sway and yaw components; or north, east and heading.
 Columns = tuple[str, str, str]
@@ -15,7 +15,7 @@ def _axes(prefix: str) -> Columns:
     return f"{prefix}X", f"{prefix}Y", f"{prefix}N"
 
 
-class Roles(Strict):
+class Roles(StrictModel):
     """Columns by role, three names ``instance.variable`` each; shipped scenarios use the defaults."""
 
     model_config = ConfigDict(frozen=True)

@@ -18,7 +18,7 @@ from pydantic import (
 from ..formats.imported import Unpacked
 from . import faults
 from .roles import Roles
-from .strict import Strict
+from .strict import StrictModel
 
 if TYPE_CHECKING:
     AnyFault = faults.Fault
@@ -64,7 +64,7 @@ def _table_path(path: str) -> str:
     return path
 
 
-class FmuEntry(Strict):
+class FmuEntry(StrictModel):
     """One instance: which FMU, how often it steps, with what parameters."""
 
     path: Annotated[str, AfterValidator(_fmu_path)] = Field(
@@ -88,7 +88,7 @@ class FmuEntry(Strict):
         return self
 
 
-class Event(Strict):
+class Event(StrictModel):
     """A change during the run, with the keys of an OSP scenario file."""
 
     time: Annotated[float, Field(ge=0.0)] = Field(description="when [s]")
@@ -100,7 +100,7 @@ class Event(Strict):
     value: bool | ExactInt | float | None = Field(None, description="for override and bias")
 
 
-class LogOptions(Strict):
+class LogOptions(StrictModel):
     """What is logged, and how often."""
 
     signals: Literal["all", "compact"] | list[str] = Field(
@@ -112,14 +112,14 @@ class LogOptions(Strict):
     format: Literal["csv", "parquet"] = "csv"
 
 
-class Transformation(Strict):
+class Transformation(StrictModel):
     """The transformation of a value on its way to an input: factor * value + offset."""
 
     factor: float = 1.0
     offset: float = 0.0
 
 
-class Recording(Strict):
+class Recording(StrictModel):
     """Inputs that get their values from a file over time."""
 
     path: Annotated[str, AfterValidator(_table_path)] = Field(
@@ -132,7 +132,7 @@ class Recording(Strict):
     )
 
 
-class MetricsOptions(Strict):
+class MetricsOptions(StrictModel):
     """The part of the run that the metrics cover."""
 
     start: float | None = Field(None, alias="from", ge=0.0, description="first time [s]")
@@ -141,7 +141,7 @@ class MetricsOptions(Strict):
     model_config = ConfigDict(populate_by_name=True)
 
 
-class Scenario(Strict):
+class Scenario(StrictModel):
     """A co-simulation: instances, connections, faults, events, log."""
 
     name: Annotated[str, AfterValidator(_folder_name)] = Field(

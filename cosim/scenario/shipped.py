@@ -1,5 +1,6 @@
 """The scenarios that come with the project, by name: ``ellipse``, ``eight``, ``setpoint``, ..."""
 
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -49,7 +50,8 @@ def find_scenario(source: str | Path, folder: Path = Path()) -> Path:
     if not isinstance(source, (str, Path)):
         raise InputError(f"a scenario is a name, a file or a dict, not of type {type(source).__name__}")
     path = folder / source
-    is_there = path.is_file() or (path / OSP_STRUCTURE).is_file()
+    # Of a name that no file can have pathlib would raise.
+    is_there = os.path.isfile(path) or os.path.isfile(path / OSP_STRUCTURE)
     if not is_there and path.name == str(source) and path.name in shipped_names():
         return shipped_folder() / f"{path.name}.json"
     return path

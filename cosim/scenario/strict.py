@@ -3,7 +3,7 @@
 from pydantic import BaseModel, ConfigDict
 
 
-class Strict(BaseModel):
+class StrictModel(BaseModel):
     """Refuses unknown keys, NaN and infinity."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", allow_inf_nan=False)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import InputError
-from ..fmu.fmu_model import Model, Value, Variable
+from ..fmu.fmu_model import FmuModel, FmuVariable, Value
 from ..formats.outline import read_estimates
 from ..formats.ssv import ParameterSet
 from .system import System
@@ -59,7 +59,7 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
 class _Believed:
     """The model of a parameter set: the plant's start values, and what the set says otherwise."""
 
-    def __init__(self, plant: Model, path: Path, given: ParameterSet) -> None:
+    def __init__(self, plant: FmuModel, path: Path, given: ParameterSet) -> None:
         self._plant = {n: v for n, v in plant.variables.items() if _coefficient(v)}
         where = f"'{path}': {plant.name}."
         self._given: dict[str, float] = {}
@@ -68,7 +68,7 @@ class _Believed:
                 raise InputError(f"{where}{name} does not exist")
             self._given[name] = given.number(parameter, plant.variables[name].unit, where + name)
 
-    def of(self, fmu: Model) -> Iterator[tuple[Variable, float, list[str]]]:
+    def of(self, fmu: FmuModel) -> Iterator[tuple[FmuVariable, float, list[str]]]:
         """Parameters of an FMU, what it believes of each, and the names of the set that say so."""
         parameters = [v for v in fmu.variables.values() if v.causality == "parameter"]
         estimates = read_estimates(fmu.annotations)
@@ -92,6 +92,6 @@ class _Believed:
         return self._base(name) + self._given.get(ADDITION + name, 0.0)
 
 
-def _coefficient(v: Variable) -> bool:
+def _coefficient(v: FmuVariable) -> bool:
     """Whether a parameter is one of the model: initial states are fixed, coefficients tunable."""
     return v.causality == "parameter" and v.type == "Real" and v.variability == "tunable"

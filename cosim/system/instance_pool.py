@@ -11,7 +11,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from ..errors import SimulationError
-from ..fmu.fmu_model import Model
+from ..fmu.fmu_model import FmuModel
 from ..fmu.instance import Instance, OnMessage
 from ..fmu.isolated import TIMEOUT, IsolatedInstance
 from ..fmu.local import LocalInstance
@@ -31,11 +31,11 @@ class InstancePool:
 
     def __init__(self, resettable: Collection[str] = ()) -> None:
         self.resettable = set(resettable)
-        self._models: dict[Path, Model] = {}
+        self._models: dict[Path, FmuModel] = {}
         # By file and instance name, which an FMU knows from its instantiation on.
         self._waiting: OrderedDict[tuple[str, str], LocalInstance] = OrderedDict()
 
-    def models(self, scenario: Scenario) -> dict[str, Model]:
+    def models(self, scenario: Scenario) -> dict[str, FmuModel]:
         """The FMU of each instance of a scenario whose paths are all files.
 
         Raises:
@@ -44,15 +44,15 @@ class InstancePool:
         paths = {name: scenario.folder / entry.path for name, entry in scenario.fmus.items()}
         for path in paths.values():
             if path not in self._models:
-                self._models[path] = Model(path)
+                self._models[path] = FmuModel(path)
         return {name: self._models[path] for name, path in paths.items()}
 
-    def know(self, path: Path, model: Model) -> None:
+    def know(self, path: Path, model: FmuModel) -> None:
         """Take what has been read of the FMU elsewhere for that of a copy of its file."""
         if path not in self._models:
             self._models[path] = model.copied_to(path)
 
-    def take(self, name: str, model: Model, entry: FmuEntry, on_message: OnMessage) -> Instance:
+    def take(self, name: str, model: FmuModel, entry: FmuEntry, on_message: OnMessage) -> Instance:
         """An instance in the state after instantiation.
 
         Args:

@@ -8,12 +8,12 @@ from pathlib import Path, PurePath
 
 from ..compiled.library import compiles
 from ..errors import InputError
-from ..fmu.fmu_model import Model
+from ..fmu.fmu_model import FmuModel
 from ..interrupts import INTERRUPTED
 from ..scenario.schema import Scenario
 
 
-def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
+def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, FmuModel]:
     """Instance -> FMU; instances of one file share it.
 
     Args:
@@ -33,12 +33,12 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
             warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
         except InputError:
             paths[name] = scenario.folder / name
-    models: dict[Path, Model] = {}
-    found: dict[str, Model] = {}
+    models: dict[Path, FmuModel] = {}
+    found: dict[str, FmuModel] = {}
     for instance, entry in scenario.fmus.items():
         path = paths.get(entry.path) or scenario.folder / entry.path
         if path not in models:
-            models[path] = Model(path)
+            models[path] = FmuModel(path)
         found[instance] = models[path]
     return found
 

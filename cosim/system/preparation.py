@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from ..errors import InputError
-from ..fmu.fmu_model import NUMERIC, Model, Variable
+from ..fmu.fmu_model import NUMERIC, FmuModel, FmuVariable
 from ..scenario.schema import Scenario
 from .checks import (
     check_events,
@@ -29,7 +29,7 @@ def prepare(
     scenario: Scenario,
     overrides: Overrides = (),
     only_own: bool = False,
-    models: Mapping[str, Model] | None = None,
+    models: Mapping[str, FmuModel] | None = None,
     beliefs: Overrides = (),
     unlogged: Collection[str] = (),
 ) -> System:
@@ -136,7 +136,7 @@ def _choose_signals(system: System, unlogged: Collection[str]) -> None:
     }
 
 
-def _compact(system: System, available: Mapping[str, Variable]) -> list[str]:
+def _compact(system: System, available: Mapping[str, FmuVariable]) -> list[str]:
     """What metrics, pictures and the diagnosis read: the roles, and what measures the pose."""
     sources = set(system.scenario.roles.pose)
     measured = [c.target.name for c in system.connections if c.source.name in sources]
@@ -146,7 +146,7 @@ def _compact(system: System, available: Mapping[str, Variable]) -> list[str]:
     return [name for name in available if name in wanted]
 
 
-def _numbers(system: System) -> dict[str, Variable]:
+def _numbers(system: System) -> dict[str, FmuVariable]:
     """All variables that are numbers, by ``instance.variable``."""
     return {
         f"{name}.{v.name}": v

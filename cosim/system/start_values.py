@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from cybership.message_text import name_of
+
 from ..errors import InputError, nearest
-from ..fmu.fmu_model import INT_LIMIT, Model, Value, Variable
+from ..fmu.fmu_model import INT_LIMIT, FmuModel, FmuVariable, Value
 from ..formats.ssv import ParameterSet
 from .belief import Chosen, believe
 from .parameter_table import read_table, table_parameters
@@ -39,7 +41,7 @@ def check_parameters(system: System, overrides: Overrides, beliefs: Overrides = 
             if parameter not in settable:
                 what = "cannot be set" if parameter in known else "does not exist"
                 hint = nearest(parameter, list(settable))
-                raise InputError(f"{where}: {name}.{parameter} {what}{hint}")
+                raise InputError(f"{where}: {name}.{name_of(parameter)} {what}{hint}")
             check_value(settable[parameter], value, f"{where}: {name}.{parameter}")
             system.parameters[name].append((settable[parameter], value))
 
@@ -107,7 +109,7 @@ def _models_hint(system: System, wrong: str) -> str:
     return nearest(wrong, {model.name for model in system.models.values()})
 
 
-def _in_units_of(model: Model, path: Path, given: ParameterSet) -> dict[str, Value]:
+def _in_units_of(model: FmuModel, path: Path, given: ParameterSet) -> dict[str, Value]:
     """The values of a parameter set for one model, in the units of the FMU.
 
     Raises:
@@ -124,7 +126,7 @@ def _in_units_of(model: Model, path: Path, given: ParameterSet) -> dict[str, Val
     return found
 
 
-def _effects_hint(model: Model, wrong: str) -> str:
+def _effects_hint(model: FmuModel, wrong: str) -> str:
     """A hint for a parameter that an FMU lacks, and how one of this project would get it."""
     hint = nearest(wrong, [v.name for v in model.variables.values() if v.causality == "parameter"])
     if model.path.name != f"{model.name}.fmu":
@@ -135,7 +137,7 @@ def _effects_hint(model: Model, wrong: str) -> str:
     )
 
 
-def check_value(variable: Variable, value: Value | None, where: str) -> None:
+def check_value(variable: FmuVariable, value: Value | None, where: str) -> None:
     """Refuse a value that is not of a variable's type, or outside its range.
 
     Raises:

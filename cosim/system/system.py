@@ -6,8 +6,8 @@ from pathlib import PurePath
 
 from ..conversion import Conversion
 from ..errors import InputError, nearest
-from ..fmu.fmu_model import Model, Value, Variable
-from ..formats.outline import Outline, Trial, read_outline, read_trial
+from ..fmu.fmu_model import FmuModel, FmuVariable, Value
+from ..formats.outline import AnnotatedOutline, AnnotatedTrial, read_outline, read_trial
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -17,7 +17,7 @@ class Signal:
     """A variable of an instance."""
 
     instance: str
-    variable: Variable
+    variable: FmuVariable
 
     @cached_property
     def name(self) -> str:
@@ -53,7 +53,7 @@ class System:
     """
 
     scenario: Scenario
-    models: dict[str, Model]
+    models: dict[str, FmuModel]
     every: dict[str, int] = field(default_factory=dict)
     steps: int = 0
     order: list[str] = field(default_factory=list)
@@ -61,7 +61,7 @@ class System:
     recordings: dict[str, list[Recorded]] = field(default_factory=dict)
     signals: dict[str, Signal] = field(default_factory=dict)
     logged: list[str] = field(default_factory=list)
-    parameters: dict[str, list[tuple[Variable, Value]]] = field(default_factory=dict)
+    parameters: dict[str, list[tuple[FmuVariable, Value]]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
     @property
@@ -86,13 +86,13 @@ class System:
         return self.models[self.own[0]].is_native if self.own else None
 
     @property
-    def outline(self) -> Outline | None:
+    def outline(self) -> AnnotatedOutline | None:
         """The ship to draw: that of the first FMU which says so."""
         outlines = (read_outline(model.annotations) for model in self.models.values())
         return next((outline for outline in outlines if outline is not None), None)
 
     @property
-    def trial(self) -> Trial | None:
+    def trial(self) -> AnnotatedTrial | None:
         """The manoeuvring trial that the first FMU which says so conducts."""
         trials = (read_trial(m.annotations, n) for n, m in self.models.items() if "order" in m.variables)
         return next((trial for trial in trials if trial is not None), None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from cybership.message_text import name_of
+
 from ..conversion import SAME, Conversion, conversion
 from ..errors import InputError, nearest
 from .system import Connection, Signal, System, causality_of
@@ -26,16 +28,20 @@ def connect(system: System) -> None:
     taken: dict[str, Signal] = {}
     for k, (output, input_) in enumerate(system.scenario.connections):
         place = f"connections[{k}]"
-        for source, target in _resolve(system, output, input_, f"{place} {output} -> {input_}"):
+        for source, target in _resolve(system, output, input_, _where(place, output, input_)):
             _join(source, target, place, taken, system)
     for k, (output, input_) in enumerate(system.scenario.optional_connections):
         place = f"optional_connections[{k}]"
-        for source, target in _present(system, output, input_, f"{place} {output} -> {input_}"):
+        for source, target in _present(system, output, input_, _where(place, output, input_)):
             if target.name not in taken:
                 _join(source, target, place, taken, system)
     for name in system.scenario.transformations:
         if name not in taken:
-            raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
+            raise InputError(f"transformations: {name_of(name)} is not connected{nearest(name, taken)}")
+
+
+def _where(place: str, output: str, input_: str) -> str:
+    return f"{place} {name_of(output)} -> {name_of(input_)}"
 
 
 def _join(source: Signal, target: Signal, place: str, taken: dict[str, Signal], system: System) -> None:

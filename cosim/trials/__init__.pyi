@@ -5,7 +5,7 @@ from .ship_passage import Passage as Passage
 from .ship_passage import executes as executes
 from .ship_passage import passage as passage
 from .trial_outcome import DEGREES as DEGREES
-from .trial_outcome import Outcome as Outcome
+from .trial_outcome import TrialOutcome as TrialOutcome
 from .trial_outcome import outcome as outcome
 from .trial_outcome import sheet as sheet
 from .trial_outcome import simulated_trial as simulated_trial

@@ -58,7 +58,7 @@ KINDS: Mapping[str, Callable[[Passage, float], dict[str, float]]] = {
 TEN, TWENTY, OFF = math.radians(10.0), math.radians(20.0), math.radians(2.5)
 
 
-class Limits(NamedTuple):
+class TrialLimits(NamedTuple):
     """Limits in ship's lengths, and of overshoots in degrees over L/V in seconds (MSC.137(76), 5.3)."""
 
     advance: float = 4.5
@@ -95,7 +95,7 @@ def limits(found: Mapping[str, float], length: float) -> dict[str, float]:
         Name -> largest value, in the unit of the measure, for those with a limit. Those of a zig-zag are
         for 10/10 and 20/20.
     """
-    allowed = {n: share * length for n, share in Limits()._asdict().items() if n in found}
+    allowed = {n: share * length for n, share in TrialLimits()._asdict().items() if n in found}
     check, speed = found.get("check_angle", 0.0), found.get("approach_speed", 0.0)
     if abs(check - TEN) > OFF:
         allowed.pop("initial_turning", None)

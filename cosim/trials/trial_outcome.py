@@ -9,7 +9,7 @@ from rich.table import Table
 
 from ..errors import InputError
 from ..files import write_json
-from ..formats.outline import Trial
+from ..formats.outline import AnnotatedTrial
 from ..results.log import TRIAL, Log, read_log
 from ..results.performance import MetricsError
 from ..results.run_options import read_options
@@ -22,7 +22,7 @@ NOTHING = "nothing more to measure: the run is too short, or the order does not 
 DEGREES = {"rad": "°", "rad/s": "°/s"}  # how angles are shown
 
 
-class Outcome(NamedTuple):
+class TrialOutcome(NamedTuple):
     """A trial, measured.
 
     Attributes:
@@ -55,7 +55,7 @@ class Outcome(NamedTuple):
         write_json(folder / TRIAL, self.content())
 
 
-def outcome(kind: str, p: Passage, length: float) -> Outcome:
+def outcome(kind: str, p: Passage, length: float) -> TrialOutcome:
     """Measure a trial.
 
     Args:
@@ -67,12 +67,12 @@ def outcome(kind: str, p: Passage, length: float) -> Outcome:
         InputError: no such trial, or no order.
     """
     found = measure(kind, p, length)
-    return Outcome(kind, p, length, found, limits(found, length) if length > 0.0 else {})
+    return TrialOutcome(kind, p, length, found, limits(found, length) if length > 0.0 else {})
 
 
 def outcome_of_log(
-    log: Log, trial: Trial, roles: Roles, length: float, start: float | None, stop: float | None
-) -> Outcome:
+    log: Log, trial: AnnotatedTrial, roles: Roles, length: float, start: float | None, stop: float | None
+) -> TrialOutcome:
     """Measure a trial in a log.
 
     Args:
@@ -97,7 +97,7 @@ def outcome_of_log(
         raise MetricsError(str(error)) from None
 
 
-def simulated_trial(folder: Path, start: float | None = None, stop: float | None = None) -> Outcome:
+def simulated_trial(folder: Path, start: float | None = None, stop: float | None = None) -> TrialOutcome:
     """The trial that a finished run is.
 
     Args:
@@ -119,7 +119,7 @@ def simulated_trial(folder: Path, start: float | None = None, stop: float | None
         raise InputError(str(error)) from None
 
 
-def sheet(found: Outcome, title: str = "") -> Table:
+def sheet(found: TrialOutcome, title: str = "") -> Table:
     """A trial for the terminal, as in a trial report: angles in degrees, distances also in lengths."""
     shown = Table(title=title or f"Trial: {found.kind}", title_justify="left", box=None, pad_edge=False)
     if found.measures.keys() <= APPROACH:

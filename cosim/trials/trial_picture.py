@@ -12,7 +12,7 @@ from ..results.canvas import DPI, WIDTH, arrange, blank, grid, save, thin
 from ..results.log import TRIAL_PICTURE
 from ..results.picture_files import Drawn
 from .ship_passage import executes
-from .trial_outcome import Outcome
+from .trial_outcome import TrialOutcome
 from .yaw_stability import plateaus
 
 if TYPE_CHECKING:
@@ -23,17 +23,17 @@ HEIGHT = 4.2  # in
 SHIP, MARK = "blue", "0.4"  # colours of the ship's line, and of what is measured
 
 
-def draw_trial(found: Outcome) -> Drawn:
+def draw_trial(found: TrialOutcome) -> Drawn:
     """The picture of a trial: its track, and heading and order, or rate over order."""
     return Drawn(_figure(found))
 
 
-def write_picture(found: Outcome, folder: Path) -> None:
+def write_picture(found: TrialOutcome, folder: Path) -> None:
     """Write it as ``trial.png``."""
     save(_figure(found), folder / TRIAL_PICTURE, DPI)
 
 
-def _figure(found: Outcome) -> Figure:
+def _figure(found: TrialOutcome) -> Figure:
     figure = blank(WIDTH, HEIGHT)
     left, right = figure.subplots(1, 2)
     for panel in (left, right):
@@ -43,7 +43,7 @@ def _figure(found: Outcome) -> Figure:
     return arrange(figure)
 
 
-def _track(panel: Axes, found: Outcome) -> None:
+def _track(panel: Axes, found: TrialOutcome) -> None:
     """Track along and across the heading at the first execute, in metres or ship's lengths."""
     p = found.passage
     x_0, y_0, psi_0 = p.at(executes(p)[0])
@@ -63,7 +63,7 @@ def _track(panel: Axes, found: Outcome) -> None:
         panel.axvline(side * m["tactical_diameter"] / size, color=MARK, linewidth=0.8, dashes=(5, 4))
 
 
-def _heading(panel: Axes, found: Outcome) -> None:
+def _heading(panel: Axes, found: TrialOutcome) -> None:
     """Heading off the first one, and the order as a share of its largest, over time."""
     p = found.passage
     times = executes(p)
@@ -78,7 +78,7 @@ def _heading(panel: Axes, found: Outcome) -> None:
     panel.set(xlabel="time [s]", ylabel="heading [°]; order (red)")
 
 
-def _speed(panel: Axes, found: Outcome) -> None:
+def _speed(panel: Axes, found: TrialOutcome) -> None:
     """Speed over ground over time."""
     p = found.passage
     speed = np.hypot(np.gradient(p.x, p.time), np.gradient(p.y, p.time))
@@ -86,14 +86,14 @@ def _speed(panel: Axes, found: Outcome) -> None:
     panel.set(xlabel="time [s]", ylabel="speed [m/s]")
 
 
-def _rates(panel: Axes, found: Outcome) -> None:
+def _rates(panel: Axes, found: TrialOutcome) -> None:
     """Steady rate over order, in the order of the plateaus."""
     held = plateaus(found.passage)[1:]
     panel.plot([h.order for h in held], [np.degrees(h.rate) for h in held], "o-", color=SHIP)
     panel.set(xlabel="order", ylabel="rate of turn [°/s]")
 
 
-PANELS: Mapping[str, Callable[[Axes, Outcome], None]] = {
+PANELS: Mapping[str, Callable[[Axes, TrialOutcome], None]] = {
     "circle": _heading,
     "zigzag": _heading,
     "stop": _speed,

@@ -22,7 +22,7 @@ from fmus.frames import rotate_to_body
 
 from ..predictors.shooting import Shooting
 from ..runs import Smoothed
-from ..search.prediction_fit.disturbance import Push, covariance
+from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
 from .criterion import JUDGED
 from .predictions import Predictions, difference, judged
 
@@ -40,7 +40,7 @@ class Learned(NamedTuple):
     """
 
     posterior: Posterior | None
-    push: Push
+    push: ForceDisturbance
     files: tuple[Path, ...]
 
 
@@ -62,7 +62,7 @@ def read_learned(folder: str | Path) -> Learned:
     if not (np.isfinite([size, time]).all() and (size >= 0.0).all() and (time > 0.0).all()):
         raise InputError(f"'{path}': the unrecorded force has no size and time")
     posterior = read_posterior(other) if some else None
-    return Learned(posterior, Push(size, time), (path, *([other] if some else [])))
+    return Learned(posterior, ForceDisturbance(size, time), (path, *([other] if some else [])))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..report.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Axis, Chart, Panel
+from ..report.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
 from .judged_criterion import EXPANDED, Judgement
 
 
@@ -13,7 +13,7 @@ def error_figure(j: Judgement) -> Chart:
     number, inside = np.arange(1, size.size + 1), size <= c.tolerance
     reach = 0.0 if j.budget is None else EXPANDED * j.budget.u_val / c.factor
     ends = (0, size.size + 1)
-    panel = Panel(Axis("window", ends), Axis(f"{c.quantity} [{c.unit}]"), zero=True)
+    panel = Panel(ChartAxis("window", ends), ChartAxis(f"{c.quantity} [{c.unit}]"), zero=True)
     if j.budget is not None:
         panel.fill(ends, 0.0, reach, BAND, "2 u_val")
     for k in np.flatnonzero(np.diff(j.run)):

@@ -5,7 +5,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..report.document import Section
+from ..report.document import ReportSection
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,7 +14,9 @@ A4 = (8.27, 11.69)  # in
 LETTERS, LINES = 90, 60  # of a fixed width within matplotlib's margins; derived from its small size
 
 
-def write_pdf(path: Path, title: str, parts: Sequence[Section], figures: "Sequence[Figure]") -> None:
+def write_pdf(
+    path: Path, title: str, parts: Sequence[ReportSection], figures: "Sequence[Figure]"
+) -> None:
     """Write text pages, then the figures, one a page."""
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
@@ -31,7 +33,7 @@ def write_pdf(path: Path, title: str, parts: Sequence[Section], figures: "Sequen
             pdf.savefig(figure)
 
 
-def laid_out(title: str, parts: Sequence[Section], letters: int = LETTERS) -> list[str]:
+def laid_out(title: str, parts: Sequence[ReportSection], letters: int = LETTERS) -> list[str]:
     """The lines of some sections, with columns of tables beside each other."""
     from rich.box import SIMPLE
     from rich.console import Console

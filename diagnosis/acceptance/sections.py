@@ -3,33 +3,33 @@
 from collections.abc import Iterator
 
 from ..report.content import Content
-from ..report.document import Section, Table
+from ..report.document import ReportSection, Table
 from ..report.formatting import NO_VALUE, number
 
 BUDGET = ("u_D", "initial_state", "parameters", "process_noise", "u_input", "u_num", "u_val")
 CALLED = {"u_D": "measurement u_D", "initial_state": "initial state", "process_noise": "process noise"}
 
 
-def sections(r: Content) -> Iterator[Section]:
+def sections(r: Content) -> Iterator[ReportSection]:
     """The report, in order."""
     told = [(f"{j.criterion}: {j.requirement}", j.outcome, j.reason) for j in r.judgements]
-    yield Section("Verdict", tables=[Table(("criterion", "verdict", "why"), told, words=True)])
+    yield ReportSection("Verdict", tables=[Table(("criterion", "verdict", "why"), told, words=True)])
     yield _errors(r)
     yield _uncertainty(r)
     heads = ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest")
     covered = [(v.signal, v.unit, *map(number, [*v.values()][2:])) for v in r.validity]
     text = "What the data cover: least, quantiles and greatest over all samples that are used."
-    yield Section("Validity range", [text], [Table(heads, covered)])
+    yield ReportSection("Validity range", [text], [Table(heads, covered)])
     faults = [f"{s['run']}: {s['sentence']}" for s in r.sensors]
-    yield Section("Faults of sensors", faults or ["The channels do not contradict each other."])
-    yield Section("What is not covered", r.not_covered)
+    yield ReportSection("Faults of sensors", faults or ["The channels do not contradict each other."])
+    yield ReportSection("What is not covered", r.not_covered)
     if r.notes:
-        yield Section("Notes", r.notes)
+        yield ReportSection("Notes", r.notes)
     yield _origin(r)
-    yield Section("Terms and standing", [r.standing, *r.references])
+    yield ReportSection("Terms and standing", [r.standing, *r.references])
 
 
-def _errors(r: Content) -> Section:
+def _errors(r: Content) -> ReportSection:
     rows = [
         (
             j.criterion,
@@ -45,10 +45,10 @@ def _errors(r: Content) -> Section:
         "Bounds of the share, or of the RMS, are one-sided at the confidence of the criterion."
     )
     heads = ("criterion", "unit", "tolerance", "E", "RMS", "largest", "windows", "share or RMS")
-    return Section("Comparison error", [told], [Table(heads, rows)])
+    return ReportSection("Comparison error", [told], [Table(heads, rows)])
 
 
-def _uncertainty(r: Content) -> Section:
+def _uncertainty(r: Content) -> ReportSection:
     rows = [
         (
             j.criterion,
@@ -63,10 +63,10 @@ def _uncertainty(r: Content) -> Section:
         "state, parameters and process noise, u_val² = u_num² + u_input² + u_D², of what is known."
     )
     heads = ("criterion", "unit", *(CALLED.get(name, name) for name in BUDGET))
-    return Section("Uncertainty", [told], [Table(heads, rows)])
+    return ReportSection("Uncertainty", [told], [Table(heads, rows)])
 
 
-def _origin(r: Content) -> Section:
+def _origin(r: Content) -> ReportSection:
     c = r.criteria
     rows = [
         ("made", r.made),
@@ -80,4 +80,4 @@ def _origin(r: Content) -> Section:
     ]
     purpose = [f"Purpose: {c.purpose}."] if c.purpose else []
     told = r.fmu["sentences"] if r.fmu else []
-    return Section("Made with", [*purpose, *told], [Table(("", ""), rows, words=True)])
+    return ReportSection("Made with", [*purpose, *told], [Table(("", ""), rows, words=True)])

@@ -30,7 +30,7 @@ from ..predictors.ship_model import parameters
 from .settings import SETTINGS
 
 
-class Reference(NamedTuple):
+class ReferencePath(NamedTuple):
     """A path to follow.
 
     Attributes:
@@ -48,7 +48,7 @@ class Reference(NamedTuple):
     seconds: float
 
     @classmethod
-    def of(cls, name: str, guidance: Component, scenario: str) -> "Reference":
+    def of(cls, name: str, guidance: Component, scenario: str) -> "ReferencePath":
         """The path of a shipped scenario."""
         content = json.loads(find_scenario(scenario).read_text(encoding="utf-8"))
         vessel, observer = (content["fmus"][name]["parameters"] for name in ("vessel", "observer"))
@@ -56,12 +56,12 @@ class Reference(NamedTuple):
 
 
 REFERENCES = (
-    Reference.of("ellipse", ellipse.COMPONENT, "ellipse"),
-    Reference.of("figure of eight", eight.COMPONENT, "eight"),
+    ReferencePath.of("ellipse", ellipse.COMPONENT, "ellipse"),
+    ReferencePath.of("figure of eight", eight.COMPONENT, "eight"),
 )
 
 
-class Loop(NamedTuple):
+class ClosedLoop(NamedTuple):
     """A closed loop at an instant: the states of its components, and what they give to each other."""
 
     states: tuple[Any, ...]  # of vessel, path, observer, controller and thrusters
@@ -72,8 +72,8 @@ class Loop(NamedTuple):
 
 
 def closed_loop(
-    reference: Reference, model: Model
-) -> tuple[Loop, Callable[[Loop, float], tuple[Loop, Number]]]:
+    reference: ReferencePath, model: Model
+) -> tuple[ClosedLoop, Callable[[ClosedLoop, float], tuple[ClosedLoop, Number]]]:
     """A closed loop at its start, and the function that advances it by a step.
 
     That function gets the time [s] since controller and thrusters acted last, and gives the distance [m]
@@ -94,9 +94,9 @@ def closed_loop(
     c, _ = controller.begin(ControllerInputs(estimate, target))
     t, _ = drive.begin(told())
     late = max(1, 1 + round(model.clock / h_path))
-    first = Loop((s, g, o, c, t), vessel.velocity, target, estimate, (vessel.measured,) * late)
+    first = ClosedLoop((s, g, o, c, t), vessel.velocity, target, estimate, (vessel.measured,) * late)
 
-    def step(now: Loop, h: float) -> tuple[Loop, Number]:
+    def step(now: ClosedLoop, h: float) -> tuple[ClosedLoop, Number]:
         s, g, o, c, t = now.states
         c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
         t, thrust = drive.advance(t, told(demand.tau, now.velocity), h)
@@ -107,7 +107,7 @@ def closed_loop(
         poses = (*now.poses[1:], vessel.measured)
         commanded = Force(thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N)
         o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), h_path)
-        return Loop((s, g, o, c, t), vessel.velocity, target, estimate, poses), sqrt(x * x + y * y)
+        return ClosedLoop((s, g, o, c, t), vessel.velocity, target, estimate, poses), sqrt(x * x + y * y)
 
     return first, step
 
@@ -128,7 +128,7 @@ class _Part:
         return self._component.advance(state, inputs, self._prepared, h)
 
 
-def distances(reference: Reference, model: Model) -> Iterator[float]:
+def distances(reference: ReferencePath, model: Model) -> Iterator[float]:
     """Distance [m] between the ship and its target after each step.
 
     The loop is recorded once for the model's parameters, and runs without what does not act in it.
@@ -150,7 +150,7 @@ def bound_of(model: Model) -> float:
     return SETTINGS.bound * model.ship.scale.length
 
 
-def largest_distance(reference: Reference, model: Model) -> float:
+def largest_distance(reference: ReferencePath, model: Model) -> float:
     """Largest distance [m] between the ship and its target; infinite as soon as the ship is lost."""
     bound = bound_of(model)
     try:

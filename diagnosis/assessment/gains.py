@@ -25,7 +25,7 @@ from .settings import SETTINGS
 
 
 @dataclass(frozen=True, eq=False)
-class Gains:
+class ThrustGains:
     """k of each axis; NaN where nothing varies.
 
     Attributes:
@@ -62,7 +62,7 @@ class Gains:
         return bool(self.told.any() and near[self.told].all())
 
 
-def gains(w: WeakWindows, model: Model) -> Gains:
+def gains(w: WeakWindows, model: Model) -> ThrustGains:
     """The acceleration that the commands of a run give, as shares of what they give by a model."""
     a, z, T = inertial(w, model), needed(w, model), w.held @ commanded_force(w, model)
     moves = T.std(axis=0) > SETTINGS.rounding * np.abs(T).max()
@@ -90,7 +90,7 @@ def gains(w: WeakWindows, model: Model) -> Gains:
         value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
         # With less explained of what all else leaves, it is not T that moves the ship.
         told[j] = beta[0] ** 2 > SETTINGS.explained * (beta[0] ** 2 + free * variance)
-    return Gains(value, error * np.sqrt(correlated_windows([w], left)), told)
+    return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), told)
 
 
 def _own(command: np.ndarray, others: Sequence[np.ndarray]) -> float:

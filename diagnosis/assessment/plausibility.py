@@ -30,10 +30,10 @@ from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import OVERLAP, commanded_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU
-from ..runs.columns.side_car import Change
+from ..runs.columns.side_car import ColumnChange
 from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
-from .gains import Gains, gains
+from .gains import ThrustGains, gains
 from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
 from .settings import SETTINGS
 
@@ -61,14 +61,14 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
             raise InputError(f"run '{w.run.name}': {seen}{remedy}; {GO_ON}")
 
 
-def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
+def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChange], str | None] | None:
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
     twice, wrong_one = same_columns(w.run), still_column(w.run)
     seen = f"{wrong_one} is the same number in all rows, while the rest of the pose changes"
     if twice:
         wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} are the same numbers"
     if wrong_one:
-        return seen, {wrong_one: Change(wrong_one)}, "the name of its column"
+        return seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column"
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
         return silent, {}, None
@@ -90,7 +90,7 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
     return f"{seen}; it seems that {reading.mistake}", reading.changes, None
 
 
-def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None:
+def likeliest_unit(w: WeakWindows, model: Model, given: ThrustGains) -> Reading | None:
     """The reading in which the commands give the accelerations that they should, if there is any.
 
     Of several that in which the model's error is the least part of the commands: the median of the axes

@@ -11,7 +11,7 @@ from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
 from ..runs import Run
 from ..runs.columns.columns import POSE, TAU, UNITS
-from ..runs.columns.side_car import Change
+from ..runs.columns.side_car import ColumnChange
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Reading:
     """
 
     mistake: str
-    changes: Mapping[str, Change] = field(default_factory=dict)
+    changes: Mapping[str, ColumnChange] = field(default_factory=dict)
     motion: np.ndarray = field(default_factory=lambda: np.eye(3))
     commands: np.ndarray = field(default_factory=lambda: np.eye(3))
     turn: float = 0.0
@@ -55,9 +55,9 @@ def of_commands(mistake: str, factors: Sequence[float]) -> Reading:
     return Reading(mistake, _scaled(TAU, factors), commands=np.diag(factors))
 
 
-def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, Change]:
+def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, ColumnChange]:
     pairs = zip(signals, factors, strict=True)
-    return {s: Change(s, np.sign(f), abs(f)) for s, f in pairs if f != 1.0}
+    return {s: ColumnChange(s, np.sign(f), abs(f)) for s, f in pairs if f != 1.0}
 
 
 def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
@@ -65,7 +65,7 @@ def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
     order = np.eye(3)
     order[[i, k]] = order[[k, i]]
     pair = signals[i], signals[k]
-    changes = {a: Change(b) for a, b in (pair, pair[::-1])}
+    changes = {a: ColumnChange(b) for a, b in (pair, pair[::-1])}
     motion, commands = (order, np.eye(3)) if signals is POSE else (np.eye(3), order)
     return Reading(f"{pair[0]} and {pair[1]} are swapped", changes, motion, commands)
 
@@ -89,7 +89,7 @@ def directions(run: Run, model: Model) -> Iterator[Reading]:
     else:
         unit = model.ship.commands  # a force turns round with its thrust, at the same angle
         thrusts = [s for s in run.signals if unit.get(s) != "rad"]
-        changes = {s: Change(s, -1.0) for s in thrusts or run.signals}
+        changes = {s: ColumnChange(s, -1.0) for s in thrusts or run.signals}
         yield Reading(wrong, changes, commands=-np.eye(3))
 
 
@@ -98,7 +98,7 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
     for unit, m in UNITS["length"].items():
         for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
             yield of_pose(f"{name} is in {unit}", factors)
-    half = Change("psi", offset=np.pi)
+    half = ColumnChange("psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
     if run.commands is not None:
         yield from _shares(run, run.commands, model)
@@ -132,7 +132,7 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
     yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
-    clock = {"time": Change("time", factor=k**0.5)}
+    clock = {"time": ColumnChange("time", factor=k**0.5)}
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock, pace=k**0.5)
 
 

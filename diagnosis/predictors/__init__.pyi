@@ -15,15 +15,15 @@ from .parameter_set import ship_with as ship_with
 from .parameter_set import write_model as write_model
 from .predictor import MAP as MAP
 from .predictor import WRITTEN as WRITTEN
-from .predictor import Description as Description
 from .predictor import ModelSource as ModelSource
 from .predictor import Predictor as Predictor
+from .predictor import PredictorDescription as PredictorDescription
 from .predictor import UnmatchedError as UnmatchedError
 from .predictor import open_model as open_model
 from .predictor import refuse_map as refuse_map
 from .python_function import PythonFunction as PythonFunction
-from .ship_model import GivenForce as GivenForce
 from .ship_model import Model as Model
+from .ship_model import SampledForce as SampledForce
 from .ship_model import of_one_run as of_one_run
 from .ship_model import of_run as of_run
 from .thrust import Response as Response

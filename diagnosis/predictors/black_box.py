@@ -9,8 +9,8 @@ heading.
 **Model error, by inverse use.** In the measured state and with the command of each sample, the black
 box accelerates by nu_dot, and the model of the ship by another nu_dot. The difference, times the
 inertia, is a force over time, linear in pose and velocity about the measured ones, that makes the model
-what the black box is along the run. With it as a given force (:class:`.ship_model.GivenForce`) all that
-is done with a model can be done with the black box: its model error, and the library's effects in
+what the black box is along the run. With it as a given force (:class:`.ship_model.SampledForce`) all
+that is done with a model can be done with the black box: its model error, and the library's effects in
 addition to it. A black box whose velocity cannot be set is asked along its own prediction of the run,
 in place of the measured one.
 
@@ -33,9 +33,9 @@ from fmus.ops import wrap
 
 from ..runs import Run, Smoothed
 from .described_ship import DescribedShip, windows_of
-from .prediction import Starts, at_rest
-from .predictor import Description, Predictor
-from .ship_model import GivenForce, Model
+from .prediction import WindowStarts, at_rest
+from .predictor import Predictor, PredictorDescription
+from .ship_model import Model, SampledForce
 from .thrust import FORGOTTEN
 from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
 from .windows import Windows, first_row, free_runs, step_of
@@ -60,7 +60,7 @@ class BlackBox(ABC):
         ship: model of the ship.
 
     Attributes:
-        kind, sha256, given_map: see :class:`.predictor.Description`.
+        kind, sha256, given_map: see :class:`.predictor.PredictorDescription`.
         starts: what a prediction can begin with, of :data:`MOTION`.
         inputs: the forces and commands that it takes.
         own_run_in: the run-in of every run [s]; None: none from rest, else the usual one.
@@ -167,10 +167,12 @@ class BlackBox(ABC):
         pose = self._placed_at(motion, h, first, smoothed.eta[[row]])[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
 
-    def description(self) -> Description:
+    def description(self) -> PredictorDescription:
         waits = {w.run.name: self.run_in(w.smoothed) for w in self.runs}
         told = [*self._sentences(max(waits.values()))]
-        return Description(self.kind, self.name, self.sha256, self.given_map, self.whole, waits, told)
+        return PredictorDescription(
+            self.kind, self.name, self.sha256, self.given_map, self.whole, waits, told
+        )
 
     def in_windows(self) -> Predictor:
         return DescribedShip(self.model) if self.whole else self
@@ -194,7 +196,7 @@ class BlackBox(ABC):
         if self.placed:
             yield "Its pose is laid onto the measured one where a prediction begins."
 
-    def _poses(self, starts: Starts) -> np.ndarray:
+    def _poses(self, starts: WindowStarts) -> np.ndarray:
         """The predicted pose (steps + 1, 3, 1, w) in windows."""
         found, h = [], starts.h
         for smoothed, rows in starts.runs:
@@ -222,13 +224,15 @@ class BlackBox(ABC):
         columns = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2]), nu])
         return between(smoothed.time, time, columns)
 
-    def _beyond_along(self, w: WeakWindows, body: Model) -> GivenForce:
+    def _beyond_along(self, w: WeakWindows, body: Model) -> SampledForce:
         """The force of the black box beyond that of a model, along a run."""
         time = w.run.time
         slope = np.zeros((time.size, 3, len(MOTION)))
         if self.whole:
             motion = self._whole_run(w.smoothed)
-            return GivenForce(_beyond(w, body, motion, np.gradient(motion[:, 3:], time, axis=0)), slope)
+            return SampledForce(
+                _beyond(w, body, motion, np.gradient(motion[:, 3:], time, axis=0)), slope
+            )
         known = np.flatnonzero(w.known)
         motion = np.concatenate([w.smoothed.eta, w.smoothed.nu], axis=1)
         motion[~w.known] = 0.0
@@ -253,7 +257,7 @@ class BlackBox(ABC):
             change = (beyond(sparse, moved) - plain)[sparse] / (SMALL * size)
             slope[:, :, k] = between(time, time[sparse], change)
         force[~w.known], slope[~w.known] = 0.0, 0.0
-        return GivenForce(force - np.einsum("nij,nj->ni", slope, motion), slope)
+        return SampledForce(force - np.einsum("nij,nj->ni", slope, motion), slope)
 
     def _inertia(self) -> dict[str, float]:
         """Coefficients that give a model the inertia of the black box, as far as it takes forces."""

@@ -12,7 +12,7 @@ from fmus.ships.naming import described_ship
 from ..execution.progress import Advance, silent
 from ..runs import Smoothed
 from .parameter_set import read_model, write_model
-from .predictor import MODEL, Description, Predictor, refuse_map
+from .predictor import MODEL, Predictor, PredictorDescription, refuse_map
 from .ship_model import Model
 from .weak_form import WeakWindows
 from .windows import Windows, free_runs
@@ -55,7 +55,7 @@ class DescribedShip:
     def in_windows(self) -> Predictor:
         return self
 
-    def description(self) -> Description | None:
+    def description(self) -> PredictorDescription | None:
         return None
 
     def write(

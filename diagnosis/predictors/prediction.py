@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.actuators.response import Prepared
+from fmus.actuators.response import PreparedThrusters
 from fmus.frames import rotate_to_body
 from fmus.ops import when, wrap
 from fmus.signals import Force
@@ -25,7 +25,7 @@ UNSURE = 3.0  # standard deviations of a speed within which it may be none
 
 
 @dataclass(frozen=True, eq=False)
-class Starts:
+class WindowStarts:
     """Windows, of one run or more with commands in one layout, that are predicted together.
 
     Attributes:
@@ -42,7 +42,7 @@ class Starts:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
 
-    def drive(self, model: Model) -> Prepared:
+    def drive(self, model: Model) -> PreparedThrusters:
         """The thrusters of a model, in the layout of the runs' commands."""
         return drive_of(self.runs[0][0].track.run, model)
 
@@ -100,7 +100,7 @@ def at_rest(smoothed: Smoothed) -> bool:
     return bool((np.abs(smoothed.nu[first]) < still).all())
 
 
-def predict(starts: Starts, model: Model) -> np.ndarray:
+def predict(starts: WindowStarts, model: Model) -> np.ndarray:
     """The measured pose as a model predicts it.
 
     Args:
@@ -121,7 +121,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         return np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull)), axis=1)
 
 
-def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
+def arriving(starts: WindowStarts, model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Commands that arrive and shares of full force that act, each (steps, k, p or 1, w)."""
     found = [starts.arriving(single) for single in singles(model)]
     given, acting = (np.concatenate(part, axis=2) for part in zip(*found, strict=True))
@@ -129,7 +129,7 @@ def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def propagate(
-    starts: Starts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
+    starts: WindowStarts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
 ) -> Iterator[vessel.State]:
     """The state at the start and after each step of the integration; arrays (p, w) or like them.
 
@@ -196,7 +196,7 @@ def singles(model: Model) -> list[Model]:
     return [replace(model, thrusters={**model.thrusters, **one}) for one in each] or [model]
 
 
-def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.State:
+def moved(s: vessel.State, tau: Force, b: vessel.PreparedVessel, h: float) -> vessel.State:
     """The ship a step later."""
     return when(
         b.disturbed,
@@ -205,7 +205,7 @@ def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.S
     )
 
 
-def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
+def true_motion(eta: Any, eta_dot: Any, b: vessel.PreparedVessel) -> tuple[list[Any], list[Any]]:
     """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
     x, y, psi = true_pose(eta, b)
     ahead, astern = (true_pose(eta + h * eta_dot, b) for h in (LONGEST_STEP, -LONGEST_STEP))
@@ -213,7 +213,7 @@ def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], 
     return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 
 
-def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
+def true_pose(measured: Any, b: vessel.PreparedVessel) -> list[Any]:
     """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
     pose = [m[None] for m in measured]
     for _ in range(8):

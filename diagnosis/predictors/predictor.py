@@ -35,7 +35,7 @@ class UnmatchedError(InputError):
 
 
 @dataclass(frozen=True)
-class Description:
+class PredictorDescription:
     """How a predictor that is not a model of this project predicts, for the report.
 
     Attributes:
@@ -144,7 +144,7 @@ class Predictor(Protocol):
         """What predicts windows that begin in a measured state: itself, or ``model`` in its place."""
         ...
 
-    def description(self) -> Description | None:
+    def description(self) -> PredictorDescription | None:
         """How it predicts; None for a model of this project."""
         ...
 

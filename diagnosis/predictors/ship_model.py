@@ -12,15 +12,15 @@ from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
 from fmus.effects.linear_map import AXES, parameter
 from fmus.effects.measurement import CLOCK_OFFSET
-from fmus.hull import mass_matrix
+from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
-from fmus.vessel.vessel import Prepared
+from fmus.vessel.vessel import PreparedVessel
 
 Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
 
 
-class GivenForce(NamedTuple):
+class SampledForce(NamedTuple):
     """A force on the hull over the samples of a run, linear in pose and velocity over ground.
 
     Attributes:
@@ -103,7 +103,7 @@ class Model:
     ship: Ship = field(default_factory=ship)
     origin: "Model | None" = None
     runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    given: Mapping[str, GivenForce] = field(default_factory=dict)
+    given: Mapping[str, SampledForce] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         parts = (*self.ship.parameters, "measurement")
@@ -186,13 +186,14 @@ class Model:
         return self.measurement.get(CLOCK_OFFSET.id, 0.0)
 
     @cached_property
-    def hull(self) -> Prepared:
+    def hull(self) -> PreparedVessel:
         """The vessel, ready for a step."""
-        return self.ship.vessel.prepared(parameters(self.ship.vessel, self.vessel))
+        b = self.ship.vessel.prepared(parameters(self.ship.vessel, self.vessel))
+        return b._replace(hull=b.hull._replace(damping=without_zeros(b.hull.damping)))
 
     @cached_property
     def drive(self) -> Any:
-        """The thrusters, ready for a step, :class:`fmus.actuators.response.Prepared`."""
+        """The thrusters, ready for a step, :class:`fmus.actuators.response.PreparedThrusters`."""
         return self.ship.thrusters.prepared(parameters(self.ship.thrusters, self.thrusters))
 
     @cached_property

@@ -15,7 +15,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from .prediction import Starts, arriving, propagate
+from .prediction import WindowStarts, arriving, propagate
 from .ship_model import Model
 from .thrust import Response
 from .windows import usable_windows
@@ -80,7 +80,7 @@ class Shooting:
         rows = [usable_windows(smoothed, length).first_rows for smoothed in runs]
         self.every = length / INSTANTS
         groups = tuple(zip(runs, rows, strict=True))
-        self.starts = Starts(groups, self.every / PARTS, INSTANTS * PARTS)
+        self.starts = WindowStarts(groups, self.every / PARTS, INSTANTS * PARTS)
         self.since = self.every * np.arange(1.0, INSTANTS + 1.0)
         self.run = np.repeat(np.arange(len(runs)), [r.size for r in rows])
         self.start = np.concatenate([s.time[r] for s, r in groups])
@@ -102,7 +102,7 @@ class Shooting:
             parts.append(self._stepped(starts, model.during(name), like.during(name)))
         return [_beside(states) for states in zip(*parts, strict=True)]
 
-    def _stepped(self, starts: Starts, model: Model, like: Model) -> list[vessel.State]:
+    def _stepped(self, starts: WindowStarts, model: Model, like: Model) -> list[vessel.State]:
         runs = tuple(smoothed.track.run.name for smoothed, _ in starts.runs)
         key, kept = Response.key(like), self._thrust.get(runs)
         if kept is None or kept[0] != key:

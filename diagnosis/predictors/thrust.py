@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.actuators.response import Prepared, at_rest, command_response, force_response
+from fmus.actuators.response import PreparedThrusters, at_rest, command_response, force_response
 from fmus.effects import Memory
 from fmus.vessel.vessel import State, water_velocity
 
@@ -29,7 +29,7 @@ LONGEST_STEP = 0.02
 FORGOTTEN = 60.0
 
 
-def drive_of(run: Run, model: Model) -> Prepared:
+def drive_of(run: Run, model: Model) -> PreparedThrusters:
     """The thrusters of a model, in the layout of a run's commands."""
     drive, layout = model.drive, model.ship.layout_of(run.commands)
     return drive._replace(effects=drive.effects._replace(layout=layout))
@@ -70,7 +70,8 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
         drive = layout.powered(drive, run.power.T)
     total = np.zeros((3, run.time.size))
     points = between[1:] if len(between) > 1 else between
-    now = layout.running(run.time, *nu.T, tuple(between[0]), drive)
+    u, v, r = nu.T
+    now = layout.running(run.time, u, v, r, tuple(between[0]), drive)
     for acting in points:
         force = layout.act(tuple(acting), now, drive)
         for axis in range(3):

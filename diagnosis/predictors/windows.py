@@ -16,7 +16,7 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
-from .prediction import Starts, by_clock, predict
+from .prediction import WindowStarts, by_clock, predict
 from .ship_model import Model
 from .thrust import LONGEST_STEP
 from .weak_form import HORIZON
@@ -90,12 +90,12 @@ class Windows:
         self.sample_window = np.concatenate([p.window + a for p, a in zip(parts, before, strict=True)])
         self.measured = np.concatenate([p.smoothed.track.pose[p.rows] for p in parts])
         self.since = np.concatenate([p.time[p.rows] for p in parts]) - self.start[self.sample_window]
-        self._groups: list[tuple[Starts, np.ndarray]] = []
+        self._groups: list[tuple[WindowStarts, np.ndarray]] = []
         kinds = [(step_of(s), s.track.run.signals) for s in runs]
         for kind in sorted({kinds[k] for k in np.unique(self.run)}):
             members = [k for k, each in enumerate(kinds) if each == kind]
             starts = tuple((runs[k], parts[k].first_rows) for k in members)
-            group = Starts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
+            group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def after(self, seconds: float) -> "Windows":
@@ -165,7 +165,7 @@ class Windows:
         found = self.residuals_by(lambda starts: predict(starts, model), *(models or (1,)))
         return found if models else found[0]
 
-    def residuals_by(self, poses: Callable[[Starts], np.ndarray], models: int = 1) -> np.ndarray:
+    def residuals_by(self, poses: Callable[[WindowStarts], np.ndarray], models: int = 1) -> np.ndarray:
         """Residuals (p, samples, 3) of p models.
 
         Args:
@@ -274,7 +274,7 @@ def free_runs(
     h = max(step_of(smoothed), FREE_STEP * smoothed.scale.time)
     left = float(smoothed.time[-1] - smoothed.time[first])
     seconds = min(left, LONGEST_FREE * smoothed.scale.time)
-    starts = Starts(((smoothed, np.array([first])),), h, int(seconds / h))
+    starts = WindowStarts(((smoothed, np.array([first])),), h, int(seconds / h))
     found: dict[int, np.ndarray] = {}
     for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
         poses = predict(starts, together)

@@ -10,7 +10,7 @@ from .content import file_content as file_content
 from .content import write_coefficients as write_coefficients
 from .document import Document as Document
 from .document import Plot as Plot
-from .document import Section as Section
+from .document import ReportSection as ReportSection
 from .document import Table as Table
 from .document import numbers as numbers
 from .document import write_document as write_document

@@ -66,7 +66,7 @@ class Box(NamedTuple):
 
 
 @dataclass
-class Axis:
+class ChartAxis:
     """An axis of a panel.
 
     Attributes:
@@ -127,8 +127,8 @@ class Panel:
         notes: value of y -> text to the right.
     """
 
-    x: Axis = field(default_factory=Axis)
-    y: Axis = field(default_factory=Axis)
+    x: ChartAxis = field(default_factory=ChartAxis)
+    y: ChartAxis = field(default_factory=ChartAxis)
     zero: bool = False
     equal: bool = False
     marks: list[Mark] = field(default_factory=list)

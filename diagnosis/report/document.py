@@ -28,7 +28,7 @@ class Plot(NamedTuple):
 
 
 @dataclass
-class Section:
+class ReportSection:
     """A part of the page.
 
     Attributes:
@@ -56,7 +56,7 @@ class Document:
 
     title: str
     lead: str = ""
-    sections: Sequence[Section] = field(default_factory=list)
+    sections: Sequence[ReportSection] = field(default_factory=list)
     provenance: Mapping[str, str] = field(default_factory=dict)
 
 

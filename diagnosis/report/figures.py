@@ -12,7 +12,7 @@ from ..predictors.evaluation import Evaluation
 from ..runs.cleaning import Z95
 from ..search.findings import Ranked
 from ..search.shortlist import TIE
-from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Axis, Chart, Panel
+from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Chart, ChartAxis, Panel
 from .formatting import percent
 from .shape import Curve
 
@@ -41,7 +41,7 @@ def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> Chart:
         measured = e.before.omega[:, axis]
         rows = thin(np.arange(time.size), measured)[0]
         t, y = interrupted(np.column_stack([time, measured])[rows], segment[rows]).T
-        panel = Panel(Axis("time [s]", shown=axis == 2), Axis(label), zero=True)
+        panel = Panel(ChartAxis("time [s]", shown=axis == 2), ChartAxis(label), zero=True)
         if std is not None:
             half = Z95 * interrupted(std[rows, axis], segment[rows])
             panel.fill(t, y - half, y + half, BAND, "uncertainty, 95 %")
@@ -72,8 +72,8 @@ def profile(
         # What never changes has one edge, and one bin.
         edges = covariate.display_factor * np.resize(first.edges, first.rms.size + 1)
         shown = axis == AXES[-1] or covariate is THRUST  # the thrust is that of the axis
-        x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=shown)
-        panel = Panel(x, Axis(force), zero=True)
+        x = ChartAxis(LABELS[covariate], (edges[0], edges[-1]), shown=shown)
+        panel = Panel(x, ChartAxis(force), zero=True)
         steps = np.repeat(edges, 2)[1:-1]
         panel.fill(steps, 0.0, np.repeat(first.uncertainty, 2), BAND, "noise")
         panel.draw(steps, np.repeat(first.rms, 2), BEFORE, "before" if last else "model error")
@@ -96,8 +96,8 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     scale = (lambda x: np.arcsinh(x / linear)) if linear else None
     label = "score behind the first, with its standard error [1]"
     label += "\nright: explained beyond other values of the coefficients"
-    names = Axis(limits=(len(shown), -1), names=[r.id for r in shown])
-    panel = Panel(Axis(label, scale=scale), names)
+    names = ChartAxis(limits=(len(shown), -1), names=[r.id for r in shown])
+    panel = Panel(ChartAxis(label, scale=scale), names)
     for k, (r, (x, std)) in enumerate(zip(shown, behind, strict=True)):
         colour = AFTER if (tied := x <= TIE * std) else BAND
         panel.draw([x - std, x + std], [k, k], colour)
@@ -120,7 +120,7 @@ def _explained(share: float) -> str:
 
 def curve(c: Curve) -> Chart:
     """A learned shape beside the nominal one."""
-    panel = Panel(Axis(c.over, (c.x[0], c.x[-1])), Axis(c.what), zero=True)
+    panel = Panel(ChartAxis(c.over, (c.x[0], c.x[-1])), ChartAxis(c.what), zero=True)
     if c.sure is not None:
         panel.fill(c.x, *c.sure, AFTER)
     panel.draw(c.x, c.nominal, BEFORE, "before", dashed=True)

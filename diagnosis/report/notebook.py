@@ -10,7 +10,7 @@ from .page import rendered
 from .report_data import ReportData
 
 
-class Picture(Drawn):
+class NotebookChart(Drawn):
     """A chart of the report; a notebook shows it as SVG."""
 
     def __init__(self, chart: Chart) -> None:
@@ -27,7 +27,7 @@ class Plots:
     def __init__(self, data: ReportData) -> None:
         self._data, self._comparison = data, data.comparison
 
-    def where(self, over: str | None = None) -> Picture:
+    def where(self, over: str | None = None) -> NotebookChart:
         """RMS of the model error over a quantity, before and after.
 
         Args:
@@ -42,18 +42,20 @@ class Plots:
             raise InputError(f"no quantity '{over}'; there are {', '.join(names)}")
         c = self._comparison
         after = c.after.profiles if self._data.learned else None
-        return Picture(figures.profile(covariate, c.before.profiles, after))
+        return NotebookChart(figures.profile(covariate, c.before.profiles, after))
 
-    def omega(self, run: int = 0) -> Picture:
+    def omega(self, run: int = 0) -> NotebookChart:
         """The model error over time, and what of it is explained, of the run with this number."""
         c = self._comparison
-        return Picture(figures.model_error(c.evaluations[run], c.omega_std[run], self._data.learned))
+        return NotebookChart(
+            figures.model_error(c.evaluations[run], c.omega_std[run], self._data.learned)
+        )
 
-    def track(self, run: int = 0) -> Picture:
+    def track(self, run: int = 0) -> NotebookChart:
         """Measured and predicted track of the run with this number."""
-        return Picture(tracks.track(self._comparison.evaluations[run], self._data.learned))
+        return NotebookChart(tracks.track(self._comparison.evaluations[run], self._data.learned))
 
-    def ranking(self) -> Picture:
+    def ranking(self) -> NotebookChart:
         """The candidates by their loss.
 
         Raises:
@@ -62,7 +64,7 @@ class Plots:
         ranked = self._data.ranking
         if not ranked:
             raise InputError("no candidates were compared")
-        return Picture(figures.ranking(ranked))
+        return NotebookChart(figures.ranking(ranked))
 
 
 def as_html(r: ReportData) -> str:

@@ -15,7 +15,7 @@ T = TypeVar("T")
 AXES = ("X", "Y", "N", "XY")  # effects on other sets of axes count as XYN
 
 
-class Coefficient(NamedTuple):
+class ReportedCoefficient(NamedTuple):
     """An addition to the nominal value, and its 95 % interval; None where there is none.
 
     ``run`` is the one in which alone it holds, such as the time of a failure; None: it holds in all.
@@ -37,7 +37,7 @@ class ReportedEffect:
 
     id: str
     axis: str
-    coefficients: Mapping[str, Coefficient]
+    coefficients: Mapping[str, ReportedCoefficient]
     confidence: float
     share_of_error: float
     indistinguishable: Sequence[str]
@@ -69,7 +69,9 @@ def _reported(
     values = {n: x + present[n] for n, x in f.values.items()}
     ci95 = {n: (low + present[n], high + present[n]) for n, (low, high) in f.ci95.items()}
     coefficients = {
-        _plain(n, f): Coefficient(x, unit(effect, n), ci95.get(n), parameter_and_run(n)[1] or None)
+        _plain(n, f): ReportedCoefficient(
+            x, unit(effect, n), ci95.get(n), parameter_and_run(n)[1] or None
+        )
         for n, x in values.items()
     }
     return ReportedEffect(

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.actuators.response import Layout
+from fmus.actuators.response import CommandLayout
 from fmus.effects import Effect, Motion
 from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
@@ -16,7 +16,7 @@ from ..assessment.settings import SETTINGS
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..predictors.thrust import commanded_shares
-from .reported_effect import Coefficient, ReportedEffect
+from .reported_effect import ReportedCoefficient, ReportedEffect
 
 POINTS = 401  # of a curve; chosen, so that its corners are seen
 
@@ -69,7 +69,7 @@ def given(p: Picture, m: Model, command: Any, u: Any = 0.0) -> Any:
     return (f.X if p.axis == "X" else f.Y)[p.members[0]]
 
 
-def _apart(m: Model) -> Layout:
+def _apart(m: Model) -> CommandLayout:
     """The layout in which each actuator has commands of its own."""
     return m.ship.layouts[-1]
 
@@ -159,7 +159,7 @@ def _curve(
     data = np.concatenate([s.data(e) for e in evaluations])
     x = np.linspace(*(s.reach or (data.min(), data.max())), POINTS)
 
-    def by(value: Callable[[Coefficient], float]) -> np.ndarray:
+    def by(value: Callable[[ReportedCoefficient], float]) -> np.ndarray:
         wanted = {name: value(c) for name, c in found.coefficients.items() if name in of_effect}
         learned = model.plus({name: v - model.value(name) for name, v in wanted.items()})
         return np.broadcast_to(s.force(x, learned), x.shape)

@@ -10,7 +10,7 @@ from fmus.ship import Ship
 
 from ..assessment.covariates import means_of_run
 from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
-from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Axis, Chart, Panel
+from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
 
 QUARTILES = (0.25, 0.5, 0.75)  # 1
@@ -91,7 +91,7 @@ def heading_bands(e: Evaluation) -> Chart | None:
     inside = e.windows.sample_window == worst
     since, predicted = e.windows.since[inside], e.bands.predicted[worst, :, 2]
     centre = np.interp(since, e.bands.since, predicted)
-    panel = Panel(Axis("time since the window began [s]"), Axis("heading [°]"))
+    panel = Panel(ChartAxis("time since the window began [s]"), ChartAxis("heading [°]"))
     _broad(panel, since, np.degrees(centre + wrap(e.windows.measured[inside, 2] - centre)))
     panel.draw(e.bands.since, np.degrees(predicted), AFTER, "after")
     for level in LEVELS:
@@ -129,9 +129,11 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
     edges = np.linspace(0.0, windows[0].length, PARTS + 1)
     middle = (edges[:-1] + edges[1:]) / 2
     part = np.clip(np.digitize(since, edges) - 1, 0, PARTS - 1)
-    time = Axis("time since the window began [s]", (0.0, edges[-1]))
-    position = Panel(Axis(limits=time.limits, shown=False), Axis("position [mm]", scale=np.log10))
-    panels = (position, Panel(time, Axis("heading [°]", scale=np.log10)))
+    time = ChartAxis("time since the window began [s]", (0.0, edges[-1]))
+    position = Panel(
+        ChartAxis(limits=time.limits, shown=False), ChartAxis("position [mm]", scale=np.log10)
+    )
+    panels = (position, Panel(time, ChartAxis("heading [°]", scale=np.log10)))
     for models in zip(*(_models(e, learned) for e in known), strict=True):
         residuals = np.concatenate([p.residuals for p, _, _ in models])
         _, colour, label = models[0]
@@ -189,7 +191,7 @@ def _map(places: np.ndarray) -> Panel:
     most = reach.max() or 1.0
     half = np.maximum(reach + MARGIN * most, most / 2)  # no narrower than half of its height
     north, east = zip((middle - half).tolist(), (middle + half).tolist(), strict=True)
-    return Panel(Axis("east [m]", east), Axis("north [m]", north), equal=True)
+    return Panel(ChartAxis("east [m]", east), ChartAxis("north [m]", north), equal=True)
 
 
 def _chart(panel: Panel) -> Chart:

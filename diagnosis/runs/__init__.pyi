@@ -28,8 +28,8 @@ from .sensors.sensor_finding import Examined as Examined
 from .sensors.sensor_finding import SensorFinding as SensorFinding
 from .sensors.sensor_finding import sensor_lines as sensor_lines
 from .smoothing.command_motion import idle as idle
-from .smoothing.smoother import Motion as Motion
 from .smoothing.smoother import Smoothed as Smoothed
+from .smoothing.smoother import SmoothMotion as SmoothMotion
 from .smoothing.smoother import smooth as smooth
 from .smoothing.smoother import without_commands as without_commands
 from .thinning import thinned as thinned

@@ -30,7 +30,7 @@ SLIGHT = np.finfo(float).eps  # sum of squares of a force, in the units above, t
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class CandidateShape:
     """One way in which an effect may act.
 
     Attributes:
@@ -57,7 +57,7 @@ class Candidate:
     """An effect with the shapes that it can take on these data."""
 
     effect: Effect
-    shapes: Sequence[Shape] = field(default_factory=list)
+    shapes: Sequence[CandidateShape] = field(default_factory=list)
 
 
 def model_error(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
@@ -72,14 +72,14 @@ def shape(
     given: Mapping[str, float],
     fitted: Sequence[str],
     step: float = 1.0,
-) -> Shape:
+) -> CandidateShape:
     """What the model gains by an effect: minus the change of the model error, by steps of ``step``."""
     start = model_error(data, model.plus(given)) if given else base
     unit = np.array([model.unit(n) for n in fitted])
     steps = zip(fitted, (step * unit).tolist(), strict=True)
     columns = [(start - model_error(data, model.plus({**given, n: h}))) / h for n, h in steps]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
-    return Shape(dict(given), list(fitted), base - start if given else None, stacked, unit)
+    return CandidateShape(dict(given), list(fitted), base - start if given else None, stacked, unit)
 
 
 def covered(columns: np.ndarray) -> np.ndarray:
@@ -112,7 +112,7 @@ def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     return bend.T @ bend
 
 
-def curve(base: np.ndarray, plain: Shape, scale: Scale) -> list[Shape]:
+def curve(base: np.ndarray, plain: CandidateShape, scale: Scale) -> list[CandidateShape]:
     """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
     force = plain.columns * plain.unit / np.array(scale.forces)[:, None]
     inside = covered(force)
@@ -149,7 +149,7 @@ def spread(e: Effect) -> bool:
 
 def by_starts(
     data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect, step: float
-) -> list[Shape]:
+) -> list[CandidateShape]:
     """The shapes of an effect at the best values of what it is not linear in."""
     sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR * model.ship.scale.forces
 
@@ -223,7 +223,7 @@ def scaled(
 
 def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect) -> Candidate:
     """An effect's shapes on these data."""
-    shapes: list[Shape] = []
+    shapes: list[CandidateShape] = []
     # By inertia, current and measurement the model error changes smoothly, but not linearly.
     hull = e.kind in ("force", "environment", "actuator") and e.linear
     step = 1.0 if hull or not e.differentiable else SMALL

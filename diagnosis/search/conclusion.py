@@ -9,13 +9,13 @@ import numpy as np
 from ..predictors import Model
 from ..predictors.uncertainty import omega_std
 from .candidates import model_error
-from .effect_evidence import Evidence, credible, evidence
+from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, score
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
-from .refinement import Estimate, TrainingSet, nuisance_of, refit, weighted_rows
+from .refinement import RefinedModel, TrainingSet, nuisance_of, refit, weighted_rows
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Selection:
     """
 
     t: TrainingSet
-    at: Estimate
+    at: RefinedModel
     accepted: Sequence[AcceptedEffect]
     ranked: Sequence[Ranked]
     lacking: np.ndarray
@@ -108,7 +108,7 @@ class Selection:
             models.append(self.at.plus(step, change[len(fitted) :]).model(t.prior))
         return models
 
-    def _of(self, at: Estimate) -> Nuisance:
+    def _of(self, at: RefinedModel) -> Nuisance:
         """Nuisance parameters of a part of the effects, by slopes beside all of them."""
         names = [*self.at.fitted, *self.t.prior.mean]
         kept = [k for k, n in enumerate(names) if n in at.fitted or k >= len(self.at.fitted)]
@@ -137,13 +137,13 @@ class Selection:
             before = left
         return models, shares
 
-    def _scored(self, at: Estimate, nuisance: Nuisance) -> Scored:
+    def _scored(self, at: RefinedModel, nuisance: Nuisance) -> Scored:
         """A model as it is, by fits to a part of the data, linear about it."""
         t = self.t
         table = gram_table(t.error(at), t.blocks, [], nuisance, np.asarray(t.sigma))
         return score(table, -1, 1)
 
-    def _evidence(self, p: AcceptedEffect) -> Evidence:
+    def _evidence(self, p: AcceptedEffect) -> EffectEvidence:
         data, model = self.t.data, self.model
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))

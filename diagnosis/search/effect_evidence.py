@@ -20,7 +20,7 @@ from ..predictors.uncertainty import NOISE_TOLERANCE
 from .most_likely import LEVEL
 
 
-class Evidence(NamedTuple):
+class EffectEvidence(NamedTuple):
     """What speaks for a finding.
 
     Attributes:
@@ -51,7 +51,7 @@ def credible(own: str, weights: Mapping[str, float]) -> list[str]:
 
 def evidence(
     bagged: float, force: np.ndarray, left: np.ndarray, std: np.ndarray, blocks: np.ndarray
-) -> Evidence:
+) -> EffectEvidence:
     """Evidence of a finding.
 
     Args:
@@ -68,7 +68,7 @@ def evidence(
     weight = own / np.sum(std**2, axis=0)
     shares = np.divide(beyond, own, out=np.zeros(3), where=own > 0.0)
     share = float(weight @ shares / max(weight.sum(), np.finfo(float).tiny))
-    return Evidence(bagged, float(np.sqrt(share)), variation(force / std, left / std, blocks))
+    return EffectEvidence(bagged, float(np.sqrt(share)), variation(force / std, left / std, blocks))
 
 
 def variation(force: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> float:

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..predictors import Model
 from ..predictors.ship_model import parameter_and_run
-from .effect_evidence import Evidence
+from .effect_evidence import EffectEvidence
 from .prior import NominalPrior
 
 if TYPE_CHECKING:
-    from .refinement import Estimate
+    from .refinement import RefinedModel
 
 
 # Prior standard deviations beyond which a coefficient alone is no explanation; contract.
@@ -85,10 +85,10 @@ class Finding:
     q2: float
     share: float
     model: Model = field(default_factory=Model)
-    evidence: Evidence | None = None
+    evidence: EffectEvidence | None = None
     together: float = np.nan
     doubt: str = ""
-    set_evidence: Evidence | None = None
+    set_evidence: EffectEvidence | None = None
 
     @property
     def of_runs(self) -> list[str]:
@@ -129,7 +129,7 @@ class Findings:
     moved: Mapping[str, float] = field(default_factory=dict)
     fold_models: Sequence[Model] = ()
     refit: "Callable[[Sequence[str]], Findings] | None" = None
-    estimate: "Estimate | None" = None
+    estimate: "RefinedModel | None" = None
     searched: NominalPrior | None = None
 
     @property

@@ -24,7 +24,7 @@ from .most_likely import STEPS
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
-from .refinement import Estimate, TrainingSet, nuisance_of, refit
+from .refinement import RefinedModel, TrainingSet, nuisance_of, refit
 from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
 from .significance import better, beyond_chance, harmful, matters
 
@@ -69,13 +69,13 @@ def search(
 ) -> Selection:
     """All effects that a regression finds; arguments as of :class:`.methods.Method`."""
     belief = NominalPrior.of(start, prior, MEASURED)
-    t, at = TrainingSet(data, None, belief), Estimate.at(start, belief)
+    t, at = TrainingSet(data, None, belief), RefinedModel.at(start, belief)
     advance("every effect as a candidate")
     ranking = rank(t, at, set())
     lacking, command = ranking.base, commanded(data, start)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
-    before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
+    before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
     while len(accepted) < MOST_REPORTED:
         advance(f"effect {len(accepted) + 1}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
@@ -117,11 +117,11 @@ def search(
 
 def searched_again(
     t: TrainingSet,
-    at: Estimate,
+    at: RefinedModel,
     accepted: Sequence[AcceptedEffect],
     advance: Advance,
     rng: np.random.Generator,
-) -> tuple[Estimate, list[AcceptedEffect]]:
+) -> tuple[RefinedModel, list[AcceptedEffect]]:
     """Each effect but the last found is taken out, and its place searched again beside the others.
 
     What came first had to stand for all that was missing: a wrong one, or a free curve where a simple

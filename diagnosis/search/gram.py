@@ -14,7 +14,7 @@ import numpy as np
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
-from .candidates import SLIGHT, Candidate, Shape
+from .candidates import SLIGHT, Candidate, CandidateShape
 from .most_likely import ridge
 
 FOLDS = 8  # of cross-validation over blocks
@@ -164,7 +164,7 @@ def gram_table(
         count += unit.size
         return list(range(count - unit.size, count))
 
-    def entry(s: Shape) -> Entry:
+    def entry(s: CandidateShape) -> Entry:
         given = -1 if s.offset is None else added(s.offset[:, :, None], np.ones(1))[0]
         start = np.array([s.given.get(n, 0.0) for n in s.fitted])
         precision = np.zeros((start.size, start.size)) if s.precision is None else s.precision

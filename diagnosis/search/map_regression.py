@@ -30,7 +30,7 @@ def _form(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
     return (np.matmul(matrix, x[..., None])[..., 0] * x).sum(axis=-1)
 
 
-class Fit(NamedTuple):
+class RegressionFit(NamedTuple):
     """A fitted regression, or several of the same columns.
 
     Attributes:
@@ -50,7 +50,7 @@ class Fit(NamedTuple):
         return _form(part, self.left)
 
 
-class Regression(NamedTuple):
+class CandidateRegression(NamedTuple):
     """One shape of a candidate, and the nuisance parameters.
 
     Attributes:
@@ -70,7 +70,7 @@ class Regression(NamedTuple):
     nonlinear: int
     unit: np.ndarray
 
-    def fitted(self, gram: np.ndarray) -> Fit:
+    def fitted(self, gram: np.ndarray) -> RegressionFit:
         """The maximum a posteriori fits to data with Gram matrices (..., p, p)."""
         H = gram[..., self.use[:, None], self.use] + self.precision
         diagonal = np.einsum("...ii->...i", H)
@@ -79,7 +79,7 @@ class Regression(NamedTuple):
         right = gram[..., self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
         beta = np.linalg.solve(H, right[..., None])[..., 0]
         target = np.broadcast_to(self.target[given], (*beta.shape[:-1], given.size))
-        return Fit(
+        return RegressionFit(
             np.concatenate([given, self.use]),
             np.concatenate([target, -beta], axis=-1),
             beta[..., : self.free],
@@ -95,7 +95,7 @@ class Regression(NamedTuple):
         return float(np.trace(inverse)) + self.nonlinear
 
 
-def regression(t: GramTable, candidate: int, shape: int) -> Regression:
+def regression(t: GramTable, candidate: int, shape: int) -> CandidateRegression:
     """A candidate's shape as a regression; candidate -1 is none at all."""
     entry = t.entries[candidate][shape]
     target = np.zeros(t.grams.shape[1])
@@ -108,7 +108,7 @@ def regression(t: GramTable, candidate: int, shape: int) -> Regression:
     use = np.array([*[entry.columns[k] for k in live], *t.nuisance])
     precision = np.asarray(block_diag(entry.precision[live[:, None], live], t.precision))
     offset = np.concatenate([entry.start[live], entry.offset])
-    return Regression(target, use, live.size, precision, offset, entry.nonlinear, t.unit[use])
+    return CandidateRegression(target, use, live.size, precision, offset, entry.nonlinear, t.unit[use])
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ def score(t: GramTable, candidate: int, shapes: int) -> Scored:
     return Scored(candidate, shape, by_block, by_run, float(fits[shape].penalty), complexity)
 
 
-def held_out_loss(t: GramTable, options: Sequence[Regression], folds: Folds) -> np.ndarray:
+def held_out_loss(t: GramTable, options: Sequence[CandidateRegression], folds: Folds) -> np.ndarray:
     """Loss of each block (blocks,) by the fit, of the shape that does best, to all other folds."""
     found = np.empty(len(t.grams))
     fits = [o.fitted(folds.train) for o in options]

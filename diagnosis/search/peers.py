@@ -20,7 +20,7 @@ from cosim import InputError
 
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
-from .candidates import Candidate, Shape, candidates, model_error
+from .candidates import Candidate, CandidateShape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import FOLDS, block_numbers
 from .most_likely import ROUNDING
@@ -47,7 +47,7 @@ class Features(NamedTuple):
     scale: np.ndarray
     owner: np.ndarray
     parameters: Sequence[str]
-    chosen: Sequence[tuple[Candidate, Shape]]
+    chosen: Sequence[tuple[Candidate, CandidateShape]]
     target: np.ndarray
     target_scale: float
     blocks: np.ndarray
@@ -84,7 +84,7 @@ def features(data: Sequence[WeakWindows], model: Model) -> Features:
     return Features(standard, scale[live], owner[live], used, chosen, target / size, size, blocks, sigma)
 
 
-def _stacked(shape: Shape, sigma: np.ndarray) -> np.ndarray:
+def _stacked(shape: CandidateShape, sigma: np.ndarray) -> np.ndarray:
     """Columns (3 K, p) of a shape in units of noise, what is given first."""
     given = [] if shape.offset is None else [shape.offset[:, :, None]]
     stacked = np.concatenate([*given, shape.columns], axis=2) / sigma[:, None]

@@ -18,7 +18,7 @@ from fmus.ship import Ship
 from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import OVERLAP
-from .candidates import SMALL, Shape, model_error
+from .candidates import SMALL, CandidateShape, model_error
 from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
 from .nonlinear.multistart import limits
@@ -52,13 +52,13 @@ class TrainingSet:
         """(3,), what an error counts on each axis."""
         return 1.0 / np.asarray(self.sigma) / np.sqrt(OVERLAP)
 
-    def error(self, at: "Estimate") -> np.ndarray:
+    def error(self, at: "RefinedModel") -> np.ndarray:
         """(K, 3), model error of an estimate [N, N, N m]."""
         return model_error(self.data, at.model(self.prior))
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class RefinedModel:
     """A model on the way to the most likely one.
 
     Attributes:
@@ -76,7 +76,7 @@ class Estimate:
     held: frozenset[str] = frozenset()
 
     @classmethod
-    def at(cls, start: Model, prior: NominalPrior) -> "Estimate":
+    def at(cls, start: Model, prior: NominalPrior) -> "RefinedModel":
         """The start."""
         return cls(start, np.zeros(prior.size))
 
@@ -95,18 +95,18 @@ class Estimate:
         ship = self.start.ship
         return [n for n in self.values if n not in self.held and timed(ship, n) is None]
 
-    def without(self, names: Collection[str]) -> "Estimate":
+    def without(self, names: Collection[str]) -> "RefinedModel":
         """The estimate without the values of some effects."""
         kept = [k for k, n in enumerate(self.fitted) if n not in names]
         values = {n: v for n, v in self.values.items() if n not in names}
         return replace(self, values=values, precision=self.precision[kept][:, kept])
 
-    def holding(self, names: Collection[str]) -> "Estimate":
+    def holding(self, names: Collection[str]) -> "RefinedModel":
         """The estimate with further values that stay as they are."""
         kept = [k for k, n in enumerate(self.fitted) if n not in names]
         return replace(self, precision=self.precision[kept][:, kept], held=self.held | set(names))
 
-    def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "Estimate":
+    def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "RefinedModel":
         """The estimate with additions, effects' parameters within their range."""
         names = (*self.values, *values)
         together = {n: self.values.get(n, 0.0) + values.get(n, 0.0) for n in names}
@@ -146,7 +146,7 @@ def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: floa
     return (left - model_error(t.data, model.plus({name: small}))) / small
 
 
-def nuisance_of(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
+def nuisance_of(t: TrainingSet, at: RefinedModel, base: np.ndarray) -> Nuisance:
     """What is fitted along with every candidate: effects found before, and nominal coefficients.
 
     ``base`` is the model error (K, 3) of the model so far.
@@ -164,7 +164,7 @@ def nuisance_of(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class CandidateStart:
     """A candidate's parameters to start from.
 
     Attributes:
@@ -190,18 +190,18 @@ class Refined:
         intervals: 95 % interval of each change point [s].
     """
 
-    estimate: Estimate
+    estimate: RefinedModel
     left: np.ndarray
     columns: np.ndarray
     cost: float
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    def own(self, at: Estimate) -> dict[str, float]:
+    def own(self, at: RefinedModel) -> dict[str, float]:
         """The candidate's own values, beside those of a model that it was not in."""
         return {n: v for n, v in self.estimate.values.items() if n not in at.values}
 
 
-def refine(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
+def refine(t: TrainingSet, at: RefinedModel, nuisance: Nuisance, start: CandidateStart) -> Refined:
     """A candidate, from a start, and what is fitted along with it at their most likely values."""
     e = next((e for n in start.values if (e := timed(at.start.ship, n))), None)
     if e is None:
@@ -209,9 +209,9 @@ def refine(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Re
     return _with_intervals(t, at, nuisance, start, e)
 
 
-def refit(t: TrainingSet, at: Estimate, nuisance: Nuisance) -> Refined:
+def refit(t: TrainingSet, at: RefinedModel, nuisance: Nuisance) -> Refined:
     """The effects found and the nominal coefficients at their most likely values, without a new one."""
-    return Refinement(t, at, nuisance, Start({}, (), np.zeros((0, 0)))).solved()
+    return Refinement(t, at, nuisance, CandidateStart({}, (), np.zeros((0, 0)))).solved()
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,16 +226,16 @@ class Refinement:
     """The fit of a candidate and all nuisance parameters by slopes; arguments as of :func:`refine`."""
 
     t: TrainingSet
-    at: Estimate
+    at: RefinedModel
     nuisance: Nuisance
-    start: Start
+    start: CandidateStart
 
     @cached_property
     def precision(self) -> np.ndarray:
         """(q, q), prior precision of all that is fitted."""
         return np.asarray(block_diag(self.start.precision, self.nuisance.precision))
 
-    def theta(self, of: Estimate) -> np.ndarray:
+    def theta(self, of: RefinedModel) -> np.ndarray:
         """(q,), all that is fitted: the candidate's, effects found before, nominal coefficients."""
         return np.array([*[of.values[n] for n in (*self.start.fitted, *self.at.fitted)], *of.offset])
 
@@ -253,7 +253,7 @@ class Refinement:
         values = dict(zip(names, step.tolist(), strict=False))
         return self._evaluated(r.estimate.plus(values, step[len(names) :]))
 
-    def _evaluated(self, estimate: Estimate) -> Refined:
+    def _evaluated(self, estimate: RefinedModel) -> Refined:
         left, x = self.t.error(estimate), self.theta(estimate)
         cost = float(((left * self.t.weight) ** 2).sum() + x @ self.precision @ x)
         return Refined(estimate, left, np.zeros((*left.shape, 0)), cost)
@@ -281,7 +281,7 @@ def weighted_rows(columns: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def _with_intervals(
-    t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start, e: Effect
+    t: TrainingSet, at: RefinedModel, nuisance: Nuisance, start: CandidateStart, e: Effect
 ) -> Refined:
     """The same with the intervals of an effect found anew at each fit of all else, until they stay."""
     found = Refinement(t, at, nuisance, start).solved()
@@ -305,10 +305,12 @@ def _with_intervals(
     return found if p is None else replace(found, intervals=likely(p, p.spans(present)))
 
 
-def as_shape(r: Refined, base: np.ndarray, at: Estimate, start: Start) -> Shape:
+def as_shape(r: Refined, base: np.ndarray, at: RefinedModel, start: CandidateStart) -> CandidateShape:
     """A refined candidate as a shape, seen from the model ``at`` with the error ``base``."""
     given = r.own(at)
     fitted = [r.estimate.values[n] for n in at.fitted]
     offset = np.array([*fitted, *r.estimate.offset])
     unit = np.array([at.start.unit(n) for n in start.fitted])
-    return Shape(given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision)
+    return CandidateShape(
+        given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision
+    )

@@ -17,7 +17,16 @@ from .gram import GramTable, Nuisance, gram_table, noise
 from .map_regression import Scored, regression, score
 from .most_likely import STEPS, ridge
 from .nonlinear.segmentation import FLOOR
-from .refinement import Estimate, Refined, Start, TrainingSet, as_shape, nuisance_of, refine, timed
+from .refinement import (
+    CandidateStart,
+    Refined,
+    RefinedModel,
+    TrainingSet,
+    as_shape,
+    nuisance_of,
+    refine,
+    timed,
+)
 
 LENGTH = 8  # of the shortlist
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
@@ -52,7 +61,7 @@ class Ranking:
         return float(self.table.total[0, 0])
 
 
-def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
+def rank(t: TrainingSet, at: RefinedModel, known: Set[str]) -> Ranking:
     """Score every effect that is not known yet."""
     model = at.model(t.prior)
     base = model_error(t.data, model)
@@ -76,7 +85,7 @@ def weighted(
     return Ranking(base, nuisance, table, found, order)
 
 
-def scored_alone(t: TrainingSet, at: Estimate) -> Scored:
+def scored_alone(t: TrainingSet, at: RefinedModel) -> Scored:
     """The score of a model without any candidate."""
     base = t.error(at)
     nuisance = nuisance_of(t, at, base)
@@ -118,17 +127,17 @@ class Shortlist:
     """
 
     ids: Sequence[str]
-    starts: Sequence[Start]
+    starts: Sequence[CandidateStart]
     refined: Sequence[Refined]
     table: GramTable
     scored: Sequence[Scored]
 
     @property
-    def winner(self) -> Estimate:
+    def winner(self) -> RefinedModel:
         """The model with the best of them."""
         return self.of(0)
 
-    def of(self, chosen: int) -> Estimate:
+    def of(self, chosen: int) -> RefinedModel:
         """The model with the candidate of a place in the order."""
         best = self.scored[chosen].candidate
         estimate = self.refined[best].estimate
@@ -136,7 +145,7 @@ class Shortlist:
         return replace(estimate, precision=np.asarray(precision))
 
 
-def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
+def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking) -> Shortlist:
     """Refine the best candidates and score them again."""
     best = sorted(ranking.order[:LENGTH], key=lambda s: s.candidate)
     effects = [ranking.candidates[s.candidate].effect for s in best]
@@ -151,7 +160,7 @@ def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
 
 
 def reweighted(
-    t: TrainingSet, at: Estimate, ranking: Ranking
+    t: TrainingSet, at: RefinedModel, ranking: Ranking
 ) -> tuple[TrainingSet, Ranking, Shortlist] | None:
     """A shortlist in which an error counts by what even the best candidate leaves over.
 
@@ -184,7 +193,7 @@ def reweighted(
     return t, ranking, found
 
 
-def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
+def start(at: RefinedModel, ranking: Ranking, best: Scored) -> CandidateStart:
     """A candidate's parameters by the linear fit; those without any data stay out."""
     shape = ranking.candidates[best.candidate].shapes[best.shape]
     mine = regression(ranking.table, best.candidate, best.shape)
@@ -195,4 +204,4 @@ def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
     fitted = [n for n in values if timed(at.start.ship, n) is None]
     size = len(fitted)
     precision = np.zeros((size, size)) if shape.precision is None else shape.precision
-    return Start(values, fitted, precision)
+    return CandidateStart(values, fitted, precision)

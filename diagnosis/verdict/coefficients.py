@@ -8,7 +8,7 @@ from ..predictors import Model
 from ..search.findings import Finding, Findings
 from ..search.gram import PARTS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
-from ..search.prediction_fit.refit import Outcome
+from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from .confidence import confidence_of
 from .paired_errors import gain, harm, harms
@@ -63,7 +63,7 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     return Conclusion(replace(found, model=start, suspects=[]), False, [])
 
 
-def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Outcome | None:
+def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
     No effect follows from it. Each training run is predicted without it; a current is in it where that

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import expit
 
 from ..predictors import Model
-from ..search.effect_evidence import Evidence
+from ..search.effect_evidence import EffectEvidence
 from ..search.findings import Finding
 from ..search.refinement import at_limit
 
@@ -53,7 +53,7 @@ class Confidence(NamedTuple):
         return not self.of_set < EVEN_ODDS
 
 
-def probability(e: Evidence) -> float:
+def probability(e: EffectEvidence) -> float:
     """Probability that an effect with this evidence is a true cause."""
     a_candidate_is_right = expit(SURE - PER_DOUBT * (e.left + e.varies))
     return float(e.bagged * a_candidate_is_right)

@@ -16,7 +16,7 @@ from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import omega_std
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.disturbance_summary import Unrecorded
-from ..search.prediction_fit.joint_posterior import Posterior
+from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
@@ -31,7 +31,7 @@ VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class DecidedFindings:
     """What a model lacks, as the runs that decide have it.
 
     Attributes:
@@ -53,7 +53,7 @@ class Verdict:
     dropped: Sequence[Finding]
     shares: Sequence[float]
     unique: Sequence[float | None]
-    posterior: Posterior
+    posterior: JointPosterior
     unrecorded: Unrecorded
 
     @property
@@ -99,7 +99,7 @@ def judge(
     region: OperatingRegion,
     calibrates: bool,
     advance: Advance,
-) -> Verdict:
+) -> DecidedFindings:
     """Judge what a search found: prune, conclude, fit to predictions, calibrate, say how sure it is.
 
     Args:
@@ -137,7 +137,9 @@ def judge(
     explained = shares(learned, start, data.validate)
     alone = unique_shares(learned, start, train, data.validate)
     known, force = fit.posterior, fit.unrecorded
-    return Verdict(learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force)
+    return DecidedFindings(
+        learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
+    )
 
 
 def with_confidence(found: Findings, remainder: Remainder, start: Model) -> Findings:

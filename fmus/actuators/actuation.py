@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
-from ..declare import POSITIVE, Known, Range, Variable, group_of, variables
+from ..declare import POSITIVE, Fields, Known, Range, Variable, group_of, variables
 from ..effects import Thrust
 from ..hull import Triple
 from ..ops import Number, clip, wrap
@@ -86,7 +85,7 @@ def variable(command: str) -> str:
     return command.replace(".", "_")
 
 
-def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type[Any]:
+def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type[Fields]:
     """Parameters of an actuator: those of its law, and its place.
 
     Args:
@@ -118,13 +117,13 @@ def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type
     return group_of(f"{prefix}{name}", found)
 
 
-def law_of(a: Actuator, values: Any) -> tuple[Number, Number, Number]:
+def law_of(a: Actuator, values: Fields) -> tuple[Fields, Number, Number]:
     """Parameters of an actuator's law, and its place x, y [m, m]."""
     *own, x, y = values
     return a.law.Parameters._make(own), x, y
 
 
-def within(a: Actuator, commands: Sequence[Number], p: Any) -> tuple[Number, ...]:
+def within(a: Actuator, commands: Sequence[Number], p: Fields) -> tuple[Number, ...]:
     """Commands brought within their limits."""
     each = zip(commands, a.law.limits(p), a.round, strict=True)
     return tuple([clip(wrap(c) if angle else c, low, high) for c, (low, high), angle in each])
@@ -138,7 +137,7 @@ def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
 def water_at(
     ship: Description,
     a: Actuator,
-    every: Sequence[tuple[Any, Number, Number]],
+    every: Sequence[tuple[Fields, Number, Number]],
     commands: Sequence[Number],
     nu: Triple,
 ) -> Flow:
@@ -165,7 +164,7 @@ def forces(
     ship: Description,
     commands: Sequence[Number],
     nu: Triple,
-    values: Any,
+    values: Sequence[Fields],
     settings: Sequence[Number] = (),
     apart: bool = False,
 ) -> Thrust:
@@ -215,7 +214,9 @@ def measurable(ship: Description) -> dict[str, str]:
     }
 
 
-def output(ship: Description, name: str, commands: Sequence[Number], nu: Triple, values: Any) -> Number:
+def output(
+    ship: Description, name: str, commands: Sequence[Number], nu: Triple, values: Sequence[Fields]
+) -> Number:
     """What is measured of an actuator beside its commands.
 
     Args:
@@ -233,7 +234,9 @@ def output(ship: Description, name: str, commands: Sequence[Number], nu: Triple,
     return a.law.output(what, within(a, commands[a.commands], p), flow, p)
 
 
-def limits(ship: Description, values: Any, apart: bool = False) -> tuple[tuple[Number, Number], ...]:
+def limits(
+    ship: Description, values: Sequence[Fields], apart: bool = False
+) -> tuple[tuple[Number, Number], ...]:
     """The lowest and the highest value of each command, by the parameters of each actuator."""
     return tuple(
         [

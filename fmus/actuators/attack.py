@@ -1,8 +1,8 @@
 """Where the force of a ship's actuators acts, beside the places that are described, (2.17)-(2.19)."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from ..ops import Number
+from ..declare import Fields
 
 
 class Attack(NamedTuple):
@@ -19,7 +19,7 @@ class RealAttack(NamedTuple):
     plant_p_y: Annotated[float, "m", "real point of attack, to starboard"] = 0.0
 
 
-def attacking(values: Any, attack: tuple[Number, Number]) -> Any:
+def attacking(values: Fields, attack: Attack | RealAttack) -> Fields:
     """Parameters of actuators, of which the last two are the place, with a point of attack."""
     p_x, p_y = attack
     return type(values)._make(

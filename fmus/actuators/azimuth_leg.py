@@ -12,7 +12,7 @@ from .law import Change, Flow, Law, Span
 from .laws import Azimuth, AzimuthThruster
 
 
-class Leg(NamedTuple):
+class LegForces(NamedTuple):
     """What the water does to the leg; alpha below is the thruster's angle less that of the inflow."""
 
     area: Annotated[float, "m2", "area of the leg in the flow", POSITIVE] = 0.0
@@ -36,7 +36,7 @@ class AzimuthLeg(Law):
         Change("leg_drag", ("drag", "drag_slope"), "drag of the legs"),
         Change("leg_lift", ("lift",), "lift of the legs"),
     )
-    Parameters = group_of("AzimuthLegs", [*variables(Azimuth), *variables(Leg)])
+    Parameters = group_of("AzimuthLegs", [*variables(Azimuth), *variables(LegForces)])
 
     @classmethod
     def limits(cls, p: Any) -> tuple[Span, ...]:

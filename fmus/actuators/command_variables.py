@@ -1,15 +1,13 @@
 """The commands of a ship, and the limits of their rates, as variables of an FMU."""
 
-from typing import Any
-
-from ..declare import POSITIVE, Variable, group_of
+from ..declare import POSITIVE, Fields, Variable, group_of
 from ..ship_description import Description
 from .actuation import actuators, command_names, ordered, variable
 from .actuator import Actuator
 from .law import Command
 
 
-def commands_of(ship: Description) -> type[Any]:
+def commands_of(ship: Description) -> type[Fields]:
     """The commands of a ship as a group of variables."""
     return group_of(
         "Commands",
@@ -20,7 +18,7 @@ def commands_of(ship: Description) -> type[Any]:
     )
 
 
-def rates_of(ship: Description) -> type[Any]:
+def rates_of(ship: Description) -> type[Fields]:
     """The limit of each command's rate; one for all where each is a share and none has its own."""
     limits = [(a, c, a.part.number(f"{c.name}_rate")) for a, c in _commands(ship)]
     if limits and all(c.unit == "1" and not rate for _, c, rate in limits):
@@ -41,7 +39,7 @@ def rates_of(ship: Description) -> type[Any]:
     )
 
 
-def powers_of(ship: Description) -> type[Any]:
+def powers_of(ship: Description) -> type[Fields]:
     """The power setting of each actuator that has one."""
     return group_of(
         "Power",

@@ -128,5 +128,5 @@ def named_effects(
             found.append(others[name])
         else:
             known = [*(f"{k} {d}" for k in KINDS for d in devices), *TOGETHER, *others]
-            raise DeclarationError(f"effects: there is no '{name}'{nearest(name, known)}")
+            raise DeclarationError(f"effects: there is no {name!r:.60}{nearest(name, known)}")
     return found

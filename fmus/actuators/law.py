@@ -5,7 +5,7 @@ operations of :mod:`fmus.ops`, so that it runs on floats, arrays and symbols.
 """
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from ..declare import DeclarationError
 from ..effects.families import Family
@@ -14,6 +14,7 @@ from ..ops import Number
 from ..ship_description import Part
 
 Span = tuple[Number, Number]
+P = TypeVar("P", bound=tuple[Number, ...])  # parameters of a law
 
 
 class Command(NamedTuple):
@@ -37,8 +38,8 @@ class Race(NamedTuple):
         diameter: of the propeller [m].
     """
 
-    inflow: Any
-    jet: Any
+    inflow: Number
+    jet: Number
     diameter: Number
 
 
@@ -57,7 +58,7 @@ class Flow(NamedTuple):
     race: Race | None = None
 
 
-class Law:
+class Law(Generic[P]):
     """A kind of actuator.
 
     Attributes:
@@ -103,24 +104,25 @@ class Law:
         if taken is not None and taken.__module__.startswith(f"{__package__}."):
             raise DeclarationError(f"there is a law '{cls.name}' already")
         Law.known[cls.name] = cls
+        super().__init_subclass__()
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: P) -> tuple[Span, ...]:
         """For each command the lowest and the highest value."""
         raise NotImplementedError
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: P) -> tuple[Number, Number]:
         """Force on the hull (X, Y) [N, N], for commands within their limits."""
         raise NotImplementedError
 
     @classmethod
-    def acts_at(cls, x: Number, p: Any) -> Number:
+    def acts_at(cls, x: Number, p: P) -> Number:
         """Where along the ship [m] the force of an actuator at x [m] acts."""
         return x
 
     @classmethod
-    def race(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> Race | None:
+    def race(cls, commands: tuple[Number, ...], flow: Flow, p: P) -> Race | None:
         """Its race; None: it has none that others could work in."""
         return None
 
@@ -130,16 +132,16 @@ class Law:
         return cls.measurable
 
     @classmethod
-    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Any) -> Number:
+    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: P) -> Number:
         """One of ``measurable``, in its unit."""
         raise NotImplementedError
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: P) -> tuple[Span, ...]:
         """For each of ``components`` the lowest and the highest force [N]."""
         return ()
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: P) -> tuple[Number, ...]:
         """The commands that give a force on each of ``components`` [N], within their reach."""
         raise NotImplementedError

@@ -1,9 +1,8 @@
 """What the law of an actuator may have otherwise than described: an effect for each, by its law."""
 
 from collections.abc import Sequence
-from typing import Any
 
-from ..declare import Range, Variable, variables
+from ..declare import Fields, Range, Variable, variables
 from ..effects.effect import Effect, Search, Wording, effect
 from ..effects.text import Found
 from ..hull_functions import Change
@@ -53,7 +52,7 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
         search=Search(differentiable=True),
         description=f"{change.text}: {title}",
     )
-    def function(plant: Any, *additions: Number) -> Any:
+    def function(plant: Fields, *additions: Number) -> Fields:
         for b in alike:
             own = plant[b.k]
             places = [b.law.Parameters._fields.index(p) for p in change.parameters]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import pi
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 from ..declare import POSITIVE, Range
 from ..effects.families import PROPELLERS, TUNNEL_THRUSTER
@@ -26,39 +26,44 @@ class Bollard(NamedTuple):
     n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern", ASTERN] = -1.0
 
 
-def bollard_thrust(n: Number, p: Any) -> Number:
+def bollard_thrust(n: Number, p: "Bollard | Azimuth") -> Number:
     """Thrust [N] by the square of the shaft speed n [1/s]."""
     return where(n > 0.0, p.k_ahead, p.k_astern) * n * abs(n)
 
 
-def bollard_speed(thrust: Number, p: Any) -> Number:
+def bollard_speed(thrust: Number, p: "Bollard | Azimuth") -> Number:
     """The shaft speed [1/s] that gives a thrust [N]."""
     return signed_root(thrust / where(thrust > 0.0, p.k_ahead, p.k_astern))
 
 
-class FixedPropeller(Law):
+class OnShaft:
+    """What propellers on a fixed shaft have in common: one command, and a force along the ship."""
+
+    commands = (SHAFT_SPEED,)
+    components = "X"
+
+    @classmethod
+    def limits(cls, p: "Bollard | OpenWater") -> tuple[Span, ...]:
+        return ((p.n_min, p.n_max),)
+
+
+class FixedPropeller(OnShaft, Law[Bollard]):
     """Propeller on a fixed shaft, whose thrust is that at a bollard."""
 
     name = "fixed_propeller"
-    commands = (SHAFT_SPEED,)
-    components = "X"
     Parameters = Bollard
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
-        return ((p.n_min, p.n_max),)
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Bollard) -> tuple[Number, Number]:
         (n,) = commands
         return bollard_thrust(n, p), 0.0 * n
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: Bollard) -> tuple[Span, ...]:
         return ((bollard_thrust(p.n_min, p), bollard_thrust(p.n_max, p)),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Bollard) -> tuple[Number, ...]:
         return (bollard_speed(forces[0], p),)
 
 
@@ -77,7 +82,7 @@ class OpenWater(NamedTuple):
     n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern", ASTERN] = -1.0
 
 
-def square_by_coefficient(n: Number, advance: Number, p: Any) -> Number:
+def square_by_coefficient(n: Number, advance: Number, p: OpenWater) -> Number:
     """n |n| K_T(J) [1/s2], multiplied out, so that a propeller at rest needs no J.
 
     Args:
@@ -92,7 +97,7 @@ def square_by_coefficient(n: Number, advance: Number, p: Any) -> Number:
     return where(n == 0.0, 0.0 * n, found)
 
 
-class OpenWaterPropeller(FixedPropeller):
+class OpenWaterPropeller(OnShaft, Law[OpenWater]):
     """Propeller with an open-water curve, wake and thrust deduction (Yasukawa and Yoshimura 2015)."""
 
     name = "open_water_propeller"
@@ -101,24 +106,24 @@ class OpenWaterPropeller(FixedPropeller):
     Parameters = OpenWater
 
     @classmethod
-    def advance(cls, flow: Flow, p: Any) -> Number:
+    def advance(cls, flow: Flow, p: OpenWater) -> Number:
         """Speed of the water [m/s] that meets the propeller."""
         return (1.0 - p.wake) * flow.u
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: OpenWater) -> tuple[Number, Number]:
         (n,) = commands
         thrust = square_by_coefficient(n, cls.advance(flow, p), p)
         return (1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0) * thrust, 0.0 * n
 
     @classmethod
-    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Any) -> Number:
+    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: OpenWater) -> Number:
         (n,) = commands
         coefficient = square_by_coefficient(n, cls.advance(flow, p), p)
         return p.water_density * power(p.diameter, 4.0) * coefficient
 
     @classmethod
-    def race(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> Race:
+    def race(cls, commands: tuple[Number, ...], flow: Flow, p: OpenWater) -> Race:
         """By momentum theory, V sqrt(1 + 8 K_T / (pi J^2)), multiplied out."""
         (n,) = commands
         inflow = cls.advance(flow, p)
@@ -128,13 +133,13 @@ class OpenWaterPropeller(FixedPropeller):
         return Race(inflow, jet, p.diameter)
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: OpenWater) -> tuple[Span, ...]:
         low, _ = cls.force((p.n_min,), flow, p)
         high, _ = cls.force((p.n_max,), flow, p)
         return ((fmin(0.0, low), fmax(0.0, high)),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: OpenWater) -> tuple[Number, ...]:
         wanted = forces[0] / ((1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0))
         advance = cls.advance(flow, p)
         slope = p.K_T1 * advance / p.diameter
@@ -149,7 +154,7 @@ class Tunnel(NamedTuple):
     F: Annotated[float, "N", "force to starboard at full command", DIVISOR] = 1.0
 
 
-class TunnelThruster(Law):
+class TunnelThruster(Law[Tunnel]):
     """Thruster in a tunnel across the ship, whose force is linear in its command."""
 
     name = "tunnel_thruster"
@@ -166,20 +171,20 @@ class TunnelThruster(Law):
     Parameters = Tunnel
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: Tunnel) -> tuple[Span, ...]:
         return ((-1.0, 1.0),)
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Tunnel) -> tuple[Number, Number]:
         (u,) = commands
         return 0.0 * u, p.F * u
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: Tunnel) -> tuple[Span, ...]:
         return ((-p.F, p.F),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Tunnel) -> tuple[Number, ...]:
         return (forces[0] / p.F,)
 
 
@@ -189,7 +194,7 @@ class Cycloidal(NamedTuple):
     P_full: Annotated[float, "W", "power at full command, at rest; 0: not known", POSITIVE] = 0.0
 
 
-class VoithSchneider(Law):
+class VoithSchneider(Law[Cycloidal]):
     """Voith Schneider propeller: a force in any direction, linear in two commands, (2.10).
 
     Its power, (2.12), grows from idle with the force to 3/2, as that of an ideal propeller at rest does.
@@ -215,20 +220,20 @@ class VoithSchneider(Law):
     measurable: ClassVar[Mapping[str, str]] = {"power": "W"}
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: Cycloidal) -> tuple[Span, ...]:
         return ((-1.0, 1.0), (-1.0, 1.0))
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Cycloidal) -> tuple[Number, Number]:
         surge, sway = commands
         return p.F * surge, p.F * sway
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: Cycloidal) -> tuple[Span, ...]:
         return ((-p.F, p.F), (-p.F, p.F))
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Cycloidal) -> tuple[Number, ...]:
         return forces[0] / p.F, forces[1] / p.F
 
     @classmethod
@@ -236,7 +241,7 @@ class VoithSchneider(Law):
         return cls.measurable if part.number("P_full") > 0.0 else {}
 
     @classmethod
-    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Any) -> Number:
+    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Cycloidal) -> Number:
         surge, sway = commands
         share = fmin(1.0, sqrt(surge * surge + sway * sway))
         return p.P_idle + (p.P_full - p.P_idle) * share * sqrt(share)
@@ -250,7 +255,7 @@ class Azimuth(NamedTuple):
     alpha_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 3.2
 
 
-class AzimuthThruster(Law):
+class AzimuthThruster(Law[Azimuth]):
     """Propeller that turns about a vertical axis: its thrust at a bollard, at an angle from ahead."""
 
     name = "azimuth"
@@ -263,23 +268,23 @@ class AzimuthThruster(Law):
     Parameters = Azimuth
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: Azimuth) -> tuple[Span, ...]:
         return ((-p.alpha_max, p.alpha_max), (p.n_min, p.n_max))
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Azimuth) -> tuple[Number, Number]:
         alpha, n = commands
         thrust = bollard_thrust(n, p)
         return thrust * cos(alpha), thrust * sin(alpha)
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: Azimuth) -> tuple[Span, ...]:
         most, least = bollard_thrust(p.n_max, p), bollard_thrust(p.n_min, p)
         aside = most * sin(fmin(p.alpha_max, QUARTER))
         return ((where(p.alpha_max > QUARTER, -most, least), most), (-aside, aside))
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Azimuth) -> tuple[Number, ...]:
         # One that cannot turn round runs backwards; beyond its angles it gives what it can of the force.
         X, Y = forces
         way = where((p.alpha_max <= QUARTER) & (X < 0.0), -1.0, 1.0)
@@ -299,7 +304,7 @@ class Foil(NamedTuple):
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
 
 
-class Rudder(Law):
+class Rudder(Law[Foil]):
     """Rudder in a free flow: a normal force by the square of the flow (Yasukawa and Yoshimura 2015).
 
     A positive angle of a rudder aft turns a ship that goes ahead to starboard. What it is asked for is
@@ -314,11 +319,11 @@ class Rudder(Law):
     Parameters = Foil
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: Foil) -> tuple[Span, ...]:
         return ((-p.delta_max, p.delta_max),)
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Foil) -> tuple[Number, Number]:
         (delta,) = commands
         u = (1.0 - p.wake) * flow.u
         # U sin(delta + arctan(v / u)), the speed across the rudder, which holds astern as well.
@@ -329,48 +334,48 @@ class Rudder(Law):
         return -along, -(1.0 + p.hull_force) * normal * cos(delta)
 
     @staticmethod
-    def _full(flow: Flow, p: Any) -> Number:
+    def _full(flow: Flow, p: Foil) -> Number:
         """Sway force [N] at an angle of 45 degrees, without drift."""
         return Rudder.force((0.5 * QUARTER,), Flow(flow.u, 0.0), p)[1]
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+    def reach(cls, flow: Flow, p: Foil) -> tuple[Span, ...]:
         most = abs(Rudder._full(flow, p)) * sin(2.0 * fmin(p.delta_max, 0.5 * QUARTER))
         return ((-most, most),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Foil) -> tuple[Number, ...]:
         # The force goes with sin(2 delta).
         full = Rudder._full(flow, p)
         sine = clip(forces[0] / where(abs(full) > SMALL, full, SMALL), -1.0, 1.0)
         return (0.5 * atan2(sine, sqrt(1.0 - sine * sine)),)
 
 
-class Given(NamedTuple):
+class LargestForces(NamedTuple):
     F_X: Annotated[float, "N", "largest force ahead and astern", DIVISOR] = 1.0
     F_Y: Annotated[float, "N", "largest force to starboard and port", DIVISOR] = 1.0
 
 
-class GivenForce(Law):
+class ExternalForce(Law[LargestForces]):
     """A force that is given, as a tug's or a winch's."""
 
     name = "given_force"
     commands = (Command("X", "N", "force ahead"), Command("Y", "N", "force to starboard"))
     components = "XY"
-    Parameters = Given
+    Parameters = LargestForces
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: LargestForces) -> tuple[Span, ...]:
         return ((-p.F_X, p.F_X), (-p.F_Y, p.F_Y))
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: LargestForces) -> tuple[Number, Number]:
         return commands[0], commands[1]
 
     @classmethod
-    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
-        return GivenForce.limits(p)
+    def reach(cls, flow: Flow, p: LargestForces) -> tuple[Span, ...]:
+        return ExternalForce.limits(p)
 
     @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: LargestForces) -> tuple[Number, ...]:
         return forces

@@ -2,19 +2,37 @@
 
 Commands pass the effects with a memory of commands (a delay), the limit of their rate, the
 characteristic of the thrusters, and the effects with a memory of forces (a lag). What becomes of them
-then is of the ship: see :class:`Layout`. The functions run on floats, step by step in an FMU, and on
-arrays, which is how a diagnosis computes whole series with them.
+then is of the ship: see :class:`CommandLayout`. The functions run on floats, step by step in an FMU,
+and on arrays, by which a diagnosis computes whole series.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import NamedTuple
 
+from ..declare import Fields
 from ..effects import EffectSet, Memory, Running, Thrust
 from ..effects.all_thrusters import way
 from ..effects.group import Group, Member, group
 from ..hull import Triple
-from ..ops import Condition, Number, clip, when
+from ..ops import Condition, Number, Series, clip, fmax, when
+from ..ship_description import Description
+from .actuation import (
+    actuators,
+    command_names,
+    forces,
+    limits,
+    ordered,
+    power_of,
+    shared,
+    variable,
+)
+from .actuator import Actuator
+from .law import Law, Span
+from .weighted_allocation import TINY, allocate, largest
+
+AT_REST = (0.0, 0.0, 0.0)
 
 
 def total(f: Thrust) -> Triple:
@@ -27,38 +45,117 @@ def total(f: Thrust) -> Triple:
     return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
 
 
-class Layout(NamedTuple):
-    """What a ship has for thrusters: how many commands they get, and how these become a force.
+@dataclass(frozen=True, eq=False)
+class CommandLayout:
+    """How a ship's commands become a force, with the effects of its actuators.
 
     Attributes:
-        commands: names of their variables, in the order of all tuples of commands and shares.
-        running: ``running(t, u, v, r, commands, b)``: what a thruster's force may depend on.
-        thrust: ``thrust(shares, running, b)``: the force of each unit, effects included.
-        believed: ``believed(commands, params)``: tau that the allocation expects of commands at rest.
-        allocate: ``allocate(tau, params)``: the commands, or shares of full force, that give a force.
-        full: ``full(params)``: the largest force and moment on each axis [N, N, N m].
-        limits: ``limits(params)``: the lowest and the highest value of each command.
-        powered: ``powered(b, settings)``: the thrusters at settings of their power, if they have any.
-        shared: for each command of each actuator the place of the one that is given; empty: each is.
-        curved: whether forces are not in proportion to what acts.
-        round: for each command whether it is an angle that goes round; empty: none is.
+        ship: whose actuators they are.
+        apart: whether each unit of those with two has commands of its own.
     """
 
-    commands: tuple[str, ...]
-    running: Callable[..., Any]
-    thrust: Callable[[Any, Any, Any], Thrust]
-    believed: Callable[[Any, Any], Triple]
-    allocate: Callable[[Triple, Any], tuple[Number, ...]]
-    full: Callable[[Any], Triple]
-    limits: Callable[[Any], tuple[tuple[Number, Number], ...]]
-    powered: Callable[[Any, Any], Any] = lambda b, settings: b
-    shared: tuple[int, ...] = ()
-    curved: bool = False
-    round: tuple[bool, ...] = ()
+    ship: Description
+    apart: bool = False
 
-    def act(self, shares: Sequence[Number], now: Running, b: Any) -> Triple:
-        """tau [N, N, N m], effects included, of :attr:`thrust`."""
-        return total(self.thrust(shares, now, b))
+    @cached_property
+    def commands(self) -> tuple[str, ...]:
+        """Names of their variables, in the order of all tuples of commands and shares."""
+        return tuple(map(variable, command_names(self.ship, self.apart)))
+
+    @cached_property
+    def shared(self) -> tuple[int, ...]:
+        """For each command of each actuator the place of the one that is given; empty: each is."""
+        places = shared(self.ship)
+        return places if not self.apart and len(places) > len(self.commands) else ()
+
+    @cached_property
+    def curved(self) -> bool:
+        """Whether forces are not in proportion to what acts."""
+        return not all(a.law.proportional for a in actuators(self.ship))
+
+    @cached_property
+    def round(self) -> tuple[bool, ...]:
+        """For each command whether it is an angle that goes round."""
+        return tuple([angle for a, _ in self._sets() for angle in a.round])
+
+    def _sets(self) -> list[tuple[Actuator, float]]:
+        """Each actuator with commands of its own, as often as it has them."""
+        return [(a, side) for a in ordered(self.ship) for side in (a.sides if self.apart else (0.0,))]
+
+    def running(
+        self,
+        t: Series,
+        u: Series,
+        v: Series,
+        r: Series,
+        commands: Sequence[Series],
+        b: "PreparedThrusters",
+    ) -> Running:
+        """What the force of the actuators may depend on, at a time [s], velocity and commands."""
+        p = b.params
+        units = [c.unit for a, _ in self._sets() for c in a.law.commands]
+        part = [
+            c if unit == "1" else clip(c / fmax(fmax(high, -low), TINY), -1.0, 1.0)
+            for c, unit, (low, high) in zip(commands, units, self.limits(p), strict=True)
+        ]
+        each = part if self.apart else [part[k] for k in shared(self.ship)]
+        power = zip(actuators(self.ship), power_of(self.ship, p.power), strict=True)
+        gains = [x for a, x in power for _ in a.sides]
+        return Running(t, u, v, r, tuple(commands), tuple(each), tuple(gains))
+
+    def thrust(self, acting: Sequence[Number], now: Running, b: "PreparedThrusters") -> Thrust:
+        """The force of each unit by the commands that act, effects included."""
+        p = b.params
+        f = forces(self.ship, acting, (now.u, now.v, now.r), p.plant, p.power, self.apart)
+        for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
+            f = member.apply(acts, p.wrong, f, f, now)
+        return f
+
+    def act(self, acting: Sequence[Number], now: Running, b: "PreparedThrusters") -> Triple:
+        """tau [N, N, N m], effects included, of :meth:`thrust`."""
+        return total(self.thrust(acting, now, b))
+
+    def nominal_force(self, commands: Sequence[Number], p: Fields) -> Triple:
+        """tau [N, N, N m] that the allocation expects of commands at rest."""
+        settings = p.power if self.apart else ()  # of a run are given with the commands of each unit
+        return total(
+            forces(allocating(self.ship), commands, AT_REST, p.allocation, settings, self.apart)
+        )
+
+    def allocate(self, tau: Triple, p: Fields) -> tuple[Number, ...]:
+        """The commands that give a force, as nearly as they can."""
+        return allocate(allocating(self.ship), tau, AT_REST, p.allocation, self.apart)
+
+    def full(self, p: Fields) -> Triple:
+        """The largest force and moment on each axis [N, N, N m]."""
+        return largest(allocating(self.ship), p.allocation, self.apart)
+
+    def limits(self, p: Fields) -> tuple[Span, ...]:
+        """The lowest and the highest value of each command."""
+        return limits(self.ship, p.plant, self.apart)
+
+    def powered(self, b: "PreparedThrusters", settings: Sequence[Number]) -> "PreparedThrusters":
+        """The actuators at settings of their power, of each that has one."""
+        p = b.params
+        power = p.power._make([x * s for x, s in zip(p.power, settings, strict=True)])
+        return b._replace(params=p._replace(power=power))
+
+
+@cache
+def allocating(ship: Description) -> Description:
+    """The ship as the allocation has it, which may know simpler laws."""
+    laws = [Law.known[part.law].allocated for part in ship.actuators]
+    parts = [
+        p if x is None else p._replace(law=x.name) for p, x in zip(ship.actuators, laws, strict=True)
+    ]
+    return ship._replace(actuators=tuple(parts))
+
+
+@cache
+def layouts(ship: Description) -> tuple[CommandLayout, ...]:
+    """How runs may have a ship's commands: as its FMU does, and each unit by its own."""
+    each = any(len(a.sides) > 1 for a in actuators(ship))
+    return (CommandLayout(ship), CommandLayout(ship, apart=True)) if each else (CommandLayout(ship),)
 
 
 class ThrusterEffects(NamedTuple):
@@ -73,7 +170,7 @@ class ThrusterEffects(NamedTuple):
             its place among the memories.
     """
 
-    layout: Layout
+    layout: CommandLayout
     dynamics: Group
     forces: Group
     remembering: Mapping[str, Sequence[tuple[int, Member, Memory]]]
@@ -81,7 +178,7 @@ class ThrusterEffects(NamedTuple):
 
 
 @cache
-def thruster_effects(effects: EffectSet, layout: Layout) -> ThrusterEffects:
+def thruster_effects(effects: EffectSet, layout: CommandLayout) -> ThrusterEffects:
     """The groups of a set of effects; those with a memory of commands come first."""
     actuator = [e for e in effects.of_kind("actuator") if e.function is not None]
     slow = [e for of in ("command", "force") for e in actuator if e.memory and e.memory.of == of]
@@ -101,7 +198,7 @@ class Past(NamedTuple):
     """What the thrusters remember: time [s], the memory of each slow effect, the last command."""
 
     t: Number
-    memories: tuple[Number, ...]
+    memories: tuple[tuple[object, ...], ...]
     limited: tuple[Number, ...]
 
 
@@ -112,7 +209,7 @@ def at_rest(effects: ThrusterEffects) -> Past:
     return Past(0.0, tuple([m.start(width) for m in memories if m is not None]), (0.0,) * width)
 
 
-class Prepared(NamedTuple):
+class PreparedThrusters(NamedTuple):
     """What follows from the parameters alone: which effects act.
 
     Attributes:
@@ -123,16 +220,16 @@ class Prepared(NamedTuple):
         any_acts: whether any of these acts.
     """
 
-    params: Any
+    params: Fields
     effects: ThrusterEffects
     slow: tuple[Condition, ...]
     acting: tuple[Condition, ...]
     any_acts: Condition
 
 
-def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
+def prepared(p: Fields, effects: ThrusterEffects) -> PreparedThrusters:
     """Everything that a step needs of the parameters."""
-    return Prepared(
+    return PreparedThrusters(
         p,
         effects,
         effects.dynamics.acting(p.dynamics),
@@ -142,8 +239,12 @@ def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
 
 
 def remember(
-    memories: tuple[Number, ...], signals: tuple[Number, ...], of: str, b: Prepared, h: Number
-) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+    memories: tuple[tuple[object, ...], ...],
+    signals: tuple[Number, ...],
+    of: str,
+    b: PreparedThrusters,
+    h: Number,
+) -> tuple[tuple[tuple[object, ...], ...], tuple[Number, ...]]:
     """The memories a step later, and what they make of commands or of shares of full force.
 
     Args:
@@ -171,12 +272,11 @@ def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle:
 
 
 def command_response(
-    s: Past, commands: tuple[Number, ...], b: Prepared, h: Number
+    s: Past, commands: tuple[Number, ...], b: PreparedThrusters, h: Number
 ) -> tuple[Past, tuple[Number, ...]]:
     """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
     memories, given = remember(s.memories, commands, "command", b, h)
     rates = b.params.rate if len(b.params.rate) == len(given) else tuple(b.params.rate) * len(given)
-    angles = b.effects.layout.round or (False,) * len(given)
     given = tuple(
         [
             when(
@@ -184,14 +284,14 @@ def command_response(
                 lambda x=x, w=w, rate=rate, angle=angle: rate_limited(x, w, rate, h, angle),
                 lambda w=w: w,
             )
-            for x, w, rate, angle in zip(s.limited, given, rates, angles, strict=True)
+            for x, w, rate, angle in zip(s.limited, given, rates, b.effects.layout.round, strict=True)
         ]
     )
     return Past(s.t + h, memories, given), given
 
 
 def force_response(
-    s: Past, shares: tuple[Number, ...], b: Prepared, h: Number
+    s: Past, shares: tuple[Number, ...], b: PreparedThrusters, h: Number
 ) -> tuple[Past, tuple[Number, ...]]:
     """The shares of full force that act after a step of h [s], for those of the characteristic."""
     memories, shares = remember(s.memories, shares, "force", b, h)

@@ -67,7 +67,7 @@ class RaceFoil(NamedTuple):
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1000.0
 
 
-class RudderInRace(Law):
+class RudderInRace(Law[RaceFoil]):
     """Rudder in the race of a propeller.
 
     u_R = epsilon u (1 - w) sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta) with
@@ -92,16 +92,16 @@ class RudderInRace(Law):
     Parameters = RaceFoil
 
     @classmethod
-    def limits(cls, p: Any) -> tuple[Span, ...]:
+    def limits(cls, p: RaceFoil) -> tuple[Span, ...]:
         return ((-p.delta_max, p.delta_max),)
 
     @classmethod
-    def acts_at(cls, x: Number, p: Any) -> Number:
+    def acts_at(cls, x: Number, p: RaceFoil) -> Number:
         """Where rudder and hull together have their force."""
         return (x + p.hull_force * p.hull_force_place) / (1.0 + p.hull_force)
 
     @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
         (delta,) = commands
         angle = delta + p.bias
         u, v = RudderInRace.met(flow, p)
@@ -111,7 +111,7 @@ class RudderInRace(Law):
         return -along, -(1.0 + p.hull_force) * normal * cos(angle)
 
     @staticmethod
-    def met(flow: Flow, p: Any) -> tuple[Number, Number]:
+    def met(flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
         """u_R along the ship and v_R, positive from port, of the water that meets the rudder [m/s]."""
         assert flow.race is not None
         inflow, jet, diameter = flow.race

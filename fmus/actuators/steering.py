@@ -10,8 +10,9 @@ law needs nothing but its force; a request out of reach gets what comes nearest.
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ..declare import Fields
 from ..hull import Triple
 from ..ops import Number, clip, fmax, fmin, where
 from ..ship_description import Description
@@ -24,7 +25,7 @@ CRUISING = 0.1  # Froude number at which it is told to which side an angle turns
 TRIED = 0.1  # rad, the angle for that
 
 
-class Roles(NamedTuple):
+class CommandRoles(NamedTuple):
     """For each command of a ship what it is for.
 
     Attributes:
@@ -37,13 +38,13 @@ class Roles(NamedTuple):
 
 
 @cache
-def believed(ship: Description) -> tuple[Number, ...]:
+def believed(ship: Description) -> tuple[Fields, ...]:
     """The parameters of a ship's actuators, as its description has them."""
     return tuple([parameters(ship, a, "", False)() for a in actuators(ship)])
 
 
 @cache
-def roles(ship: Description) -> Roles:
+def roles(ship: Description) -> CommandRoles:
     """What the commands of a ship are for, by the forces that they have in its description."""
     values = believed(ship)
     angles = [c.unit == "rad" for a in ordered(ship) for c in a.law.commands]
@@ -63,7 +64,7 @@ def roles(ship: Description) -> Roles:
     for k in places:
         N = alone(k, TRIED, ahead, u)[2] - alone(k, -TRIED, ahead, u)[2]
         steers.append((N > 0.0) - (N < 0.0) if angles[k] else 0.0)
-    return Roles(tuple(drives), tuple(map(float, steers)))
+    return CommandRoles(tuple(drives), tuple(map(float, steers)))
 
 
 def steerable(ship: Description) -> bool:
@@ -72,7 +73,7 @@ def steerable(ship: Description) -> bool:
 
 
 def commands_at(
-    ship: Description, drive: Number, helm: Number, angle_max: Number, values: Any
+    ship: Description, drive: Number, helm: Number, angle_max: Number, values: Sequence[Fields]
 ) -> tuple[Number, ...]:
     """The commands of two shares.
 
@@ -112,7 +113,7 @@ def share(of: Callable[[Number], Number], wanted: Number) -> Number:
     return where(reach == 0.0, 0.0, found)
 
 
-class Given(NamedTuple):
+class SteeringCommands(NamedTuple):
     """What becomes of a request: the commands, the share of the largest angle, and tau [N, N, N m]."""
 
     commands: tuple[Number, ...]
@@ -127,8 +128,8 @@ def steer(
     helm: Number,
     nu: Triple,
     angle_max: Number,
-    values: Any,
-) -> Given:
+    values: Sequence[Fields],
+) -> SteeringCommands:
     """Commands that give a surge force and a yaw moment as nearly as the ship can.
 
     Args:
@@ -147,4 +148,4 @@ def steer(
     drive = share(lambda x: given(x, helm)[1][0], tau_X)
     helm = share(lambda x: given(drive, x)[1][2], tau_N)
     commands, tau = given(drive, helm)
-    return Given(commands, helm, tau)
+    return SteeringCommands(commands, helm, tau)

@@ -8,10 +8,9 @@ half and all of ``table_speed``. It starts as a straight line without influence 
 line commands are allocated.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
-from ..declare import Range, Variable, group_of, variables
+from ..declare import Fields, Range, Variable, group_of, variables
 from ..effects.curve import hats
 from ..ops import Number, signed_root
 from .law import Flow, Law
@@ -34,11 +33,11 @@ def squared(line: type[Law]) -> type[Law]:
         variants = {}  # noqa: RUF012
 
         @classmethod
-        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, Number]:
             return line.force(tuple([abs(c) * c for c in commands]), flow, p)
 
         @classmethod
-        def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+        def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, ...]:
             return tuple([signed_root(c) for c in line.commanded(forces, flow, p)])
 
     return Squared
@@ -62,7 +61,7 @@ def tabulated(line: type[Law], tables: Mapping[str, str]) -> type[Law]:
         Parameters = group_of("Tabulated", [*variables(line.Parameters), *cells, TABLE_SPEED])
 
         @classmethod
-        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Fields) -> tuple[Number, Number]:
             first = len(p) - 1 - len(cells)
             shares = [
                 looked_up(c, abs(getattr(flow, speed)), p[first + k * NODES :][:NODES], p.table_speed)
@@ -83,7 +82,7 @@ def _table(name: str) -> list[Variable]:
     ]
 
 
-def looked_up(command: Number, speed: Number, table: Any, most: Number) -> Any:
+def looked_up(command: Number, speed: Number, table: Sequence[Number], most: Number) -> Number:
     """Share of full force by linear interpolation in both directions, constant beyond the table."""
     by_speed = hats(speed, 0.0, most, SPEEDS)
     total = 0.0

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ..declare import Fields
 from ..hull import Triple
 from ..ops import Number, clip, where
 from ..ship_description import Description
@@ -16,7 +17,7 @@ TINY = 1e-9  # share by which a matrix that has no inverse gets one
 NOTHING = 1e-30  # N2, in place of zero where no actuator can push
 
 
-class Component(NamedTuple):
+class ForceComponent(NamedTuple):
     """A force that an actuator can be asked for: whose it is, and along which axis of the ship."""
 
     actuator: Actuator
@@ -24,9 +25,9 @@ class Component(NamedTuple):
 
 
 @cache
-def components(ship: Description) -> tuple[Component, ...]:
+def components(ship: Description) -> tuple[ForceComponent, ...]:
     """The forces that a ship's actuators can be asked for."""
-    return tuple([Component(a, axis) for a in actuators(ship) for axis in a.law.components])
+    return tuple([ForceComponent(a, axis) for a in actuators(ship) for axis in a.law.components])
 
 
 @cache
@@ -55,13 +56,13 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
     return sum(x * y for x, y in zip(a, b, strict=True))
 
 
-def _column(c: Component, x: Number, y: Number) -> Triple:
+def _column(c: ForceComponent, x: Number, y: Number) -> Triple:
     """tau [N, N, N m] of one newton along a component."""
     return (1.0, 0.0, -y) if c.along == "X" else (0.0, 1.0, x)
 
 
 def allocate(
-    ship: Description, tau: Sequence[Number], nu: Triple, values: Any, apart: bool = False
+    ship: Description, tau: Sequence[Number], nu: Triple, values: Sequence[Fields], apart: bool = False
 ) -> tuple[Number, ...]:
     """Commands that give a force as nearly as the actuators can, within limits.
 
@@ -96,7 +97,7 @@ def allocate(
         found = [clip(f, low, high) for f, (low, high) in zip(exact, spans, strict=True)]
     else:
         found = _shared(columns, spans, wanted)
-    commands: list[Any] = []
+    commands: list[Number] = []
     for a in ordered(ship):
         p, x, y = every[a.k]
         count = _units(a, apart)
@@ -139,7 +140,7 @@ def _order(ship: Description) -> tuple[tuple[int, int], ...]:
     return tuple(found)
 
 
-def solution(ship: Description, tau: Sequence[Number], values: Any) -> Triple:
+def solution(ship: Description, tau: Sequence[Number], values: Sequence[Fields]) -> Triple:
     """The forces [N] of as many components as axes that give a force exactly, whatever their limits."""
     every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
     columns = [_column(c, *every[c.actuator.k][1:]) for c in components(ship)]
@@ -150,7 +151,7 @@ def solution(ship: Description, tau: Sequence[Number], values: Any) -> Triple:
 
 def _eliminated(
     ship: Description, columns: Sequence[Sequence[Number]], wanted: Sequence[Number]
-) -> list[Any]:
+) -> list[Number]:
     """f of B f = tau for the columns of a square B, by elimination."""
     n = len(wanted)
     rows = [[column[i] for column in columns] for i in range(n)]
@@ -161,7 +162,7 @@ def _eliminated(
             share = rows[m][j] / rows[i][j]
             rows[m] = [x - share * y for x, y in zip(rows[m], rows[i], strict=True)]
             right[m] = right[m] - share * right[i]
-    found: list[Any] = [0.0] * n
+    found: list[Number] = [0.0] * n
     for k, (i, j) in reversed([*enumerate(order)]):
         known = sum_of([rows[i][other] * found[other] for _, other in order[k + 1 :]])
         found[j] = (right[i] - known) / rows[i][j]
@@ -172,10 +173,10 @@ def _shared(
     columns: Sequence[Sequence[Number]],
     spans: Sequence[tuple[Number, Number]],
     wanted: Sequence[Number],
-) -> list[Any]:
+) -> list[Number]:
     """Forces within their spans that give what is wanted as nearly as they can."""
     weights = [0.25 * (high - low) * (high - low) for low, high in spans]
-    found: list[Any] = [0.0] * len(columns)
+    found: list[Number] = [0.0] * len(columns)
     for _ in range(PASSES):
         left = list(wanted)
         for f, column in zip(found, columns, strict=True):
@@ -192,7 +193,7 @@ def _shared(
 
 def _least(
     columns: Sequence[Sequence[Number]], weights: Sequence[Number], wanted: Sequence[Number]
-) -> list[Any]:
+) -> list[Number]:
     """f = W B' (B W B' + e I)^-1 tau for the columns of B, by elimination."""
     n = range(len(wanted))
     rows = [
@@ -214,7 +215,7 @@ def _least(
     return [w * sum_of([b[i] * right[i] for i in n]) for w, b in zip(weights, columns, strict=True)]
 
 
-def sum_of(values: Sequence[Number]) -> Any:
+def sum_of(values: Sequence[Number]) -> Number:
     """The sum of some numbers, one after the other: ``sum`` compensates floats from Python 3.12 on."""
     found: Number = 0.0
     for x in values:
@@ -222,7 +223,7 @@ def sum_of(values: Sequence[Number]) -> Any:
     return found
 
 
-def largest(ship: Description, values: Any, apart: bool = False) -> Triple:
+def largest(ship: Description, values: Sequence[Fields], apart: bool = False) -> Triple:
     """The largest force and moment on each axis [N, N, N m], of all actuators at rest together."""
     found = [0.0, 0.0, 0.0]
     for c in components(ship):

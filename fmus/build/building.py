@@ -23,7 +23,7 @@ from .finding import ROOT, BuildError, load, which
 from .packing import changes, hash_of, pack, sources
 from .platforms import Native, native_targets
 from .released import released
-from .start_values_file import Starts
+from .start_values_file import StartValues
 
 # Wall time after which a build says that it takes long [s]; chosen: an FMU takes a second or two, and
 # one that is compiled for all platforms up to ten.
@@ -34,7 +34,7 @@ CHECKER = ROOT / "check"  # judges FMUs, and is in none
 def build(
     names: str | Path | Sequence[str | Path],
     out: str | Path | None = None,
-    starts: Starts | None = None,
+    starts: StartValues | None = None,
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
     native: Native | None = None,
@@ -80,7 +80,7 @@ def build(
 def export(
     names: Sequence[str],
     folder: Path,
-    starts: Starts | None = None,
+    starts: StartValues | None = None,
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
     overwrite: bool = False,
@@ -134,14 +134,14 @@ def _listed(names: object) -> list[str]:
     return [str(name) for name in every]
 
 
-def _every(names: Sequence[str], starts: Starts | None, of: Ship) -> Sequence[str]:
+def _every(names: Sequence[str], starts: StartValues | None, of: Ship) -> Sequence[str]:
     """The components asked for; without names those of the parameter set, or all that a ship has."""
     if starts is not None:
         return names or list(starts.values)
     return names or [component.name for _, component in discover(of)]
 
 
-def _tell_unused(starts: Starts, built: Sequence[str], of: Ship, note: Callable[[str], None]) -> None:
+def _tell_unused(starts: StartValues, built: Sequence[str], of: Ship, note: Callable[[str], None]) -> None:
     """Say what of a parameter set went into no FMU.
 
     Raises:
@@ -162,7 +162,7 @@ def _tell_unused(starts: Starts, built: Sequence[str], of: Ship, note: Callable[
 def _cached(
     name: str,
     of: Ship,
-    starts: Starts | None = None,
+    starts: StartValues | None = None,
     native: Native | None = None,
     note: Callable[[str], None] = lambda _: None,
 ) -> Path:

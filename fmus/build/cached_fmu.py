@@ -13,6 +13,8 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
+from cybership.scratch_folder import atomic_write, sweep_parts
+
 from .finding import BuildError
 
 SEAL = ".sha256"  # ends the name of the file beside an entry with its size [bytes] and SHA-256
@@ -65,6 +67,8 @@ def _seal(fmu: Path) -> str:
 def make_folder(folder: Path) -> None:
     """Make a folder of the cache, in which only this user may write.
 
+    What killed processes have left in the cache is removed.
+
     Raises:
         BuildError: it cannot be made.
     """
@@ -72,6 +76,7 @@ def make_folder(folder: Path) -> None:
         cache_folder().parent.mkdir(parents=True, exist_ok=True)
         for place in (cache_folder(), folder):
             place.mkdir(mode=0o755, exist_ok=True)
+        sweep_parts(cache_folder().glob("**/.*.part"))
     except OSError as error:
         raise BuildError(
             f"cannot keep FMUs in '{folder}' ({error.strerror}); CYBERSHIP_CACHE may name another folder"
@@ -90,12 +95,8 @@ def store(built: Path, fmu: Path) -> None:
 
 def place(source: Path, target: Path) -> Path:
     """Copy a file so that the target is either the old one or the whole new one."""
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
+    with atomic_write(target) as part:
         shutil.copyfile(source, part)
         with open(part, "rb+") as file:
             os.fsync(file.fileno())
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
     return target

@@ -7,6 +7,8 @@ import traceback
 from pathlib import Path
 
 from ..base_units import base_exponents
+from cybership.message_text import PrintableError
+
 from ..declare import Component, DeclarationError, discover, nearest, width
 from ..effects import EffectSet
 from ..fmi.trace import trace_init, trace_step
@@ -16,7 +18,7 @@ from ..ships.naming import DEFAULT
 ROOT = Path(__file__).parent.parent
 
 
-class BuildError(Exception):
+class BuildError(PrintableError):
     """What was asked for cannot be built; the message says why."""
 
 

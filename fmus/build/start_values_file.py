@@ -11,6 +11,8 @@ from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
+from cybership.message_text import brief, name_of, quoted
+
 from ..declare import Component, DeclarationError, Variable, nearest, variables
 
 # Entries that belong to the model but that no FMU takes, in the annotation that is ours.
@@ -20,7 +22,7 @@ RUNS = ".//*[@type='cybership.run']/*[@name]"
 
 
 @dataclass(frozen=True)
-class Starts:
+class StartValues:
     """Start values for components.
 
     Attributes:
@@ -44,7 +46,7 @@ class Starts:
         given = self.values.get(component.name, {})
         settable = {v.name: v for v in [*variables(component.params), *variables(component.inputs)]}
         for name, (value, unit) in given.items():
-            where = f"'{self.path}': {component.name}.{name}"
+            where = f"'{self.path}': {component.name}.{name_of(name)}"
             if name not in settable:
                 raise DeclarationError(
                     f"{where} is no parameter{nearest(name, settable)}; "
@@ -55,7 +57,7 @@ class Starts:
         return component.starting(starts)
 
 
-def read_starts(path: Path) -> Starts:
+def read_starts(path: Path) -> StartValues:
     """The values of a parameter set.
 
     Args:
@@ -74,26 +76,27 @@ def read_starts(path: Path) -> Starts:
     except Exception as error:  # FMPy raises nothing more special, and begins with a title
         lines = str(error).splitlines() or [repr(error)]
         reason = lines[min(1, len(lines) - 1)]
-        raise DeclarationError(f"'{path}' is not an SSP 1.0 parameter set: {reason}") from None
+        raise DeclarationError(f"'{path}' is not an SSP 1.0 parameter set: {brief(reason)}") from None
     found: dict[str, dict[str, tuple[float, str | None]]] = {}
     for entry in entries:
         model, dot, name = str(entry.name).partition(".")
+        called = name_of(entry.name)
         if not dot:
-            raise DeclarationError(f"'{path}': '{entry.name}' is not of the form model.parameter")
+            raise DeclarationError(f"'{path}': '{called}' is not of the form model.parameter")
         if name in found.setdefault(model, {}):
-            raise DeclarationError(f"'{path}': {entry.name} stands there twice")
+            raise DeclarationError(f"'{path}': {called} stands there twice")
         value = float(entry.value) if entry.type in ("Real", "Integer") else math.nan
         if not math.isfinite(value):
-            raise DeclarationError(f"'{path}': {entry.name} has no number as its value")
+            raise DeclarationError(f"'{path}': {called} has no number as its value")
         found[model][name] = value, entry.unit
     root = ElementTree.fromstring(content)
     notes = [f"{e.get('name')}: {e.get('description')}" for e in root.iterfind(BESIDE)]
-    return Starts(found, path, notes, [e.get("name", "") for e in root.iterfind(RUNS)])
+    return StartValues(found, path, notes, [e.get("name", "") for e in root.iterfind(RUNS)])
 
 
 def _check(value: float, unit: str | None, v: Variable, where: str) -> None:
     if unit not in (None, v.unit):
-        raise DeclarationError(f"{where} is in '{unit}', but the FMU's unit is '{v.unit}'")
+        raise DeclarationError(f"{where} is in {quoted(unit)}, but the FMU's unit is '{v.unit}'")
     if v.range.min is not None and value < v.range.min:
         raise DeclarationError(f"{where} = {value:g} is below its minimum {v.range.min:g}")
     if v.range.max is not None and value > v.range.max:

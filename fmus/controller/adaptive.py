@@ -6,9 +6,9 @@ measurement is frozen.
 """
 
 from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from ..declare import FIXED, Component, Range, bundle
+from ..declare import FIXED, Component, Fields, Range, bundle
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple
 from ..ops import Condition, Number, choose, not_, where
@@ -17,7 +17,7 @@ from .backstepping import (
     HELD,
     Energy,
     Errors,
-    Gains,
+    FeedbackGains,
     Inputs,
     acting,
     control,
@@ -55,7 +55,7 @@ class OmegaTrue(NamedTuple):
 class Learner(NamedTuple):
     """Parameters of every controller that learns, whatever it learns."""
 
-    gains: Gains = Gains()
+    gains: FeedbackGains = FeedbackGains()
     disturbance: Disturbance = Disturbance()
     hold_frozen: Annotated[float, "1", "1: do not adapt while frozen", FIXED, Range(0.0, 1.0)] = 0.0
     omega_true: OmegaTrue = OmegaTrue()
@@ -64,12 +64,12 @@ class Learner(NamedTuple):
 class State(NamedTuple):
     """Estimates of phi and of the earth-fixed omega_n, and the force asked for last."""
 
-    phi_hat: Any
+    phi_hat: Fields
     omega: Triple = (0.0, 0.0, 0.0)
     tau: Force = Force()
 
 
-def parameters(model: Parametrisation, **more: Any) -> type[Any]:
+def parameters(model: Parametrisation, **more: tuple[object, ...]) -> type[Fields]:
     """The Params class of a controller that learns a model."""
     groups = {"belief": model.belief, "phi": model.start(), "gamma": model.gamma()}
     return bundle("Params", Learner, **groups, truth=model.truth(), **more)
@@ -90,18 +90,20 @@ def to_body(psi: Number, force: Sequence[Number]) -> Triple:
     return (*rotate_to_body(psi, force[0], force[1]), force[2])
 
 
-def climb(values: Any, gains: Any, slopes: Any, dt: Number) -> tuple[Number, ...]:
+def climb(
+    values: Sequence[Number], gains: Sequence[Number], slopes: Sequence[Number], dt: Number
+) -> tuple[Number, ...]:
     """An explicit Euler step of dt [s] along gains times slopes."""
     return tuple([x + dt * (g * f) for x, g, f in zip(values, gains, slopes, strict=True)])
 
 
-def energy(z: Errors, p: Any, phi: Sequence[Number], omega: Triple) -> Energy:
+def energy(z: Errors, p: Fields, phi: Sequence[Number], omega: Triple) -> Energy:
     """V3 of (4.14), corrected; an estimate whose gain is 0 is left out."""
     known = weighted(p.truth, phi, p.gamma) + weighted(p.omega_true, omega, p.disturbance)
     return Energy(tracking_energy(z, p.belief.inertia) + 0.5 * known)
 
 
-def weighted(truth: Sequence[Number], estimates: Sequence[Number], gains: Sequence[Number]) -> Any:
+def weighted(truth: Sequence[Number], estimates: Sequence[Number], gains: Sequence[Number]) -> Number:
     """Sum of error^2 / gain; a gain of 0 counts as no error."""
     total = 0.0
     for true, estimate, gain in zip(truth, estimates, gains, strict=True):
@@ -114,10 +116,10 @@ def adaptive(name: str, description: str, model: Parametrisation) -> Component:
     """A component that tracks, and learns a model by its tracking error."""
     Outputs = outputs(model)
 
-    def init(i: Inputs, p: Any) -> State:
+    def init(i: Inputs, p: Fields) -> State:
         return State(model.hat._make(p.phi))
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Fields, h: Number) -> tuple[State, Fields]:
         e = i.estimate
         nu = (e.u_hat, e.v_hat, e.r_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)

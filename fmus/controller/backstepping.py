@@ -4,19 +4,19 @@ Convention: omega = -Phi(nu) phi + R^T omega_n is the model error, a force on th
 omega_hat is what the law compensates for. Every heading difference is wrapped.
 """
 
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from dataclasses import replace
+from typing import Annotated, NamedTuple
 
-from ..declare import bundle
+from ..declare import Declared, Fields, bundle, redeclared
 from ..frames import rotate_to_body
 from ..hull import Inertia, Triple, inertia_force
-from ..ops import Number, choose, wrap
+from ..ops import Condition, Number, choose, wrap
 from ..signals import Estimate, Force, Nothing, Target
-from .parametrisation import GAIN, Parametrisation, Regressors
+from .parametrisation import GAIN, B, Parametrisation, Regressors
 
 
-class Gains(NamedTuple):
+class FeedbackGains(NamedTuple):
     """Feedback gains, Table 5.1: diagonals of K_p and K_d."""
 
     K_p_x: Annotated[float, "1/s", "position gain, along", GAIN] = 0.4
@@ -27,16 +27,23 @@ class Gains(NamedTuple):
     K_d_r: Annotated[float, "N.m.s/rad", "velocity gain, yaw", GAIN] = 1.0
 
 
-# N, N m; the start value of an input that nobody tells: a force above half of it is none.
-UNTOLD = 1e9
+# N, N m; start value of an input that is not connected, for which FMI 2.0 has no other sign: a force
+# above half of it is none.
+NOT_CONNECTED = 1e9
 
 
 class Applied(NamedTuple):
     """The force that acts: what was asked for, as the thrusters clipped it."""
 
-    tau_cmd_X: Annotated[float, "N", "optional: surge force that acts; 1e9: not told"] = UNTOLD
-    tau_cmd_Y: Annotated[float, "N", "optional: sway force that acts; 1e9: not told"] = UNTOLD
-    tau_cmd_N: Annotated[float, "N.m", "optional: yaw moment that acts; 1e9: not told"] = UNTOLD
+    tau_cmd_X: Annotated[float, "N", "optional: surge force that acts; 1e9: not connected"] = (
+        NOT_CONNECTED
+    )
+    tau_cmd_Y: Annotated[float, "N", "optional: sway force that acts; 1e9: not connected"] = (
+        NOT_CONNECTED
+    )
+    tau_cmd_N: Annotated[float, "N.m", "optional: yaw moment that acts; 1e9: not connected"] = (
+        NOT_CONNECTED
+    )
 
 
 class Inputs(NamedTuple):
@@ -49,11 +56,16 @@ class Inputs(NamedTuple):
 HELD = Applied._fields
 
 
-def acting(told: Applied, asked: Force) -> Force:
-    """The force that acted in the step before: the one that is told, or else the one asked for."""
-    X, Y, N = told
-    known = (X < 0.5 * UNTOLD) & (Y < 0.5 * UNTOLD) & (N < 0.5 * UNTOLD)
-    return choose(known, Force(X, Y, N), asked)
+def is_connected(applied: Applied) -> Condition:
+    """Whether the force that acts is reported on every axis."""
+    X, Y, N = applied
+    most = 0.5 * NOT_CONNECTED
+    return (most > X) & (most > Y) & (most > N)
+
+
+def acting(applied: Applied, asked: Force) -> Force:
+    """The force that acted in the last step: the reported one, or else the one asked for."""
+    return choose(is_connected(applied), Force(*applied), asked)
 
 
 class Errors(NamedTuple):
@@ -89,20 +101,17 @@ class Energy(NamedTuple):
     lyapunov: Annotated[float, "1", "Lyapunov function of errors and estimates, (4.14)"] = 0.0
 
 
-def starting(base: type[Any], starts: Mapping[str, float]) -> Any:
+def starting(base: Declared, starts: Mapping[str, float]) -> Fields:
     """A group of parameters in a class of its own, with other start values for those that are named."""
-    values = {**base._field_defaults, **{k: x for k, x in starts.items() if k in base._fields}}
-    made = namedtuple(base.__name__, list(values), defaults=list(values.values()))
-    made.__annotations__ = base.__annotations__
-    return made()
+    return redeclared(base, lambda v: replace(v, start=starts.get(v.name, v.start)))()
 
 
-def outputs(model: Parametrisation, learning: Any = Nothing()) -> type[Any]:  # noqa: B008 - immutable
+def outputs(model: Parametrisation, learning: tuple[object, ...] = Nothing()) -> type[Fields]:
     """The outputs of a controller with this parametrisation, and what its way of learning shows."""
     return bundle("Outputs", Demand, phi_hat=model.hat(), energy=Energy(), learning=learning)
 
 
-def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
+def control_errors(e: Estimate, t: Target, k: FeedbackGains) -> tuple[Errors, Triple]:
     """z1, z2 and the derivative of the virtual control alpha, Table 4.2.
 
     Args:
@@ -140,11 +149,11 @@ def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
 
 
 def control(
-    model: Parametrisation,
+    model: Parametrisation[B],
     nu: Triple,
     errors: tuple[Errors, Triple],
-    k: Gains,
-    belief: Any,
+    k: FeedbackGains,
+    belief: B,
     F: Regressors,
     phi: Sequence[Number],
     w: Triple,
@@ -186,7 +195,7 @@ def control(
     return Demand(Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN)
 
 
-def tracking_energy(z: Errors, inertia: Inertia) -> Any:
+def tracking_energy(z: Errors, inertia: Inertia) -> Number:
     """V2 = 1/2 z1^T z1 + 1/2 z2^T M z2, (4.8)."""
     MX, MY, MN = inertia_force(z.z2_u, z.z2_v, z.z2_r, inertia)
     return 0.5 * (

@@ -3,21 +3,30 @@
 An input that is NaN or infinite keeps its last finite value.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ..declare import Component
+from ..declare import Component, Fields
 from ..ops import Number
-from .backstepping import HELD, Energy, Gains, Inputs, control, control_errors, outputs, tracking_energy
+from .backstepping import (
+    HELD,
+    Energy,
+    FeedbackGains,
+    Inputs,
+    control,
+    control_errors,
+    outputs,
+    tracking_energy,
+)
 from .models import ROTATIONAL
-from .parametrisation import Belief
+from .parametrisation import ControllerModel
 
 Outputs = outputs(ROTATIONAL)
 
 
 class Params(NamedTuple):
-    gains: Gains = Gains()
-    belief: Belief = Belief()
-    phi: Any = ROTATIONAL.start()
+    gains: FeedbackGains = FeedbackGains()
+    belief: ControllerModel = ControllerModel()
+    phi: Fields = ROTATIONAL.start()
 
 
 class State(NamedTuple):
@@ -28,7 +37,7 @@ def init(i: Inputs, p: Params) -> State:
     return State()
 
 
-def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Any]:
+def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Fields]:
     e = i.estimate
     nu = (e.u_hat, e.v_hat, e.r_hat)
     errors = control_errors(e, i.target, p.gains)

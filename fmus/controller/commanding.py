@@ -5,12 +5,12 @@ The surge force and the yaw moment that it asks for become shaft speeds and angl
 is over ground. What these commands give is the force that acts, for its integrals.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..actuators.actuation import actuators
 from ..actuators.command_variables import commands_of
 from ..actuators.steering import believed, steer
-from ..declare import Component, Range, bundle
+from ..declare import Component, Fields, Range, bundle
 from ..ops import Number, choose
 from ..ship_description import Description
 from ..signals import Estimate, Force, Target
@@ -18,7 +18,7 @@ from ..signals import Estimate, Force, Target
 HARD_OVER = 0.6108652381980153  # 35 degrees [rad], to which rudders are put over in service
 
 
-class Helm(NamedTuple):
+class HelmLimit(NamedTuple):
     angle_max: Annotated[
         float, "rad", "largest angle of rudder or azimuth that the controller takes", Range(0.01, 1.5)
     ] = HARD_OVER
@@ -27,9 +27,9 @@ class Helm(NamedTuple):
 class State(NamedTuple):
     """The controller's own, the force of its last commands [N, N, N m], the share of the angle."""
 
-    own: Any
-    told: Any
-    helm: Any = 0.0
+    own: tuple[object, ...]
+    applied: Fields
+    helm: Number = 0.0
 
 
 class Inputs(NamedTuple):
@@ -37,7 +37,7 @@ class Inputs(NamedTuple):
     target: Target = Target()
 
 
-class Commanded(NamedTuple):
+class CommandedForce(NamedTuple):
     """The force of the commands."""
 
     tau_cmd_X: Annotated[float, "N", "surge force of the commands, as believed"] = 0.0
@@ -55,30 +55,29 @@ def commanding(controller: Component, ship: Description) -> Component:
     commands = commands_of(ship)
     names = [a.part.name for a in actuators(ship)]
     parts = bundle("Believed", None, **dict(zip(names, believed(ship), strict=True)))
-    params = bundle("Params", own=controller.params(), believed=parts(), helm=Helm())
-    outputs: Any = bundle("Outputs", own=controller.outputs(), commands=commands(), force=Commanded())
-    untold = controller.inputs().applied
-    law = controller.prepared_step or controller.step
+    params = bundle("Params", own=controller.params(), believed=parts(), helm=HelmLimit())
+    outputs = bundle("Outputs", own=controller.outputs(), commands=commands(), force=CommandedForce())
+    unreported = controller.inputs().applied
 
-    def inputs(i: Inputs, told: Any) -> Any:
-        return controller.inputs(i.estimate, i.target, told)
+    def inputs(i: Inputs, applied: Fields) -> tuple[object, ...]:
+        return controller.inputs(i.estimate, i.target, applied)
 
-    def init(i: Inputs, p: Any) -> State:
-        return State(controller.init(inputs(i, untold), p.own), untold)
+    def init(i: Inputs, p: Fields) -> State:
+        return State(controller.init(inputs(i, unreported), p.own), unreported)
 
-    def prepare(p: Any) -> Any:
+    def prepare(p: Fields) -> Fields:
         return p._replace(own=controller.prepared(p.own))
 
-    def prepared_step(s: State, i: Inputs, b: Any, h: Number) -> tuple[State, Any]:
-        own, out = law(s.own, inputs(i, s.told), b.own, h)
+    def prepared_step(s: State, i: Inputs, b: Fields, h: Number) -> tuple[State, Fields]:
+        own, out = controller.law(s.own, inputs(i, s.applied), b.own, h)
         asked: Force = out.demand.tau
         nu = i.estimate.u_hat, i.estimate.v_hat, i.estimate.r_hat
         given = steer(ship, asked.tau_X, asked.tau_N, s.helm, nu, b.helm.angle_max, b.believed)
-        after = State(own, type(untold)(*given.tau), given.helm)
-        kept = choose(h > 0.0, (after.told, after.helm), (s.told, s.helm))
-        return State(own, *kept), outputs(out, commands(*given.commands), Commanded(*given.tau))
+        after = State(own, type(unreported)(*given.tau), given.helm)
+        kept = choose(h > 0.0, (after.applied, after.helm), (s.applied, s.helm))
+        return State(own, *kept), outputs(out, commands(*given.commands), CommandedForce(*given.tau))
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Fields, h: Number) -> tuple[State, Fields]:
         return prepared_step(s, i, prepare(p), h)
 
     return Component(

@@ -6,9 +6,9 @@ the controller itself asked for last, which may be more than thrusters give. An 
 infinite keeps its last finite value.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from ..declare import POSITIVE, Component, DeclarationError
+from ..declare import POSITIVE, Component, DeclarationError, Fields
 from ..hull import Triple
 from ..ops import Condition, Number, choose, not_, sqrt, when, where
 from ..signals import Force
@@ -17,10 +17,10 @@ from .backstepping import HELD, Inputs, acting, control, control_errors, outputs
 from .blocker import Blocker, BlockerOptions, blocked, exceeds
 from .eigen import dot
 from .fixed_point import FixedPoint, Now, advanced
-from .learning import Drive, Memory, integrated, learned, remembered
+from .learning import Drive, StoreIntegral, integrated, learned, remembered
 from .parametrisation import Parametrisation
-from .smoothing import Register, Sample, Tap, shifted
-from .store import Row, Storage, Store, StoreOptions, empty_store, offer, times
+from .smoothing import LearningSample, Register, Tap, shifted
+from .store import Storage, Store, StoredSample, StoreOptions, empty_store, offer, times
 
 
 class SampleOptions(NamedTuple):
@@ -33,7 +33,7 @@ class SampleOptions(NamedTuple):
     ] = 0.0
 
 
-class Learning(NamedTuple):
+class LearningOutputs(NamedTuple):
     """What concurrent learning shows."""
 
     stored: Annotated[float, "1", "number of samples in the store"] = 0.0
@@ -46,14 +46,14 @@ class Learning(NamedTuple):
 
 
 class State(NamedTuple):
-    phi_hat: Any
+    phi_hat: Fields
     omega: Triple
     tau: Force
     time: Number
     store: Store
     blocker: Blocker
     register: Register
-    integral: Memory
+    integral: StoreIntegral
     point: FixedPoint
 
 
@@ -61,12 +61,12 @@ class Present(NamedTuple):
     """The sample to learn from, 1 where it counts, and whether it is new."""
 
     register: Register
-    sample: Sample
+    sample: LearningSample
     counts: Number
     fresh: Condition
 
 
-def present(register: Register, now: Sample, span: Number, learns: Condition) -> Present:
+def present(register: Register, now: LearningSample, span: Number, learns: Condition) -> Present:
     """The sample of this instant, or the smoothed one."""
 
     def delayed() -> Present:
@@ -77,13 +77,15 @@ def present(register: Register, now: Sample, span: Number, learns: Condition) ->
     return when(span > 0.0, delayed, lambda: Present(register, now, 1.0, learns))
 
 
-def explained(model: Parametrisation, sample: Sample, s: State, p: Any) -> tuple[Row, Triple]:
+def explained(
+    model: Parametrisation, sample: LearningSample, s: State, p: Fields
+) -> tuple[StoredSample, Triple]:
     """A sample as it is stored, y or as printed eps, and eps = y - F phi_hat - R^T omega_hat, (4.33)."""
     F = model.regressors(sample.nu, sample.nu_dot, sample.tau, p.belief)
     y = model.error(sample.nu, sample.nu_dot, sample.tau, p.belief)
     a, b = model.force(F, s.phi_hat), to_body(sample.psi, s.omega)
     eps = (y[0] - a[0] - b[0], y[1] - a[1] - b[1], y[2] - a[2] - b[2])
-    return Row(1.0, sample.time, sample.psi, choose(p.store.stale > 0.5, eps, y), F), eps
+    return StoredSample(1.0, sample.time, sample.psi, choose(p.store.stale > 0.5, eps, y), F), eps
 
 
 def concurrent(
@@ -114,18 +116,18 @@ def concurrent(
         raise DeclarationError(f"{name} has no {', '.join(sorted(unknown))} to start differently")
     # With z2 the law adds forces to a velocity: the gain has the unit for z2, store_weight the rest.
     Params = parameters(model, disturbance=DisturbanceByError() if by_eps else Disturbance(), **groups)
-    Outputs = outputs(model, Learning())
+    Outputs = outputs(model, LearningOutputs())
     still: Triple = (0.0, 0.0, 0.0)
     beginning = empty_store(model)
-    no_integral = Memory(0.0, still, (still,) * len(model.coefficients))
+    no_integral = StoreIntegral(0.0, still, (still,) * len(model.coefficients))
 
-    def init(i: Inputs, p: Any) -> State:
+    def init(i: Inputs, p: Fields) -> State:
         phi = model.hat._make(p.phi)
         s = State(phi, still, Force(), 0.0, beginning, Blocker(), Register(), no_integral, FixedPoint())
         _, out = step(s, i, p, 0.0)
         return s._replace(tau=out.tau)
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Fields, h: Number) -> tuple[State, Fields]:
         e = i.estimate
         nu, nu_dot = (e.u_hat, e.v_hat, e.r_hat), (e.u_dot_hat, e.v_dot_hat, e.r_dot_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)
@@ -136,7 +138,7 @@ def concurrent(
         learns = (h > 0.0) & (gate.beta > 0.5) & attentive(e, p.hold_frozen)
         dt = where(learns, h, 0.0)
         time = s.time + h
-        now = Sample(time, e.psi_hat, nu, nu_dot, acted)
+        now = LearningSample(time, e.psi_hat, nu, nu_dot, acted)
         register, sample, counts, fresh = when(
             h > 0.0,
             lambda: present(s.register, now, p.samples.smoothing, learns),
@@ -146,7 +148,7 @@ def concurrent(
 
         omega_on = dot(p.disturbance, (1.0, 1.0, 1.0)) > 0.0
 
-        def smoothed_row() -> tuple[FixedPoint, Row, Any]:
+        def smoothed_row() -> tuple[FixedPoint, StoredSample, Condition]:
             pose = (e.x_hat, e.y_hat, e.psi_hat)
             seen = learns & not_(e.frozen > 0.5)
             new = Now(time, pose, nu, acted)
@@ -195,7 +197,7 @@ def concurrent(
                 *demand,
                 phi,
                 energy(z, p, phi, omega),
-                Learning(count, sigma, met, gate.beta, kept.sums.newest, *rates),
+                LearningOutputs(count, sigma, met, gate.beta, kept.sums.newest, *rates),
             ),
         )
 

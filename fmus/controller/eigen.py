@@ -5,20 +5,19 @@ exceeds a bound, at a fraction of the cost of an eigenvalue, and twenty paramete
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from ..ops import Condition, Number, fmax, fmin, kernel, sqrt, where
 
 Matrix = Sequence[Sequence[Number]]
 # Diagonal and squared off-diagonal of a tridiagonal matrix.
-Tridiagonal = tuple[list[Any], list[Any]]
+Tridiagonal = tuple[list[Number], list[Number]]
 
 HALVINGS = 50
 # A divisor that would be smaller counts as this.
 TINY = 1e-150
 
 
-def dot(a: Sequence[Number], b: Sequence[Number]) -> Any:
+def dot(a: Sequence[Number], b: Sequence[Number]) -> Number:
     """Sum of products; ``sum`` would round differently from one Python to the next."""
     total = 0.0
     for x, y in zip(a, b, strict=True):
@@ -30,8 +29,8 @@ def dot(a: Sequence[Number], b: Sequence[Number]) -> Any:
 def tridiagonal(matrix: Matrix) -> Tridiagonal:
     """A symmetric matrix (n, n) in tridiagonal form, by Householder's reflections."""
     rest = [list(row) for row in matrix]
-    diagonal: list[Any] = []
-    squares: list[Any] = []
+    diagonal: list[Number] = []
+    squares: list[Number] = []
     while len(rest) > 2:
         diagonal.append(rest[0][0])
         v = rest[0][1:]
@@ -65,7 +64,7 @@ def exceed(matrices: Sequence[Tridiagonal], bound: Number) -> Condition:
 
 
 @kernel
-def smallest(matrices: Sequence[Tridiagonal], low: Number = 0.0) -> Any:
+def smallest(matrices: Sequence[Tridiagonal], low: Number = 0.0) -> Number:
     """The smallest of all eigenvalues of all matrices, if above ``low``; else ``low``."""
     high = matrices[0][0][0]
     for diagonal, _ in matrices:

@@ -16,13 +16,13 @@ measurement, its bandwidth w [rad/s] is all that is to be chosen: K = (2 w, 2 w^
 Butterworth. After the span T = 6/w, Sigma has fallen to e^-3 of P and x_j is taken as final.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple, accelerated, inverse_mass
 from ..ops import Condition, Number, choose, fmax, when
-from .parametrisation import Parametrisation
-from .smoothing import Sample
+from .parametrisation import B, Parametrisation
+from .smoothing import LearningSample
 
 # w T; w h stays below this part of 1, so that a step is short beside the filter.
 SETTLES = 6.0
@@ -31,7 +31,7 @@ STILL = (0.0, 0.0, 0.0)
 SOON = 1e-9  # s; a time or an age that has begun
 
 
-class Axis(NamedTuple):
+class FilteredAxis(NamedTuple):
     """Position, velocity and disturbance of one axis."""
 
     p: Number = 0.0
@@ -42,13 +42,21 @@ class Axis(NamedTuple):
 class FixedPoint(NamedTuple):
     """The filter, how long it has run [s], and the sample that is being smoothed, of age ``age`` [s]."""
 
-    axes: tuple[Axis, Axis, Axis] = (Axis(), Axis(), Axis())
+    axes: tuple[FilteredAxis, FilteredAxis, FilteredAxis] = (
+        FilteredAxis(),
+        FilteredAxis(),
+        FilteredAxis(),
+    )
     ran: Number = 0.0
     age: Number = 0.0
     time: Number = 0.0
     tau: Triple = STILL
     driven: Triple = STILL
-    smooth: tuple[Axis, Axis, Axis] = (Axis(), Axis(), Axis())
+    smooth: tuple[FilteredAxis, FilteredAxis, FilteredAxis] = (
+        FilteredAxis(),
+        FilteredAxis(),
+        FilteredAxis(),
+    )
     sigma: tuple[Triple, Triple, Triple] = (STILL, STILL, STILL)
 
 
@@ -72,13 +80,14 @@ def covariance(w: Number) -> tuple[Triple, Triple, Triple]:
     )
 
 
-def later(sigma: Any, K: Triple, h: Number) -> Any:
+def later(sigma: tuple[Triple, Triple, Triple], K: Triple, h: Number) -> tuple[Triple, Triple, Triple]:
     """Sigma after h [s] with the gain K."""
     a, b, c = K
-    return tuple([(x + h * (y - a * x), y + h * (z - b * x), z - h * c * x) for x, y, z in sigma])
+    i, j, k = [(x + h * (y - a * x), y + h * (z - b * x), z - h * c * x) for x, y, z in sigma]
+    return i, j, k
 
 
-def driving(model: Parametrisation, psi: Number, nu: Triple, tau: Triple, belief: Any) -> Triple:
+def driving(model: Parametrisation[B], psi: Number, nu: Triple, tau: Triple, belief: B) -> Triple:
     """Earth-fixed acceleration [m/s2, m/s2, rad/s2] by the force and what is known of the hull."""
     u, v, r = nu
     kX, kY, kN = model.known(u, v, r, belief)
@@ -87,7 +96,7 @@ def driving(model: Parametrisation, psi: Number, nu: Triple, tau: Triple, belief
     return x, y, c
 
 
-def body(axes: tuple[Axis, Axis, Axis], driven: Triple) -> tuple[Triple, Triple]:
+def body(axes: tuple[FilteredAxis, FilteredAxis, FilteredAxis], driven: Triple) -> tuple[Triple, Triple]:
     """Velocity and acceleration along the ship."""
     x, y, turn = axes
     u, v = rotate_to_body(turn.p, x.v, y.v)
@@ -100,18 +109,20 @@ def begun(now: Now) -> FixedPoint:
     """The filter at its first instant, with the observer's velocity."""
     x_dot, y_dot = rotate_to_earth(now.pose[2], now.nu[0], now.nu[1])
     x, y, psi = now.pose
-    return FixedPoint((Axis(x, x_dot), Axis(y, y_dot), Axis(psi, now.nu[2])), SOON)
+    return FixedPoint(
+        (FilteredAxis(x, x_dot), FilteredAxis(y, y_dot), FilteredAxis(psi, now.nu[2])), SOON
+    )
 
 
 def advanced(
-    model: Parametrisation,
-    belief: Any,
+    model: Parametrisation[B],
+    belief: B,
     s: FixedPoint,
     now: Now,
     span: Number,
     h: Number,
     usable: Condition,
-) -> tuple[FixedPoint, Sample, Number]:
+) -> tuple[FixedPoint, LearningSample, Condition]:
     """The smoother after a step of h [s].
 
     Args:
@@ -131,7 +142,7 @@ def advanced(
     P = covariance(w)
     K = P[0]
 
-    def stepped() -> tuple[FixedPoint, Sample, Number]:
+    def stepped() -> tuple[FixedPoint, LearningSample, Condition]:
         turn = s.axes[2]
         u, v = rotate_to_body(turn.p, s.axes[0].v, s.axes[1].v)
         push = driving(model, turn.p, (u, v, turn.v), now.tau, belief)
@@ -140,14 +151,13 @@ def advanced(
             rate = pushed + axis.d
             ahead = axis.p + h * (axis.v + 0.5 * h * rate)
             e = h * (measured - ahead)
-            axes.append(Axis(ahead + K[0] * e, axis.v + h * rate + K[1] * e, axis.d + K[2] * e))
+            axes.append(FilteredAxis(ahead + K[0] * e, axis.v + h * rate + K[1] * e, axis.d + K[2] * e))
             (a, _, _), (b, _, _), (c, _, _) = s.sigma
-            smooth.append(Axis(old.p + a * e, old.v + b * e, old.d + c * e))
-        going: Any = tuple(axes)
-        fixed: Any = tuple(smooth)
+            smooth.append(FilteredAxis(old.p + a * e, old.v + b * e, old.d + c * e))
+        going, fixed = (axes[0], axes[1], axes[2]), (smooth[0], smooth[1], smooth[2])
         age, ran = s.age + h, s.ran + h
         nu, nu_dot = body(fixed, s.driven)
-        sample = Sample(s.time, fixed[2].p, nu, nu_dot, s.tau)
+        sample = LearningSample(s.time, fixed[2].p, nu, nu_dot, s.tau)
         done = (s.age > 0.0) & (age >= span)
         after = FixedPoint(going, ran, age, s.time, s.tau, s.driven, fixed, later(s.sigma, K, h))
         # The next one begins where the filter has settled and none is under way.
@@ -160,7 +170,7 @@ def advanced(
         begins = settled & (done | (s.age <= 0.0))
         return choose(begins, fresh, choose(s.age > 0.0, after, idle)), sample, done
 
-    def restarted() -> tuple[FixedPoint, Sample, Number]:
-        return choose(usable, begun(now), FixedPoint()), Sample(), False
+    def restarted() -> tuple[FixedPoint, LearningSample, Condition]:
+        return choose(usable, begun(now), FixedPoint()), LearningSample(), False
 
     return when(usable & (s.ran > 0.0), stepped, restarted)

@@ -33,10 +33,10 @@ ship that is nearer to the speed wanted than its reference takes that along.
 An input that is NaN or infinite keeps its last finite value.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..actuators.steering import steerable
-from ..declare import POSITIVE, Component, Range, component, group_of, variables
+from ..declare import POSITIVE, Component, Fields, Range, component, group_of, variables
 from ..effects import EffectSet
 from ..frames import rotate_to_body
 from ..hull import Damping, Inertia, mass_matrix
@@ -75,7 +75,7 @@ class Params(NamedTuple):
     )
     u_least: Annotated[float, "m/s", "least speed of prime units", Range(0.001, 10.0)] = 0.1
     inertia: Inertia = Inertia()
-    damping: Any = KnownDamping()
+    damping: Fields = KnownDamping()
     omega_wave: Annotated[float, "rad/s", "frequency of the waves as met; 0: no filter", POSITIVE] = 0.0
     zeta_wave: Annotated[float, "1", "share of the waves that the filter leaves", Range(0.0, 1.0)] = 0.1
 
@@ -83,14 +83,14 @@ class Params(NamedTuple):
 class Tuning(NamedTuple):
     """Frequencies and rates of the present speed [rad/s]."""
 
-    omega_psi: Any
-    omega_u: Any
-    omega_d: Any
-    r_max: Any
-    omega_u_d: Any
+    omega_psi: Number
+    omega_u: Number
+    omega_d: Number
+    r_max: Number
+    omega_u_d: Number
 
 
-class Reference(NamedTuple):
+class HeadingReference(NamedTuple):
     """Heading [rad], yaw rate [rad/s], yaw acceleration, and speed [m/s] to be held."""
 
     psi: Number = 0.0
@@ -109,7 +109,7 @@ class Notch(NamedTuple):
 class State(NamedTuple):
     """Reference, integral parts of surge force and yaw moment [N, N m], last force, wave filter."""
 
-    reference: Reference = Reference()
+    reference: HeadingReference = HeadingReference()
     surge: Number = 0.0
     yaw: Number = 0.0
     tau: Force = Force()
@@ -142,7 +142,7 @@ def tuning(i: Inputs, p: Params) -> Tuning:
     )
 
 
-def follow(d: Reference, i: Inputs, p: Params, at: Tuning, h: Number) -> Reference:
+def follow(d: HeadingReference, i: Inputs, p: Params, at: Tuning, h: Number) -> HeadingReference:
     """The reference after h [s]."""
     t, own, w = i.target, i.estimate.u_hat, at.omega_d
     k = 2.0 * p.zeta_d + 1.0
@@ -153,10 +153,10 @@ def follow(d: Reference, i: Inputs, p: Params, at: Tuning, h: Number) -> Referen
     r = d.r + h * r_dot
     speed = wanted_speed(t)
     before = where((h > 0.0) & ((own - d.u) * (speed - own) > 0.0), own, d.u)  # the ship is ahead of it
-    return Reference(d.psi + h * r, r, r_dot, before + h * at.omega_u_d * (speed - before))
+    return HeadingReference(d.psi + h * r, r, r_dot, before + h * at.omega_u_d * (speed - before))
 
 
-def feedback(d: Reference, i: Inputs, p: Params, at: Tuning) -> Number:
+def feedback(d: HeadingReference, i: Inputs, p: Params, at: Tuning) -> Number:
     """K_P (psi_d - psi) + K_D (r_d - r) [N m]."""
     _, _, (_, _, m_r) = mass_matrix(p.inertia)
     K_D = fmax(2.0 * p.zeta_psi * at.omega_psi * m_r + p.damping.N_r, 0.0)
@@ -204,7 +204,7 @@ def law(s: State, i: Inputs, p: Params, at: Tuning) -> Outputs:
 
 def init(i: Inputs, p: Params) -> State:
     e = i.estimate
-    s = State(Reference(e.psi_hat, e.r_hat, 0.0, e.u_hat))
+    s = State(HeadingReference(e.psi_hat, e.r_hat, 0.0, e.u_hat))
     return s._replace(tau=law(s, i, p, tuning(i, p)).demand.tau)
 
 

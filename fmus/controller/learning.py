@@ -13,17 +13,18 @@ With rho > 0, where the matrix is not symmetric, this holds for phi and omega_n 
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ..declare import Fields
 from ..hull import Triple
 from ..ops import Condition, Number, fmax, sqrt, when, where
 from .adaptive import Disturbance, DisturbanceByError, climb, to_earth
 from .eigen import dot
 from .parametrisation import Parametrisation, Regressors
-from .store import Row, StoreOptions, Sums, plus, times
+from .store import StoredSample, StoreOptions, Sums, plus, times
 
 
-class Memory(NamedTuple):
+class StoreIntegral(NamedTuple):
     """Sum or integral over samples: weight, R target, and F^T R^T."""
 
     weight: Number
@@ -31,12 +32,12 @@ class Memory(NamedTuple):
     cross: tuple[Triple, ...]
 
 
-def remembered(sums: Sums, integral: Memory, rho: Number, weight: Number) -> Memory:
+def remembered(sums: Sums, integral: StoreIntegral, rho: Number, weight: Number) -> StoreIntegral:
     """What omega_n learns by: rho times the integral, or with rho = 0 the weighted store."""
     return when(
         rho > 0.0,
         lambda: times(rho, integral),
-        lambda: times(weight, Memory(sums.count, sums.turned, sums.cross)),
+        lambda: times(weight, StoreIntegral(sums.count, sums.turned, sums.cross)),
     )
 
 
@@ -67,7 +68,7 @@ def stored_slopes(
     return when(stale > 0.5, lambda: sums.projected, explained)
 
 
-def earth_slopes(memory: Memory, phi: Sequence[Number], omega: Triple, stale: Number) -> Triple:
+def earth_slopes(memory: StoreIntegral, phi: Sequence[Number], omega: Triple, stale: Number) -> Triple:
     """sum_j R_j eps_j, or its integral."""
     fresh = where(stale > 0.5, 0.0, 1.0)
     a, b, c = (
@@ -78,8 +79,13 @@ def earth_slopes(memory: Memory, phi: Sequence[Number], omega: Triple, stale: Nu
 
 
 def information(
-    model: Parametrisation, gamma: Any, sums: Sums, F: Regressors, weight: Number, own: Number
-) -> Any:
+    model: Parametrisation,
+    gamma: Sequence[Number],
+    sums: Sums,
+    F: Regressors,
+    weight: Number,
+    own: Number,
+) -> Number:
     """Trace of Gamma Q, of ``weight`` times the store and ``own`` times the present sample."""
     total = 0.0
     for indices, gram, row in zip(model.pattern, sums.grams, F, strict=True):
@@ -89,10 +95,10 @@ def information(
     return total
 
 
-def integrated(model: Parametrisation, s: Memory, row: Row, dt: Number) -> Memory:
+def integrated(model: Parametrisation, s: StoreIntegral, row: StoredSample, dt: Number) -> StoreIntegral:
     """The integral of (4.35) after dt [s]."""
-    now = Memory(1.0, to_earth(row.psi, row.target), model.turned(row.F, row.psi))
-    return Memory._make(plus(s, times(dt, now)))
+    now = StoreIntegral(1.0, to_earth(row.psi, row.target), model.turned(row.F, row.psi))
+    return StoreIntegral._make(plus(s, times(dt, now)))
 
 
 class Drive(NamedTuple):
@@ -105,15 +111,15 @@ class Drive(NamedTuple):
 
 def learned(
     model: Parametrisation,
-    estimates: tuple[Any, Triple],
-    gains: tuple[Any, Disturbance | DisturbanceByError],
+    estimates: tuple[Fields, Triple],
+    gains: tuple[Fields, Disturbance | DisturbanceByError],
     drive: Drive,
     by_eps: Number,
     sums: Sums,
-    memory: Memory,
+    memory: StoreIntegral,
     options: StoreOptions,
     dt: Number,
-) -> tuple[Any, Triple, tuple[Number, Number]]:
+) -> tuple[Fields, Triple, tuple[Number, Number]]:
     """The estimates after dt [s].
 
     Args:
@@ -153,7 +159,7 @@ def learned(
     return model.hat._make(phi), (a, b, c), rates
 
 
-def _norm(gamma: Any, slopes: Any, pace: Number, dt: Number) -> Any:
+def _norm(gamma: Sequence[Number], slopes: Sequence[Number], pace: Number, dt: Number) -> Number:
     """The norm of Gamma times slopes, as much slower as the step ``pace`` is shorter than dt [s]."""
     moves = [g * f for g, f in zip(gamma, slopes, strict=True)]
     return sqrt(dot(moves, moves)) * (pace / fmax(dt, 1e-300))

@@ -1,6 +1,6 @@
 """The parametrisations of the thesis, 2.2 and (7.1): each one object, which any law can learn by."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..declare import variables
 from ..hull import (
@@ -15,24 +15,24 @@ from ..hull import (
     towed_damping_force,
 )
 from ..ops import Number
-from .parametrisation import Belief, Coefficient, Parametrisation, Regressors
+from .parametrisation import ControllerModel, LearnedCoefficient, Parametrisation, Regressors
 
 # Table 5.1, in the order of (2.31).
 ROTATIONAL_GAINS = (8.0, 4.0, 8.0, 8.0, 8.0, 4.0, 8.0, 8.0)
 _ROTATIONAL = tuple(
-    Coefficient(c.name, c.unit, c.description, c.start, gain)
+    LearnedCoefficient(c.name, c.unit, c.description, c.start, gain)
     for c, gain in zip(variables(RotationalDamping), ROTATIONAL_GAINS, strict=True)
 )
 
 
-def towed_and_coriolis(u: Number, v: Number, r: Number, b: Belief) -> Triple:
+def towed_and_coriolis(u: Number, v: Number, r: Number, b: ControllerModel) -> Triple:
     """-C(nu) nu - g(nu), (2.27)."""
     CX, CY, CN = coriolis_force(u, v, r, b.inertia)
     X, Y, N = towed_damping_force(u, v, b.towed)
     return X - CX, Y - CY, N - CN
 
 
-def _rotational(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+def _rotational(nu: Triple, nu_dot: Triple, tau: Triple, b: ControllerModel) -> Regressors:
     f = rotational_regressors(nu[1], nu[2])
     return (), f, f
 
@@ -47,16 +47,16 @@ ROTATIONAL = Parametrisation(
 )
 
 
-def _surge_damping(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+def _surge_damping(nu: Triple, nu_dot: Triple, tau: Triple, b: ControllerModel) -> Regressors:
     u, v, r = nu
     f = rotational_regressors(v, r)
     return (abs(u) * u, u, abs(u) * r), f, f
 
 
 _SURGE = (
-    Coefficient("X_absu_u", "N.s2/m2", "surge force, |u|u", 0.0, 8.0, added=True),
-    Coefficient("X_u", "N.s/m", "surge force, u", 0.0, 4.0, added=True),
-    Coefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
+    LearnedCoefficient("X_absu_u", "N.s2/m2", "surge force, |u|u", 0.0, 8.0, added=True),
+    LearnedCoefficient("X_u", "N.s/m", "surge force, u", 0.0, 4.0, added=True),
+    LearnedCoefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
 )
 
 # (7.1), (7.2). The surge coefficients add to g(nu).
@@ -70,7 +70,7 @@ SURGE_DAMPING = Parametrisation(
 )
 
 
-def _surge(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+def _surge(nu: Triple, nu_dot: Triple, tau: Triple, b: ControllerModel) -> Regressors:
     X, Y, N = _surge_damping(nu, nu_dot, tau, b)
     return (*X, -tau[0]), (*Y, -tau[1]), (*N, -tau[2])
 
@@ -81,9 +81,9 @@ SURGE = Parametrisation(
     coefficients=(
         *_SURGE,
         *_ROTATIONAL,
-        Coefficient("delta_X", "1", "loss of thrust in surge", 0.0, 0.1),
-        Coefficient("delta_Y", "1", "loss of thrust in sway", 0.0, 0.1),
-        Coefficient("delta_N", "1", "loss of moment in yaw", 0.0, 0.1),
+        LearnedCoefficient("delta_X", "1", "loss of thrust in surge", 0.0, 0.1),
+        LearnedCoefficient("delta_Y", "1", "loss of thrust in sway", 0.0, 0.1),
+        LearnedCoefficient("delta_N", "1", "loss of moment in yaw", 0.0, 0.1),
     ),
     pattern=((0, 1, 2, 11), (3, 4, 5, 6, 12), (7, 8, 9, 10, 13)),
     regressors=_surge,
@@ -121,11 +121,11 @@ CUBIC = {"X_uuu": 100.0, "Y_vvv": 100.0}
 # (2.24)-(2.26), corrected: c1, c2, c3 of C(nu), and all damping of Table 2.1.
 ALL_UNKNOWN = Parametrisation(
     coefficients=(
-        Coefficient("c1", "kg.m", "Y_rdot - m x_g of C(nu)", _I.Y_rdot - _I.m * _I.x_g, 20.0),
-        Coefficient("c2", "kg", "Y_vdot - m of C(nu)", _I.Y_vdot - _I.m, 20.0),
-        Coefficient("c3", "kg", "m - X_udot of C(nu)", _I.m - _I.X_udot, 20.0),
+        LearnedCoefficient("c1", "kg.m", "Y_rdot - m x_g of C(nu)", _I.Y_rdot - _I.m * _I.x_g, 20.0),
+        LearnedCoefficient("c2", "kg", "Y_vdot - m of C(nu)", _I.Y_vdot - _I.m, 20.0),
+        LearnedCoefficient("c3", "kg", "m - X_udot of C(nu)", _I.m - _I.X_udot, 20.0),
         *(
-            Coefficient(c.name, c.unit, c.description, c.start, CUBIC.get(c.name, 8.0))
+            LearnedCoefficient(c.name, c.unit, c.description, c.start, CUBIC.get(c.name, 8.0))
             for c in variables(TowedDamping)
         ),
         *_ROTATIONAL,
@@ -175,9 +175,9 @@ def _scaled(nu: Triple, nu_dot: Triple, tau: Triple, b: FullBelief) -> Regressor
 # thrust's, as its gain is zero. To learn it, set the gain of the inertia to zero: a balance tells that.
 SCALED = Parametrisation(
     coefficients=(
-        Coefficient("delta_M - 1", "1", "excess of the inertia's factor", 0.0, 1.0),
-        Coefficient("delta_D - 1", "1", "excess of the damping's factor", 0.0, 1.0),
-        Coefficient("1 - delta_tau", "1", "loss of thrust; 0 gain: known", 0.0, 0.0),
+        LearnedCoefficient("delta_M - 1", "1", "excess of the inertia's factor", 0.0, 1.0),
+        LearnedCoefficient("delta_D - 1", "1", "excess of the damping's factor", 0.0, 1.0),
+        LearnedCoefficient("1 - delta_tau", "1", "loss of thrust; 0 gain: known", 0.0, 0.0),
     ),
     pattern=((0, 1, 2), (0, 1, 2), (0, 1, 2)),
     regressors=_scaled,
@@ -188,7 +188,7 @@ SCALED = Parametrisation(
     by_acceleration=True,
 )
 
-PARAMETRISATIONS: dict[str, Any] = {
+PARAMETRISATIONS: dict[str, Parametrisation] = {
     "rotational": ROTATIONAL,
     "surge": SURGE,
     "surge damping": SURGE_DAMPING,

@@ -6,9 +6,9 @@ The force on the hull is known + F phi + R^T omega_n + tau = M nu_dot: F = -Phi 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from ..declare import Estimate, Range, vector
+from ..declare import Fields, FirstEstimate, Range, vector
 from ..hull import Inertia, TowedDamping, Triple, inertia_force
 from ..ops import Number, clip, cos, sin
 
@@ -20,7 +20,7 @@ LOSS = (-1.0, 0.8)
 Regressors = tuple[tuple[Number, ...], tuple[Number, ...], tuple[Number, ...]]
 
 
-class Coefficient(NamedTuple):
+class LearnedCoefficient(NamedTuple):
     """A parameter that is learned: its true value for the default vessel, and an adaptation gain.
 
     ``added`` is whether it is learned what is to be added to what the controller believes.
@@ -38,15 +38,25 @@ class Coefficient(NamedTuple):
         return f"{self.parameter}, added" if self.added else self.parameter
 
     @property
-    def estimate(self) -> Estimate:
-        return Estimate(self.parameter, self.added)
+    def estimate(self) -> FirstEstimate:
+        return FirstEstimate(self.parameter, self.added)
 
 
-class Belief(NamedTuple):
+class ControllerModel(NamedTuple):
     """What the controller believes of the hull: M, C(nu) and g(nu) of (2.27)."""
 
     inertia: Inertia = Inertia()
     towed: TowedDamping = TowedDamping()
+
+
+class KnownHull(Protocol):
+    """What a controller knows of the hull."""
+
+    @property
+    def inertia(self) -> Inertia: ...
+
+
+B = TypeVar("B", bound=KnownHull)
 
 
 def _written_out(arguments: str, sums: Sequence[Sequence[str]]) -> Any:
@@ -56,7 +66,7 @@ def _written_out(arguments: str, sums: Sequence[Sequence[str]]) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Parametrisation:
+class Parametrisation(Generic[B]):
     """A model M nu_dot = tau + known + F phi.
 
     Attributes:
@@ -70,12 +80,12 @@ class Parametrisation:
         by_acceleration: True where F depends on the acceleration.
     """
 
-    coefficients: Sequence[Coefficient]
+    coefficients: Sequence[LearnedCoefficient]
     pattern: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
-    regressors: Callable[[Triple, Triple, Triple, Any], Regressors]
-    known: Callable[[Number, Number, Number, Any], Triple]
+    regressors: Callable[[Triple, Triple, Triple, B], Regressors]
+    known: Callable[[Number, Number, Number, B], Triple]
     blocks: tuple[tuple[int, ...], ...]
-    belief: Any = field(default_factory=Belief)
+    belief: B = field(default_factory=ControllerModel)  # pyright: ignore[reportAssignmentType]
     loss: tuple[int, int, int] | None = None
     by_acceleration: bool = False
 
@@ -83,9 +93,9 @@ class Parametrisation:
         self,
         stem: str,
         text: str,
-        start: Callable[[Coefficient], float],
-        extra: Callable[[Coefficient], Sequence[Any]] = lambda c: (),
-    ) -> type[Any]:
+        start: Callable[[LearnedCoefficient], float],
+        extra: Callable[[LearnedCoefficient], Sequence[object]] = lambda c: (),
+    ) -> type[Fields]:
         """A NamedTuple class with one scalar for each parameter."""
         name = stem.title().replace("_", "")
         fields = [
@@ -95,19 +105,19 @@ class Parametrisation:
         return vector(name, fields)
 
     @cached_property
-    def start(self) -> type[Any]:
+    def start(self) -> type[Fields]:
         return self._vector("phi_0", "estimate at the start of", lambda c: 0.0, lambda c: (c.estimate,))
 
     @cached_property
-    def hat(self) -> type[Any]:
+    def hat(self) -> type[Fields]:
         return self._vector("phi_hat", "estimate of", lambda c: 0.0)
 
     @cached_property
-    def truth(self) -> type[Any]:
+    def truth(self) -> type[Fields]:
         return self._vector("phi_true", "for the output lyapunov only: true", lambda c: c.value)
 
     @cached_property
-    def gamma(self) -> type[Any]:
+    def gamma(self) -> type[Fields]:
         fields = [
             (f"gamma_{k}", "1", f"adaptation gain of {c.name}", c.gain)
             for k, c in enumerate(self.coefficients, 1)
@@ -140,7 +150,7 @@ class Parametrisation:
         columns = [self.project(F, x) for x in ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))]
         return tuple(zip(*columns, strict=True))
 
-    def error(self, nu: Triple, nu_dot: Triple, tau: Triple, belief: Any) -> Triple:
+    def error(self, nu: Triple, nu_dot: Triple, tau: Triple, belief: B) -> Triple:
         """y = M nu_dot - known - tau [N, N, N m], (2.36): what F phi + R^T omega_n has to explain."""
         MX, MY, MN = inertia_force(*nu_dot, belief.inertia)
         X, Y, N = self.known(*nu, belief)
@@ -158,13 +168,13 @@ class Parametrisation:
         lost = self.loss or ()
         return [0.0 if k in lost else x for k, x in enumerate(phi)] if lost else phi
 
-    def matrices(self, grams: Sequence[Sequence[Sequence[Number]]]) -> list[list[list[Any]]]:
+    def matrices(self, grams: Sequence[Sequence[Sequence[Number]]]) -> list[list[list[Number]]]:
         """The information matrix (F^T F summed up) of each block, from that of each axis."""
         found = []
         for axes in self.blocks:
             members = sorted({k for axis in axes for k in self.pattern[axis]})
             place = {k: position for position, k in enumerate(members)}
-            matrix: list[list[Any]] = [[0.0] * len(members) for _ in members]
+            matrix: list[list[Number]] = [[0.0] * len(members) for _ in members]
             for axis in axes:
                 for i, row in zip(self.pattern[axis], grams[axis], strict=True):
                     for j, x in zip(self.pattern[axis], row, strict=True):

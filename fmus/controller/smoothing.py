@@ -15,7 +15,7 @@ TAPS = 11
 KERNEL = tuple((1.0 - ((k - 5) / 6.0) ** 2) ** 2 for k in range(TAPS))
 
 
-class Sample(NamedTuple):
+class LearningSample(NamedTuple):
     """A time [s], heading, velocity, acceleration and force that belong together."""
 
     time: Number = 0.0
@@ -37,15 +37,15 @@ class Register(NamedTuple):
 
     taps: tuple[Tap, ...] = (Tap(),) * TAPS
     count: Any = 0.0
-    sample: Sample = Sample()
+    sample: LearningSample = LearningSample()
 
 
-def smoothed(taps: tuple[Tap, ...]) -> Sample:
+def smoothed(taps: tuple[Tap, ...]) -> LearningSample:
     """Weighted means over the taps, and the slope of the velocity by weighted least squares."""
     total = sum(KERNEL)
     weights = [w / total for w in KERNEL]
 
-    def mean(values: list[Any]) -> Any:
+    def mean(values: list[Number]) -> Number:
         return dot(weights, values)
 
     time = mean([t.time for t in taps])
@@ -54,7 +54,7 @@ def smoothed(taps: tuple[Tap, ...]) -> Sample:
     spread = dot(lever, [t.time for t in taps]) + 1e-30
     nu = [[t.nu[axis] for t in taps] for axis in range(3)]
     tau = [[t.tau[axis] for t in taps] for axis in range(3)]
-    return Sample(
+    return LearningSample(
         time,
         mean([t.psi for t in taps]),
         (mean(nu[0]), mean(nu[1]), mean(nu[2])),

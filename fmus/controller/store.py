@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import FIXED, POSITIVE, Range
 from ..frames import rotate_to_earth
 from ..hull import Triple
-from ..ops import Condition, Number, choose, fmax, fmin, kernel, put, when, where
+from ..ops import Condition, Number, T, choose, fmax, fmin, kernel, put, when, where
 from .eigen import dot, exceed, smallest, tridiagonal
 from .parametrisation import Parametrisation, Regressors
 
@@ -32,10 +32,10 @@ class StoreOptions(NamedTuple):
     store_weight: Annotated[float, "1", "weight of the sum over the store, rho", POSITIVE] = 1.0
 
 
-class Row(NamedTuple):
+class StoredSample(NamedTuple):
     """A stored sample; ``target`` is y, or eps as it was with ``stale`` = 1."""
 
-    filled: Any
+    filled: Number
     time: Number
     psi: Number
     target: Triple
@@ -47,9 +47,9 @@ class Sums(NamedTuple):
     sum F^T target, f f^T of each axis, sum R target, and sum F^T R^T (zero while omega_n is off)."""
 
     count: Any
-    least: Any
-    oldest: Any
-    newest: Any
+    least: Number
+    oldest: Number
+    newest: Number
     projected: tuple[Number, ...]
     grams: Grams
     turned: Triple
@@ -57,21 +57,27 @@ class Sums(NamedTuple):
 
 
 class Store(NamedTuple):
-    rows: tuple[Row, ...]
+    rows: tuple[StoredSample, ...]
     last: Regressors
     sums: Sums
 
 
 # (model, rows, sums over them, new row) -> rows
-Storage = Callable[[Parametrisation, tuple[Row, ...], Sums, Row], tuple[Row, ...]]
+Storage = Callable[
+    [Parametrisation, tuple[StoredSample, ...], Sums, StoredSample], tuple[StoredSample, ...]
+]
 
 
-def window(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> tuple[Row, ...]:
+def window(
+    model: Parametrisation, rows: tuple[StoredSample, ...], sums: Sums, row: StoredSample
+) -> tuple[StoredSample, ...]:
     """Algorithm 1: a queue."""
     return (row, *rows[:-1])
 
 
-def singular(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> tuple[Row, ...]:
+def singular(
+    model: Parametrisation, rows: tuple[StoredSample, ...], sums: Sums, row: StoredSample
+) -> tuple[StoredSample, ...]:
     """Algorithm 2, corrected: fill up, then exchange the row that raises the smallest singular value of
     the stacked regressors most, on strict increase."""
     free: Number = -1.0
@@ -84,7 +90,9 @@ def singular(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row
     )
 
 
-def _worst(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> Any:
+def _worst(
+    model: Parametrisation, rows: tuple[StoredSample, ...], sums: Sums, row: StoredSample
+) -> Number:
     """Index of the row to exchange, -1 if none; an eigenvalue is only sought where it beats the best."""
     best, index = sums.least, -1.0
     gained = _added(sums.grams, row.F, 1.0)
@@ -102,11 +110,11 @@ def _worst(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) 
 
 def _added(grams: Grams, F: Regressors, sign: float) -> Grams:
     """The information of each axis with that of a sample added or taken away."""
-    return plus(grams, [[[sign * a * b for b in f] for a in f] for f in F])
+    return _plus(grams, [[[sign * a * b for b in f] for a in f] for f in F])
 
 
-def empty_row(F: Regressors) -> Row:
-    return Row(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), tuple([tuple([0.0] * len(f)) for f in F]))  # pyright: ignore
+def empty_row(F: Regressors) -> StoredSample:
+    return StoredSample(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), tuple([tuple([0.0] * len(f)) for f in F]))  # pyright: ignore
 
 
 def empty_store(model: Parametrisation) -> Store:
@@ -116,7 +124,7 @@ def empty_store(model: Parametrisation) -> Store:
 
 
 @kernel
-def summed(omega_on: Condition, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
+def summed(omega_on: Condition, rows: tuple[StoredSample, ...], model: Parametrisation) -> Sums:
     """All sums anew; an empty row is zero and adds nothing."""
     count, oldest, newest = 0.0, NEVER, 0.0
     projected: tuple[Number, ...] = (0.0,) * len(model.coefficients)
@@ -136,18 +144,26 @@ def summed(omega_on: Condition, rows: tuple[Row, ...], model: Parametrisation) -
     return Sums(count, fmax(least, 0.0), oldest, newest, projected, grams, turned, cross)
 
 
-def plus(a: Any, b: Any) -> Any:
+def plus(a: T, b: T) -> T:
     """A nested tuple of numbers plus others in the same shape."""
+    return _plus(a, b)
+
+
+def _plus(a: Any, b: Any) -> Any:
     if isinstance(a, tuple):
-        return tuple([plus(x, y) for x, y in zip(a, b, strict=True)])
+        return tuple([_plus(x, y) for x, y in zip(a, b, strict=True)])
     return a + b
 
 
-def times(factor: Number, a: Any) -> Any:
+def times(factor: Number, a: T) -> T:
     """A nested tuple of numbers times a factor, in its own classes."""
+    return _times(factor, a)
+
+
+def _times(factor: Number, a: Any) -> Any:
     if not isinstance(a, tuple):
         return factor * a
-    items = [times(factor, x) for x in a]
+    items = [_times(factor, x) for x in a]
     return type(a)._make(items) if hasattr(a, "_make") else tuple(items)  # pyright: ignore
 
 
@@ -159,10 +175,12 @@ def _gram(samples: list[tuple[Number, ...]]) -> tuple[tuple[Number, ...], ...]:
     return tuple([tuple([half[max(i, j)][min(i, j)] for j in size]) for i in size])
 
 
-def _earth_fixed(model: Parametrisation, rows: tuple[Row, ...]) -> tuple[Triple, Any]:
+def _earth_fixed(
+    model: Parametrisation, rows: tuple[StoredSample, ...]
+) -> tuple[Triple, tuple[Triple, ...]]:
     """Sum of R target, and sum of F^T R^T."""
-    turned: Any = (0.0, 0.0, 0.0)
-    cross: Any = ((0.0, 0.0, 0.0),) * len(model.coefficients)
+    turned: Triple = (0.0, 0.0, 0.0)
+    cross: tuple[Triple, ...] = ((0.0, 0.0, 0.0),) * len(model.coefficients)
     for row in rows:
         X, Y, N = row.target
         turned = plus(turned, (*rotate_to_earth(row.psi, X, Y), N))
@@ -183,7 +201,7 @@ def offer(
     model: Parametrisation,
     storage: Storage,
     store: Store,
-    row: Row,
+    row: StoredSample,
     usable: Condition,
     now: Number,
     p: StoreOptions,
@@ -206,7 +224,7 @@ def offer(
 
     def revised() -> Store:
         nothing = empty_row(row.F)
-        kept: Any = tuple(
+        kept = tuple(
             [choose((p.age_limit > 0.0) & (now - r.time > p.age_limit), nothing, r) for r in store.rows]
         )
         rows = when(considered, lambda: storage(model, kept, store.sums, row), lambda: kept)

@@ -195,7 +195,7 @@ lag = slow(
 class Kept(NamedTuple):
     """Commands that a delay remembers, the latest first, and the time since the latest [s]."""
 
-    since: Any
+    since: Number
     commands: tuple[tuple[Number, ...], ...]
 
 

@@ -1,7 +1,6 @@
 """Free shapes: a curve through values at equally spaced nodes."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from ..declare import Range, Variable
 from ..ops import Number, clip, fmax, is_series, series_between
@@ -9,13 +8,13 @@ from ..ops import Number, clip, fmax, is_series, series_between
 NODES = 21
 
 
-def hats(x: Number, low: Number, high: Number, count: int) -> list[Any]:
+def hats(x: Number, low: Number, high: Number, count: int) -> list[Number]:
     """Weights of ``count`` equally spaced nodes that interpolate linearly at x; constant outside."""
     place = (clip(x, low, high) - low) / (high - low) * (count - 1.0)
     return [fmax(0.0, 1.0 - abs(place - k)) for k in range(count)]
 
 
-def interpolate(x: Number, low: Number, high: Number, values: Sequence[Number]) -> Any:
+def interpolate(x: Number, low: Number, high: Number, values: Sequence[Number]) -> Number:
     """The piecewise linear curve through ``values`` at equally spaced nodes from low to high, at x."""
     if is_series(x) and not any(map(is_series, values)):
         return series_between(x, low, high, values)

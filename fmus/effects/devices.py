@@ -10,8 +10,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ..declare import Range, Variable
+from ..ops import Number
 from ..scale import REFERENCE, Scale
-from .effect import Effect, Picture, Thrust, Wording, effect
+from .effect import Effect, EffectFunction, Picture, Shows, Thrust, Wording, effect
 from .families import Family
 from .text import Found, capital
 
@@ -56,7 +57,7 @@ class Devices(NamedTuple):
         one = {"are": "is", "push": "pushes"}.get(verb, f"{verb}s")
         return f"{article} {self.title} {verb if self.plural else one}"
 
-    def picture(self, what: Any, axis: str = "") -> Picture:
+    def picture(self, what: Shows, axis: str = "") -> Picture:
         """A picture of the force along an axis, by default the first that it acts on."""
         axis = axis or self.axis[0]
         return Picture(what, capital(self.title), self.members, self.commanding(axis), axis)
@@ -66,19 +67,19 @@ class Devices(NamedTuple):
         return tuple([pair["XY".index(axis)] for pair in self.commands])
 
 
-def with_one(values: tuple[Any, ...], k: int, value: Any) -> tuple[Any, ...]:
+def with_one(values: tuple[Number, ...], k: int, value: Number) -> tuple[Number, ...]:
     """The values with another one at place k."""
     return (*values[:k], value, *values[k + 1 :])
 
 
-def pushed(f: Thrust, k: int, X: Any, Y: Any) -> Thrust:
+def pushed(f: Thrust, k: int, X: Number, Y: Number) -> Thrust:
     """The forces with others of actuator k."""
     return f._replace(X=with_one(f.X, k, X), Y=with_one(f.Y, k, Y))
 
 
 def replaced(
-    values: tuple[Any, ...], members: Sequence[int], change: Callable[[Any], Any]
-) -> tuple[Any, ...]:
+    values: tuple[Number, ...], members: Sequence[int], change: Callable[[Number], Number]
+) -> tuple[Number, ...]:
     """The values with some changed; those that are one object, as of actuators alike, only once."""
     known = {id(values[k]): values[k] for k in members}
     after = {key: change(x) for key, x in known.items()}
@@ -86,7 +87,11 @@ def replaced(
 
 
 def by_command(
-    f: Thrust, members: Sequence[int], axis: str, parts: Sequence[Any], change: Callable[[Any, Any], Any]
+    f: Thrust,
+    members: Sequence[int],
+    axis: str,
+    parts: Sequence[Number],
+    change: Callable[[Number, Number], Number],
 ) -> Thrust:
     """The forces with those of some actuators along an axis changed, each by its command.
 
@@ -97,7 +102,7 @@ def by_command(
         parts: command of each of these; those that are one object are of actuators alike.
         change: ``change(force, command)``: the force instead.
     """
-    known: dict[tuple[int, int], Any] = {}
+    known: dict[tuple[int, int], Number] = {}
     after = list(getattr(f, axis))
     for k, c in zip(members, parts, strict=True):
         key = id(after[k]), id(c)
@@ -107,12 +112,12 @@ def by_command(
     return f._replace(X=tuple(after)) if axis == "X" else f._replace(Y=tuple(after))
 
 
-def changed(f: Thrust, members: Sequence[int], change: Callable[[Any], Any]) -> Thrust:
+def changed(f: Thrust, members: Sequence[int], change: Callable[[Number], Number]) -> Thrust:
     """The forces with both components of some actuators changed."""
     return f._replace(X=replaced(f.X, members, change), Y=replaced(f.Y, members, change))
 
 
-def added(f: Thrust, members: Sequence[int], axis: str, extra: Any) -> Thrust:
+def added(f: Thrust, members: Sequence[int], axis: str, extra: Number) -> Thrust:
     """The forces with more of some actuators [N], each along an axis."""
     more = replaced(getattr(f, axis), members, lambda x: x + extra)
     return f._replace(X=more) if axis == "X" else f._replace(Y=more)
@@ -133,7 +138,7 @@ def declared(
     apart: dict[str, str] | None = None,
     pictures: tuple[Picture, ...] = (),
     **more: Any,
-) -> Callable[[Callable[..., Any]], Effect]:
+) -> Callable[[EffectFunction], Effect]:
     """The decorator that makes an effect of actuators.
 
     Args:

@@ -30,9 +30,13 @@ from typing import Any, Literal, NamedTuple, get_args
 from ..declare import DeclarationError, Variable, parameters_of
 from ..docstring import docstring
 from ..hull import Damping
+from ..ops import Number, Series
 from .families import UNKNOWN, Family
 
+EffectFunction = Callable[..., Any]  # its arguments and its result belong to the kind, see above
 Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
+
+Shows = Literal["damping over speed", "force over command", "force given", "effectiveness over speed"]
 
 
 class Picture(NamedTuple):
@@ -46,7 +50,7 @@ class Picture(NamedTuple):
         axis: of the force, X or Y.
     """
 
-    what: Literal["damping over speed", "force over command", "force given", "effectiveness over speed"]
+    what: Shows
     whose: str = ""
     members: tuple[int, ...] = ()
     commands: tuple[int, ...] = ()
@@ -59,29 +63,29 @@ class Motion(NamedTuple):
     A force on the hull may depend on all of it; to an effect the velocity is that through the water.
     """
 
-    x: Any = 0.0
-    y: Any = 0.0
-    psi: Any = 0.0
-    u: Any = 0.0
-    v: Any = 0.0
-    r: Any = 0.0
-    t: Any = 0.0
+    x: Series = 0.0
+    y: Series = 0.0
+    psi: Series = 0.0
+    u: Series = 0.0
+    v: Series = 0.0
+    r: Series = 0.0
+    t: Series = 0.0
 
 
 class Loaded(NamedTuple):
     """A :class:`Motion`, the thrusters' force on the hull [N, N, N m], and the hull's damping."""
 
-    x: Any = 0.0
-    y: Any = 0.0
-    psi: Any = 0.0
-    u: Any = 0.0
-    v: Any = 0.0
-    r: Any = 0.0
-    t: Any = 0.0
-    tau_X: Any = 0.0
-    tau_Y: Any = 0.0
-    tau_N: Any = 0.0
-    damping: Any = Damping()
+    x: Series = 0.0
+    y: Series = 0.0
+    psi: Series = 0.0
+    u: Series = 0.0
+    v: Series = 0.0
+    r: Series = 0.0
+    t: Series = 0.0
+    tau_X: Series = 0.0
+    tau_Y: Series = 0.0
+    tau_N: Series = 0.0
+    damping: Damping = Damping()
 
 
 class Running(NamedTuple):
@@ -91,13 +95,13 @@ class Running(NamedTuple):
     largest ones; ``power`` is for each actuator the setting by which its force is scaled.
     """
 
-    t: Any = 0.0
-    u: Any = 0.0
-    v: Any = 0.0
-    r: Any = 0.0
-    given: tuple[Any, ...] = ()
-    part: tuple[Any, ...] = ()
-    power: tuple[Any, ...] = ()
+    t: Series = 0.0
+    u: Series = 0.0
+    v: Series = 0.0
+    r: Series = 0.0
+    given: tuple[Series, ...] = ()
+    part: tuple[Series, ...] = ()
+    power: tuple[Series, ...] = ()
 
 
 class Thrust(NamedTuple):
@@ -107,16 +111,16 @@ class Thrust(NamedTuple):
     ``dx`` and ``dy`` [m] is how far from the assumed point all of it acts.
     """
 
-    X: tuple[Any, ...] = ()
-    Y: tuple[Any, ...] = ()
-    x: tuple[Any, ...] = ()
-    y: tuple[Any, ...] = ()
-    gain: tuple[Any, ...] = ()
-    loss_X: Any = 0.0
-    loss_Y: Any = 0.0
-    loss_N: Any = 0.0
-    dx: Any = 0.0
-    dy: Any = 0.0
+    X: tuple[Number, ...] = ()
+    Y: tuple[Number, ...] = ()
+    x: tuple[Number, ...] = ()
+    y: tuple[Number, ...] = ()
+    gain: tuple[Number, ...] = ()
+    loss_X: Number = 0.0
+    loss_Y: Number = 0.0
+    loss_N: Number = 0.0
+    dx: Number = 0.0
+    dy: Number = 0.0
 
 
 class Memory(NamedTuple):
@@ -136,15 +140,15 @@ class Memory(NamedTuple):
         own: places of the signals that it changes.
     """
 
-    initial: Any
+    initial: tuple[object, ...] | Callable[[int], tuple[object, ...]]
     of: Literal["command", "force"]
-    lasts: Callable[..., Any]
+    lasts: Callable[..., Number]
     keeps: int | None = None
-    idle: Callable[[Any, Any], Any] | None = None
+    idle: Callable[[Any, tuple[Number, ...]], tuple[object, ...]] | None = None
     filter: Callable[..., tuple[Sequence[float], Sequence[float]]] | None = None
     own: slice = slice(None)
 
-    def start(self, width: int) -> Any:
+    def start(self, width: int) -> tuple[object, ...]:
         """The memory before anything was commanded, of thrusters with ``width`` commands."""
         return self.initial(width) if callable(self.initial) else self.initial
 
@@ -242,7 +246,7 @@ class Effect:
     source: str
     linear: bool
     parameters: tuple[Variable, ...]
-    function: Callable[..., Any] | None
+    function: EffectFunction | None
     settings: frozenset[str] = frozenset()
     gives: str = "force"
     needs: frozenset[str] = frozenset()
@@ -251,7 +255,7 @@ class Effect:
     wording: Wording = Wording()
     apart: bool = False
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Any:
         """What the function gives."""
         assert self.function is not None
         return self.function(*arguments)
@@ -284,7 +288,7 @@ class Effect:
             return self.search.fitted
         return self.coefficients if self.differentiable else ()
 
-    def regressors(self, *at: Any) -> list[Any]:
+    def regressors(self, *at: object) -> list[Any]:
         """What one unit of each coefficient gives alone, for an effect that is linear in them.
 
         Args:
@@ -312,7 +316,7 @@ def effect(
     linear: bool = True,
     settings: Iterable[str] = (),
     **more: Any,
-) -> Callable[[Callable[..., Any]], Effect]:
+) -> Callable[[EffectFunction], Effect]:
     """Decorator that makes an effect of a function; its docstring's first line describes it.
 
     Args:
@@ -328,7 +332,7 @@ def effect(
     if unknown:
         raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
 
-    def declare(function: Callable[..., Any]) -> Effect:
+    def declare(function: EffectFunction) -> Effect:
         if kind not in get_args(Kind):
             raise DeclarationError(f"{id}: no kind '{kind}'; there are {', '.join(get_args(Kind))}")
         if not axis or not set(axis) <= set("XYN"):

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from ..declare import DeclarationError, flatten, nearest
 from ..hull_functions import FUNCTIONS
@@ -163,8 +162,8 @@ _SIZES = tuple([0.7 - 0.05 * k if k % 2 else 0.05 * k - 0.6 for k in range(12)])
 
 
 def _motion(sign: float) -> Loaded:
-    moving = (0.3, -0.2, 0.1, 7.0 * sign, 0.4, 0.6, -0.3)
-    return Loaded(1.0, 2.0, 0.5, *[sign * x for x in moving])
+    u, v, r, t, *tau = [sign * x for x in (0.3, -0.2, 0.1, 7.0 * sign, 0.4, 0.6, -0.3)]
+    return Loaded(1.0, 2.0, 0.5, u, v, r, t, tau[0], tau[1], tau[2])
 
 
 def _running(sign: float) -> tuple[Thrust, Running]:
@@ -227,7 +226,7 @@ def _unit(e: Effect, name: str) -> float:
     return 1.0 if limits.max is None else min(1.0, limits.max)
 
 
-def _flat(e: Effect, at: tuple[Any, ...], values: Mapping[str, float]) -> list[float]:
+def _flat(e: Effect, at: tuple[object, ...], values: Mapping[str, float]) -> list[float]:
     """What an effect gives with some values of its parameters, as floats."""
     return flatten(e(*at, *[values.get(p.name, p.start) for p in e.parameters]))
 

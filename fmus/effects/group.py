@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from ..declare import Variable, group_of
+from ..declare import Fields, Variable, group_of
 from ..ops import Condition, when
 from .effect import Effect
 
@@ -15,11 +15,11 @@ class Member(NamedTuple):
     parameters: slice
     coefficients: tuple[int, ...]
 
-    def acting(self, values: Any) -> Condition:
+    def acting(self, values: Fields) -> Condition:
         """Whether any coefficient is not zero, for the group's parameters."""
         return _any(self.coefficients, values)
 
-    def apply(self, acts: Condition, values: Any, otherwise: Any, *at: Any) -> Any:
+    def apply(self, acts: Condition, values: Fields, otherwise: object, *at: object) -> Any:
         """What the effect makes of its leading arguments.
 
         Args:
@@ -38,14 +38,14 @@ class Member(NamedTuple):
 class Group(NamedTuple):
     """Effects that act together in one component, and the NamedTuple class of their parameters."""
 
-    params: type[Any]
+    params: type[Fields]
     members: tuple[Member, ...]
 
-    def acting(self, values: Any) -> tuple[Condition, ...]:
+    def acting(self, values: Fields) -> tuple[Condition, ...]:
         """For each effect whether it acts, for the group's parameters."""
         return tuple([member.acting(values) for member in self.members])
 
-    def any_acts(self, values: Any) -> Condition:
+    def any_acts(self, values: Fields) -> Condition:
         """Whether any effect acts, for the group's parameters."""
         return _any([k for member in self.members for k in member.coefficients], values)
 
@@ -62,7 +62,7 @@ def group(typename: str, chosen: Iterable[Effect]) -> Group:
     return Group(group_of(typename, found), tuple(members))
 
 
-def _any(coefficients: Iterable[int], values: Any) -> Condition:
+def _any(coefficients: Iterable[int], values: Fields) -> Condition:
     """Whether any of some values is not zero."""
     total = 0.0
     for k in coefficients:

@@ -4,11 +4,9 @@ A regression of the model error on velocity and force (PLS, SysID) goes back to 
 B_tau that multiplies the thrusters' force makes their effective force (I + B_tau) tau.
 """
 
-from typing import Any
-
 from ..declare import Range, Variable
 from ..hull import Triple
-from ..ops import Number
+from ..ops import Number, Series
 from .effect import Loaded, Search, Wording, effect
 from .families import BODY_FIXED
 from .text import Found, number
@@ -44,7 +42,7 @@ UNITS = {
 }
 
 
-def regressors(u: Any, v: Any, r: Any, tau: Triple) -> tuple[Any, ...]:
+def regressors(u: Series, v: Series, r: Series, tau: Triple) -> tuple[Series, ...]:
     """The values of the regressors, in the order of REGRESSORS."""
     au, av, ar = abs(u), abs(v), abs(r)
     return 1.0, u, v, r, *tau, au * u, au * v, au * r, av * v, av * r, ar * r, ar * v

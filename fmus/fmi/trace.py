@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from .. import ops
-from ..declare import Component, flatten, packer, rebuild, variables
+from ..declare import Component, Declared, flatten, packer, rebuild, variables
 
 OPERATIONS = {
     "sin": ops.sin,
@@ -43,6 +43,8 @@ OPERATIONS = {
 }
 FACTORS = {"mul": 2, "div": 1}  # how many arguments of an operation make it 0 where they are
 
+T = TypeVar("T", bound=tuple[object, ...])
+
 
 class TraceError(Exception):
     """A component does with a value what cannot be traced."""
@@ -51,7 +53,7 @@ class TraceError(Exception):
 def _operator(name: str, swapped: bool = False) -> Callable[[Symbol, Any], Any]:
     """The method of a binary operation, with the symbol on its left, or swapped on its right."""
 
-    def method(self: Symbol, other: Any) -> Any:
+    def method(self: Symbol, other: Operand) -> Operand:
         return self.apply_operation(name, (other, self) if swapped else (self, other))
 
     return method
@@ -63,11 +65,11 @@ class Symbol:
     __slots__ = ("args", "operation")
     __array_ufunc__ = None
 
-    def __init__(self, operation: str, args: Sequence[Any]) -> None:
+    def __init__(self, operation: str, args: Sequence[object]) -> None:
         self.operation = operation
-        self.args = tuple(args)
+        self.args: tuple[Any, ...] = tuple(args)
 
-    def apply_operation(self, name: str, args: Sequence[Any]) -> Symbol:
+    def apply_operation(self, name: str, args: Sequence[Operand]) -> Operand:
         """The hook that :mod:`fmus.ops` looks for."""
         return Symbol(name, args)
 
@@ -81,15 +83,15 @@ class Symbol:
     __gt__, __ge__ = _operator("gt"), _operator("ge")
     __eq__, __ne__ = _operator("eq"), _operator("ne")
 
-    def __neg__(self) -> Symbol:
+    def __neg__(self) -> Operand:
         return self.apply_operation("neg", (self,))
 
-    def __abs__(self) -> Symbol:
+    def __abs__(self) -> Operand:
         return self.apply_operation("abs", (self,))
 
     __hash__ = object.__hash__
 
-    def _refuse(self, *_: Any) -> Any:
+    def _refuse(self, *_: object) -> Any:
         raise TraceError(
             "a component may not branch on a value, convert it, raise it by **, or pass it to math or "
             "numpy; use where, clip, fmin, fmax, power and the functions of fmus.ops"
@@ -100,9 +102,12 @@ class Symbol:
     __invert__ = __round__ = __array__ = _refuse
 
 
-def variable(name: str) -> Symbol:
-    """A symbol that stands for a value from outside."""
-    return Symbol("variable", (name,))
+Operand = Symbol | ops.Number
+
+
+def variable(name: str) -> ops.Number:
+    """A symbol that stands for a value from outside; checkers take it for a number, as components do."""
+    return cast(ops.Number, Symbol("variable", (name,)))
 
 
 @dataclass(frozen=True)
@@ -112,11 +117,11 @@ class Trace:
     The variables are called ``params[k]``, ``inputs[k]``, ``state[k]`` (k counts scalars) and ``h``.
     """
 
-    state: list[Any]
-    outputs: list[Any]
+    state: list[ops.Number]
+    outputs: list[ops.Number]
 
 
-def _symbols(group: str, count: int) -> list[Symbol]:
+def _symbols(group: str, count: int) -> list[ops.Number]:
     return [variable(f"{group}[{k}]") for k in range(count)]
 
 
@@ -129,7 +134,7 @@ def trace_init(component: Component) -> Trace:
     return Trace(flatten(state), flatten(outputs))
 
 
-def trace_step(component: Component, h: Any = None) -> Trace:
+def trace_step(component: Component, h: ops.Number | None = None) -> Trace:
     """State and outputs after a step of ``h`` (default: a symbol) from a state of symbols."""
     start = component.init(packer(component.inputs)(_starts(component.inputs)), component.params())
     symbols = _symbols("state", len(flatten(start)))
@@ -142,19 +147,19 @@ def trace_step(component: Component, h: Any = None) -> Trace:
     return Trace(flatten(state), flatten(outputs))
 
 
-def _starts(cls: type[Any]) -> list[float]:
+def _starts(cls: Declared) -> list[float]:
     return flatten(cls())
 
 
-def _pack(cls: type[Any], group: str) -> Any:
+def _pack(cls: type[T], group: str) -> T:
     return packer(cls)(_symbols(group, len(_starts(cls))))
 
 
-def ordered(results: Iterable[Any]) -> list[Symbol]:
+def ordered(results: Iterable[object]) -> list[Symbol]:
     """Every symbol that the results need, arguments before what uses them."""
     order: list[Symbol] = []
     seen: set[int] = set()
-    pending: list[tuple[Any, bool]] = [(r, False) for r in results]
+    pending: list[tuple[object, bool]] = [(r, False) for r in results]
     while pending:
         node, ready = pending.pop()
         if not isinstance(node, Symbol) or (id(node) in seen):
@@ -168,13 +173,13 @@ def ordered(results: Iterable[Any]) -> list[Symbol]:
     return order
 
 
-def used_variables(results: Sequence[Any]) -> list[frozenset[str]]:
+def used_variables(results: Sequence[object]) -> list[frozenset[str]]:
     """Names of the variables that each result depends on; a factor that is exactly 0 cuts."""
     names: list[str] = []
     followed: dict[int, int] = {}  # bit k stands for names[k]; none is set where the value is constant
-    constant: dict[int, Any] = {}
+    constant: dict[int, object] = {}
 
-    def of(arg: Any) -> tuple[int, Any]:
+    def of(arg: object) -> tuple[int, Any]:
         return (followed[id(arg)], constant.get(id(arg))) if isinstance(arg, Symbol) else (0, arg)
 
     for node in ordered(results):

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from ..declare import POSITIVE, component
 from ..ops import Number, where
 from ..signals import Nothing
-from .trial_order import ANGLE, HARD_OVER, START, Clock, Helm, Order, begun, first_side, given
+from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, TrialTime, begun, first_side, given
 
 
 class Params(NamedTuple):
@@ -20,15 +20,15 @@ class Params(NamedTuple):
     helm: Helm = Helm()
 
 
-def init(i: Nothing, p: Params) -> Clock:
-    return Clock()
+def init(i: Nothing, p: Params) -> TrialTime:
+    return TrialTime()
 
 
-def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Order]:
+def step(s: TrialTime, i: Nothing, p: Params, h: Number) -> tuple[TrialTime, Order]:
     t = s.t + h
     out = (p.release > 0.0) & begun(t, p.start + p.release, h)
     order = where(begun(t, p.start, h), where(out, 0.0, first_side(p.helm)), 0.0)
-    return Clock(t), given(order, p)
+    return TrialTime(t), given(order, p.angle, p.helm)
 
 
 COMPONENT = component(

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from ..declare import Range, component
 from ..ops import Number, cos, sin
 from ..signals import Nothing, Target
-from .pace import Clock, Pace, tick
+from .pace import PathTiming, PulseClock, tick
 from .path import Course, PathPoint, target
 
 # 5.33 deg/s of path parameter for each m/s of u_t.
@@ -22,12 +22,12 @@ class Params(NamedTuple):
     a_x: Annotated[float, "m", "half length to the north", Range(min=0.01)] = 1.0
     a_y: Annotated[float, "m", "half width to the east", Range(min=0.01)] = 1.0
     course: Course = Course()
-    pace: Pace = Pace()
+    pace: PathTiming = PathTiming()
 
 
 class State(NamedTuple):
     theta: float = 0.0
-    clock: Clock = Clock()
+    clock: PulseClock = PulseClock()
 
 
 def init(i: Nothing, p: Params) -> State:

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 from ..declare import Range, component
 from ..ops import Number, cos, sin, sqrt
 from ..signals import Nothing, Target
-from .pace import Clock, Pace, tick
+from .pace import PathTiming, PulseClock, tick
 from .path import Course, PathPoint, target
 
 
@@ -14,12 +14,12 @@ class Params(NamedTuple):
     a_x: Annotated[float, "m", "semi-axis to the north", Range(min=0.01)] = 1.0
     a_y: Annotated[float, "m", "semi-axis to the east", Range(min=0.01)] = 1.5
     course: Course = Course()
-    pace: Pace = Pace()
+    pace: PathTiming = PathTiming()
 
 
 class State(NamedTuple):
     theta: float = 0.0
-    clock: Clock = Clock()
+    clock: PulseClock = PulseClock()
 
 
 def rates(theta: Number, p: Params) -> tuple[Number, Number]:

@@ -24,7 +24,7 @@ are zero. An input that is NaN or infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Range, component
+from ..declare import FIXED, Fields, Range, component
 from ..frames import rotate_to_body
 from ..ops import Number, atan2, clip, cos, not_, pick, sin, sqrt, where, wrap
 from ..signals import Estimate, Target
@@ -46,9 +46,9 @@ class Params(NamedTuple):
     ] = 8.0
     integral: Annotated[float, "1", "kappa over the speed wanted; 0: no integral", Range(0.0, 1.0)] = 0.1
     u_given: Annotated[float, "1", "1: speeds u_k, 0: u_t everywhere", FLAG, FIXED] = 0.0
-    x: Any = Norths()
-    y: Any = Easts()
-    u: Any = Speeds()
+    x: Fields = Norths()
+    y: Fields = Easts()
+    u: Fields = Speeds()
 
 
 class State(NamedTuple):
@@ -67,15 +67,15 @@ class Outputs(NamedTuple):
     arrived: Annotated[float, "1", "1 from the last way point on, else 0"] = 0.0
 
 
-class Line(NamedTuple):
+class PathLine(NamedTuple):
     """A leg: where it begins [m], its direction [rad] and length [m]; the ship along and off it [m]."""
 
     x: Number
     y: Number
     course: Number
-    length: Any
-    ahead: Any
-    aside: Any
+    length: Number
+    ahead: Number
+    aside: Number
 
 
 def following(leg: Number, p: Params) -> Number:
@@ -83,14 +83,14 @@ def following(leg: Number, p: Params) -> Number:
     return where(leg + 1.5 < p.size.count, leg + 1.0, 0.0)
 
 
-def line(leg: Number, e: Estimate, p: Params) -> Line:
+def line(leg: Number, e: Estimate, p: Params) -> PathLine:
     """A leg, and the ship beside it."""
     x, y = pick(p.x, leg), pick(p.y, leg)
     after = following(leg, p)
     north, east = pick(p.x, after) - x, pick(p.y, after) - y
     course = atan2(east, north)
     ahead, aside = rotate_to_body(course, e.x_hat - x, e.y_hat - y)
-    return Line(x, y, course, sqrt(north * north + east * east), ahead, aside)
+    return PathLine(x, y, course, sqrt(north * north + east * east), ahead, aside)
 
 
 def init(i: Inputs, p: Params) -> State:

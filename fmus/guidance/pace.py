@@ -1,13 +1,13 @@
 """How a target runs along its path: steadily, in pulses of speed, or as in the thesis' fault."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import FIXED, POSITIVE, Range
 from ..ops import Number, fmax, fmin
 from .ramps import train
 
 
-class Pace(NamedTuple):
+class PathTiming(NamedTuple):
     """What all paths have in common in time; by itself a steady run.
 
     With ``pulse`` = 1 the speed changes between nothing and full (6.3.5: a period of 15 s, a width of
@@ -28,7 +28,7 @@ class Pace(NamedTuple):
     pulse_rise: Annotated[float, "s", "time that a change of speed takes", POSITIVE, FIXED] = 2.0
 
 
-class Clock(NamedTuple):
+class PulseClock(NamedTuple):
     """Time since the start, and how much of it a target that pulses stands still [s]."""
 
     t: float = 0.0
@@ -44,23 +44,23 @@ class Beat(NamedTuple):
         slope: its derivative [1/s].
     """
 
-    passed: Any
-    factor: Any
-    slope: Any
+    passed: Number
+    factor: Number
+    slope: Number
 
     def rates(self, rate: Number, acceleration: Number) -> tuple[Number, Number]:
         """First two derivatives in time of a path parameter, from those of the steady run."""
         return rate * self.factor, acceleration * self.factor * self.factor + rate * self.slope
 
 
-def tick(clock: Clock, p: Pace, h: Number) -> tuple[Clock, Beat]:
+def tick(clock: PulseClock, p: PathTiming, h: Number) -> tuple[PulseClock, Beat]:
     """The clock after h [s]; the time that passes is integrated exactly, whatever h."""
     short = p.pulse_period * fmin(p.pulse_width, 1.0 - p.pulse_width)
     t = clock.t + h
     rise = fmax(fmin(p.pulse_rise, short), 1e-3)
     full = train(t, p.pulse_period, p.pulse_period * p.pulse_width, rise)
     rest = t - full.integral
-    return Clock(t, rest), Beat(
+    return PulseClock(t, rest), Beat(
         (h - p.pulse * (rest - clock.rest)) * p.calls,
         1.0 - p.pulse * (1.0 - full.value),
         p.pulse * full.rate,

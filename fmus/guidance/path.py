@@ -1,6 +1,6 @@
 """From a parametrised path eta_t = g(theta) to a target with exact derivatives, (4.38)."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import FIXED
 from ..ops import Number, atan2
@@ -20,12 +20,12 @@ class PathPoint(NamedTuple):
 
     x: Number
     y: Number
-    x1: Any
-    y1: Any
-    x2: Any
-    y2: Any
-    x3: Any
-    y3: Any
+    x1: Number
+    y1: Number
+    x2: Number
+    y2: Number
+    x3: Number
+    y3: Number
 
 
 def target(p: PathPoint, theta_dot: Number, theta_ddot: Number) -> Target:

@@ -46,7 +46,7 @@ class Waypoint(NamedTuple):
     speed: Number
 
 
-class Leg(NamedTuple):
+class RouteLeg(NamedTuple):
     """A straight piece and the bend behind it.
 
     Attributes:
@@ -58,28 +58,28 @@ class Leg(NamedTuple):
         speed, gain: relative speed on the straight piece, and by how much the bend raises it [1].
     """
 
-    start: Any
+    start: Number
     x: Number
     y: Number
     course: Number
-    turn: Any
-    heading: Any
+    turn: Number
+    heading: Number
     swing: Number
-    straight: Any
-    bend: Any
+    straight: Number
+    bend: Number
     speed: Number
-    gain: Any
+    gain: Number
 
-    def span(self) -> Any:
+    def span(self) -> Number:
         """Way w that straight piece and bend take [m]."""
         return self.straight / self.speed + self.carry()
 
-    def carry(self) -> Any:
+    def carry(self) -> Number:
         """Way w that the bend takes, at the mean of both speeds [m]."""
         return self.bend / (self.speed + 0.5 * self.gain)
 
 
-class Place(NamedTuple):
+class RoutePlace(NamedTuple):
     """Position [m] and heading [rad] on a route, with their first two derivatives by w."""
 
     pose: tuple[Number, Number, Number]
@@ -109,7 +109,7 @@ def lay_out(
     loop: Condition,
     along: Condition,
     corner: Number,
-) -> tuple[Leg, ...]:
+) -> tuple[RouteLeg, ...]:
     """Legs from each way point to the next.
 
     Args:
@@ -125,7 +125,7 @@ def lay_out(
     size = len(points)
     last = [inside[k] & not_(inside[k + 1]) for k in range(size - 1)] + [inside[size - 1]]
 
-    def following(values: Sequence[Number], k: int) -> Any:
+    def following(values: Sequence[Any], k: int) -> Any:
         """What belongs to the way point behind k."""
         return where(last[k], values[0], values[min(k + 1, size - 1)])
 
@@ -145,12 +145,12 @@ def lay_out(
     begin = 0.0
     for k in range(size):
         begin = where(loop & last[k], ends[k], begin)
-    legs: list[Leg] = []
+    legs: list[RouteLeg] = []
     start = 0.0
     for k in range(size):
         turn = where(goes_on[k], wrap(following(courses, k) - courses[k]), 0.0)
         length = where(goes_on[k], bend_length(turn, ends[k]), ends[k])
-        leg = Leg(
+        leg = RouteLeg(
             where(exists[k], start, FAR),
             x[k] + begin * cos(courses[k]),
             y[k] + begin * sin(courses[k]),
@@ -169,7 +169,7 @@ def lay_out(
     return tuple(legs)
 
 
-def whole_way(legs: Sequence[Leg]) -> Number:
+def whole_way(legs: Sequence[RouteLeg]) -> Number:
     """Way w from the beginning of the first to the end of the last leg [m]."""
     way = 0.0
     for leg in legs:
@@ -177,7 +177,7 @@ def whole_way(legs: Sequence[Leg]) -> Number:
     return way
 
 
-def place(legs: Sequence[Leg], w: Number) -> Place:
+def place(legs: Sequence[RouteLeg], w: Number) -> RoutePlace:
     """Where a route is at the way w [m]."""
     leg = legs[0]
     for other in legs[1:]:
@@ -199,7 +199,7 @@ def place(legs: Sequence[Leg], w: Number) -> Place:
     aside = leg.bend * aside
     c, s = cos(leg.course), sin(leg.course)
     x, y = leg.x + c * ahead - s * aside, leg.y + s * ahead + c * aside
-    return Place(
+    return RoutePlace(
         (x, y, leg.heading + leg.swing * bend.value),
         (s1 * north, s1 * east, leg.swing * yaw),
         (

@@ -22,7 +22,7 @@ class Params(NamedTuple):
     bandwidth: Annotated[float, "rad/s", "pole of the reference", Range(0.001, 10.0)] = 0.2
 
 
-class Axis(NamedTuple):
+class ReferenceAxis(NamedTuple):
     """One coordinate of the reference and its derivatives."""
 
     value: float = 0.0
@@ -31,12 +31,12 @@ class Axis(NamedTuple):
 
 
 class State(NamedTuple):
-    x: Axis = Axis()
-    y: Axis = Axis()
-    psi: Axis = Axis()
+    x: ReferenceAxis = ReferenceAxis()
+    y: ReferenceAxis = ReferenceAxis()
+    psi: ReferenceAxis = ReferenceAxis()
 
 
-def approach(axis: Axis, error: Number, w: Number, h: Number) -> Axis:
+def approach(axis: ReferenceAxis, error: Number, w: Number, h: Number) -> ReferenceAxis:
     """The axis after h [s] on its way to a set point that it misses by ``error`` (value minus goal)."""
     c0 = error
     c1 = axis.rate + w * c0
@@ -45,11 +45,11 @@ def approach(axis: Axis, error: Number, w: Number, h: Number) -> Axis:
     left = decay * (c0 + h * (c1 + h * c2))
     slope = decay * (c1 + 2.0 * h * c2)
     rate = slope - w * left
-    return Axis(axis.value + (left - error), rate, 2.0 * decay * c2 - w * slope - w * rate)
+    return ReferenceAxis(axis.value + (left - error), rate, 2.0 * decay * c2 - w * slope - w * rate)
 
 
 def init(i: Nothing, p: Params) -> State:
-    return State(Axis(p.x_0), Axis(p.y_0), Axis(p.psi_0))
+    return State(ReferenceAxis(p.x_0), ReferenceAxis(p.y_0), ReferenceAxis(p.psi_0))
 
 
 def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:

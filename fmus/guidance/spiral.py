@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from ..declare import Range, component
 from ..ops import Number, clip, floor, where
 from ..signals import Nothing
-from .trial_order import ANGLE, HARD_OVER, START, Clock, Helm, Order, begun, first_side, given
+from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, TrialTime, begun, first_side, given
 
 
 class Params(NamedTuple):
@@ -21,15 +21,15 @@ class Params(NamedTuple):
     helm: Helm = Helm()
 
 
-def init(i: Nothing, p: Params) -> Clock:
-    return Clock()
+def init(i: Nothing, p: Params) -> TrialTime:
+    return TrialTime()
 
 
-def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Order]:
+def step(s: TrialTime, i: Nothing, p: Params, h: Number) -> tuple[TrialTime, Order]:
     t = s.t + h
     plateau = clip(floor((t - p.start + 0.5 * h) / p.hold), 0.0, 4.0 * p.plateaus)
     order = first_side(p.helm) * (abs(plateau / p.plateaus - 2.0) - 1.0)
-    return Clock(t), given(where(begun(t, p.start, h), order, 0.0), p)
+    return TrialTime(t), given(where(begun(t, p.start, h), order, 0.0), p.angle, p.helm)
 
 
 COMPONENT = component(

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 from ..declare import POSITIVE, Range, component
 from ..ops import Number, where
 from ..signals import Nothing
-from .trial_order import START, Clock, begun
+from .trial_order import START, TrialTime, begun
 
 ASTERN = Range(max=0.0)
 
@@ -29,14 +29,14 @@ class Outputs(NamedTuple):
     tau_X: Annotated[float, "N", "surge force"] = 0.0
 
 
-def init(i: Nothing, p: Params) -> Clock:
-    return Clock()
+def init(i: Nothing, p: Params) -> TrialTime:
+    return TrialTime()
 
 
-def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Outputs]:
+def step(s: TrialTime, i: Nothing, p: Params, h: Number) -> tuple[TrialTime, Outputs]:
     t = s.t + h
     astern = begun(t, p.start, h)
-    return Clock(t), Outputs(
+    return TrialTime(t), Outputs(
         where(astern, -1.0, 0.0),
         where(astern, p.n_astern, p.n_ahead),
         where(astern, p.X_astern, p.X_ahead),

@@ -7,7 +7,7 @@ thrusters' inputs. The order itself is 1 for all of it to starboard, -1 to port,
 execute.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import POSITIVE, Range
 from ..ops import Condition, Number, where
@@ -37,7 +37,7 @@ class Order(NamedTuple):
     tau_N: Annotated[float, "N.m", "the order as a moment"] = 0.0
 
 
-class Clock(NamedTuple):
+class TrialTime(NamedTuple):
     """State of a trial that goes by time alone [s]."""
 
     t: Number = 0.0
@@ -52,6 +52,6 @@ def first_side(helm: Helm) -> Number:
     return where(helm.side < 0.0, -1.0, 1.0)
 
 
-def given(order: Number, p: Any) -> Order:
-    """An order as the thrusters get it, by the ``angle`` and ``helm`` of the parameters."""
-    return Order(order, order * p.angle, order * p.helm.moment)
+def given(order: Number, angle: Number, helm: Helm) -> Order:
+    """An order as the thrusters get it: of an angle [rad], and of a moment."""
+    return Order(order, order * angle, order * helm.moment)

@@ -11,12 +11,12 @@ A leg straight back on the one before leaves no room to turn: the target then tu
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Range, component, vector
+from ..declare import FIXED, Fields, Range, component, vector
 from ..ops import Number, floor, where, wrap
 from ..signals import Nothing, Target
-from .pace import Clock, Pace, tick
+from .pace import PathTiming, PulseClock, tick
 from .ramps import ramp
-from .route import FAR, Leg, Waypoint, lay_out, place, whole_way
+from .route import FAR, RouteLeg, Waypoint, lay_out, place, whole_way
 
 SIZE = 20
 # A round in the basin, where no file says otherwise.
@@ -24,7 +24,7 @@ NORTHS = (5.0, 6.5, 6.5, 5.0)
 EASTS = (2.0, 2.0, -1.0, -1.0)
 
 
-def _column(name: str, unit: str, text: str, start: tuple[float, ...], *extra: Any) -> Any:
+def _column(name: str, unit: str, text: str, start: tuple[float, ...], *extra: object) -> type[Fields]:
     padded = start + start[-1:] * (SIZE - len(start))
     fields = [(f"{name}_{k}", unit, f"{text} {k}", padded[k - 1]) for k in range(1, SIZE + 1)]
     return vector(f"Column_{name}", fields, (*extra, FIXED))
@@ -54,18 +54,18 @@ class Params(NamedTuple):
     ] = 0.2
     psi_given: Annotated[float, "1", "1: headings psi_k, 0: along the path", FLAG, FIXED] = 0.0
     u_given: Annotated[float, "1", "1: speeds u_k, 0: u_t everywhere", FLAG, FIXED] = 0.0
-    x: Any = Norths()
-    y: Any = Easts()
-    psi: Any = Headings()
-    u: Any = Speeds()
-    pace: Pace = Pace()
+    x: Fields = Norths()
+    y: Fields = Easts()
+    psi: Fields = Headings()
+    u: Fields = Speeds()
+    pace: PathTiming = PathTiming()
 
 
 class State(NamedTuple):
-    run: Any
-    clock: Clock
-    whole: Any
-    legs: tuple[Leg, ...]
+    run: Number
+    clock: PulseClock
+    whole: Number
+    legs: tuple[RouteLeg, ...]
 
 
 def init(i: Nothing, p: Params) -> State:
@@ -75,7 +75,7 @@ def init(i: Nothing, p: Params) -> State:
     ]
     inside = [p.size.count > k + 0.5 for k in range(SIZE)]
     legs = lay_out(points, inside, p.loop > 0.5, p.psi_given < 0.5, p.corner)
-    return State(0.0, Clock(), whole_way(legs), legs)
+    return State(0.0, PulseClock(), whole_way(legs), legs)
 
 
 def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:

@@ -47,7 +47,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Order]:
     off = order * (i.psi_hat - psi_0)
     reversed_ = (h > 0.0) & (off >= p.psi_check) & (order * order > 0.0)
     order = where(reversed_, -order, order)
-    return State(t, psi_0, order), given(order, p)
+    return State(t, psi_0, order), given(order, p.angle, p.helm)
 
 
 COMPONENT = component(

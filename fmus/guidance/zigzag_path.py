@@ -16,7 +16,7 @@ from typing import Annotated, NamedTuple
 from ..declare import FIXED, Range, component
 from ..ops import Number, cos, fmin, sin
 from ..signals import Nothing, Target
-from .pace import Clock, Pace, tick
+from .pace import PathTiming, PulseClock, tick
 from .path import PathPoint, target
 from .ramps import alternation, climb
 
@@ -33,12 +33,12 @@ class Params(NamedTuple):
     stop: Annotated[
         float, "m", "run in which the speed is reversed, at most the length", Range(min=0.01), FIXED
     ] = 0.4
-    pace: Pace = Pace()
+    pace: PathTiming = PathTiming()
 
 
 class State(NamedTuple):
     run: float = 0.0
-    clock: Clock = Clock()
+    clock: PulseClock = PulseClock()
 
 
 def path(a: Number, p: Params) -> PathPoint:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
-from .tape import Block, Branch, Call, Recording, Value
+from ..fmi.trace import Operand
+from .tape import Block, Branch, Call, RecordedFunction, RecordedValue
 
 INFIX = {
     "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">=",
@@ -49,7 +49,7 @@ static inline double whole(double x) { return x - x == 0.0 ? floor(x) : x - x; }
 """
 
 
-def number(x: Any) -> str:
+def number(x: Operand) -> str:
     """A number or truth value of Python in C."""
     if isinstance(x, bool):
         return str(int(x))
@@ -65,7 +65,7 @@ class Writer:
     def __init__(self) -> None:
         self._kernels: dict[int, str] = {}
 
-    def kernel(self, recording: Recording) -> str:
+    def kernel(self, recording: RecordedFunction) -> str:
         """A kernel as a static function of its arguments and results."""
         name = f"kernel_{len(self._kernels) + 1}"
         self._kernels[id(recording)] = name
@@ -73,7 +73,7 @@ class Writer:
         return self.function(head, recording, [("results", recording.results)])
 
     def function(
-        self, head: str, recording: Recording, targets: Iterable[tuple[str, Sequence[Any]]]
+        self, head: str, recording: RecordedFunction, targets: Iterable[tuple[str, Sequence[Operand]]]
     ) -> str:
         """A function that writes its results into arrays.
 
@@ -96,25 +96,25 @@ class Body:
         self.needed: set[int] = set()
         self.lines: list[str] = []
 
-    def text(self, recording: Recording, targets: Iterable[tuple[str, Sequence[Any]]]) -> str:
+    def text(self, recording: RecordedFunction, targets: Iterable[tuple[str, Sequence[Operand]]]) -> str:
         self.write_all(recording)
         for array, results in targets:
             self.lines += [f"    {array}[{k}] = {self.of(x)};" for k, x in enumerate(results)]
         return "\n".join(["{", *self.lines, "    return 0;", "}", ""])
 
-    def write_all(self, recording: Recording) -> None:
+    def write_all(self, recording: RecordedFunction) -> None:
         """Lines of all that is needed of a recording."""
         self.need(recording.results)
         for statement in reversed(recording.body):
             self._mark(statement)
         self._write(recording.body, 1)
 
-    def need(self, values: Iterable[Any]) -> None:
-        self.needed.update(id(x) for x in values if isinstance(x, Value))
+    def need(self, values: Iterable[object]) -> None:
+        self.needed.update(id(x) for x in values if isinstance(x, RecordedValue))
 
-    def _mark(self, statement: Value | Branch | Call) -> bool:
+    def _mark(self, statement: RecordedValue | Branch | Call) -> bool:
         """Note what a statement needs, if it is needed itself: for its value, or as it may fail."""
-        if isinstance(statement, Value):
+        if isinstance(statement, RecordedValue):
             wanted = id(statement) in self.needed or _may_fail(statement)
             if wanted:
                 self.needed.add(id(statement))
@@ -133,15 +133,15 @@ class Body:
             self.need([statement.condition])
         return wanted
 
-    def of(self, x: Any) -> str:
+    def of(self, x: Operand) -> str:
         """How a value is written where it is used."""
-        if not isinstance(x, Value):
+        if not isinstance(x, RecordedValue):
             return number(x)
         if x.operation == "variable":
             return f"({x.args[0]} != 0.0)" if x.condition else x.args[0]
         return self.names[id(x)]
 
-    def _named(self, x: Value) -> str:
+    def _named(self, x: RecordedValue) -> str:
         return self.names.setdefault(id(x), f"x{len(self.names)}")
 
     def _write(self, block: Block, depth: int) -> None:
@@ -155,7 +155,7 @@ class Body:
             elif id(statement) in self.needed:
                 self.lines += [indent + line for line in self._operation(statement)]
 
-    def _operation(self, x: Value) -> Iterator[str]:
+    def _operation(self, x: RecordedValue) -> Iterator[str]:
         args = [self.of(a) for a in x.args]
         if _may_fail(x):
             yield f"if ({args[1]} == 0.0) return 1;"
@@ -191,10 +191,10 @@ class Body:
         self.lines.append(f"{indent}}}")
 
 
-def _type(x: Value) -> str:
+def _type(x: RecordedValue) -> str:
     return "int" if x.condition else "double"
 
 
-def _may_fail(x: Value) -> bool:
+def _may_fail(x: RecordedValue) -> bool:
     """Whether Python might raise: on a division by what may be zero."""
-    return x.operation == "div" and (isinstance(x.args[1], Value) or x.args[1] == 0.0)
+    return x.operation == "div" and (isinstance(x.args[1], RecordedValue) or x.args[1] == 0.0)

@@ -31,7 +31,7 @@ class CompilerError(Exception):
 
 
 @dataclass(frozen=True)
-class Target:
+class Platform:
     """A platform of FMI 2.0.
 
     Attributes:
@@ -47,9 +47,9 @@ class Target:
 
 TARGETS = {
     # glibc as old as that of the oldest Linux still in use; the library binds its own names first.
-    "linux64": Target(".so", ("x86_64-linux-gnu.2.17",), ("-Wl,-Bsymbolic", "-lm")),
-    "win64": Target(".dll", ("x86_64-windows-gnu",)),
-    "darwin64": Target(".dylib", ("x86_64-macos", "aarch64-macos")),
+    "linux64": Platform(".so", ("x86_64-linux-gnu.2.17",), ("-Wl,-Bsymbolic", "-lm")),
+    "win64": Platform(".dll", ("x86_64-windows-gnu",)),
+    "darwin64": Platform(".dylib", ("x86_64-macos", "aarch64-macos")),
 }
 
 

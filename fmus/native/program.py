@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from ..declare import Component, flatten, packer, rebuild, width
 from ..fmi.trace import Symbol, TraceError
-from .tape import Kernels, Recording, Tape, Value, is_condition, like
+from ..ops import Number
+from .tape import Kernels, RecordedFunction, RecordedValue, Tape, is_condition, like
+
+T = TypeVar("T", bound=tuple[object, ...])
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +28,10 @@ class Program:
     """
 
     component: Component
-    init: Recording
-    prepare: Recording
-    step: Recording
-    kernels: list[Recording]
+    init: RecordedFunction
+    prepare: RecordedFunction
+    step: RecordedFunction
+    kernels: list[RecordedFunction]
     states: int
 
 
@@ -51,11 +54,11 @@ def program(component: Component) -> Program:
 
     tape = Tape(kernels)
     states = len(init.results)
-    state, outputs = (component.prepared_step or component.step)(
+    state, outputs = component.law(
         rebuild(initial, [tape.variable(f"state[{k}]") for k in range(states)]),
         _group(tape, component.inputs, "inputs"),
         kept.seen_by(tape, prepared),
-        tape.variable("h"),
+        cast(Number, tape.variable("h")),
     )
     after, given = flatten(state), flatten(outputs)
     if len(after) != states or len(given) != width(component.outputs):
@@ -63,12 +66,12 @@ def program(component: Component) -> Program:
     return Program(component, init, prepare, tape.recording(after + given), kernels.recordings, states)
 
 
-def _group(tape: Tape, cls: type[Any], name: str) -> Any:
+def _group(tape: Tape, cls: type[T], name: str) -> T:
     """A declared group of variables."""
     return packer(cls)([tape.variable(f"{name}[{k}]") for k in range(width(cls))])
 
 
-def _params(tape: Tape, component: Component) -> Any:
+def _params(tape: Tape, component: Component) -> tuple[object, ...]:
     return _group(tape, component.params, "params")
 
 
@@ -76,23 +79,23 @@ class _Kept:
     """The values that ``prepare`` computes, each once; it gives them in any tuples, lists and dicts."""
 
     def __init__(self) -> None:
-        self.values: dict[int, Value] = {}
+        self.values: dict[int, RecordedValue] = {}
 
-    def gather(self, prepared: Any) -> None:
+    def gather(self, prepared: object) -> None:
         """Collect the values to keep between steps; a parameter is at hand anyway."""
 
-        def keep(x: Value) -> Any:
+        def keep(x: RecordedValue) -> RecordedValue:
             if x.operation != "variable":
                 self.values.setdefault(id(x), x)
             return x
 
         _mapped(prepared, keep)
 
-    def seen_by(self, tape: Tape, prepared: Any) -> Any:
+    def seen_by(self, tape: Tape, prepared: object) -> Any:
         """The same, as a step finds it."""
         places = {identity: k for k, identity in enumerate(self.values)}
 
-        def find(x: Value) -> Any:
+        def find(x: RecordedValue) -> RecordedValue:
             if x.operation == "variable":
                 return tape.variable(x.args[0])
             return tape.variable(f"prepared[{places[id(x)]}]", is_condition(x))
@@ -100,9 +103,9 @@ class _Kept:
         return _mapped(prepared, find)
 
 
-def _mapped(part: Any, function: Callable[[Value], Any]) -> Any:
+def _mapped(part: object, function: Callable[[RecordedValue], RecordedValue]) -> Any:
     """Nested tuples, lists and dicts with a function applied to every value; all else stays."""
-    if isinstance(part, Value):
+    if isinstance(part, RecordedValue):
         return function(part)
     if isinstance(part, dict):
         return {key: _mapped(x, function) for key, x in part.items()}
@@ -111,7 +114,7 @@ def _mapped(part: Any, function: Callable[[Value], Any]) -> Any:
     return part
 
 
-def _plain(part: Any) -> bool:
+def _plain(part: object) -> bool:
     """Whether no symbol is inside, so that the object itself can stay."""
     if isinstance(part, dict):
         return all(map(_plain, part.values()))

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
 
 from .. import ops
+from ..fmi.trace import Operand
+from ..ops import Number
 from .c_text import INFIX, Body
-from .tape import Branch, Call, Kernels, Recording, Value
+from .tape import Branch, Call, Kernels, RecordedFunction, RecordedValue
 
 _INFIX = {**INFIX, "and": "and", "or": "or"}
 _FORMS = {
@@ -31,7 +32,9 @@ _SPACE = {
 }
 
 
-def function(recording: Recording, kernels: Kernels, *given: str) -> Callable[..., tuple[Any, ...]]:
+def function(
+    recording: RecordedFunction, kernels: Kernels, *given: str
+) -> Callable[..., tuple[Number, ...]]:
     """A recording as a function of what its variables are called after, which gives its results.
 
     Args:
@@ -51,15 +54,15 @@ def function(recording: Recording, kernels: Kernels, *given: str) -> Callable[..
 
 
 class _PythonBody(Body):
-    def lines_of(self, name: str, recording: Recording, *given: str) -> list[str]:
+    def lines_of(self, name: str, recording: RecordedFunction, *given: str) -> list[str]:
         self.write_all(recording)
         results = "".join(f"{self.of(x)}, " for x in recording.results)
         return [f"def {name}({', '.join(given)}):", *self.lines, f"    return ({results})"]
 
-    def of(self, x: Any) -> str:
-        return super().of(x) if isinstance(x, Value) else f"({x!r})"
+    def of(self, x: Operand) -> str:
+        return super().of(x) if isinstance(x, RecordedValue) else f"({x!r})"
 
-    def _operation(self, x: Value) -> Iterator[str]:
+    def _operation(self, x: RecordedValue) -> Iterator[str]:
         args = [self.of(a) for a in x.args]
         form = _FORMS.get(x.operation) or f"{{0}} {_INFIX[x.operation]} {{1}}"
         yield f"{self._named(x)} = {form.format(*args)}"

@@ -10,18 +10,20 @@ bits, is recorded at the first time only: compilers do so with all but the funct
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeGuard, TypeVar, cast
 
-from ..fmi.trace import Symbol, TraceError
+from ..fmi.trace import Operand, Symbol, TraceError
+
+T = TypeVar("T")  # a number, or nested tuples and lists of numbers
 
 _CONDITIONS = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "logical_not"})
 # The truth value of one side that decides for both.
 _DECIDED = {"and": False, "or": True}
 
 
-class Value(Symbol):
+class RecordedValue(Symbol):
     """A number or a condition that is known at run time only.
 
     Attributes:
@@ -32,26 +34,26 @@ class Value(Symbol):
 
     __slots__ = ("block", "condition", "tape")
 
-    def __init__(self, tape: Tape, operation: str, args: Sequence[Any], condition: bool) -> None:
+    def __init__(self, tape: Tape, operation: str, args: Sequence[object], condition: bool) -> None:
         super().__init__(operation, args)
         self.tape = tape
         self.block = tape.block
         self.condition = condition
 
-    def apply_operation(self, name: str, args: Sequence[Any]) -> Any:
+    def apply_operation(self, name: str, args: Sequence[Operand]) -> Operand:
         """The hook of operators and of :mod:`fmus.ops`."""
         return self.tape.operation(name, args)
 
-    def branch(self, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
+    def branch(self, a: Callable[[], T], b: Callable[[], T]) -> T:
         """The hook of ``when``."""
         return self.tape.branch(self, a, b)
 
-    def call_kernel(self, function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
+    def call_kernel(self, function: Callable[..., T], args: tuple[object, ...]) -> T:
         """The hook of functions marked as ``kernel``."""
         return self.tape.call(function, args)
 
 
-class Block(list["Value | Branch | Call"]):
+class Block(list["RecordedValue | Branch | Call"]):
     """Statements in their order; an operation is the value that it gives."""
 
 
@@ -66,23 +68,23 @@ class Branch:
         given: for each block what the results are.
     """
 
-    condition: Value
+    condition: RecordedValue
     blocks: tuple[Block, Block]
-    results: list[Value]
-    given: tuple[list[Any], list[Any]]
+    results: list[RecordedValue]
+    given: tuple[list[Operand], list[Operand]]
 
 
 @dataclass(frozen=True, eq=False)
 class Call:
     """A call of a kernel: its arguments, and the values that it gives."""
 
-    kernel: Recording
-    args: list[Any]
-    results: list[Value]
+    kernel: RecordedFunction
+    args: list[Operand]
+    results: list[RecordedValue]
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class RecordedFunction:
     """A whole function.
 
     Attributes:
@@ -91,7 +93,7 @@ class Recording:
     """
 
     body: Block
-    results: list[Any]
+    results: Sequence[Operand]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +106,8 @@ class Kernels:
             the objects among them from making way for others in their place.
     """
 
-    recordings: list[Recording] = field(default_factory=list)
-    known: dict[Any, tuple[Recording, Any, Any]] = field(default_factory=dict)
+    recordings: list[RecordedFunction] = field(default_factory=list)
+    known: dict[Hashable, tuple[RecordedFunction, Any, tuple[object, ...]]] = field(default_factory=dict)
 
 
 class Tape:
@@ -120,29 +122,29 @@ class Tape:
         self.body = self.block = Block()
         self._open = {id(self.body)}
         # What has been done so far in the open blocks, the innermost first.
-        self._done: ChainMap[Any, Value] = ChainMap()
+        self._done: ChainMap[Hashable, RecordedValue] = ChainMap()
 
-    def variable(self, name: str, condition: bool = False) -> Value:
+    def variable(self, name: str, condition: bool = False) -> RecordedValue:
         """A value from outside."""
         return self._once("variable", (name,), condition)
 
-    def _once(self, name: str, args: Sequence[Any], condition: bool) -> Value:
+    def _once(self, name: str, args: Sequence[object], condition: bool) -> RecordedValue:
         """The value of an operation: of the same one before, if there was one, else a new one."""
-        key = name, tuple([id(x) if isinstance(x, Value) else repr(x) for x in args])
+        key = name, tuple([id(x) if isinstance(x, RecordedValue) else repr(x) for x in args])
         value = self._done.get(key)
         if value is None:
-            value = self._done[key] = Value(self, name, args, condition)
+            value = self._done[key] = RecordedValue(self, name, args, condition)
             if name != "variable":
                 self.block.append(value)
         return value
 
-    def recording(self, results: list[Any]) -> Recording:
+    def recording(self, results: Sequence[Operand]) -> RecordedFunction:
         """All that is recorded, as a function with these results."""
         self._check(results)
-        return Recording(self.body, results)
+        return RecordedFunction(self.body, results)
 
-    def operation(self, name: str, args: Sequence[Any]) -> Any:
-        """Record an operation, but for one with a known truth value."""
+    def operation(self, name: str, args: Sequence[Operand]) -> Operand:
+        """Fields an operation, but for one with a known truth value."""
         self._check(args)
         if name in _DECIDED and any(isinstance(x, bool) for x in args):
             known, other = args if isinstance(args[0], bool) else args[::-1]
@@ -150,8 +152,8 @@ class Tape:
         condition = name in _CONDITIONS or (name == "where" and all(map(is_condition, args[1:])))
         return self._once(name, args, condition)
 
-    def branch(self, condition: Value, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
-        """Record a branch; gives what is there behind it, in the shape that both cases have."""
+    def branch(self, condition: RecordedValue, a: Callable[[], T], b: Callable[[], T]) -> T:
+        """Fields a branch; gives what is there behind it, in the shape that both cases have."""
         self._check([condition])
         first, one = self._inner(a)
         second, other = self._inner(b)
@@ -160,9 +162,9 @@ class Tape:
         def merged(x: Any, y: Any) -> Any:
             if isinstance(x, (tuple, list)):
                 return like(x, [merged(p, q) for p, q in zip(x, y, strict=True)])
-            if x is y or (not isinstance(x, Value) and repr(x) == repr(y)):
+            if x is y or (not isinstance(x, RecordedValue) and repr(x) == repr(y)):
                 return x
-            value = Value(self, "merged", (), is_condition(x) and is_condition(y))
+            value = RecordedValue(self, "merged", (), is_condition(x) and is_condition(y))
             branch.results.append(value)
             branch.given[0].append(x)
             branch.given[1].append(y)
@@ -172,7 +174,7 @@ class Tape:
         self.block.append(branch)
         return result
 
-    def _inner(self, case: Callable[[], Any]) -> tuple[Block, Any]:
+    def _inner(self, case: Callable[[], T]) -> tuple[Block, T]:
         outer, self.block = self.block, Block()
         before, self._done = self._done, self._done.new_child()
         self._open.add(id(self.block))
@@ -184,8 +186,8 @@ class Tape:
             self._open.remove(id(self.block))
             self.block, self._done = outer, before
 
-    def call(self, function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
-        """Record a call of a kernel, which is recorded itself at its first call."""
+    def call(self, function: Callable[..., T], args: tuple[object, ...]) -> T:
+        """Fields a call of a kernel, which is recorded itself at its first call."""
         flat = list(leaves(args))
         self._check(flat)
         key = function, shape(args)
@@ -198,28 +200,30 @@ class Tape:
             self.kernels.recordings.append(recording)
             self.kernels.known[key] = recording, given, refilled_args
         recording, given, _ = self.kernels.known[key]
-        results = [Value(self, "called", (), is_condition(x)) for x in recording.results]
+        results = [RecordedValue(self, "called", (), is_condition(x)) for x in recording.results]
         self.block.append(Call(recording, flat, results))
         return refilled(given, iter(results))
 
-    def _check(self, used: Sequence[Any] | Iterator[Any]) -> None:
+    def _check(self, used: Iterable[object]) -> None:
         """Refuse a value that is not there: of another function, or of a branch that is over."""
         for x in used:
-            if isinstance(x, Symbol) and (not isinstance(x, Value) or id(x.block) not in self._open):
+            if isinstance(x, Symbol) and (
+                not isinstance(x, RecordedValue) or id(x.block) not in self._open
+            ):
                 raise TraceError("a value is used outside of the branch or the function that it is from")
 
 
-def is_condition(x: Any) -> bool:
+def is_condition(x: object) -> bool:
     """Whether something is a truth value, known or not."""
-    return x.condition if isinstance(x, Value) else isinstance(x, bool)
+    return x.condition if isinstance(x, RecordedValue) else isinstance(x, bool)
 
 
-def is_number(x: Any) -> bool:
+def is_number(x: object) -> TypeGuard[Operand]:
     """Whether something is a number or a truth value, known or not."""
-    return isinstance(x, (Value, float, int))
+    return isinstance(x, (RecordedValue, float, int))
 
 
-def leaves(value: Any) -> Iterator[Any]:
+def leaves(value: object) -> Iterator[Operand]:
     """The numbers that nested tuples and lists hold, in order."""
     if isinstance(value, (tuple, list)):
         for item in value:
@@ -228,21 +232,21 @@ def leaves(value: Any) -> Iterator[Any]:
         yield value
 
 
-def like(template: Any, items: list[Any]) -> Any:
+def like(template: Any, items: list[object]) -> Any:
     """Items as a list or a tuple of the template's class."""
     if isinstance(template, list):
         return items
     return type(template)._make(items) if hasattr(template, "_make") else tuple(items)
 
 
-def refilled(template: Any, values: Iterator[Any]) -> Any:
+def refilled(template: T, values: Iterator[object]) -> T:
     """Numbers in place of those in nested tuples and lists: the inverse of :func:`leaves`."""
     if isinstance(template, (tuple, list)):
         return like(template, [refilled(item, values) for item in template])
-    return next(values) if is_number(template) else template
+    return cast(T, next(values)) if is_number(template) else template
 
 
-def shape(value: Any) -> Any:
+def shape(value: object) -> Hashable:
     """What tells nested tuples of other lengths, classes, kinds of numbers or objects apart."""
     if isinstance(value, (tuple, list)):
         return type(value), tuple([shape(item) for item in value])

@@ -10,7 +10,7 @@ sample, until they scatter again (a strong tracking filter).
 Written out for scalars, so that it needs no matrices.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range
 from ..ops import Number, clip, fmax, sqrt, where
@@ -25,7 +25,7 @@ MOST_INNOVATION = 5.0
 SCATTER = 4.0
 
 
-class Learning(NamedTuple):
+class NoiseLearning(NamedTuple):
     """How the noise of the disturbance is learnt."""
 
     change_time: Annotated[float, "s", "for which a disturbance goes on changing", Range(0.1)] = 8.0
@@ -36,15 +36,15 @@ class Learning(NamedTuple):
     alert_time: Annotated[float, "s", "over which innovations are averaged", Range(0.01)] = 0.3
 
 
-class Rates(NamedTuple):
+class LearningRates(NamedTuple):
     """What is the same on every axis, computed once a step."""
 
-    memory: Any  # share of the present in the variance that is learnt
-    keep: Any  # share of the slope that is left after a step
-    noise: Any  # gain of its variance by one step, in variances
-    alert: Any  # growth of the covariance by one sample
-    mean: Any  # share of a sample in the mean innovation
-    scatter: Any  # squared mean innovation that is none
+    memory: Number  # share of the present in the variance that is learnt
+    keep: Number  # share of the slope that is left after a step
+    noise: Number  # gain of its variance by one step, in variances
+    alert: Number  # growth of the covariance by one sample
+    mean: Number  # share of a sample in the mean innovation
+    scatter: Number  # squared mean innovation that is none
 
 
 class Covariance(NamedTuple):
@@ -62,7 +62,7 @@ class Covariance(NamedTuple):
     ss: Number = 0.0
 
 
-class Axis(NamedTuple):
+class DisturbedAxis(NamedTuple):
     """Disturbance [m/s2 or rad/s2], its slope and the learnt variance of that; mean innovation in
     standard deviations; covariance."""
 
@@ -73,10 +73,10 @@ class Axis(NamedTuple):
     covariance: Covariance = Covariance()
 
 
-def rates(p: Learning, period: Number, h: Number) -> Rates:
+def rates(p: NoiseLearning, period: Number, h: Number) -> LearningRates:
     """The rates of learning at a time between samples and a step [s]."""
     mean = period / (p.alert_time + period)
-    return Rates(
+    return LearningRates(
         h / (p.memory_time + h),
         p.change_time / (p.change_time + h),
         2.0 * h / p.change_time,
@@ -86,7 +86,7 @@ def rates(p: Learning, period: Number, h: Number) -> Rates:
     )
 
 
-def later(a: Axis, drift: Number, k: Rates, h: Number) -> Axis:
+def later(a: DisturbedAxis, drift: Number, k: LearningRates, h: Number) -> DisturbedAxis:
     """The axis after h [s] without a measurement, P = F P F^T + Q.
 
     Args:
@@ -105,7 +105,7 @@ def later(a: Axis, drift: Number, k: Rates, h: Number) -> Axis:
     vs1 = vs + h * ds + half * ss
     ds1 = ds + h * ss
     dd1 = dd + h * ds
-    return Axis(
+    return DisturbedAxis(
         d + h * slope,
         keep * slope,
         variance + k.memory * (slope * slope - variance),
@@ -125,7 +125,9 @@ def later(a: Axis, drift: Number, k: Rates, h: Number) -> Axis:
     )
 
 
-def taken(a: Axis, innovation: Number, noise: Number, k: Rates) -> tuple[Axis, Any, Any]:
+def taken(
+    a: DisturbedAxis, innovation: Number, noise: Number, k: LearningRates
+) -> tuple[DisturbedAxis, Number, Number]:
     """The axis after a sample, and the corrections of position and velocity.
 
     Args:
@@ -143,7 +145,7 @@ def taken(a: Axis, innovation: Number, noise: Number, k: Rates) -> tuple[Axis, A
     rest = noise * share
     sigmas = clip(innovation * sqrt(inverse), -MOST_INNOVATION, MOST_INNOVATION)
     return (
-        Axis(
+        DisturbedAxis(
             clip(d + kd * innovation, -MOST_DISTURBANCE, MOST_DISTURBANCE),
             clip(slope + ks * innovation, -MOST_SLOPE, MOST_SLOPE),
             variance,

@@ -7,12 +7,12 @@ from ..frames import rotate_to_body, rotate_to_earth
 from ..ops import Condition, Number, clip, where
 from ..signals import Estimate
 from .derivative import FRACTION, Acceleration, accelerated, weight
-from .screen import Inputs, Sample, Seen, first_look
+from .screen import Inputs, ScreenedSample, Seen, first_look
 
 GAIN = Range(0.0, 50.0)
 
 
-class Gains(NamedTuple):
+class CorrectionGains(NamedTuple):
     """K_1 and K_2, limits of the velocity, and the filter of the acceleration."""
 
     k1_x: Annotated[float, "1/s", "correction of the north position", GAIN] = 6.0
@@ -56,7 +56,7 @@ def moved(m: MotionState, h: Number) -> MotionState:
     return m._replace(x=m.x + h * x_dot, y=m.y + h * y_dot, psi=m.psi + h * m.r)
 
 
-def corrected(m: MotionState, s: Sample, k: Gains, h: Number) -> MotionState:
+def corrected(m: MotionState, s: ScreenedSample, k: CorrectionGains, h: Number) -> MotionState:
     """A prediction corrected by a good sample, (4.48); by any other, nothing but a fading velocity."""
     dx, dy, dpsi = s.x - m.x, s.y - m.y, s.psi - m.psi
     ahead, aside = rotate_to_body(m.psi, dx, dy)
@@ -83,7 +83,7 @@ def corrected(m: MotionState, s: Sample, k: Gains, h: Number) -> MotionState:
 
 
 def estimated(
-    s: State, seen: Seen, after: MotionState, good: Condition, k: Gains, h: Number
+    s: State, seen: Seen, after: MotionState, good: Condition, k: CorrectionGains, h: Number
 ) -> tuple[State, Estimate]:
     """State and outputs after a step that ends in ``after``."""
     nu = (after.u, after.v, after.r)

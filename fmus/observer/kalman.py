@@ -18,15 +18,15 @@ from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Condition, Number, choose, clip, exp, finite, fmax, when, where
 from ..signals import Estimate, Force
-from .axis import MOST, Axis, Learning, Rates, later, rates, taken
+from .axis import MOST, DisturbedAxis, LearningRates, NoiseLearning, later, rates, taken
 from .correction import MotionState
 from .derivative import Acceleration
-from .screen import Inputs, Sample, Screening, Seen, first_look, limited, look
+from .screen import Inputs, ScreenedSample, Screening, Seen, first_look, limited, look
 
 STD = Range(1e-6, 1.0)
 
 
-class Noise(NamedTuple):
+class KalmanNoise(NamedTuple):
     """Noise of the measurement, and what the slope of a disturbance gains in a second at least."""
 
     position_std: Annotated[float, "m", "standard deviation of a measured position", STD] = 0.0002
@@ -47,26 +47,26 @@ class Rejection(NamedTuple):
 
 
 class Params(NamedTuple):
-    noise: Noise = Noise()
-    learning: Learning = Learning()
+    noise: KalmanNoise = KalmanNoise()
+    learning: NoiseLearning = NoiseLearning()
     rejection: Rejection = Rejection()
     screening: Screening = Screening()
     inertia: Inertia = Inertia()
     damping: Damping = Damping()
 
 
-class Belief(NamedTuple):
+class KalmanState(NamedTuple):
     """Pose and velocity, and what is known on each body axis."""
 
     motion: MotionState = MotionState()
-    surge: Axis = Axis()
-    sway: Axis = Axis()
-    yaw: Axis = Axis()
+    surge: DisturbedAxis = DisturbedAxis()
+    sway: DisturbedAxis = DisturbedAxis()
+    yaw: DisturbedAxis = DisturbedAxis()
 
 
 class State(NamedTuple):
     seen: Seen = Seen()
-    belief: Belief = Belief()
+    belief: KalmanState = KalmanState()
     acceleration: Acceleration = Acceleration()
     refused: Number = 0.0
 
@@ -96,15 +96,22 @@ def predicted(
     ), Acceleration(X, Y, N)
 
 
-def believed(s: State, ahead: MotionState, keep: Number, p: Params, k: Rates, h: Number) -> Belief:
+def believed(
+    s: State, ahead: MotionState, keep: Number, p: Params, k: LearningRates, h: Number
+) -> KalmanState:
     """What is believed after h [s], before the sample of that instant."""
     _, surge, sway, yaw = s.belief
     n = p.noise
     return when(
         keep < 1.0,
         # Long lost, nothing is known any more but that a ship comes to rest.
-        lambda: Belief(ahead, Axis(keep * surge.d), Axis(keep * sway.d), Axis(keep * yaw.d)),
-        lambda: Belief(
+        lambda: KalmanState(
+            ahead,
+            DisturbedAxis(keep * surge.d),
+            DisturbedAxis(keep * sway.d),
+            DisturbedAxis(keep * yaw.d),
+        ),
+        lambda: KalmanState(
             ahead,
             later(surge, n.drift_u, k, h),
             later(sway, n.drift_v, k, h),
@@ -113,7 +120,9 @@ def believed(s: State, ahead: MotionState, keep: Number, p: Params, k: Rates, h:
     )
 
 
-def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Condition]:
+def corrected(
+    b: KalmanState, s: ScreenedSample, p: Params, k: LearningRates
+) -> tuple[KalmanState, Condition]:
     """The belief after a sample, and whether the sample fits to what was believed."""
     m, n, rejection = b.motion, p.noise, p.rejection
     ahead, aside = rotate_to_body(m.psi, s.x - m.x, s.y - m.y)
@@ -139,12 +148,12 @@ def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Condit
         * turn
         / (heading + rejection.heading_slack * rejection.heading_slack + b.yaw.covariance.pp)
     )
-    return Belief(after, surge, sway, yaw), distance <= rejection.gate * rejection.gate
+    return KalmanState(after, surge, sway, yaw), distance <= rejection.gate * rejection.gate
 
 
 def init(i: Inputs, p: Params) -> State:
     seen = first_look(i.measurement)
-    return State(seen, Belief(MotionState(seen.x_m, seen.y_m, seen.psi_m)))
+    return State(seen, KalmanState(MotionState(seen.x_m, seen.y_m, seen.psi_m)))
 
 
 def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
@@ -164,7 +173,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     elsewhere = sample.first | (refused > p.rejection.jump_time)
     belief = when(
         elsewhere,
-        lambda: Belief(MotionState(sample.x, sample.y, finite(sample.psi, 0.0))),
+        lambda: KalmanState(MotionState(sample.x, sample.y, finite(sample.psi, 0.0))),
         lambda: choose(fits, after, before),
     )
     m = belief.motion

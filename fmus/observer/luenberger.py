@@ -12,12 +12,12 @@ from ..declare import component
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number
 from ..signals import Estimate, Force
-from .correction import Gains, MotionState, State, corrected, estimated, moved, start
+from .correction import CorrectionGains, MotionState, State, corrected, estimated, moved, start
 from .screen import Inputs, Screening, limited, look
 
 
 class Params(NamedTuple):
-    gains: Gains = Gains()
+    gains: CorrectionGains = CorrectionGains()
     screening: Screening = Screening()
     inertia: Inertia = Inertia()
     damping: Damping = Damping()

@@ -10,12 +10,12 @@ from typing import NamedTuple
 from ..declare import component
 from ..ops import Number
 from ..signals import Estimate
-from .correction import Gains, State, corrected, estimated, moved, start
+from .correction import CorrectionGains, State, corrected, estimated, moved, start
 from .screen import Inputs, Screening, look
 
 
 class Params(NamedTuple):
-    gains: Gains = Gains()
+    gains: CorrectionGains = CorrectionGains()
     screening: Screening = Screening()
 
 

@@ -36,7 +36,7 @@ class Seen(NamedTuple):
     psi_m: float = 0.0
 
 
-class Sample(NamedTuple):
+class ScreenedSample(NamedTuple):
     """A screened sample: whether it is good, and the first one; whether there has been none for long;
     its pose with continuous heading, which is finite even if the sample is not."""
 
@@ -81,7 +81,7 @@ def first_look(m: Measurement) -> Seen:
     )
 
 
-def look(s: Seen, m: Measurement, near: Number, p: Screening, h: Number) -> tuple[Seen, Sample]:
+def look(s: Seen, m: Measurement, near: Number, p: Screening, h: Number) -> tuple[Seen, ScreenedSample]:
     """Screen a sample.
 
     Args:
@@ -103,6 +103,6 @@ def look(s: Seen, m: Measurement, near: Number, p: Screening, h: Number) -> tupl
     first = good & (s.started < 0.5)
     # A lost sample must not reach the arithmetic: NaN times zero is NaN.
     x, y, psi = where(here, m.x_m, s.x_m), where(here, m.y_m, s.y_m), where(here, m.psi_m, s.psi_m)
-    return Seen(where(here, 1.0, s.started), age, x, y, psi), Sample(
+    return Seen(where(here, 1.0, s.started), age, x, y, psi), ScreenedSample(
         good, first, age > p.rest_time, x, y, where(first, psi, unwrap(psi, near))
     )

@@ -7,25 +7,25 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat,
 
 from ..base_units import base_exponents
 from ..declare import DeclarationError
-from ..ship_description import Value
+from ..ship_description import GUESSED, Value
 
 FACTOR = re.compile(r"\|[uvr]\||[uvr]")  # of a product of speeds
 
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 
-class Strict(BaseModel):
+class StrictTable(BaseModel):
     """A table in which a key that is not known is an error."""
 
     model_config = ConfigDict(extra="forbid", strict=False)
 
 
-class Number(Strict):
+class Number(StrictTable):
     """A number, where it comes from, and its standard deviation."""
 
     value: Finite | None = Field(None, description="in SI units")
     prime: Finite | None = Field(None, description="in place of value: in prime units, see prime")
-    origin: str = Field("guessed", description="weighed, tank test, borrowed, guessed, or a publication")
+    origin: str = Field(GUESSED, description="weighed, tank test, borrowed, guessed, or a publication")
     std: PositiveFloat | None = Field(
         None, description="standard deviation in the number's unit", allow_inf_nan=False
     )

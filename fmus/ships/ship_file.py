@@ -27,7 +27,7 @@ from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
 from .hull_errors import WIND_SETTINGS
-from .numbers_told import Finite, Given, Number, Prime, Strict, Term, valued
+from .numbers_told import Finite, Given, Number, Prime, StrictTable, Term, valued
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
@@ -36,7 +36,7 @@ VARIABLE = r"^[A-Za-z][A-Za-z0-9_]*$"
 REQUIRED = ("m", "I_z")  # of the inertia; what else is not named is zero
 
 
-class HullTable(Strict):
+class HullTable(StrictTable):
     """What the water does to the hull."""
 
     terms: list[Term] = Field(default=[])
@@ -56,14 +56,14 @@ class ActuatorTable(BaseModel):
     behind: str = ""
 
 
-class PrimeTable(Strict):
+class PrimeTable(StrictTable):
     """What numbers in prime units are over."""
 
     water_density: Annotated[Finite, Field(gt=0.0, description="rho [kg/m3]")]
     draft: Annotated[Finite, Field(gt=0.0, description="d [m]; a mass is over rho L^2 d / 2")]
 
 
-class ShipTable(Strict):
+class ShipTable(StrictTable):
     """The description of a ship."""
 
     name: Annotated[str, Field(pattern=NAME, max_length=40)]

@@ -5,32 +5,33 @@ a memory of forces (a lag), all in :mod:`fmus.actuators.response`, the laws of t
 the effects without a memory.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..actuators.actuation import actuators, forces, measurable, ordered, output, parameters, variable
-from ..actuators.actuator_layout import allocating, layouts
 from ..actuators.attack import Attack, RealAttack, attacking
 from ..actuators.command_variables import commands_of, powers_of, rates_of
 from ..actuators.law import Law
 from ..actuators.response import (
     Past,
-    Prepared,
+    PreparedThrusters,
+    allocating,
     at_rest,
     command_response,
     force_response,
+    layouts,
     prepared,
     thruster_effects,
     total,
 )
 from ..actuators.weighted_allocation import allocate
-from ..declare import Component, Variable, bundle, group_of, redeclared, variables
+from ..declare import Component, Fields, Variable, bundle, group_of, redeclared, variables
 from ..effects import EffectSet
 from ..ops import Number, finite, when
 from ..ship_description import Description
 from ..signals import Force, VelocityInCurrent
 
 
-class Applied(NamedTuple):
+class ThrusterForces(NamedTuple):
     """Forces of a thrusters' FMU."""
 
     tau_cmd_X: Annotated[float, "N", "surge force of the commands, by the allocation"] = 0.0
@@ -41,7 +42,7 @@ class Applied(NamedTuple):
     tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
 
 
-def outputs_of(ship: Description) -> type[Any]:
+def outputs_of(ship: Description) -> type[Fields]:
     """What can be measured of a ship's actuators beside their commands, as a group of variables."""
     titles = {a.part.name: a.label for a in actuators(ship)}
 
@@ -72,10 +73,14 @@ def make(effects: EffectSet, ship: Description, name: str = "thrusters", form: s
     params = bundle(
         "Params",
         allocation=bundle(
-            "Allocation", **{a.part.name: parameters(ship, a, "", False)() for a in actuators(known)}
+            "Allocation",
+            None,
+            **{a.part.name: parameters(ship, a, "", False)() for a in actuators(known)},
         )(),
         attack=Attack(),
-        plant=bundle("Plant", **{a.part.name: parameters(ship, a, "plant_", True)() for a in parts})(),
+        plant=bundle(
+            "Plant", None, **{a.part.name: parameters(ship, a, "plant_", True)() for a in parts}
+        )(),
         plant_attack=RealAttack(),
         power=powers_of(ship)(),
         rate=rates_of(ship)(),
@@ -83,24 +88,24 @@ def make(effects: EffectSet, ship: Description, name: str = "thrusters", form: s
         wrong=groups.forces.params(),
         changed=groups.changes.params(),
     )
-    commands: Any = commands_of(ship)
+    commands = commands_of(ship)
     told = variables(commands) if ship.allocates else ()
     beside = measurable(ship)
-    outputs: Any = group_of("Outputs", [*told, *variables(Applied), *variables(outputs_of(ship))])
+    outputs = group_of("Outputs", [*told, *variables(ThrusterForces), *variables(outputs_of(ship))])
     request = Force() if ship.allocates else commands()
     inputs = bundle("Inputs", request=request, velocity=VelocityInCurrent())
 
-    def prepare(p: Any) -> Prepared:
+    def prepare(p: Fields) -> PreparedThrusters:
         plant = p.plant
         for member in groups.changes.members:
             plant = member.apply(member.acting(p.changed), p.changed, plant, plant)
         plant = attacking(plant, p.plant_attack)
         return prepared(p._replace(plant=plant, allocation=attacking(p.allocation, p.attack)), groups)
 
-    def init(i: Any, p: Any) -> Past:
+    def init(i: Fields, p: Fields) -> Past:
         return at_rest(groups)
 
-    def prepared_step(s: Past, i: Any, b: Prepared, h: Number) -> tuple[Past, Any]:
+    def prepared_step(s: Past, i: Fields, b: PreparedThrusters, h: Number) -> tuple[Past, Fields]:
         p = b.params
         u, v, r, u_c, v_c = (finite(x, 0.0) for x in i.velocity)
         through_water = u - u_c, v - v_c, r
@@ -115,7 +120,7 @@ def make(effects: EffectSet, ship: Description, name: str = "thrusters", form: s
         found = [output(ship, name, acting, through_water, p.plant) for name in beside]
         return after, outputs(*shown, *possible, *tau, *found)
 
-    def step(s: Past, i: Any, p: Any, h: Number) -> tuple[Past, Any]:
+    def step(s: Past, i: Fields, p: Fields, h: Number) -> tuple[Past, Fields]:
         return prepared_step(s, i, prepare(p), h)
 
     what = "Thrust allocation and thrusters" if ship.allocates else "Thrusters"

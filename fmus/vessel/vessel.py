@@ -5,12 +5,14 @@ communication step above 0.02 s is divided. A force input that is NaN or infinit
 model effect on the hull, from outside, or in the measurement is off until a parameter says otherwise.
 """
 
+from collections.abc import Callable, Sequence
 from operator import add
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from ..declare import (
     FIXED,
     Component,
+    Fields,
     Variable,
     bundle,
     group_of,
@@ -36,13 +38,13 @@ from ..hull import (
     term_variable,
 )
 from ..hull_functions import FUNCTIONS
-from ..ops import Condition, Number, finite, when, wrap
-from ..ship_description import Description, Part, Value
+from ..ops import Condition, Number, Series, finite, when, wrap
+from ..ship_description import GUESSED, Description, Part, Value
 from ..signals import Force, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
 
-class Start(NamedTuple):
+class VesselStart(NamedTuple):
     """State at the start of the simulation."""
 
     x_0: Annotated[float, "m", "initial north position", FIXED] = 5.0
@@ -55,6 +57,9 @@ class Start(NamedTuple):
 
 # eta, nu over ground, and time.
 State = Motion
+B = TypeVar("B", Hull, "PreparedVessel")
+# (state, force, what is known of the ship) -> nu_dot [m/s2, m/s2, rad/s2]
+Acceleration = Callable[[State, Any, Any], Sequence[Series]]
 
 
 class Pose(NamedTuple):
@@ -80,7 +85,7 @@ class Outputs(NamedTuple):
     omega_star_N: Annotated[float, "N.m", "what control model (2.27) lacks in yaw"] = 0.0
 
 
-def hull(p: Any, effects: VesselEffects) -> Hull:
+def hull(p: Fields, effects: VesselEffects) -> Hull:
     """The hull with the changes of its damping and inertia applied."""
     inertia = p.inertia
     for member in effects.inertia.members:
@@ -90,7 +95,7 @@ def hull(p: Any, effects: VesselEffects) -> Hull:
     return Hull(inertia, inverse_mass(inertia), damping)
 
 
-class Prepared(NamedTuple):
+class PreparedVessel(NamedTuple):
     """What follows from the parameters alone: the hull, and which effects act.
 
     Attributes:
@@ -103,7 +108,7 @@ class Prepared(NamedTuple):
             current acts, the inertia is changed.
     """
 
-    params: Any
+    params: Fields
     effects: VesselEffects
     hull: Hull
     changes: tuple[Condition, ...]
@@ -115,10 +120,10 @@ class Prepared(NamedTuple):
     heavier: Condition
 
 
-def prepared(p: Any, effects: VesselEffects) -> Prepared:
+def prepared(p: Fields, effects: VesselEffects) -> PreparedVessel:
     """Everything that a step needs of the parameters."""
     flows = effects.water.any_acts(p.water)
-    return Prepared(
+    return PreparedVessel(
         p,
         effects,
         hull(p, effects),
@@ -132,7 +137,7 @@ def prepared(p: Any, effects: VesselEffects) -> Prepared:
     )
 
 
-def through_water(s: State, b: Prepared) -> tuple[Motion, Any, Any]:
+def through_water(s: State, b: PreparedVessel) -> tuple[Motion, Number, Number]:
     """The ship as the water sees it, and the water's body-fixed velocity [m/s, m/s]."""
     u_c: Number = 0.0
     v_c: Number = 0.0
@@ -142,7 +147,7 @@ def through_water(s: State, b: Prepared) -> tuple[Motion, Any, Any]:
     return s._replace(u=s.u - u_c, v=s.v - v_c), u_c, v_c
 
 
-def water_velocity(s: State, b: Prepared) -> tuple[Number, Number]:
+def water_velocity(s: State, b: PreparedVessel) -> tuple[Number, Number]:
     """The water's body-fixed velocity [m/s, m/s]; zero at once where it does not move."""
     return when(b.flows, lambda: through_water(s, b)[1:], lambda: (0.0, 0.0))
 
@@ -152,7 +157,7 @@ def nominal(s: State, tau: Force, b: Hull) -> Triple:
     return motion(s[3], s[4], s[5], tau, b)
 
 
-def disturbed(s: State, tau: Force, b: Prepared) -> Triple:
+def disturbed(s: State, tau: Force, b: PreparedVessel) -> Triple:
     """nu_dot [m/s2, m/s2, rad/s2] with every effect, in a current that the hull sees as nu_r."""
     ship, u_c, v_c = through_water(s, b)
     X, Y, N = tau
@@ -165,7 +170,7 @@ def disturbed(s: State, tau: Force, b: Prepared) -> Triple:
     return u_dot + s.r * v_c, v_dot - s.r * u_c, r_dot
 
 
-def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = nominal) -> State:
+def integrate(s: State, tau: object, b: object, h: Number, law: Acceleration = nominal) -> State:
     """State after h [s] of constant force by one step of the classical Runge-Kutta method.
 
     The law gives nu_dot from state, force and b: :func:`nominal` with b a Hull, :func:`disturbed` with
@@ -196,14 +201,14 @@ def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = nominal) -> St
     )
 
 
-def change_forces(s: State, b: Prepared) -> Any:
+def change_forces(s: State, b: PreparedVessel) -> Fields:
     """The force of each change of a damping coefficient."""
     ship, _, _ = through_water(s, b)
     forces = forces_of(b.effects.changes, b.changes, b.params.change, ship)
     return b.effects.change_forces._make(forces)
 
 
-def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
+def outside_forces(s: State, tau: Force, b: PreparedVessel) -> Fields:
     """The force of each other effect on the hull."""
     ship, _, _ = through_water(s, b)
     forces = forces_of(
@@ -212,7 +217,7 @@ def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
     return b.effects.outside_forces._make(forces)
 
 
-def model_error(s: State, nu_dot: Triple, tau: Force, p: Any) -> Triple:
+def model_error(s: State, nu_dot: Triple, tau: Force, p: Fields) -> Triple:
     """omega [N, N, N m]: what the nominal model lacks of the force on the hull, (2.36)."""
     MX, MY, MN = inertia_force(*nu_dot, p.inertia)
     CX, CY, CN = coriolis_force(s.u, s.v, s.r, p.inertia)
@@ -220,7 +225,7 @@ def model_error(s: State, nu_dot: Triple, tau: Force, p: Any) -> Triple:
     return MX + CX - DX - tau[0], MY + CY - DY - tau[1], MN + CN - DN - tau[2]
 
 
-def measured(s: State, b: Prepared) -> Measurement:
+def measured(s: State, b: PreparedVessel) -> Measurement:
     """The pose as the measurement system sees it."""
     pose = (s.x, s.y, s.psi)
     for member, acts in zip(b.effects.measurement.members, b.measurement, strict=True):
@@ -228,31 +233,35 @@ def measured(s: State, b: Prepared) -> Measurement:
     return Measurement(pose[0], pose[1], wrap(pose[2]))
 
 
-def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Triple]:
+def moved(
+    s: State, tau: Force, b: B, h: Number, law: Callable[[State, Force, B], Triple]
+) -> tuple[State, Triple]:
     """The state after h [s], and nu_dot there."""
     after = integrate(s, tau, b, h, law)
     return after, law(after, tau, b)
 
 
-def described(ship: Description) -> tuple[Number, Number, Number]:
+def described(ship: Description) -> tuple[Fields, Fields, Fields]:
     """Inertia, damping and start of a described ship, with where their values come from."""
     given = ship.values()
 
     groups_of = {v.name: v.known.group for v in variables(Inertia) if v.known is not None}
 
     def valued(v: Variable) -> Variable:
-        start = given.get(v.name, Value(v.name, 0.0, "", 0.0))
+        start = given.get(v.name, Value(v.name, 0.0, GUESSED, 0.0))
         return start.of(v, groups_of.get(v.name, "damping"))
 
     own = [v.name for v in variables(Terms)]
     further = [term_variable(v.name) for v in ship.terms if v.name not in own]
     terms = group_of("Terms", map(valued, [*variables(Terms), *further]))()
-    functions = bundle("HullFunctions", **{part.law: _function(part)() for part in ship.functions})()
-    start = redeclared(Start, ship.scale.of)()
+    functions = bundle(
+        "HullFunctions", None, **{part.law: _function(part)() for part in ship.functions}
+    )()
+    start = redeclared(VesselStart, ship.scale.of)()
     return redeclared(Inertia, valued)(), bundle("Damping", terms=terms, functions=functions)(), start
 
 
-def _function(part: Part) -> type[Any]:
+def _function(part: Part) -> type[Fields]:
     """Parameters of a function of the hull, as a description gives them."""
     given = {v.name: v for v in part.values}
     declared = parameters_of(part.law, 3, FUNCTIONS[part.law])
@@ -284,13 +293,13 @@ def make(effects: EffectSet, ship: Description) -> Component:
     )
     outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
 
-    def init(i: Force, p: Any) -> State:
+    def init(i: Force, p: Fields) -> State:
         return State(*p.start)
 
-    def prepare(p: Any) -> Prepared:
+    def prepare(p: Fields) -> PreparedVessel:
         return prepared(p, groups)
 
-    def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Any]:
+    def prepared_step(s: State, i: Force, b: PreparedVessel, h: Number) -> tuple[State, Fields]:
         p = b.params
         tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
         after, nu_dot = when(
@@ -323,7 +332,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
             outside,
         )
 
-    def step(s: State, i: Force, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Force, p: Fields, h: Number) -> tuple[State, Fields]:
         return prepared_step(s, i, prepare(p), h)
 
     return Component(

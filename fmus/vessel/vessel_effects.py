@@ -1,12 +1,13 @@
 """The model effects that act on a vessel: their parameters, and their forces as outputs."""
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ..declare import variables, vector
+from ..declare import Declared, Fields, variables, vector
 from ..effects import Effect, EffectSet, Loaded, Motion
 from ..effects.group import Group, group
 from ..hull import Damping
+from ..ops import Condition, Number
 
 NONE = (0.0, 0.0, 0.0)
 
@@ -27,12 +28,12 @@ class VesselEffects(NamedTuple):
     outside: Group
     inertia: Group
     measurement: Group
-    change_forces: type[Any]
-    outside_forces: type[Any]
+    change_forces: type[Fields]
+    outside_forces: type[Fields]
 
 
 @cache
-def vessel_effects(effects: EffectSet, damping: type[Any] = Damping) -> VesselEffects:
+def vessel_effects(effects: EffectSet, damping: Declared = Damping) -> VesselEffects:
     """The groups of a set of effects, for a hull with these damping coefficients."""
     order = [v.name for v in variables(damping)]
     forces = effects.of_kind("force", "environment")
@@ -61,9 +62,11 @@ def _outputs_of(e: Effect) -> list[tuple[str, str, str, float]]:
     ]
 
 
-def forces_of(group: Group, acting: tuple[Any, ...], values: Any, ship: Motion | Loaded) -> list[Any]:
+def forces_of(
+    group: Group, acting: tuple[Condition, ...], values: Fields, ship: Motion | Loaded
+) -> list[Number]:
     """The force of each effect of a group [N, N m], on the axes that it acts on."""
-    found: list[Any] = []
+    found: list[Number] = []
     for member, acts in zip(group.members, acting, strict=True):
         force = member.apply(acts, values, NONE, ship)
         found += [force["XYN".index(axis)] for axis in member.effect.axis]

@@ -11,8 +11,8 @@ learned.
 The inputs are those of a controller; ``tau_cmd`` must be connected. The target is not used.
 """
 
-from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Annotated, NamedTuple
 
 from ..actuators.actuation import actuators, parameters
 from ..actuators.attack import Attack, attacking
@@ -20,7 +20,7 @@ from ..actuators.weighted_allocation import axes, components, solution
 from ..controller.backstepping import HELD, Inputs, acting
 from ..controller.eigen import dot
 from ..controller.models import FullBelief, everything
-from ..declare import POSITIVE, Component, Range, Variable, bundle, group_of
+from ..declare import POSITIVE, Component, Fields, Range, Variable, bundle, group_of
 from ..effects import EffectSet
 from ..hull import inertia_force
 from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
@@ -56,7 +56,7 @@ class Settings(NamedTuple):
     failure_rate: Annotated[float, "1/s", "how often a failure is to be expected", Range(1e-12)] = 2.8e-5
 
 
-class Told(NamedTuple):
+class Detection(NamedTuple):
     """Probability that each of two thrusters has failed, since when [s], and the share of its force."""
 
     failed: tuple[Number, Number] = (0.0, 0.0)
@@ -64,7 +64,7 @@ class Told(NamedTuple):
     lost: tuple[Number, Number] = (0.0, 0.0)
 
 
-def outputs_of(ship: Description) -> type[Any]:
+def outputs_of(ship: Description) -> type[Fields]:
     """The outputs of the detector of a ship."""
 
     def each(stem: str, text: str) -> list[Variable]:
@@ -80,7 +80,7 @@ def outputs_of(ship: Description) -> type[Any]:
     )
 
 
-class Row(NamedTuple):
+class WatchedSample(NamedTuple):
     """A sample of the window: time [s], velocity, commanded forces of the thrusters [N], what they seem
     to give too much [N], how far that was from the usual, its variance over that of the noise (what is
     usual is not sure where the ship has never been), the likelihood ratios then, and whether enough had
@@ -116,20 +116,20 @@ class Usual(NamedTuple):
 
 class State(NamedTuple):
     time: Number
-    quiet: Any  # s since the last frozen measurement
-    waited: Any  # s since the last sample
+    quiet: Number  # s since the last frozen measurement
+    waited: Number  # s since the last sample
     nu: Triple
     rest: Triple
     f: Triple
-    rows: tuple[Row, ...]
+    rows: tuple[WatchedSample, ...]
     usual: Usual
-    told: Told
+    told: Detection
 
 
-def init(i: Inputs, p: Any) -> State:
+def init(i: Inputs, p: Fields) -> State:
     e = i.estimate
     nu = (e.u_hat, e.v_hat, e.r_hat)
-    return State(0.0, 0.0, 0.0, nu, STILL, STILL, (Row(),) * ROWS, Usual(), Told())
+    return State(0.0, 0.0, 0.0, nu, STILL, STILL, (WatchedSample(),) * ROWS, Usual(), Detection())
 
 
 def low_pass(before: Triple, now: Triple, share: Number) -> Triple:
@@ -141,14 +141,14 @@ def regressors(nu: Triple, f: Triple) -> tuple[Number, ...]:
     return (1.0, *nu, *f)
 
 
-def unusual(row: Row, usual: Usual) -> Triple:
+def unusual(row: WatchedSample, usual: Usual) -> Triple:
     """g less what is usual [N]."""
     z = regressors(row.nu, row.f)
     a, b, c = [g - dot(w, z) for g, w in zip(row.g, usual.weights, strict=True)]
     return a, b, c
 
 
-def learned(usual: Usual, old: Row, p: Any) -> Usual:
+def learned(usual: Usual, old: WatchedSample, p: Fields) -> Usual:
     """What is usual, with one more sample, by recursive least squares that forgets."""
     z = regressors(old.nu, old.f)
     keep = exp(-p.sample_time / p.memory)
@@ -179,7 +179,9 @@ def learned(usual: Usual, old: Row, p: Any) -> Usual:
     return Usual(P, weights, (a, b, c), (x, y), usual.learned + p.sample_time, judged)
 
 
-def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: Number) -> Any:
+def evidence(
+    rows: tuple[WatchedSample, ...], usual: Usual, axes: tuple[int, ...], least: Number
+) -> tuple[Number, Number, Number, Number]:
     """Likelihood ratio of a loss on some of the axes of g: of the whole window, and the largest over the
     time of the failure, with the share lost and that time."""
     up, full, down, best, share, since = 0.0, 0.0, 1e-12, 0.0, 0.0, 0.0
@@ -200,7 +202,9 @@ def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: 
     return up * up / down, best, share, since
 
 
-def judged(rows: tuple[Row, ...], usual: Usual, p: Any) -> tuple[tuple[Number, Number], Told]:
+def judged(
+    rows: tuple[WatchedSample, ...], usual: Usual, p: Fields
+) -> tuple[tuple[Number, Number], Detection]:
     """The likelihood ratios of the window, and what is told."""
     found = [evidence(rows, usual, axes, p.least_loss) for axes in AXES]
     (whole_a, best_a, lost_a, since_a), (whole_b, best_b, lost_b, since_b) = found
@@ -215,12 +219,12 @@ def judged(rows: tuple[Row, ...], usual: Usual, p: Any) -> tuple[tuple[Number, N
     a, b = [ready * x / (1.0 + odds[0] + odds[1]) for x in odds]
     since = where(a > b, since_a, since_b)
     told = fmax(a, b) > 0.5
-    return (whole_a, whole_b), Told((a, b), where(told, since, 0.0), (lost_a, lost_b))
+    return (whole_a, whole_b), Detection((a, b), where(told, since, 0.0), (lost_a, lost_b))
 
 
 def advanced(
-    s: State, i: Inputs, p: Any, h: Number, forces: Callable[[Any], Triple]
-) -> tuple[State, Told]:
+    s: State, i: Inputs, p: Fields, h: Number, forces: Callable[[Sequence[Number]], Triple]
+) -> tuple[State, Detection]:
     """The state after h [s]; ``forces(tau)``: the thrusters' forces [N] that give a force."""
     e = i.estimate
     nu = (e.u_hat, e.v_hat, e.r_hat)
@@ -239,12 +243,12 @@ def advanced(
     ready = (waited > p.sample_time * (1.0 - 1e-9)) & (quiet > 2.0 * p.filter_time * (1.0 - 1e-9))
     due = (h > 0.0) & ready
 
-    def sampled() -> tuple[tuple[Row, ...], Usual, Told]:
+    def sampled() -> tuple[tuple[WatchedSample, ...], Usual, Detection]:
         omega = (moved[0] - rest[0], moved[1] - rest[1], moved[2] - rest[2])
         old = s.rows[-1]
         calm = (s.told.failed[0] < 0.5) & (s.told.failed[1] < 0.5)
         usual = when((old.filled > 0.5) & calm, lambda: learned(s.usual, old, p), lambda: s.usual)
-        row = Row(1.0, time, slow, f, forces(omega))
+        row = WatchedSample(1.0, time, slow, f, forces(omega))
         z = regressors(slow, f)
         unsure = 1.0 + fmax(dot(z, [dot(line, z) for line in usual.P]), 0.0)
         row = row._replace(error=unusual(row, usual), unsure=unsure)
@@ -269,12 +273,12 @@ def make(effects: EffectSet, ship: Description) -> Component | None:
         "Params",
         Settings,
         belief=FullBelief(),
-        allocation=bundle("Allocation", **known)(),
+        allocation=bundle("Allocation", None, **known)(),
         attack=Attack(),
     )
     outputs = outputs_of(ship)
 
-    def step(s: State, i: Inputs, p: Any, h: Number) -> tuple[State, Any]:
+    def step(s: State, i: Inputs, p: Fields, h: Number) -> tuple[State, Fields]:
         values = attacking(p.allocation, p.attack)
         after, told = advanced(s, i, p, h, lambda tau: solution(ship, tau, values))
         return after, outputs(*told.failed, told.since, *told.lost)

@@ -29,7 +29,7 @@ TOGETHER = 2  # blocks of 15 s: what counts as independent
 
 
 @dataclass(frozen=True, eq=False)
-class Fold:
+class LeftOutRun:
     """What was learned without one run, and how it does there.
 
     Attributes:
@@ -74,7 +74,7 @@ def fall(e: Evaluation) -> np.ndarray:
     return e.before.omega_rms / e.after.omega_rms
 
 
-def leave_out(runs: Sequence[WeakWindows], k: int, prior: Prior, advance: Advance) -> Fold:
+def leave_out(runs: Sequence[WeakWindows], k: int, prior: Prior, advance: Advance) -> LeftOutRun:
     """Learn from all runs but one.
 
     Args:
@@ -84,7 +84,7 @@ def leave_out(runs: Sequence[WeakWindows], k: int, prior: Prior, advance: Advanc
         advance: receives the name of each step when it begins.
     """
     others = [w for i, w in enumerate(runs) if i != k]
-    return Fold(diagnosis.diagnose(others, [runs[k]], prior, advance=advance))
+    return LeftOutRun(diagnosis.diagnose(others, [runs[k]], prior, advance=advance))
 
 
 def gather(files: Sequence[Path], advance: Advance) -> list[WeakWindows]:
@@ -117,7 +117,7 @@ def at_full_power(w: WeakWindows) -> np.ndarray:
     return np.sqrt(np.mean(omega(at_full, Model()) ** 2, axis=0))
 
 
-class Commanded(NamedTuple):
+class CommandedShares(NamedTuple):
     """Shares (3,) of what is left, 0 to 1, that the commands of the VSP would explain on each axis.
 
     Attributes:
@@ -129,7 +129,7 @@ class Commanded(NamedTuple):
     single: np.ndarray
 
 
-def commanded(e: Evaluation, model: Model) -> Commanded:
+def commanded(e: Evaluation, model: Model) -> CommandedShares:
     """How much of what is left goes with the commands of the VSP, in any direction of the force.
 
     Fitted are commands and their sizes, delayed as in the model, and judged on blocks that were not
@@ -141,12 +141,12 @@ def commanded(e: Evaluation, model: Model) -> Commanded:
     """
     w = e.weak_windows
     if not apart(w):
-        return Commanded(np.zeros(3), np.zeros(3))
+        return CommandedShares(np.zeros(3), np.zeros(3))
     power = 1.0 if w.run.power is None else w.run.power[:, :1]
     arriving = Response(w.run, model).between_samples[0]
     first, second = arriving[:2].T, arriving[2:4].T
     two, four = first + second, np.hstack([first, second])
-    return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
+    return CommandedShares(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
 
 
 def _explained(w: WeakWindows, left: np.ndarray, commands: np.ndarray) -> np.ndarray:

@@ -11,18 +11,18 @@ from diagnosis import Content, Evaluation, Model
 from ..study_report import Report
 from . import bollard
 from .expected import AXES, BY_HAND, CURVE_WITHIN, STEERED, Fall, expectations, reason, wanted
-from .leave_one_out import Fold, at_full_power, commanded, fall, steered
+from .leave_one_out import LeftOutRun, at_full_power, commanded, fall, steered
 
 UNITS = ("N", "N", "N m")
 RUNS_AWAY = "runs away"
 HEADING = 2.0  # target: fall of the heading error over 8 s, geometric mean of the runs
 
 
-def kind(fold: Fold) -> str:
+def kind(fold: LeftOutRun) -> str:
     return STEERED if steered(fold.evaluation.weak_windows) else BY_HAND
 
 
-def falls(fold: Fold) -> list[Fall]:
+def falls(fold: LeftOutRun) -> list[Fall]:
     """The fall of each axis, and what bounds it."""
     in_sample = np.full(3, np.nan) if fold.seen is None else fall(fold.seen)
     columns = zip(
@@ -31,7 +31,7 @@ def falls(fold: Fold) -> list[Fall]:
     return [Fall(*map(float, row)) for row in columns]
 
 
-def write_falls(report: Report, folds: Sequence[Fold]) -> None:
+def write_falls(report: Report, folds: Sequence[LeftOutRun]) -> None:
     """The model error before and after on the run left out, beside the target."""
     report.heading("The model error on the run left out")
     report.text(
@@ -89,11 +89,11 @@ def window_error(value: float, scale: float) -> str:
     return f"{scale * value:.3g}" if isfinite(value) else RUNS_AWAY if np.isinf(value) else "–"
 
 
-def write_windows(report: Report, folds: Sequence[Fold]) -> None:
+def write_windows(report: Report, folds: Sequence[LeftOutRun]) -> None:
     """Errors of prediction over 8 s."""
     report.heading("Prediction over 8 s on the run left out")
 
-    def row(f: Fold) -> list[str]:
+    def row(f: LeftOutRun) -> list[str]:
         errors = [f.evaluation.before, f.evaluation.after, f.seen.after if f.seen else None]
         position = ["–" if e is None else window_error(e.position, 1000.0) for e in errors]
         heading = ["–" if e is None else window_error(e.heading, 180.0 / np.pi) for e in errors]
@@ -117,7 +117,7 @@ def write_windows(report: Report, folds: Sequence[Fold]) -> None:
         report.text(f"In {', '.join(away)} the learned model runs away in one window or more.")
 
 
-def write_heading(report: Report, folds: Sequence[Fold]) -> None:
+def write_heading(report: Report, folds: Sequence[LeftOutRun]) -> None:
     """How far the heading's error falls over 8 s, beside the target and with the run learned from."""
     seen = [f.seen for f in folds if f.seen is not None]
     if not seen:
@@ -137,7 +137,7 @@ def write_heading(report: Report, folds: Sequence[Fold]) -> None:
         )
 
 
-def write_expected(report: Report, folds: Sequence[Fold]) -> None:
+def write_expected(report: Report, folds: Sequence[LeftOutRun]) -> None:
     """Expectations set before the study, and the result of each."""
     report.heading("What was expected")
     rows = expectations([f.content for f in folds])
@@ -187,7 +187,7 @@ def write_findings(report: Report, name: str, d: Content) -> None:
     )
 
 
-def write_curve(report: Report, folds: Sequence[Fold], last: Model, pulls: bollard.Pulls) -> None:
+def write_curve(report: Report, folds: Sequence[LeftOutRun], last: Model, pulls: bollard.Pulls) -> None:
     """The learned VSP beside bollard pulls."""
     report.heading("The VSP beside bollard pulls")
     models = {"nominal": Model(), "all runs": last} | {f"without {f.name}": f.model for f in folds}

@@ -1,11 +1,22 @@
-"""A command of the project, run in this process."""
+"""A command of the project, run in this process, and what it says."""
 
 import io
 import os
+import re
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
+
+# Lines that say what takes long, where there is no terminal: on a busy machine any command may write some.
+PROGRESS = re.compile(
+    r"^(\d+ s: |\d+ of \d+ (runs|members)|note: building \S+ takes longer than ).*\n", re.MULTILINE
+)
+
+
+def without_progress(stderr: str) -> str:
+    """What a command has written on standard error, but for its progress."""
+    return PROGRESS.sub("", stderr)
 
 
 class Done(NamedTuple):

@@ -22,7 +22,7 @@ from thesis.basin_trials import (
     sysid4,
     trials,
 )
-from thesis.basin_trials.found import FAULTY, FRESH, PRINTED, REGULAR, Found, share
+from thesis.basin_trials.found import FAULTY, FRESH, PRINTED, REGULAR, TrialRuns, share
 from thesis.monte_carlo import shipped, vary
 from thesis.observers.estimates_replayed import parameters
 from thesis.tracking.outcome import missing, quick
@@ -193,7 +193,7 @@ def made_up(regular=None, faulty=None):
             table[trial.name, fault] = {
                 c: runs(dict((given or {}).get(c, {}))) for c in trials.CONTROLLERS
             }
-    return Found(table, {}, {}, {}, {})
+    return TrialRuns(table, {}, {}, {}, {})
 
 
 def test_lost_runs_are_left_out_of_pairs():
@@ -344,7 +344,7 @@ def test_swift_gains_oscillate_from_a_delay_on(hard, soft, twice, here):
         for name in begins
         for delay in causes.DELAYS
     }
-    found = causes.oscillation(Found({}, {}, {}, delayed, {}))
+    found = causes.oscillation(TrialRuns({}, {}, {}, delayed, {}))
     assert found.here == here
     assert "Table 5.1, ABS: 0 s ×1 (0.20 Hz)" in found.numbers
     if twice is not None:
@@ -386,7 +386,7 @@ def test_spikes_are_stored_and_hurt_or_not(with_spikes, blocked, stored, window,
     spiked |= {(PRINTED, True): {c: runs(1.0, lost=1.0) for c in names}}
     kept = store_contents.StoreContents(spikes=2.0, time=0.01, stored=stored, oldest=40.0, gained=0.5)
     stores = {names[0]: [kept, kept._replace(oldest=20.0)], names[1]: [kept._replace(oldest=window)] * 2}
-    storing, spoiling = causes.spikes(Found({}, spiked, {}, {}, stores))
+    storing, spoiling = causes.spikes(TrialRuns({}, spiked, {}, {}, stores))
     assert storing.here.startswith(said[0])
     assert "which is 1.0 % of the time" in storing.numbers
     assert (

@@ -294,7 +294,7 @@ def test_table_of_the_loops_has_what_is_lost(found, tmp_path, monkeypatch, drawn
     def run_all(todo, seeds, analyse, folder, jobs):
         assert ([*seeds], folder, jobs) == ([0], None, 3)
         return {
-            key: [model_loops.Loop(9.0 if key == "PLS2|RBS, eight" else 0.25, -0.125, log)]
+            key: [model_loops.LoopResult(9.0 if key == "PLS2|RBS, eight" else 0.25, -0.125, log)]
             for key in todo
         }
 

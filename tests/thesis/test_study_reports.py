@@ -33,7 +33,7 @@ from thesis.basin_trials.store_contents import StoreContents
 from thesis.error_models import lap_pictures, model_loops
 from thesis.observers import claims, estimates_replayed, pictures
 from thesis.observers.estimates_replayed import OBSERVERS, SIGNALS
-from thesis.tracking.outcome import AXES, LEARNED_FROM, Outcome, missing
+from thesis.tracking.outcome import AXES, LEARNED_FROM, TrackingOutcome, missing
 from thesis.tracking.verdict import CONTROLLERS, FOUR, PRINTED
 
 
@@ -139,7 +139,7 @@ def test_report_of_chapter_5(tmp_path, monkeypatch, figures, read):
 
     def run_each(todo, seeds, analyse, processes, advance):
         asked.update(seeds)
-        run = Outcome(True, *[0.1] * 17, phi=(0.1,) * 8)
+        run = TrackingOutcome(True, *[0.1] * 17, phi=(0.1,) * 8)
         return {key: [run for _ in seeds[key]] for key in todo}
 
     monkeypatch.setattr(chapter5, "run_each", run_each)
@@ -521,7 +521,7 @@ def test_runs_of_the_lost_thrust_hide_sysid4_or_stop_the_bow_thruster():
 
 
 def test_report_of_the_lost_thrust(tmp_path, monkeypatch, figures):
-    at = [lost_thrust.Place(d, -1.0 - 2.0 * d, 0.9) for d in (0.1, 0.2, 0.3)]
+    at = [lost_thrust.PassResult(d, -1.0 - 2.0 * d, 0.9) for d in (0.1, 0.2, 0.3)]
     given = iter(
         [
             {f"{name}, {pace:g}": at for name in lost_thrust.ESTIMATES for pace in lost_thrust.PACES},

@@ -9,9 +9,9 @@ import pytest
 from studies.study_report import Report
 from thesis import chapter7, lost_thrust, store_weight
 from thesis.basin_trials import observations, sysid4, trials
-from thesis.basin_trials.found import FAULTY, REGULAR, Found
+from thesis.basin_trials.found import FAULTY, REGULAR, TrialRuns
 from thesis.error_models import analysis_tables, model_loops
-from thesis.monte_carlo import Interval, shipped
+from thesis.monte_carlo import SampleMean, shipped
 from thesis.store_weight import FORMS, PLAIN, UNTOLD, WEIGHTS, tables
 from thesis.tracking.outcome import BROKEN, TRUE_PHI
 from thesis.tracking.store_verdicts import full_rank, lack_of_rank, order, richer, saturated, stale
@@ -181,7 +181,7 @@ def test_study_of_the_weights_takes_the_paths_that_are_asked_for(tmp_path, monke
     ],
 )
 def test_shares_are_judged_by_their_intervals(shares, below, above):
-    named = dict(zip("ab", (Interval(*s) for s in shares), strict=True))
+    named = dict(zip("ab", (SampleMean(*s) for s in shares), strict=True))
     assert judged(named) == below
     assert worse(named) == above
 
@@ -400,7 +400,7 @@ def basin(**changes):
                     for r in runs
                 ]
                 table.setdefault((trial.name, fault), {})[c] = noisy
-    return Found(table, {}, {}, {}, {})
+    return TrialRuns(table, {}, {}, {}, {})
 
 
 def answers(found, section):
@@ -440,7 +440,7 @@ def test_statements_on_the_slow_ellipse():
     ],
 )
 def test_ratio_is_below_one_surely_or_not(ratios, said):
-    assert observations.surely_below([Interval(*r) for r in ratios]) == said
+    assert observations.surely_below([SampleMean(*r) for r in ratios]) == said
 
 
 def test_statements_on_the_eights():

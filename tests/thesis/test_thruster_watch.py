@@ -27,7 +27,7 @@ def window(share, axes, since=watch.ROWS):
     rows = []
     for k, f in enumerate(F.tolist()):
         g = [-share * x if axis in axes and k < since else 0.0 for axis, x in enumerate(f)]
-        rows.append(watch.Row(1.0, 100.0 - 0.5 * k, f=tuple(f), g=tuple(g)))
+        rows.append(watch.WatchedSample(1.0, 100.0 - 0.5 * k, f=tuple(f), g=tuple(g)))
     return tuple(rows)
 
 
@@ -97,7 +97,7 @@ def test_usual_is_what_least_squares_with_its_prior_finds():
     z[:, 0] = 1.0
     for x in z.tolist():
         g.append(true @ x)
-        row = watch.Row(1.0, nu=tuple(x[1:4]), f=tuple(x[4:]), g=tuple(g[-1].tolist()))
+        row = watch.WatchedSample(1.0, nu=tuple(x[1:4]), f=tuple(x[4:]), g=tuple(g[-1].tolist()))
         usual = watch.learned(usual, row, p)
     prior = np.diag((watch.NOISE / np.array(watch.SPREAD)) ** 2)
     expected = np.linalg.solve(z.T @ z + prior, z.T @ np.array(g)).T
@@ -112,7 +112,9 @@ def test_what_stands_out_counts_as_three_standard_deviations():
     def means(deviations):
         square, ratios = np.array(usual.square), np.array(usual.ratios)
         error = deviations * np.sqrt(4.0 * square)
-        row = watch.Row(error=tuple(error), unsure=4.0, ratios=tuple(deviations**2 * ratios), fair=1.0)
+        row = watch.WatchedSample(
+            error=tuple(error), unsure=4.0, ratios=tuple(deviations**2 * ratios), fair=1.0
+        )
         after = watch.learned(usual, row, WATCH.params())
         return np.array([*after.square, *after.ratios]) / [*square, *ratios] - 1.0
 

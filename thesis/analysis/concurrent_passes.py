@@ -17,7 +17,7 @@ import numpy as np
 from fmus.controller import cl_improved
 from fmus.controller.blocker import BlockerOptions
 from fmus.controller.models import SURGE
-from fmus.controller.parametrisation import Belief
+from fmus.controller.parametrisation import ControllerModel
 from fmus.controller.store import SIZE
 
 from .principal_components import sequential
@@ -35,7 +35,7 @@ GAMMA = np.array(PARAMS.gamma)
 
 def regressors(s: Samples) -> np.ndarray:
     """F (n, 3, 14) of (7.1) and (7.4), with its sign: omega = F phi."""
-    parts = SURGE.regressors(tuple(s.nu.T), tuple(s.nu_dot.T), tuple(s.tau.T), Belief())
+    parts = SURGE.regressors(tuple(s.nu.T), tuple(s.nu_dot.T), tuple(s.tau.T), ControllerModel())
     F = np.zeros((s.time.size, 3, len(SURGE.coefficients)))
     for axis, (indices, columns) in enumerate(zip(SURGE.pattern, parts, strict=True)):
         for k, column in zip(indices, columns, strict=True):

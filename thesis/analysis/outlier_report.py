@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.report import Document, Plot, Section, Table, number, numbers, percent
+from diagnosis.report import Document, Plot, ReportSection, Table, number, numbers, percent
 
 from . import analysis_figures as pictures
 from .principal_components import (
@@ -26,7 +26,7 @@ LISTED = 30  # removals that the page lists; the JSON file has all
 
 
 @dataclass(frozen=True, eq=False)
-class Analysed:
+class OutlierComponents:
     """The components of runs in a row.
 
     Attributes:
@@ -46,7 +46,7 @@ class Analysed:
     kept: np.ndarray
 
 
-def analyse(runs: Sequence[Samples], components: int | None = None) -> Analysed:
+def analyse(runs: Sequence[Samples], components: int | None = None) -> OutlierComponents:
     """Components and outliers of runs in a row.
 
     Args:
@@ -60,10 +60,10 @@ def analyse(runs: Sequence[Samples], components: int | None = None) -> Analysed:
     X = np.hstack([s.omega, s.nu, s.tau])
     model = fit_components(X, VARIABLES, components)
     removed = removals(model, X, VARIABLES, s.run)
-    return Analysed(s, X, model, validated(X, VARIABLES), removed, ~outliers(model, X))
+    return OutlierComponents(s, X, model, validated(X, VARIABLES), removed, ~outliers(model, X))
 
 
-def content(a: Analysed, estimates: str) -> dict[str, Any]:
+def content(a: OutlierComponents, estimates: str) -> dict[str, Any]:
     """The content of ``pca.json``."""
     m = a.model
     return {
@@ -94,7 +94,7 @@ def content(a: Analysed, estimates: str) -> dict[str, Any]:
     }
 
 
-def sentences(a: Analysed) -> Iterator[str]:
+def sentences(a: OutlierComponents) -> Iterator[str]:
     """What was found, a line each."""
     m = a.model
     yield (
@@ -115,13 +115,13 @@ def sentences(a: Analysed) -> Iterator[str]:
     )
 
 
-def document(a: Analysed, estimates: str) -> Document:
+def document(a: OutlierComponents, estimates: str) -> Document:
     """The page."""
     m, s = a.model, a.samples
     told = " ".join(sentences(a))
     Z = m.scores(a.X)
     plane = m.loadings[:, :2] * np.sqrt(m.variance[:2])
-    share = Section(
+    share = ReportSection(
         "Components",
         [
             "Columns are centred and divided by their standard deviations. R² is the share of the "
@@ -159,7 +159,7 @@ def document(a: Analysed, estimates: str) -> Document:
         for r in sorted(a.removed, key=lambda r: r.first - r.last)[:LISTED]
     ]
     listed = f" The {LISTED} longest of {len(a.removed)} are listed." if len(a.removed) > LISTED else ""
-    gone = Section(
+    gone = ReportSection(
         "Outliers",
         [
             "T² is how far a sample is within the model's plane, in variances of the scores; Q its "

@@ -75,7 +75,7 @@ def enough(error: np.ndarray, least: float = 0.01) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class AxesRegression:
     """The regression of some axes of the model error on one X.
 
     Attributes:
@@ -119,7 +119,7 @@ class Regressed:
     samples: Samples
     X: np.ndarray
     columns: list[str]
-    parts: Sequence[Fitted]
+    parts: Sequence[AxesRegression]
     clipped: dict[str, float]
 
     @property
@@ -147,7 +147,7 @@ class Regressed:
         return found
 
 
-def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) -> Fitted:
+def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) -> AxesRegression:
     """The regression of some axes."""
     y = Y[:, axes]
     most = min(recipe.factors or recipe.most, np.linalg.matrix_rank(X - X.mean(axis=0)))
@@ -158,7 +158,7 @@ def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) 
     c, B = plain(m)
     each = np.array([plain(f)[1] for f in folds(X, y, factors)])
     left = left_over(X, y, most, np.arange(len(y)), np.arange(len(y)))
-    return Fitted(
+    return AxesRegression(
         axes,
         factors,
         m,

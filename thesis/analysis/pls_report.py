@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.report import Document, Plot, Section, Table, number, numbers, percent
+from diagnosis.report import Document, Plot, ReportSection, Table, number, numbers, percent
 
 from . import analysis_figures as pictures
 from .constrained_fit import Stable
 from .into_the_plant import goes_into_the_plant, thrust_of
-from .partial_least_squares import AXES, Fitted, Regressed
+from .partial_least_squares import AXES, AxesRegression, Regressed
 from .principal_components import BLOCKS
 
 
@@ -100,7 +100,9 @@ def document(r: Regressed, estimates: str, stable: Stable | None = None) -> Docu
     first, *rest = sentences(r, stable)
     parts = [_part(r, part) for part in r.parts]
     shown = pictures.model_error_over_time(r.samples.omega, {r.recipe.name: r.predicted}, r.samples.time)
-    fit = Section("Model error", rest, (), [Plot(shown, "Model error and what the model makes of it.")])
+    fit = ReportSection(
+        "Model error", rest, (), [Plot(shown, "Model error and what the model makes of it.")]
+    )
     made = {
         "runs": ", ".join(r.samples.names),
         "estimates": estimates,
@@ -109,7 +111,7 @@ def document(r: Regressed, estimates: str, stable: Stable | None = None) -> Docu
     return Document(f"Partial least squares: {r.recipe.name}", first, [fit, *parts], made)
 
 
-def _part(r: Regressed, part: Fitted) -> Section:
+def _part(r: Regressed, part: AxesRegression) -> ReportSection:
     """The regression of one axis, or of all."""
     axes = [AXES[k] for k in part.axes]
     header = ["factors", *(f"Q² {a}" for a in axes)]
@@ -138,7 +140,7 @@ def _part(r: Regressed, part: Fitted) -> Section:
     points, names = correlations(r, part)
     if points.shape[1] > 1:
         bars.append(Plot(pictures.loadings(points, names, "factor"), "Correlation loadings."))
-    return Section(
+    return ReportSection(
         f"Coefficients of {', '.join(axes)}",
         ["In the units of the columns, with the standard deviation over the folds."],
         [Table(header, rows), Table(["column", *axes], coefficients)],
@@ -146,7 +148,7 @@ def _part(r: Regressed, part: Fitted) -> Section:
     )
 
 
-def correlations(r: Regressed, part: Fitted) -> tuple[np.ndarray, Sequence[str]]:
+def correlations(r: Regressed, part: AxesRegression) -> tuple[np.ndarray, Sequence[str]]:
     """Correlation of each column, and of the model error, with the first two factors (m + p, 2)."""
     Z = part.model.transform(r.X)[:, :2]
     both = np.hstack([r.X, r.samples.omega[:, part.axes]])

@@ -12,7 +12,7 @@ from diagnosis.execution import Advance, silent
 from diagnosis.predictors import Model
 from diagnosis.runs import PreparedRun, prepare, read_each
 from fmus.controller.models import ROTATIONAL
-from fmus.controller.parametrisation import Belief
+from fmus.controller.parametrisation import ControllerModel
 from fmus.frames import rotate_to_body
 from fmus.hull import mass_matrix
 from fmus.observer import mdf
@@ -79,7 +79,7 @@ def model_error(
         of: the ship; by default control model (2.27), of a described ship its nominal model.
     """
     if of is None or of.name == ship().name:
-        error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
+        error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), ControllerModel())
         return np.column_stack(np.broadcast_arrays(*error))
     body = Model(ship=of).hull
     free = disturbed(State(0.0, 0.0, 0.0, *nu.T), Force(*tau.T), body)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.report import Document, Plot, Section, Table, number, numbers
+from diagnosis.report import Document, Plot, ReportSection, Table, number, numbers
 from fmus.controller.models import SURGE
 
 from . import analysis_figures as pictures
@@ -24,7 +24,7 @@ PRODUCTS = 1e-3  # relative difference below which |r|v = -|v|r is as good as ex
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class SysidResult:
     """A model of (7.1)-(7.5) and how good it is.
 
     Attributes:
@@ -53,13 +53,13 @@ class Result:
 
 def result(
     runs: Sequence[Samples], others: Sequence[Samples], row: np.ndarray | None, name: str
-) -> Result:
+) -> SysidResult:
     """Identify a model from runs, or hold a row of Table 7.1 against them."""
     found = identify(runs) if row is None else None
     phi = found.phi if found is not None else np.asarray(row)
     own = explained(runs, phi) if runs else None
     other = explained(others, phi) if others else None
-    return Result(name, phi, found, runs, others, own, other, list(warnings(found, runs)))
+    return SysidResult(name, phi, found, runs, others, own, other, list(warnings(found, runs)))
 
 
 def warnings(found: Identified | None, runs: Sequence[Samples]) -> Iterator[str]:
@@ -96,7 +96,7 @@ def warnings(found: Identified | None, runs: Sequence[Samples]) -> Iterator[str]
             )
 
 
-def content(r: Result, estimates: str) -> dict[str, Any]:
+def content(r: SysidResult, estimates: str) -> dict[str, Any]:
     """The content of ``sysid.json``."""
 
     def named(phi: np.ndarray | None) -> dict[str, float] | None:
@@ -123,7 +123,7 @@ def content(r: Result, estimates: str) -> dict[str, Any]:
     }
 
 
-def sentences(r: Result) -> Iterator[str]:
+def sentences(r: SysidResult) -> Iterator[str]:
     """What was found, a line each."""
     passes = f", {r.found.passes} passes" if r.found else ""
     own = "" if r.own is None else f"; R² of ω in X, Y, N: {', '.join(numbers(list(r.own)))}"
@@ -135,7 +135,7 @@ def sentences(r: Result) -> Iterator[str]:
     yield r.thrust.sentence
 
 
-def document(r: Result, estimates: str) -> Document:
+def document(r: SysidResult, estimates: str) -> Document:
     """The page."""
     first, _, *rest = sentences(r)
     header = ["coefficient", "unit", r.name]
@@ -154,15 +154,15 @@ def document(r: Result, estimates: str) -> Document:
         "that is lost. Beside them least squares and ridge on the same samples, and Table 7.1."
     ]
     sections = [
-        Section("What to know", rest),
-        Section("Coefficients", text, [Table(header, rows)]),
+        ReportSection("What to know", rest),
+        ReportSection("Coefficients", text, [Table(header, rows)]),
     ]
     if r.runs:
         s = joined([thinned(x) for x in r.runs])
         shown = {"model": regressors(s) @ r.phi}
         plot = pictures.model_error_over_time(s.omega, shown, s.time)
         sections.append(
-            Section("Model error", (), (), [Plot(plot, "Model error and the model (Fig. 7.2).")])
+            ReportSection("Model error", (), (), [Plot(plot, "Model error and the model (Fig. 7.2).")])
         )
     made = {"runs": ", ".join(n for s in r.runs for n in s.names) or "none", "estimates": estimates}
     return Document("System identification by concurrent learning", first, sections, made)

@@ -5,7 +5,7 @@ import numpy as np
 from studies.study_report import Verdict
 
 from ..tracking.verdict import listed, worse
-from .found import BLOCKED, FRESH, OPENED, PRINTED, REGULAR, Found, kept, lost, mean, share
+from .found import BLOCKED, FRESH, OPENED, PRINTED, REGULAR, TrialRuns, kept, lost, mean, share
 from .margin import margins
 from .store_contents import StoreContents
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
@@ -14,7 +14,7 @@ DELAYS = (0.0, 0.1, 0.3, 0.5, 1.0)
 SWINGS = 3.0  # times the swing without delay that count as an oscillation
 
 
-def spikes(found: Found) -> list[Verdict]:
+def spikes(found: TrialRuns) -> list[Verdict]:
     """Spikes with and without the blocker and stale errors; what the stores hold in the end."""
     parts, hurt = [], {}
     for store in dict.fromkeys(store for store, _ in found.spiked):
@@ -60,7 +60,7 @@ def spikes(found: Found) -> list[Verdict]:
     ]
 
 
-def eight(found: Found) -> Verdict:
+def eight(found: TrialRuns) -> Verdict:
     """The slow eight, where CLE was by far the worst: with spikes, without, and with the blocker."""
     trial = TRIALS[1].name
     runs = found.trials[trial, REGULAR]
@@ -85,7 +85,7 @@ def short(controller: str) -> str:
     return controller.removeprefix("controller_cl_")
 
 
-def oscillation(found: Found) -> Verdict:
+def oscillation(found: TrialRuns) -> Verdict:
     """Delay and gains."""
     numbers, begins = [], {}
     for name, (T, hertz) in margins().items():
@@ -126,6 +126,6 @@ def estimators() -> Verdict:
     )
 
 
-def of_causes(found: Found) -> list[Verdict]:
+def of_causes(found: TrialRuns) -> list[Verdict]:
     """The lessons that need the experiments on spikes, stores and delay."""
     return [*spikes(found), eight(found), estimators(), oscillation(found)]

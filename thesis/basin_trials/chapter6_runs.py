@@ -8,7 +8,7 @@ from studies.study_command import progress
 
 from ..monte_carlo import Content, run_all, vary
 from .causes import DELAYS
-from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found
+from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, TrialRuns
 from .margin import SETTINGS
 from .store_contents import logged, store_contents
 from .trials import ABS, CLE, CLZ, CONTROLLERS, TRIALS, Sailed, Trial, gains, sailed, scenario
@@ -81,7 +81,7 @@ def storing(trial: Trial, plant: Plant) -> dict[str, Content]:
 
 def run(
     out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, plant: Plant, causes: bool
-) -> Found:
+) -> TrialRuns:
     """Everything; the logs of the first seed of each trial stay in ``logs``.
 
     Args:
@@ -112,7 +112,7 @@ def run(
         sailed_all = {k: {c: first[k][c] + rest[k][c] for c in runs} for k, runs in first.items()}
         others = [together(group, some, None, jobs, advance) for group, some in groups]
         kept = run_all(stores, few, store_contents, None, jobs, advance)
-    return Found(sailed_all, others[0], others[1], others[2], kept)
+    return TrialRuns(sailed_all, others[0], others[1], others[2], kept)
 
 
 def folder(key: tuple[str, float]) -> str:

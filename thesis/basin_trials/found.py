@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from ..monte_carlo import Interval, interval
+from ..monte_carlo import SampleMean, interval
 from ..tracking.verdict import finite_ratio
 from .store_contents import StoreContents
 from .trials import Sailed
@@ -15,7 +15,7 @@ PRINTED, FRESH = "as printed", "errors formed anew"
 OPENED, BLOCKED = "no blocker", "blocker"
 
 
-class Found(NamedTuple):
+class TrialRuns(NamedTuple):
     """All runs.
 
     Attributes:
@@ -43,12 +43,12 @@ def kept(runs: Sequence[Sailed], name: str) -> list[float]:
     return [x for x in values(runs, name) if isfinite(x)]
 
 
-def mean(runs: Sequence[Sailed], name: str) -> Interval:
+def mean(runs: Sequence[Sailed], name: str) -> SampleMean:
     """Over the runs that kept up with the target."""
     return interval(kept(runs, name) or [float("nan")])
 
 
-def share(a: Sequence[Sailed], b: Sequence[Sailed], name: str = "position") -> Interval:
+def share(a: Sequence[Sailed], b: Sequence[Sailed], name: str = "position") -> SampleMean:
     """A number of runs a over that of b, seed by seed where both kept up with the target."""
     return finite_ratio(values(a, name), values(b, name))
 

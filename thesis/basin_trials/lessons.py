@@ -9,11 +9,11 @@ from studies.study_report import Verdict
 
 from ..tracking.verdict import finite_ratio, listed, worse
 from .causes import of_causes
-from .found import FAULTY, REGULAR, Found, kept, label, lost, mean, share, values
+from .found import FAULTY, REGULAR, TrialRuns, kept, label, lost, mean, share, values
 from .trials import ABS, CLE, CLZ, HARD, LABELS, RBS, TRIALS
 
 
-def guidance(found: Found) -> Verdict:
+def guidance(found: TrialRuns) -> Verdict:
     """The fault against the same true speed set properly, and how much it must cost in surge."""
     shares = {
         f"{t.name}, {LABELS[c]}": share(runs[c], found.trials[t.name, REGULAR][c])
@@ -35,7 +35,7 @@ def guidance(found: Found) -> Verdict:
     )
 
 
-def adaptive(found: Found) -> Verdict:
+def adaptive(found: TrialRuns) -> Verdict:
     """Backstepping with and without adaptation."""
     shares = {label(*key): share(runs[ABS], runs[RBS]) for key, runs in found.trials.items()}
     aside = {
@@ -63,7 +63,7 @@ def adaptive(found: Found) -> Verdict:
     )
 
 
-def surge_error(found: Found) -> Verdict:
+def surge_error(found: TrialRuns) -> Verdict:
     """Size of the model error in surge, the lag that it must cause, and the side of the path."""
     rows, lags, sides = [], [], []
     stiffness = 1.0 + HARD["p_x"] * HARD["d_u"]
@@ -90,7 +90,7 @@ def surge_error(found: Found) -> Verdict:
     )
 
 
-def no_surge(found: Found) -> Verdict:
+def no_surge(found: TrialRuns) -> Verdict:
     """The estimate in surge, and the lag from one half of a run to the other."""
     everything = [run for runs in found.trials.values() for each in runs.values() for run in each]
     largest = max(run.omega_hat_X for run in everything if isfinite(run.omega_hat_X))
@@ -111,7 +111,7 @@ def no_surge(found: Found) -> Verdict:
     )
 
 
-def fallen(found: Found) -> Verdict:
+def fallen(found: TrialRuns) -> Verdict:
     """Which controllers fall behind at the higher speed (6.4.4)."""
     rows, fast = [], TRIALS[2].name
     for faulty in (REGULAR, FAULTY):
@@ -128,11 +128,11 @@ def fallen(found: Found) -> Verdict:
     )
 
 
-def of_trials(found: Found) -> list[Verdict]:
+def of_trials(found: TrialRuns) -> list[Verdict]:
     """The lessons that the trials alone tell, in the order of 6.5."""
     return [guidance(found), fallen(found), adaptive(found), surge_error(found), no_surge(found)]
 
 
-def lessons(found: Found) -> list[Verdict]:
+def lessons(found: TrialRuns) -> list[Verdict]:
     """Every lesson with its verdict, those of the experiments where they were made."""
     return of_trials(found) + (of_causes(found) if found.spiked else [])

@@ -5,9 +5,9 @@ from math import isnan
 
 from studies.study_report import Verdict
 
-from ..monte_carlo import Interval
+from ..monte_carlo import SampleMean
 from ..tracking.verdict import listed
-from .found import FAULTY, REGULAR, Found, Runs, lost, mean, share
+from .found import FAULTY, REGULAR, Runs, TrialRuns, lost, mean, share
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
 
 MUCH = 1.5  # times that count as "substantially"; chosen
@@ -20,7 +20,7 @@ def answered(answers: Mapping[str, str | bool | None]) -> str:
     return "; ".join(f"{setting}: {a}" for setting, a in said.items())
 
 
-def surely_below(ratios: Sequence[Interval]) -> str:
+def surely_below(ratios: Sequence[SampleMean]) -> str:
     """Whether all ratios are below 1, surely; "no" where one surely is not."""
     if any(isnan(s.mean) for s in ratios):
         return "no run kept up"
@@ -29,13 +29,13 @@ def surely_below(ratios: Sequence[Interval]) -> str:
     return "yes" if all(s.high < 1.0 for s in ratios) else "undecided"
 
 
-def as_in_the_basin(found: Found, trial: int) -> dict[str, Runs]:
+def as_in_the_basin(found: TrialRuns, trial: int) -> dict[str, Runs]:
     """The runs of a trial with the guidance fault, as in the basin, and without."""
     name = TRIALS[trial].name
     return {"with the fault": found.trials[name, FAULTY], "without": found.trials[name, REGULAR]}
 
 
-def below(found: Found, thesis: str, trial: int, number: str, *pairs: tuple[str, str]) -> Verdict:
+def below(found: TrialRuns, thesis: str, trial: int, number: str, *pairs: tuple[str, str]) -> Verdict:
     """Whether a number of the first of each pair of controllers is surely below that of the second."""
     here, rows = {}, []
     for name, runs in as_in_the_basin(found, trial).items():
@@ -45,7 +45,7 @@ def below(found: Found, thesis: str, trial: int, number: str, *pairs: tuple[str,
     return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
 
 
-def held(found: Found, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
+def held(found: TrialRuns, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
     """Whether the mean of a number lies between two limits for every controller that kept up."""
     here, rows = {}, []
     for name, runs in as_in_the_basin(found, trial).items():
@@ -56,7 +56,7 @@ def held(found: Found, thesis: str, trial: int, number: str, low: float, high: f
     return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
 
 
-def follow(found: Found, trial: int) -> Verdict:
+def follow(found: TrialRuns, trial: int) -> Verdict:
     """Whether every controller keeps up in every run."""
     runs = as_in_the_basin(found, trial)
     fell = {name: {LABELS[c]: lost(r) for c, r in each.items()} for name, each in runs.items()}
@@ -68,7 +68,7 @@ def follow(found: Found, trial: int) -> Verdict:
     )
 
 
-def other_sections(found: Found) -> dict[str, Sequence[Verdict]]:
+def other_sections(found: TrialRuns) -> dict[str, Sequence[Verdict]]:
     """What the thesis says of the other three trials, by section."""
     old, new = (RBS, ABS), (CLZ, CLE)
     both = [(a, b) for a in old for b in new]
@@ -98,13 +98,13 @@ def other_sections(found: Found) -> dict[str, Sequence[Verdict]]:
     }
 
 
-def settings(found: Found) -> dict[str, tuple[Runs, Runs]]:
+def settings(found: TrialRuns) -> dict[str, tuple[Runs, Runs]]:
     """With the guidance fault, as in the basin, and without: the slow runs and the fast ones."""
     slow, fast = (as_in_the_basin(found, trial) for trial in (0, 2))
     return {name: (slow[name], fast[name]) for name in slow}
 
 
-def grown(found: Found, thesis: str, number: str, unit: str) -> Verdict:
+def grown(found: TrialRuns, thesis: str, number: str, unit: str) -> Verdict:
     """Whether a number of every controller is much larger than at half the speed."""
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
@@ -118,7 +118,7 @@ def grown(found: Found, thesis: str, number: str, unit: str) -> Verdict:
     return Verdict(thesis, answered(here), "; ".join(rows))
 
 
-def failing(found: Found) -> Verdict:
+def failing(found: TrialRuns) -> Verdict:
     """Whether concurrent learning loses the ship more often than the others."""
     here, rows = {}, []
     for name, (_, fast) in settings(found).items():
@@ -133,7 +133,7 @@ def failing(found: Found) -> Verdict:
     return Verdict("CLZ and CLE fail compared with RBS and ABS", answered(here), "; ".join(rows))
 
 
-def improving(found: Found) -> Verdict:
+def improving(found: TrialRuns) -> Verdict:
     """Whether adaptive backstepping still tracks better than backstepping."""
     here, rows = {}, []
     for name, (_, fast) in settings(found).items():
@@ -148,7 +148,7 @@ def improving(found: Found) -> Verdict:
     )
 
 
-def surge(found: Found) -> Verdict:
+def surge(found: TrialRuns) -> Verdict:
     """Whether the model error in surge grows less than in proportion to the speed."""
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
@@ -163,7 +163,7 @@ def surge(found: Found) -> Verdict:
     )
 
 
-def sway(found: Found) -> Verdict:
+def sway(found: TrialRuns) -> Verdict:
     """Whether the mean model error in sway leaves zero at the higher speed."""
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
@@ -178,7 +178,7 @@ def sway(found: Found) -> Verdict:
     )
 
 
-def observations(found: Found) -> list[Verdict]:
+def observations(found: TrialRuns) -> list[Verdict]:
     """The observations in the order of 6.4.4."""
     return [
         grown(found, "Tracking is substantially decreased", "position", "m"),

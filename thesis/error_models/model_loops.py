@@ -30,7 +30,7 @@ RUNS = {
 }
 
 
-class Loop(NamedTuple):
+class LoopResult(NamedTuple):
     """Distance to the target, RMS [m], mean z1_x over the second half [m], and every tenth row."""
 
     position: float
@@ -43,13 +43,13 @@ class Loop(NamedTuple):
         return not self.position < LOST
 
 
-def loop(run: FinishedRun) -> Loop:
+def loop(run: FinishedRun) -> LoopResult:
     """The numbers of a run; of one that broke off, what there is."""
     log = run.log
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     half = log["time"] >= 0.5 * log["time"][-1]
     position = rms(distance) if run.status != "failed" else float("nan")
-    return Loop(
+    return LoopResult(
         position, float(log["controller.z1_x"][half].mean()), {n: x[::10] for n, x in log.items()}
     )
 

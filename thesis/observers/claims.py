@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.study_report import Report, Verdict
 
-from ..monte_carlo import Interval, interval, paired
+from ..monte_carlo import SampleMean, interval, paired
 from .estimates_replayed import OBSERVERS, SIGNALS
 
 Runs = Mapping[str, Sequence[Mapping[str, Mapping[str, float]]]]
@@ -17,7 +17,7 @@ def _each(found: Runs, variant: str, observer: str, measure: str) -> list[float]
     return [x for run in found[variant] if np.isfinite(x := run[observer][measure])]
 
 
-def _mean(found: Runs, variant: str, observer: str, measure: str) -> Interval:
+def _mean(found: Runs, variant: str, observer: str, measure: str) -> SampleMean:
     return interval(_each(found, variant, observer, measure) or [float("nan")])
 
 
@@ -112,7 +112,7 @@ def write(report: Report, found: Runs) -> None:
     report.result("kalman_to_best", table)
 
 
-def ahead(runs: Sequence[Mapping[str, Mapping[str, float]]]) -> dict[str, Interval]:
+def ahead(runs: Sequence[Mapping[str, Mapping[str, float]]]) -> dict[str, SampleMean]:
     """Signal -> error of the Kalman filter over the least of the others', by seed."""
     found = {}
     for signal in SIGNALS:
@@ -120,5 +120,5 @@ def ahead(runs: Sequence[Mapping[str, Mapping[str, float]]]) -> dict[str, Interv
         others = [o for o in OBSERVERS if o != "kalman"]
         best = min(others, key=lambda o: np.mean([np.log(run[o][key]) for run in runs]))
         logs = interval([float(np.log(run["kalman"][key] / run[best][key])) for run in runs])
-        found[signal] = Interval(*(float(np.exp(x)) for x in logs))
+        found[signal] = SampleMean(*(float(np.exp(x)) for x in logs))
     return found

@@ -1,6 +1,6 @@
 """Measured runs fed to observer and controller FMUs open loop, by the master: 7.1."""
 
-from .playback import Loop, Played, loop_of, play, watch_loop
+from .playback import OpenLoop, Played, loop_of, play, watch_loop
 from .run_source import Source, gather_source
 
-__all__ = ["Loop", "Played", "Source", "gather_source", "loop_of", "play", "watch_loop"]
+__all__ = ["OpenLoop", "Played", "Source", "gather_source", "loop_of", "play", "watch_loop"]

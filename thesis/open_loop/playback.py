@@ -27,7 +27,7 @@ POSE = ("x_m", "y_m", "psi_m")
 
 
 @dataclass(frozen=True)
-class Loop:
+class OpenLoop:
     """The FMUs that a run is played to: entries of a scenario.
 
     Attributes:
@@ -58,7 +58,7 @@ class Played:
     """
 
     source: Source
-    loop: Loop
+    loop: OpenLoop
     log: dict[str, np.ndarray]
     notes: list[str]
 
@@ -68,7 +68,7 @@ class Played:
         return self.log[name][np.clip(rows, 0, None)]
 
 
-def loop_of(run: Path, controller: str, observer: str | None, scenario: Path | None) -> Loop:
+def loop_of(run: Path, controller: str, observer: str | None, scenario: Path | None) -> OpenLoop:
     """The FMUs to play a run to.
 
     Args:
@@ -102,10 +102,10 @@ def loop_of(run: Path, controller: str, observer: str | None, scenario: Path | N
     wired = [] if content is None else [target for _, target in content["connections"]]
     told = not own or any(target.startswith("controller.tau_cmd") for target in wired)
     thrusters = {"path": "thrusters.fmu", "parameters": believed}
-    return Loop(law, eyes, thrusters, taken.get("guidance"), told, own and scenario is None)
+    return OpenLoop(law, eyes, thrusters, taken.get("guidance"), told, own and scenario is None)
 
 
-def watch_loop(run: Path, watch: str, observer: str | None, scenario: Path | None) -> Loop:
+def watch_loop(run: Path, watch: str, observer: str | None, scenario: Path | None) -> OpenLoop:
     """The observer as of :func:`loop_of`, and a detector in the controller's place."""
     found = loop_of(run, watch, observer, scenario)
     return replace(found, guidance=None, thrusters=None, told=True)
@@ -141,7 +141,7 @@ def _path(name: str, kind: str) -> str:
     return f"{whole}.fmu"
 
 
-def play(source: Source, loop: Loop, advance: Advance = silent) -> Played:
+def play(source: Source, loop: OpenLoop, advance: Advance = silent) -> Played:
     """Feed a run to the FMUs.
 
     Args:
@@ -172,7 +172,7 @@ def _regular(source: Source) -> bool:
     return bool(np.allclose(np.diff(source.time), source.step, rtol=0.0, atol=1e-9))
 
 
-def _paced(loop: Loop, source: Source) -> Entry:
+def _paced(loop: OpenLoop, source: Source) -> Entry:
     """The observer, told how often there is a new measurement, if nobody has."""
     kind, _, name = loop.observer["path"].removesuffix(".fmu").partition("_")
     if "parameters" in loop.observer or kind != "observer":
@@ -193,7 +193,7 @@ def _held(values: np.ndarray) -> np.ndarray:
     return pd.DataFrame(values).ffill().fillna(0.0).to_numpy()
 
 
-def fed(source: Source, loop: Loop) -> dict[str, np.ndarray]:
+def fed(source: Source, loop: OpenLoop) -> dict[str, np.ndarray]:
     """What is fed, by the input's name; the force is that of the step before each row."""
     tau = source.tau if loop.thrusters is not None else _held(source.tau)
     before = np.vstack([tau[:1], tau[:-1]])
@@ -220,7 +220,7 @@ def _write(path: Path, time: np.ndarray, columns: dict[str, np.ndarray]) -> None
 
 
 def _scenario(
-    source: Source, loop: Loop, recording: str, columns: dict[str, np.ndarray], notes: list[str]
+    source: Source, loop: OpenLoop, recording: str, columns: dict[str, np.ndarray], notes: list[str]
 ) -> dict[str, Any]:
     fmus = {"observer": loop.observer, "controller": loop.controller}
     connections = [["observer.*", "controller.*"]]

@@ -13,7 +13,7 @@ from diagnosis.report import (
     BEFORE,
     Document,
     Plot,
-    Section,
+    ReportSection,
     Table,
     number,
     numbers,
@@ -109,8 +109,8 @@ def document(r: Replay) -> Document:
     first, *rest = sentences(r)
     lost = r.played.source.lost
     sections = [
-        Section("What came of it", rest),
-        Section(
+        ReportSection("What came of it", rest),
+        ReportSection(
             "Errors and force",
             ["Drawn are the replayed signals; dots are what the run has, where it has lost samples."],
             [Table(["signal", "lost", "largest difference"], _rows(r))],
@@ -130,7 +130,7 @@ def document(r: Replay) -> Document:
             Plot(_over_time(r, ("sigma_min", "by_store", "by_now")), "Store and rates of learning.")
         )
     text = ["Grey: learning was blocked. Marks on the axis: a sample was stored."]
-    sections.append(Section("Learning", text, (), learning))
+    sections.append(ReportSection("Learning", text, (), learning))
     made = {
         "run": r.played.source.name,
         "controller": r.played.loop.controller["path"],

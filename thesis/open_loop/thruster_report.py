@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.report import AFTER, BAND, BEFORE, Document, Plot, Section, Table, number, numbers
+from diagnosis.report import AFTER, BAND, BEFORE, Document, Plot, ReportSection, Table, number, numbers
 
 from ..analysis.page_figure import PageFigure, figure_of
 from .playback import Played
@@ -109,7 +109,7 @@ def document(played: Played) -> Document:
         "(benchmarks.watch_delay).",
     ]
     sections = [
-        Section(
+        ReportSection(
             "Failures",
             text,
             [Table(header, rows)] if rows else [],

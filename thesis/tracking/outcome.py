@@ -27,7 +27,7 @@ LEARNED_FROM = [
 SETTLED = 20.0
 
 
-class Outcome(NamedTuple):
+class TrackingOutcome(NamedTuple):
     """Numbers of one run; RMS values over the window of its metrics.
 
     Attributes:
@@ -75,7 +75,7 @@ class Outcome(NamedTuple):
         return self.omega_Y
 
 
-BROKEN = Outcome(False, *[float("nan")] * 17, phi=())
+BROKEN = TrackingOutcome(False, *[float("nan")] * 17, phi=())
 TRUE_PHI = tuple(RotationalDamping())
 PHI = [f"controller.phi_hat_{k + 1}" for k in range(len(TRUE_PHI))]
 
@@ -98,7 +98,7 @@ def missing(log: Log, axis: str) -> np.ndarray:
     return log[f"vessel.omega_star_{axis}"] + lost
 
 
-def outcome(run: FinishedRun) -> Outcome:
+def outcome(run: FinishedRun) -> TrackingOutcome:
     """The numbers of a run; those of one that broke off are NaN."""
     if run.status == "failed":
         return BROKEN
@@ -109,7 +109,7 @@ def outcome(run: FinishedRun) -> Outcome:
     wrong = {a: rms((log[f"controller.omega_hat_{a}"] - missing(log, a))[settled]) for a in AXES}
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     learns = "controller.sigma_min" in log
-    return Outcome(
+    return TrackingOutcome(
         done=True,
         start=m["from"],
         position=rms(distance[settled]),

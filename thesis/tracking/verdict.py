@@ -9,8 +9,8 @@ from scipy import stats
 
 from studies.study_report import Verdict
 
-from ..monte_carlo import Interval, interval, ratio
-from .outcome import TRUE_PHI, Outcome, columns
+from ..monte_carlo import SampleMean, interval, ratio
+from .outcome import TRUE_PHI, TrackingOutcome, columns
 
 FOUR = ("controller_cl_svd_eps", "controller_cl_svd_z2", "controller_cl_win_eps", "controller_cl_win_z2")
 OLD = ("controller_bs", "controller_abs", "controller_cl_svd_eps", "controller_cl_win_z2")
@@ -24,7 +24,7 @@ ORDERS = {
 PRINTED = "true, stale, 0.1"  # the simulations as printed: no noise, stale errors, footnote 1
 NEAR = 0.1  # of a coefficient, within which an estimate counts as converged; chosen
 
-Table = Mapping[str, Mapping[str, list[Outcome]]]
+Table = Mapping[str, Mapping[str, list[TrackingOutcome]]]
 Paths = Mapping[str, Table]
 
 
@@ -33,7 +33,7 @@ def short(controller: str) -> str:
     return controller.removeprefix("controller_").removeprefix("cl_")
 
 
-def error(runs: Mapping[str, Sequence[Outcome]], name: str = "position") -> dict[str, float]:
+def error(runs: Mapping[str, Sequence[TrackingOutcome]], name: str = "position") -> dict[str, float]:
     """A number of each controller, mean over the seeds."""
     return {short(c): interval(columns(o, name)).mean for c, o in runs.items()}
 
@@ -45,22 +45,22 @@ def in_order(errors: Mapping[str, float], path: str) -> bool:
     return all(a < b for a, b in pairwise([*first, min(others, default=inf)]))
 
 
-def share(table: Table, condition: str, a: str, b: str) -> Interval:
+def share(table: Table, condition: str, a: str, b: str) -> SampleMean:
     """Position error of controller a over that of b, seed by seed."""
     runs = table[condition]
     x, y = (columns(runs[f"controller_{name}"], "position") for name in (a, b))
     return finite_ratio(x, y)
 
 
-def finite_ratio(x: Sequence[float], y: Sequence[float]) -> Interval:
+def finite_ratio(x: Sequence[float], y: Sequence[float]) -> SampleMean:
     """Ratio over the seeds for which both went through; open where there is none."""
     kept = [(p, q) for p, q in zip(x, y, strict=True) if isfinite(p) and isfinite(q)]
     if not kept:
-        return Interval(float("nan"), 0.0, float("inf"))
+        return SampleMean(float("nan"), 0.0, float("inf"))
     return ratio([p for p, _ in kept], [q for _, q in kept])
 
 
-def judged(shares: Mapping[str, Interval]) -> str:
+def judged(shares: Mapping[str, SampleMean]) -> str:
     """Reproduced where every share is surely below 1, reversed where surely above, else mixed."""
     below = [s.high < 1.0 for s in shares.values()]
     above = [s.low > 1.0 for s in shares.values()]
@@ -77,14 +77,14 @@ def judged(shares: Mapping[str, Interval]) -> str:
     return "undecided"
 
 
-def worse(shares: Mapping[str, Interval]) -> str:
+def worse(shares: Mapping[str, SampleMean]) -> str:
     """Reproduced where every share is surely above 1, reversed where surely below, else mixed."""
     return judged(
-        {k: Interval(1.0 / s.mean, 1.0 / s.high, 1.0 / (s.low or 1e-9)) for k, s in shares.items()}
+        {k: SampleMean(1.0 / s.mean, 1.0 / s.high, 1.0 / (s.low or 1e-9)) for k, s in shares.items()}
     )
 
 
-def listed(shares: Mapping[str, Interval]) -> str:
+def listed(shares: Mapping[str, SampleMean]) -> str:
     """Intervals with the names of their runs."""
     return "; ".join(f"{run}: {value}" for run, value in shares.items())
 

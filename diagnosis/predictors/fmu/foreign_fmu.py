@@ -11,7 +11,7 @@ import numpy as np
 
 import cosim
 from cosim.export import export_fmu
-from cosim.fmu import Model as FmuModel
+from cosim.fmu import FmuModel as FmuModel
 from cosim.system import prepare
 from cybership.scratch_folder import Scratch
 from fmus.frames import rotate_to_body

@@ -10,7 +10,7 @@ from contextlib import suppress
 import numpy as np
 
 from cosim import InputError, SimulationError
-from cosim.fmu import LocalInstance, Memory, Model, Port
+from cosim.fmu import DoubleMemory, FmuModel, LocalInstance, Port
 
 STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
 
@@ -26,12 +26,12 @@ class ShortSteps:
         h: length of a step [s].
     """
 
-    def __init__(self, model: Model, inputs: Sequence[str], outputs: Sequence[str], h: float) -> None:
+    def __init__(self, model: FmuModel, inputs: Sequence[str], outputs: Sequence[str], h: float) -> None:
         self._model, self.h = model, h
         self._inputs = [Port(model.variables[name], k) for k, name in enumerate(inputs)]
         told = dict.fromkeys(outputs)
         self._outputs = [Port(model.variables[name], len(inputs) + k) for k, name in enumerate(told)]
-        self._memory = Memory(len(inputs) + len(told))
+        self._memory = DoubleMemory(len(inputs) + len(told))
         self._resets: bool | None = None
         self._instance: LocalInstance | None = None
 

@@ -32,7 +32,7 @@ from pydantic import (
 
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
-from cosim.fmu import Model, Variable
+from cosim.fmu import FmuModel, FmuVariable
 from cybership.message_text import Location, first_fault, quoted
 from fmus.addition import Line
 from fmus.base_units import base_exponents
@@ -152,7 +152,7 @@ def signal_lines(map: VariableMap, commands: Mapping[str, str]) -> dict[str, dic
     return {g: {s: line(c, known[g][s]) for s, c in map.told(g).items()} for g in GROUPS}
 
 
-def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
+def propose(model: FmuModel, commands: Mapping[str, str]) -> VariableMap:
     """The map that names and units of an FMU tell.
 
     Args:
@@ -171,7 +171,9 @@ def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
     return VariableMap(**found)
 
 
-def completed(given: VariableMap, model: Model, commands: Mapping[str, str], where: str) -> VariableMap:
+def completed(
+    given: VariableMap, model: FmuModel, commands: Mapping[str, str], where: str
+) -> VariableMap:
     """A map with the units that the FMU declares, checked against it.
 
     Args:
@@ -203,7 +205,7 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
     return VariableMap(**found)
 
 
-def unmatched(found: VariableMap, model: Model) -> list[str]:
+def unmatched(found: VariableMap, model: FmuModel) -> list[str]:
     """What an FMU lacks in order to be held against a run, a part of a sentence each."""
     lacking = []
     outputs = found.known
@@ -215,14 +217,14 @@ def unmatched(found: VariableMap, model: Model) -> list[str]:
     return lacking
 
 
-def _with_hints(signals: Iterable[str], model: Model, group: str) -> str:
+def _with_hints(signals: Iterable[str], model: FmuModel, group: str) -> str:
     known = [v.name for v in _candidates(model, group)]
     near = {signal: most_alike(signal, known) for signal in signals}
     told = ", ".join(s if n is None else f"{s} (near: '{n}')" for s, n in near.items())
     return f"{told}; its {group} are {', '.join(known[:8]) or 'none'}{', ...' if known[8:] else ''}"
 
 
-def _candidates(model: Model, group: str) -> list[Variable]:
+def _candidates(model: FmuModel, group: str) -> list[FmuVariable]:
     """The variables of an FMU that can be in a group of a map."""
     real = [v for v in model.variables.values() if v.type == "Real"]
     if group == "start":
@@ -262,7 +264,7 @@ def _is_of(unit: Unit, quantity: str) -> bool:
     return unit.exponents == tuple(exponents.get(base, 0) for base in BASE_UNITS)
 
 
-def _with_unit(column: Column, v: Variable, quantity: str, where: str) -> Column:
+def _with_unit(column: Column, v: FmuVariable, quantity: str, where: str) -> Column:
     """A column with the unit of its variable, where the map does not tell another one."""
     unit = v.unit
     if column.unit is not None or unit is None:

@@ -9,7 +9,7 @@ import numpy as np
 
 import cosim
 from cosim.export import export_fmu
-from cosim.fmu import Model as FmuModel
+from cosim.fmu import FmuModel as FmuModel
 from cosim.process import scratch_folder
 from cosim.system import prepare
 from fmus.addition import ACCELERATION, FORCE, Line

@@ -41,7 +41,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
-from cybership.message_text import Location, first_fault, quoted
+from cybership.message_text import Location, first_fault, name_of, quoted
 from fmus.ship import Ship
 
 from .unit_check import UNITS
@@ -93,7 +93,7 @@ def quantities(of: Ship) -> dict[str, str]:
 
 def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
     """The message about a unit that a signal cannot have."""
-    return f"{quoted(unit)} is not a unit of {signal}{nearest(unit, units)}"
+    return f"{quoted(unit)} is not a unit of {name_of(signal)}{nearest(unit, units)}"
 
 
 Mark = Annotated[str, StringConstraints(min_length=1, max_length=1)]  # a character

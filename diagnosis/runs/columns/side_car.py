@@ -18,7 +18,7 @@ from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, read_layout
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 
 
-class Change(NamedTuple):
+class ColumnChange(NamedTuple):
     """What a signal should be read as.
 
     Attributes:
@@ -34,7 +34,7 @@ class Change(NamedTuple):
     offset: float = 0.0
 
 
-def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | None = None) -> str:
+def line_beside(path: Path | None, changes: Mapping[str, ColumnChange], name: str | None = None) -> str:
     """What to put into the file beside a measurement so that columns are read otherwise.
 
     Args:

@@ -47,6 +47,10 @@ def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
     rows: dict[str, np.ndarray] = dict(zip(ROWS, data, strict=False))
     names = (*of.layouts[-1].commands, *of.power_settings)
+    if len(data) < POWER.stop:
+        raise InputError(
+            f"'{path}' is not a measured run: its matrix has {len(data)} rows, {POWER.stop} are needed"
+        )
     given = zip(names, [*data[COMMANDS], *_power(data)], strict=True)
     return {s: rows[s] for s in ("time", *POSE)} | dict(given)
 

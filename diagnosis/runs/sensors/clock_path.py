@@ -22,9 +22,9 @@ from scipy.linalg import cholesky_banded
 from scipy.sparse import csr_array
 
 from ..smoothing.outliers import OUTLIER
-from ..smoothing.penalised import Equations, System
+from ..smoothing.penalised import Equations, LinearSystem
 from ..thinning import MOST_ROWS
-from .constants import Column
+from .constants import FaultColumn
 from .evidence import Evidence
 
 NODE = ("north", "east", "heading", "rate of the clock")  # the unknowns of a node
@@ -141,7 +141,7 @@ class PathProblem:
         counts = np.array([np.sum(group == g) if g < CLOCK else 0 for g in range(FIXED + 1)])
         self.equations = Equations(matrix, matrix.T, root, group, np.array(normals), counts)
 
-    def border(self, constants: Sequence[Column], clock: np.ndarray) -> np.ndarray:
+    def border(self, constants: Sequence[FaultColumn], clock: np.ndarray) -> np.ndarray:
         """(equations, constants): what one unit of each constant changes, with a rate of the clock."""
         made = np.zeros((self.right.size, len(constants)))
         run = np.interp(self.evidence.time, self.edges, integral_of(self.edges, clock))
@@ -154,7 +154,7 @@ class PathProblem:
                 made[begin : begin + end.size, k] = np.einsum("ij,ij->i", a, path[end] - path[start])
         return made
 
-    def solve(self, constants: Sequence[Column], fixed_clock: bool = False) -> "Path":
+    def solve(self, constants: Sequence[FaultColumn], fixed_clock: bool = False) -> "Path":
         """The likeliest path with some constant faults; a fixed clock runs evenly at rate 1."""
         place, angle = self.noise
         samples, walk = np.array([place, place, angle]), np.array([place, angle, 1.0])
@@ -202,10 +202,10 @@ class Path:
     """
 
     def __init__(
-        self, problem: PathProblem, columns: Sequence[Column], std: np.ndarray, clock: np.ndarray
+        self, problem: PathProblem, columns: Sequence[FaultColumn], std: np.ndarray, clock: np.ndarray
     ) -> None:
         self.problem, self.columns, self.std = problem, columns, std
-        self.system = System(problem.equations, std**-2.0)
+        self.system = LinearSystem(problem.equations, std**-2.0)
         data = np.column_stack([problem.right, problem.border(columns, clock)])
         found = self.system.solve(data)
         off = self.system.residual(data, found)

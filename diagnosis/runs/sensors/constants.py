@@ -31,7 +31,7 @@ LEAST = 0.005
 LEAST_DELAY = 0.5  # of the time between two samples
 
 
-class Column(NamedTuple):
+class FaultColumn(NamedTuple):
     """What one unit of a fault adds to the path.
 
     Attributes:
@@ -53,7 +53,7 @@ class Column(NamedTuple):
     clocked: bool = True
 
 
-def columns(e: Evidence, scale: Scale) -> list[Column]:
+def columns(e: Evidence, scale: Scale) -> list[FaultColumn]:
     """All constant faults that the channels of a run can show."""
     late = LEAST_DELAY * float(np.median(np.diff(e.time[e.rows])))
     return [*_of_velocity(e, scale, late), *_of_rate(e, scale, late)]
@@ -70,7 +70,7 @@ def _path(e: Evidence, move: np.ndarray | float = 0.0, turn: np.ndarray | float 
     return path
 
 
-def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[Column]:
+def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
     """Scale and axes of the velocity, the place of the position aboard, and the velocity's delay."""
     if e.velocity is None or e.by is None:
         return []
@@ -87,27 +87,27 @@ def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[Column]:
         mean, turn = 0.5 * (e.velocity[1:] + e.velocity[:-1]), np.diff(e.psi)
         delay[1:, :2] -= np.cumsum(np.column_stack([-mean[:, 1], mean[:, 0]]) * turn[:, None], axis=0)
     return [
-        Column(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST),
-        Column(axes, "offset", "rad", "velocity", _path(e, across), LEAST),
-        Column("x", "place", "m", "velocity", ahead, place, False),
-        Column("y", "place", "m", "velocity", aside, place, False),
-        Column(e.by[0], "delay", "s", "velocity", delay, late, False),
+        FaultColumn(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST),
+        FaultColumn(axes, "offset", "rad", "velocity", _path(e, across), LEAST),
+        FaultColumn("x", "place", "m", "velocity", ahead, place, False),
+        FaultColumn("y", "place", "m", "velocity", aside, place, False),
+        FaultColumn(e.by[0], "delay", "s", "velocity", delay, late, False),
     ]
 
 
-def _of_rate(e: Evidence, scale: Scale, late: float) -> list[Column]:
+def _of_rate(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
     """Scale, offset and delay of the yaw rate."""
     if e.rate is None:
         return []
     offset = _path(e, turn=e.time[0] - e.time)
     return [
-        Column("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST),
-        Column("r", "offset", "rad/s", "rate", offset, LEAST / (HORIZON * scale.time)),
-        Column("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
+        FaultColumn("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST),
+        FaultColumn("r", "offset", "rad/s", "rate", offset, LEAST / (HORIZON * scale.time)),
+        FaultColumn("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
     ]
 
 
-def deviations(e: Evidence) -> list[Column]:
+def deviations(e: Evidence) -> list[FaultColumn]:
     """The heading is measured too large by the value times a function of itself.
 
     Velocity in the ship's own axes is turned by it. Without a yaw rate nothing shows it.
@@ -118,5 +118,5 @@ def deviations(e: Evidence) -> list[Column]:
         if e.by == ("u", "v") and e.velocity is not None:
             across = np.column_stack([e.velocity[:, 1], -e.velocity[:, 0]]) * path[:, 2:]
             path[:, :2] = integral(e.time, across)
-        made.append(Column("psi", kind, "rad", "rate", path, LEAST, False))
+        made.append(FaultColumn("psi", kind, "rad", "rate", path, LEAST, False))
     return made

@@ -14,7 +14,7 @@ from fmus.scale import Scale
 from ..cleaning import noise
 from ..files.reading import Run
 from .clock_path import DRIFT, HEADING, NEGLIGIBLE, TURN, Path, PathProblem, integral_of
-from .constants import DEVIATIONS, LEAST, Column, columns, deviations
+from .constants import DEVIATIONS, LEAST, FaultColumn, columns, deviations
 from .evidence import FEWEST, SURE, Evidence, evidence, large, spread_of, straight
 from .gaps import gaps
 from .repairing import Correction, corrected
@@ -33,7 +33,7 @@ TWO_CLOCKS = (
 )
 
 
-class Motion(NamedTuple):
+class MotionFaults(NamedTuple):
     """Faults that were found.
 
     Attributes:
@@ -86,7 +86,7 @@ def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iter
 
 
 def _correction(
-    found: Motion, jumps: Sequence[SensorFinding], fixes: Sequence[SensorFinding]
+    found: MotionFaults, jumps: Sequence[SensorFinding], fixes: Sequence[SensorFinding]
 ) -> Correction:
     """What findings say of the run."""
     values = {(f.channel, f.kind): f.value for f in fixes if f.channel != "time"}
@@ -101,7 +101,9 @@ def _correction(
     return Correction(values, (problem.edges, true), jumps)
 
 
-def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFinding]) -> Motion:
+def _estimated(
+    e: Evidence, every: Sequence[FaultColumn], jumps: Sequence[SensorFinding]
+) -> MotionFaults:
     """The likeliest clock and the constants that are sure."""
     cut = [(jump.start, jump.end) for jump in jumps]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
@@ -135,16 +137,16 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFindi
         path = problem.solve([c for c in every if c.kind == "delay"], fixed_clock=True)
     while len(kept := _sure(path)) < len(path.columns):
         path = problem.solve(kept, fixed_clock=not wanders)
-    return Motion(path, wanders, either, torn)
+    return MotionFaults(path, wanders, either, torn)
 
 
-def _sure(path: Path) -> list[Column]:
+def _sure(path: Path) -> list[FaultColumn]:
     """Constants that are sure and matter."""
     found = zip(path.columns, path.constants, path.deviation, strict=True)
     return [c for c, value, s in found if abs(value) > max(SURE * s, c.least) and s > 0.0]
 
 
-def _clock(found: Motion) -> list[SensorFinding]:
+def _clock(found: MotionFaults) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
     clock = ("time", "clock_rate", "1")
     if not found.wanders:
@@ -164,7 +166,7 @@ def _clock(found: Motion) -> list[SensorFinding]:
     return made
 
 
-def _even(found: Motion) -> tuple[float, float] | None:
+def _even(found: MotionFaults) -> tuple[float, float] | None:
     """Rate of a clock that runs evenly, and its standard deviation; None: channels agree on none."""
     at = [k for k, c in enumerate(found.path.columns) if c.kind == "scale"]
     if found.wanders or len(at) < 2:
@@ -176,7 +178,7 @@ def _even(found: Motion) -> tuple[float, float] | None:
     return 1.0 - float((weights * values).sum() / weights.sum()), float(weights.sum() ** -0.5)
 
 
-def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
+def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     by_clock = _even(found) is not None
     path, made, edges = found.path, [], found.path.problem.edges
     # Whether the run turns so much that its turns tell by how much the clock is off at the least.
@@ -198,7 +200,7 @@ def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
     return made
 
 
-def _told(c: Column, value: float, e: Evidence) -> str:
+def _told(c: FaultColumn, value: float, e: Evidence) -> str:
     """A constant fault in words."""
     name = " and ".join(e.by) if e.by and c.channel == e.by[0] and e.by[0] != "speed" else c.channel
     if c.kind == "scale":
@@ -298,7 +300,7 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
     )
 
 
-def _agreeing(found: Motion, e: Evidence) -> dict[str, float]:
+def _agreeing(found: MotionFaults, e: Evidence) -> dict[str, float]:
     """Channels that the pose agrees with, and how far in one sampling period."""
     period = float(np.median(np.diff(e.time[e.rows])))
     std = found.path.std

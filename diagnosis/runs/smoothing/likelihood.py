@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.optimize import toms748
 
-from .penalised import JERK, POSE, Equations, Problem, System, solve
+from .penalised import JERK, POSE, Equations, LinearSystem, Problem, solve
 from .spline import third
 
 # Of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise (chosen).
@@ -48,21 +48,21 @@ def deviance(p: Problem, weights: np.ndarray, smoothness: np.ndarray) -> float:
     return sum(c.cost(at) for c, at in zip(criteria(p, weights), decades, strict=True))
 
 
-def criteria(p: Problem, weights: np.ndarray) -> list["Criterion"]:
+def criteria(p: Problem, weights: np.ndarray) -> list["Likelihood"]:
     """-2 log L of each channel, for weights (n, 3) of the samples."""
-    return [Criterion(p, k, e) for k, e in enumerate(p.equations(weights))]
+    return [Likelihood(p, k, e) for k, e in enumerate(p.equations(weights))]
 
 
-class Criterion:
+class Likelihood:
     """-2 log L of one channel over its smoothness, in decades."""
 
     def __init__(self, p: Problem, channel: int, equations: Equations) -> None:
         self._problem, self._channel, self._equations = p, channel, equations
         self._y = p.data(channel, p.z[:, [channel]])
 
-    def _solved(self, decades: float) -> tuple[System, np.ndarray]:
+    def _solved(self, decades: float) -> tuple[LinearSystem, np.ndarray]:
         """The system, and its residuals (rows, 1)."""
-        system = System(self._equations, self._problem.precision(self._channel, 10.0**decades))
+        system = LinearSystem(self._equations, self._problem.precision(self._channel, 10.0**decades))
         return system, system.residual(self._y, system.solve(self._y))
 
     def cost(self, decades: float) -> float:

@@ -52,7 +52,7 @@ class Equations(NamedTuple):
     counts: np.ndarray
 
 
-class System:
+class LinearSystem:
     """Equations with precisions (groups,), inverse variances: A = L L^T factored.
 
     Raises:
@@ -208,7 +208,7 @@ class Fit(NamedTuple):
     """
 
     coefficients: np.ndarray
-    systems: list[System]
+    systems: list[LinearSystem]
 
     @property
     def covariance(self) -> np.ndarray:
@@ -219,7 +219,7 @@ class Fit(NamedTuple):
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
     """The smoothing spline of each channel, for weights (n, 3) of the samples."""
     systems = [
-        System(e, p.precision(k, float(smoothness[k]))) for k, e in enumerate(p.equations(weights))
+        LinearSystem(e, p.precision(k, float(smoothness[k]))) for k, e in enumerate(p.equations(weights))
     ]
     parts = [system.solve(p.data(k, p.z[:, [k]])) for k, system in enumerate(systems)]
     return Fit(np.hstack(parts), systems)

@@ -56,7 +56,7 @@ class PoseOnly(NamedTuple):
     smoothness: np.ndarray
 
 
-class Motion(NamedTuple):
+class SmoothMotion(NamedTuple):
     """Pose, its derivatives and body-fixed velocity, (n, 3) each, as those of :class:`Smoothed`."""
 
     eta: np.ndarray
@@ -150,7 +150,7 @@ def smooth(track: Track, agreeing: Agreeing = ALONE) -> Smoothed:
         ) from None
 
 
-def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
+def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> SmoothMotion:
     """The motion by the pose alone: its spline follows whatever is quick, and noise with it.
 
     Args:
@@ -168,11 +168,13 @@ def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
     return _motion(origin, *derivatives)
 
 
-def _motion(origin: np.ndarray, offset: np.ndarray, eta_dot: np.ndarray, eta_ddot: np.ndarray) -> Motion:
+def _motion(
+    origin: np.ndarray, offset: np.ndarray, eta_dot: np.ndarray, eta_ddot: np.ndarray
+) -> SmoothMotion:
     """The motion by the pose about an origin (3,), and its derivatives."""
     eta = offset + origin
     u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])
-    return Motion(eta, eta_dot, eta_ddot, np.column_stack([u, v, eta_dot[:, 2]]))
+    return SmoothMotion(eta, eta_dot, eta_ddot, np.column_stack([u, v, eta_dot[:, 2]]))
 
 
 def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
@@ -334,7 +336,7 @@ def spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     return found
 
 
-def _body_std(motion: Motion, eta_std: np.ndarray, eta_dot_std: np.ndarray) -> np.ndarray:
+def _body_std(motion: SmoothMotion, eta_std: np.ndarray, eta_dot_std: np.ndarray) -> np.ndarray:
     """Standard deviation of nu (n, 3), the heading's included; the channels are independent."""
     psi, (u, v) = motion.eta[:, 2], motion.nu.T[:2]
     c2, s2 = np.cos(psi) ** 2, np.sin(psi) ** 2

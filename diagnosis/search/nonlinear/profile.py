@@ -20,7 +20,16 @@ from ...predictors.ship_model import parameter_and_run
 from ..candidates import SMALL, model_error
 from ..conclusion import AcceptedEffect
 from ..most_likely import rise
-from ..refinement import Estimate, Refined, Start, TrainingSet, bounded, nuisance_of, refine, slope
+from ..refinement import (
+    CandidateStart,
+    Refined,
+    RefinedModel,
+    TrainingSet,
+    bounded,
+    nuisance_of,
+    refine,
+    slope,
+)
 
 REACH = 1.5  # factor to both sides within which the best value is looked for; chosen
 FINEST = 1e-4  # of what is searched, to which a value and the ends of its interval are found; chosen
@@ -28,7 +37,9 @@ FINEST = 1e-4  # of what is searched, to which a value and the ends of its inter
 Interval = tuple[float, float]
 
 
-def profiled(t: TrainingSet, at: Estimate, p: AcceptedEffect) -> tuple[Estimate, dict[str, Interval]]:
+def profiled(
+    t: TrainingSet, at: RefinedModel, p: AcceptedEffect
+) -> tuple[RefinedModel, dict[str, Interval]]:
     """The most likely model by profiles of an effect's rough parameters, and their intervals.
 
     Args:
@@ -59,7 +70,7 @@ def profiled(t: TrainingSet, at: Estimate, p: AcceptedEffect) -> tuple[Estimate,
     return last, {name: (low - start, high - start)}
 
 
-def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
+def is_rough(t: TrainingSet, at: RefinedModel, name: str) -> bool:
     """Whether slopes by a parameter to both sides differ by more than half, so that they are none."""
     parameter, run = parameter_and_run(name)
     effects = at.start.ship.effects.values()
@@ -73,7 +84,9 @@ def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
     return bool(np.linalg.norm(sides[0] - sides[1]) > np.linalg.norm(sides[1]) / 2.0)
 
 
-def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Callable[[float], Refined]:
+def _profile(
+    t: TrainingSet, at: RefinedModel, p: AcceptedEffect, name: str
+) -> Callable[[float], Refined]:
     """The model with a parameter held at a value, all else fitted anew."""
     beside = at.without(p.names)
     nuisance = nuisance_of(t, beside, t.error(beside))
@@ -83,7 +96,9 @@ def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Call
     def trial(value: float) -> Refined:
         held = bounded(at.start, name, value - at.start.value(name))
         values: Mapping[str, float] = {**{n: at.values[n] for n in p.names}, name: held}
-        return refine(t, beside, nuisance, Start(values, others, np.zeros((len(others), len(others)))))
+        return refine(
+            t, beside, nuisance, CandidateStart(values, others, np.zeros((len(others), len(others))))
+        )
 
     return trial
 

@@ -44,7 +44,7 @@ NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Spans = list[tuple[int, int]]  # intervals in cells, the second end not included
 
 
-class Section(NamedTuple):
+class RunCells(NamedTuple):
     """The cells of one run.
 
     Attributes:
@@ -62,7 +62,7 @@ class Section(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class SegmentationProblem:
     """A model error that intervals without thrust may explain.
 
     Attributes:
@@ -78,7 +78,7 @@ class Problem:
         scale: of the ship.
     """
 
-    sections: Sequence[Section]
+    sections: Sequence[RunCells]
     lasting: bool
     cell: float
     y: np.ndarray
@@ -106,7 +106,7 @@ class Problem:
         runs = [self.section(a).run for a, _ in spans]
         return len(set(runs)) == len(runs) and all(b == self.section(a).end for a, b in spans)
 
-    def section(self, cell: int) -> Section:
+    def section(self, cell: int) -> RunCells:
         """The section that a cell lies in."""
         return next(s for s in self.sections if cell < s.end)
 
@@ -120,7 +120,7 @@ class Problem:
         """Of each change point."""
         return float(np.log(self.y.size / OVERLAP))
 
-    def weighted(self, sigma: np.ndarray) -> "Problem":
+    def weighted(self, sigma: np.ndarray) -> "SegmentationProblem":
         """The same in units of the noise sigma (3,)."""
         weight = np.tile(1.0 / sigma / np.sqrt(OVERLAP), self.y.size // 3)
         columns = csc_matrix(diags(weight) @ self.columns)
@@ -138,7 +138,7 @@ class Problem:
             used[s.run] += 1
         return found
 
-    def seconds(self, s: Section, cell: int) -> float:
+    def seconds(self, s: RunCells, cell: int) -> float:
         """Time [s] in a run; where 0 would mean that an effect never begins, a cell later."""
         time = float(f"{s.first + self.cell * (cell - s.start):f}")  # so that it reads as it was meant
         return max(time, self.cell) if self.lasting else time
@@ -191,7 +191,7 @@ class Problem:
         return self.fitted(self.left(spans))[1] + self.charge * points
 
 
-def segmented(p: Problem, start: Spans | None = None) -> Spans:
+def segmented(p: SegmentationProblem, start: Spans | None = None) -> Spans:
     """The intervals of least cost, from those of a start or from none."""
     best = moved(p, start or [])
     least = p.cost(best)
@@ -209,7 +209,7 @@ def segmented(p: Problem, start: Spans | None = None) -> Spans:
     return best
 
 
-def programmed_in(p: Problem, s: Section, gain: np.ndarray) -> Iterator[tuple[int, int]]:
+def programmed_in(p: SegmentationProblem, s: RunCells, gain: np.ndarray) -> Iterator[tuple[int, int]]:
     """The intervals of one run that gain the most, by what each window (K,) gains inside of one."""
     size = EVERY * p.scale.time / p.cell  # cells in a bin
     inside = (p.middles >= s.start) & (p.middles < s.end)
@@ -219,7 +219,7 @@ def programmed_in(p: Problem, s: Section, gain: np.ndarray) -> Iterator[tuple[in
         yield s.start + round(a * size), s.end if b == gained.size else s.start + round(b * size)
 
 
-def intervals(p: Problem) -> Spans:
+def intervals(p: SegmentationProblem) -> Spans:
     """The intervals of least cost where the noise is not known: it is what they leave over.
 
     Args:
@@ -265,7 +265,7 @@ def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool = False
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def around(p: Problem, spans: Spans, k: int, size: int) -> Iterator[Spans]:
+def around(p: SegmentationProblem, spans: Spans, k: int, size: int) -> Iterator[Spans]:
     """The intervals with an end of the k-th moved, without it, or with it and the next made one."""
     (a, b), before, after = spans[k], spans[:k], spans[k + 1 :]
     section = p.section(a)
@@ -281,7 +281,7 @@ def around(p: Problem, spans: Spans, k: int, size: int) -> Iterator[Spans]:
         yield [*before, (a, after[0][1]), *after[1:]]
 
 
-def moved(p: Problem, spans: Spans) -> Spans:
+def moved(p: SegmentationProblem, spans: Spans) -> Spans:
     """Intervals with change points moved one by one while the cost falls."""
     least = p.cost(spans)
     for size in p.moves:
@@ -297,7 +297,7 @@ def moved(p: Problem, spans: Spans) -> Spans:
     return spans
 
 
-def likely(p: Problem, spans: Spans) -> dict[str, Interval]:
+def likely(p: SegmentationProblem, spans: Spans) -> dict[str, Interval]:
     """95 % intervals of all change points [s] by their names, each with the others held."""
     least, found = p.cost(spans) + rise(), {}
     for k, (span, pair) in enumerate(zip(spans, p.keys(spans), strict=True)):
@@ -324,7 +324,7 @@ def problem(
     base: np.ndarray,
     e: Effect,
     nuisance: NuisanceParts | None = None,
-) -> Problem | None:
+) -> SegmentationProblem | None:
     """The problem of an effect with intervals, in units of force; None: its thruster is never at work.
 
     Args:
@@ -339,7 +339,7 @@ def problem(
     counts = [int(np.ceil((last - first) / cell)) for first, last in ends]
     # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
     turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T
-    sections: list[Section] = []
+    sections: list[RunCells] = []
     parts, work, middles = [], [], []
     for w, (first, last), count in zip(data, ends, counts, strict=True):
         whole = dict(zip(e.search.intervals[0], (max(first, cell), last), strict=True))
@@ -356,7 +356,7 @@ def problem(
         parts.append(by_axis.tocsr()[rows])
         start = sections[-1].end if sections else 0
         free = [pair for pair in e.search.intervals if not any(_set(model, n, w) for n in pair)]
-        sections.append(Section(w.run.name, first, start, start + count, free))
+        sections.append(RunCells(w.run.name, first, start, start + count, free))
         middles.append(start + np.clip((w.middle - first) / cell, 0.0, count - 1e-6))
     columns = csc_matrix(block_diag(parts))
     if not columns.count_nonzero():
@@ -366,7 +366,7 @@ def problem(
     lasting, middle = not e.search.intervals[0][1], np.concatenate(middles)
     y, Z, time = base.ravel(), Z.reshape(base.size, -1), np.concatenate(work)
     parts = sections, lasting, cell, y, columns, middle, Z, precision, offset, unit, time, scale
-    return Problem(*parts)
+    return SegmentationProblem(*parts)
 
 
 def _set(model: Model, name: str, w: WeakWindows) -> bool:

@@ -18,7 +18,7 @@ from ...execution.parallel import for_each
 from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
-from ...runs import Motion, Run, Smoothed, without_commands
+from ...runs import Run, Smoothed, SmoothMotion, without_commands
 from ...runs.cleaning import BRIEF
 from ..map_regression import REPLICATES
 
@@ -172,7 +172,7 @@ def peak(
     return level, Peak(int(row), int(axis), float(height[row, axis]))
 
 
-def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
+def model_error(run: Run, motion: SmoothMotion, model: Model) -> np.ndarray:
     """omega (n, 3) [N, N, N m] by the acceleration of a run's motion, NaN where there is none."""
     eta, _, eta_ddot, nu = motion
     u_dot, v_dot = rotate_to_body(eta[:, 2], eta_ddot[:, 0], eta_ddot[:, 1])

@@ -20,12 +20,12 @@ from ...predictors.shooting import Shooting
 from ..candidates import SMALL, model_error
 from ..findings import Findings
 from ..prior import NominalPrior
-from ..refinement import Estimate
-from .disturbance import Push
+from ..refinement import RefinedModel
+from .disturbance import ForceDisturbance
 from .disturbance_summary import unrecorded
 from .fit import Information, PredictionFit, fit_to, push_of, shootings, whitened
-from .joint_posterior import Posterior
-from .refit import Outcome
+from .joint_posterior import JointPosterior
+from .refit import RefitOutcome
 
 # Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
@@ -50,10 +50,10 @@ class Calibration(PredictionFit):
         constant: of each group of windows, by run its rows, slopes of the constants and covariance.
     """
 
-    def information(self, at: Estimate) -> Information:
+    def information(self, at: RefinedModel) -> Information:
         model, q = at.model(self.prior), self.unit.size
         whole, pushes = push_of(self.runs, model_error(self.runs, model), self.std)
-        self.assumed = Push(np.median([p.size for p in pushes], axis=0), whole.time)
+        self.assumed = ForceDisturbance(np.median([p.size for p in pushes], axis=0), whole.time)
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
         unit = np.concatenate([self.unit, self.assumed.size[1:]])
         H, g = np.zeros((len(self.runs), q, q)), np.zeros((len(self.runs), q))
@@ -92,7 +92,7 @@ class Calibration(PredictionFit):
             total += float(left @ left - along @ K @ along)
         return total
 
-    def without_each_run(self, at: Estimate) -> list[Model]:
+    def without_each_run(self, at: RefinedModel) -> list[Model]:
         """The model fitted without each run, by one step about the fit to all, which ended last."""
         P, (H, g) = self.precision, self.of_runs
         whole_H, whole_g, prior = H.sum(axis=0), g.sum(axis=0), P @ self.theta(at)
@@ -123,16 +123,16 @@ class Calibrator:
         """Those in which predictions are shown."""
         return shootings(self.train, [1.0])
 
-    def still(self) -> Outcome:
+    def still(self) -> RefitOutcome:
         """The calibrated model in still water."""
         return self._fitted(begin(self.start, self.prior))
 
-    def flowing(self, still: Outcome) -> Outcome:
+    def flowing(self, still: RefitOutcome) -> RefitOutcome:
         """The same with a current that all runs are in."""
         near = still.findings.estimate
         return self._fitted(begin(self.start, self.prior, {"current": STREAM}, near))
 
-    def _fitted(self, at: Estimate) -> Outcome:
+    def _fitted(self, at: RefinedModel) -> RefitOutcome:
         problem = Calibration(self.train, self.windows, at, self.prior)
         fitted = fit_to(problem, at)
         at = fitted.estimate
@@ -140,16 +140,16 @@ class Calibrator:
         moved = dict(zip(self.prior.mean, at.offset.tolist(), strict=True))
         f = self.found
         learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)
-        posterior = Posterior.of(fitted, self.prior)
-        return Outcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
+        posterior = JointPosterior.of(fitted, self.prior)
+        return RefitOutcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
 
 
 def begin(
     start: Model,
     prior: NominalPrior,
     further: Mapping[str, float] | None = None,
-    near: Estimate | None = None,
-) -> Estimate:
+    near: RefinedModel | None = None,
+) -> RefinedModel:
     """The first model with coefficients that it leaves out, zero as yet, and their prior precision.
 
     Args:
@@ -167,5 +167,5 @@ def begin(
     precision = np.diag([s**-2.0 for s in std.values()])
     values = dict.fromkeys(std, 0.0)
     if near is None:
-        return Estimate(start, np.zeros(prior.size), values, precision)
-    return Estimate(start, near.offset, {**values, **near.values}, precision)
+        return RefinedModel(start, np.zeros(prior.size), values, precision)
+    return RefinedModel(start, near.offset, {**values, **near.values}, precision)

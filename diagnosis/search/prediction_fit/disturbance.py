@@ -24,7 +24,7 @@ GAUSS = 4  # points of the integral of the noise between two instants; chosen, e
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
+class ForceDisturbance:
     """Size (..., 3) [N, N, N m] and correlation time (3,) [s] of the unrecorded force; size 0: none."""
 
     size: np.ndarray
@@ -53,7 +53,7 @@ OF_FORCE, OF_NOISE = _kernels()
 
 def estimate(
     data: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray, time: np.ndarray | None = None
-) -> Push:
+) -> ForceDisturbance:
     """The push that a model error shows.
 
     Args:
@@ -66,10 +66,10 @@ def estimate(
     variance = np.maximum(OF_FORCE @ left, 0.0) / np.sum(OF_FORCE**2, axis=1)[:, None]  # (times, 3)
     missed = np.sum((left - variance[..., None, :] * OF_FORCE[..., None]) ** 2, axis=1)
     best = np.argmin(missed, axis=0) if time is None else np.searchsorted(times, time)
-    return Push(np.sqrt(variance[best, range(3)]), times[best])
+    return ForceDisturbance(np.sqrt(variance[best, range(3)]), times[best])
 
 
-def covariance(motion: Linear, at_start: np.ndarray, push: Push) -> np.ndarray:
+def covariance(motion: Linear, at_start: np.ndarray, push: ForceDisturbance) -> np.ndarray:
     """Covariance (w, T, 3, T, 3) of predicted poses, by the initial state and a push.
 
     Args:
@@ -93,7 +93,7 @@ def covariance(motion: Linear, at_start: np.ndarray, push: Push) -> np.ndarray:
     return found
 
 
-def _steps(motion: Linear, push: Push) -> tuple[np.ndarray, np.ndarray]:
+def _steps(motion: Linear, push: ForceDisturbance) -> tuple[np.ndarray, np.ndarray]:
     """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds."""
     A = np.zeros((*motion.slope.shape[:2], 9, 9))
     A[..., :6, :6], A[..., 3:6, 6:] = motion.slope, motion.by_mass

@@ -17,7 +17,7 @@ from ...predictors.weak_form import BLOCK, kernel_integral
 from ...runs.sensors.evidence import spread_of
 from ..findings import MOST_REPORTED
 from ..most_likely import beyond
-from .disturbance import Push
+from .disturbance import ForceDisturbance
 
 AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw")
 
@@ -43,7 +43,7 @@ class Unrecorded:
         stretches: pushes at a time, the clearest first.
     """
 
-    push: Push
+    push: ForceDisturbance
     differing: Mapping[str, tuple[float, float]]
     stretches: Sequence[Stretch]
 
@@ -73,7 +73,10 @@ class Unrecorded:
 
 
 def unrecorded(
-    runs: Sequence[WeakWindows], model: Model, push: Push, differing: Mapping[str, tuple[float, float]]
+    runs: Sequence[WeakWindows],
+    model: Model,
+    push: ForceDisturbance,
+    differing: Mapping[str, tuple[float, float]],
 ) -> Unrecorded:
     """What acts unrecorded in runs that a model was fitted to; push and differing as in the result."""
     left = [omega(w, model) for w in runs]

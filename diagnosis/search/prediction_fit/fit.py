@@ -33,8 +33,8 @@ from ...predictors.uncertainty import omega_std
 from ..candidates import SMALL, model_error
 from ..most_likely import ROUNDING, STEPS, Quadratic, most_likely, ridge
 from ..prior import NominalPrior
-from ..refinement import Estimate
-from .disturbance import Push, covariance, estimate
+from ..refinement import RefinedModel
+from .disturbance import ForceDisturbance, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
 
@@ -50,10 +50,10 @@ class Fitted:
         push: the unrecorded force.
     """
 
-    estimate: Estimate
+    estimate: RefinedModel
     names: Sequence[str]
     covariance: np.ndarray
-    push: Push
+    push: ForceDisturbance
 
 
 def shootings(runs: Sequence[WeakWindows], lengths: Sequence[float] = LENGTHS) -> list[Shooting]:
@@ -66,7 +66,9 @@ def shootings(runs: Sequence[WeakWindows], lengths: Sequence[float] = LENGTHS) -
     return [s for s in found if s.run.size]
 
 
-def push_of(runs: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray) -> tuple[Push, list[Push]]:
+def push_of(
+    runs: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray
+) -> tuple[ForceDisturbance, list[ForceDisturbance]]:
     """The push of all runs, and of each with the same correlation times, see :func:`.push.estimate`."""
     edges = np.cumsum([w.middle.size for w in runs])[:-1]
     parts = zip(runs, np.split(error, edges), np.split(std, edges), strict=True)
@@ -89,7 +91,7 @@ class Information:
     G: np.ndarray
     g: np.ndarray
     weights: Sequence[np.ndarray]
-    push: Push
+    push: ForceDisturbance
 
     def power(self, P: np.ndarray) -> float:
         """k, for a prior precision P (q, q)."""
@@ -113,10 +115,16 @@ class PredictionFit:
     """
 
     def __init__(
-        self, runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
+        self,
+        runs: Sequence[WeakWindows],
+        windows: Sequence[Shooting],
+        at: RefinedModel,
+        prior: NominalPrior,
     ) -> None:
         self.runs, self.prior, self.windows = runs, prior, windows
-        self.assumed = Push(np.zeros_like(runs[0].smoothed.noise), np.ones_like(runs[0].smoothed.noise))
+        self.assumed = ForceDisturbance(
+            np.zeros_like(runs[0].smoothed.noise), np.ones_like(runs[0].smoothed.noise)
+        )
         self._place = {id(w.smoothed): k for k, w in enumerate(runs)}
         self.std = np.concatenate([omega_std(w, at.start) for w in runs])
         names, believed = at.fitted, [*prior.std.values()]
@@ -133,13 +141,13 @@ class PredictionFit:
         P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
         self.precision = P[np.ix_(self._kept, self._kept)]
 
-    def theta(self, at: Estimate) -> np.ndarray:
+    def theta(self, at: RefinedModel) -> np.ndarray:
         """(q,), fitted parameters about their prior means, in units of the ship's size; coefficients in
         prior standard deviations.
         """
         return (np.array([*[at.values[n] for n in at.fitted], *at.offset]) / self._own)[self._kept]
 
-    def moved(self, at: Estimate, step: np.ndarray) -> Estimate:
+    def moved(self, at: RefinedModel, step: np.ndarray) -> RefinedModel:
         """The estimate after a step (q,)."""
         whole = np.zeros(self._kept.size)
         whole[self._kept] = step
@@ -182,14 +190,14 @@ class PredictionFit:
         """Sum of squares of the whitened residuals of a model in the windows of one length."""
         return float(np.sum(whitened(weights, self.windows[k].residuals(model)) ** 2))
 
-    def cost(self, at: Estimate, weights: Sequence[np.ndarray], power: float) -> float:
+    def cost(self, at: RefinedModel, weights: Sequence[np.ndarray], power: float) -> float:
         """Twice the negative logarithm of the posterior, but for a constant."""
         theta, model = self.theta(at), at.model(self.prior)
         squares = [self.squares(k, W, model) for k, W in enumerate(weights)]
         total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
         return total if np.isfinite(total) else np.inf
 
-    def information(self, at: Estimate) -> Information:
+    def information(self, at: RefinedModel) -> Information:
         """What the windows say, by the slopes at an estimate and the push that it leaves in each run."""
         push, pushes = push_of(self.runs, model_error(self.runs, at.model(self.prior)), self.std)
         model, q = at.model(self.prior), self.unit.size
@@ -201,7 +209,7 @@ class PredictionFit:
             flat = A.reshape(-1, q)
             fine = running(W)
             sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]
-            V = covariance(around.motion[fine], s.at_start[fine], Push(sizes, push.time))
+            V = covariance(around.motion[fine], s.at_start[fine], ForceDisturbance(sizes, push.time))
             back = W[fine].transpose(0, 2, 1) @ A[fine]
             pushed = (_square(V, s.noise[fine]) @ back).reshape(-1, q)
             g = flat.T @ whitened(W, around.residuals[..., None]).ravel()
@@ -234,7 +242,7 @@ def whitened(W: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def fit_predictions(
-    runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
+    runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: RefinedModel, prior: NominalPrior
 ) -> Fitted:
     """The most likely model by its predictions, and how sure it is.
 
@@ -247,18 +255,18 @@ def fit_predictions(
 
 
 @dataclass(frozen=True, eq=False)
-class _Weighed(Quadratic[Estimate]):
+class _Weighed(Quadratic[RefinedModel]):
     """The cost with what the windows say, at the power of their likelihood."""
 
     known: Information
     power: float
 
 
-def fit_to(problem: PredictionFit, at: Estimate) -> Fitted:
+def fit_to(problem: PredictionFit, at: RefinedModel) -> Fitted:
     """The most likely model of a problem, from where to begin, and how sure it is."""
     P = problem.precision
 
-    def about(at: Estimate) -> _Weighed:
+    def about(at: RefinedModel) -> _Weighed:
         known = problem.information(at)
         k, weights = known.power(P), known.weights
         H, right = k * known.H + P, k * known.g - P @ problem.theta(at)

@@ -15,7 +15,7 @@ TOGETHER = 0.97  # of a correlation, from which on two values are known only tog
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class JointPosterior:
     """A normal distribution of parameters of a model.
 
     Attributes:
@@ -31,7 +31,7 @@ class Posterior:
     covariance: np.ndarray
 
     @classmethod
-    def of(cls, fitted: Fitted, prior: NominalPrior) -> "Posterior":
+    def of(cls, fitted: Fitted, prior: NominalPrior) -> "JointPosterior":
         """The posterior of a fit to predictions."""
         model, names = fitted.estimate.model(prior), [*dict.fromkeys(fitted.names)]
         # A value that an effect and a nominal coefficient are of is their sum.
@@ -46,7 +46,7 @@ class Posterior:
         )
 
     @classmethod
-    def nothing(cls) -> "Posterior":
+    def nothing(cls) -> "JointPosterior":
         """That of no value at all."""
         return cls([], [], np.zeros(0), np.zeros((0, 0)))
 

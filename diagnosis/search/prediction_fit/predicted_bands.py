@@ -8,12 +8,16 @@ from ...predictors.shooting import Shooting
 from ...predictors.windows import Windows
 from ...runs import Smoothed
 from ..candidates import SMALL
-from .disturbance import Push, covariance
-from .joint_posterior import Posterior
+from .disturbance import ForceDisturbance, covariance
+from .joint_posterior import JointPosterior
 
 
 def prediction_bands(
-    smoothed: Smoothed, windows: Windows | None, model: Model, posterior: Posterior, push: Push
+    smoothed: Smoothed,
+    windows: Windows | None,
+    model: Model,
+    posterior: JointPosterior,
+    push: ForceDisturbance,
 ) -> Bands | None:
     """The bands about a model's predictions in the windows of a run; None: it has none.
 

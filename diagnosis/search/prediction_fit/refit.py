@@ -11,15 +11,15 @@ from ..candidates import model_error
 from ..conclusion import interval, laplace_std, suspected
 from ..findings import Findings
 from ..prior import NominalPrior
-from ..refinement import Estimate, TrainingSet, nuisance_of, refit
+from ..refinement import RefinedModel, TrainingSet, nuisance_of, refit
 from .disturbance import estimate
 from .disturbance_summary import Unrecorded, unrecorded
 from .fit import fit_predictions, shootings
-from .joint_posterior import Posterior
+from .joint_posterior import JointPosterior
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class RefitOutcome:
     """The end of a fit.
 
     Attributes:
@@ -29,10 +29,10 @@ class Outcome:
     """
 
     findings: Findings
-    posterior: Posterior
+    posterior: JointPosterior
     unrecorded: Unrecorded
 
-    def about(self, found: Findings) -> "Outcome":
+    def about(self, found: Findings) -> "RefitOutcome":
         """Other findings with the covariance of this fit, by the same parameters."""
         values = [found.model.value(n.partition(".")[2]) for n in self.posterior.names]
         return replace(self, findings=found, posterior=replace(self.posterior, mean=np.array(values)))
@@ -40,7 +40,7 @@ class Outcome:
 
 def to_predictions(
     found: Findings, runs: Sequence[WeakWindows], prior: NominalPrior, fits: bool
-) -> Outcome:
+) -> RefitOutcome:
     """Fit what was found to predictions of the runs that it was found on.
 
     Args:
@@ -53,11 +53,11 @@ def to_predictions(
     if known or begin is None or searched is None or not windows:
         std = np.concatenate([omega_std(w, found.model) for w in runs])
         push = estimate(runs, model_error(runs, found.model), std)
-        return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, push, {}))
+        return RefitOutcome(found, JointPosterior.nothing(), unrecorded(runs, found.model, push, {}))
     begin = replace(begin, offset=prior.rescaled(begin.offset, searched))
     weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
     fitted = fit_predictions(runs, windows, weak, prior)
-    posterior, at = Posterior.of(fitted, prior), fitted.estimate
+    posterior, at = JointPosterior.of(fitted, prior), fitted.estimate
     model, std = at.model(prior), posterior.std
     effects = []
     for f in found.effects:
@@ -82,12 +82,12 @@ def to_predictions(
         moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
         estimate=at,
     )
-    return Outcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
+    return RefitOutcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
 
 
 def fit_model_error(
-    at: Estimate, sigma: np.ndarray, runs: Sequence[WeakWindows], prior: NominalPrior
-) -> tuple[Estimate, dict[str, float]]:
+    at: RefinedModel, sigma: np.ndarray, runs: Sequence[WeakWindows], prior: NominalPrior
+) -> tuple[RefinedModel, dict[str, float]]:
     """The fit to the model error with the prior of the fit, and its standard deviations [SI]."""
     t = TrainingSet(runs, sigma, prior)
     nuisance = nuisance_of(t, at, t.error(at))
