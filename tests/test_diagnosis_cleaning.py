@@ -85,7 +85,8 @@ def test_rows_that_straight_lines_have_filled_are_no_measurements(every):
     assert tuple(track.counts()) == (rows.size, 0, 0, 0, rows.size)
     assert track.period == pytest.approx(every * 0.02)
     assert "filled by straight lines" in track.notes[0]
-    assert np.isnan(track.pose[track.between]).all()
+    assert np.isnan(track.pose[track.between, :2]).all()
+    assert track.fresh[:, 2].all()
 
 
 def test_gap_is_told():

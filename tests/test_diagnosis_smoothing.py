@@ -165,21 +165,22 @@ def test_smoothness_has_the_largest_likelihood():
     grid = knots(np.array([0.0]), np.array([20.0]), 0.05)
     time = 0.02 * np.arange(1000)
     z = 1e3 + np.sin(time)[:, None] + 1e-3 * np.random.default_rng(0).standard_normal((1000, 3))
+    even = np.ones((1000, 3))
     spline = Spline(grid, basis(grid, time), np.ones((3, 400)), Rates.none(grid))
-    p = Problem(np.arange(1000), z, np.full(3, 1e-3), np.ones((1000, 3)), 160, spline)
-    best = likeliest(p, np.ones(1000))
-    again = likeliest(p, np.ones(1000), 30.0 * best)
+    p = Problem(np.arange(1000), z, np.full(3, 1e-3), even, 160, spline)
+    best = likeliest(p, even)
+    again = likeliest(p, even, 30.0 * best)
     np.testing.assert_allclose(again, best, rtol=1e-7)
-    found = criteria(p, np.ones(1000))
+    found = criteria(p, even)
     values = [
         sum(f.cost(np.log10(s) + off) for f, s in zip(found, best, strict=True)) for off in (-0.1, 0.1)
     ]
-    assert min(values) > deviance(p, np.ones(1000), best) + 1e-3
+    assert min(values) > deviance(p, even, best) + 1e-3
     for f, s in zip(found, best, strict=True):
         at, h = np.log10(s) + 0.5, 1e-3
         slope = (f.cost(at + h) - f.cost(at - h)) / (2.0 * h * np.log(10.0))
         expected = slope / np.expm1(f.excess(at))  # of the roughness; the slope is what is beyond it
-        system = LinearSystem(p.equations(np.ones(1000))[found.index(f)], p.precision(0, 10.0**at))
+        system = LinearSystem(p.equations(even)[found.index(f)], p.precision(0, 10.0**at))
         assert grid.rank - system.trace(PENALTY) == pytest.approx(expected, rel=1e-4)
 
 
