@@ -20,7 +20,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.runs import prepare, table_of
 
 from .recorded import SURE, Good, Recorded, recorded
-from .recordings import POSE, WAYS
+from .ways_to_log import POSE, WAYS
 
 CLEAN = "clean"
 WITHIN = 0.3  # of the noise that there is; issue: the estimate counts as right

@@ -15,7 +15,7 @@ import diagnosis
 from diagnosis.predictors import ship_with
 from diagnosis.runs import prepare
 
-from .recordings import POSE, WAYS
+from .ways_to_log import POSE, WAYS
 
 SURE = 0.9  # confidence from which on a cause that is not there is wrong; contract
 
