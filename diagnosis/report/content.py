@@ -27,7 +27,7 @@ COUNTS = "samples frozen dropped spikes used"
 COVARIATE = "by=covariate.id unit=covariate.unit run"
 REGION = f"axis {COVARIATE} low high rms elsewhere share_of_time=share sentence"
 PROFILE = f"axis {COVARIATE} ends=edges rms uncertainty share_of_time=share"
-SENSOR = "channel kind value unit ci95 from=start to=end sentence alike repaired"
+SENSOR = "channel kind value unit ci95 from=start to=end sentence alike repaired aside"
 EFFECT = (
     "id axis coefficients confidence share_of_error indistinguishable advice sentence equation "
     "separation share_unique doubt"

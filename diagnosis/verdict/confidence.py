@@ -6,15 +6,16 @@ the limit of its range, an interval that holds zero, an alternative that looks t
 the same axes.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit
 
-from ..predictors import Model
+from ..predictors import Model, WeakWindows
 from ..search.effect_evidence import EffectEvidence
 from ..search.findings import Finding
+from ..search.prior import MEASURED
 from ..search.refinement import at_limit
 
 # Constants of the logistic map, to be fitted by benchmarks.hidden_effects on other seeds and effects
@@ -31,6 +32,7 @@ MAY_BE_NONE = "by the interval of its value it may be nothing"
 MAY_BE_LAGS = (
     "actuators that are faster than described, or commands that are measured states, look the same"
 )
+MAY_BE_CLOCK = "a channel was set aside that tells of a clock at another rate, which may look the same"
 RESIDUAL = "something that it does not explain acts on the same axis"
 
 
@@ -59,13 +61,16 @@ def probability(e: EffectEvidence) -> float:
     return float(e.bagged * a_candidate_is_right)
 
 
-def confidence_of(f: Finding, start: Model, residual: Collection[str] = ()) -> Confidence:
+def confidence_of(
+    f: Finding, start: Model, residual: Collection[str] = (), clock_in_doubt: bool = False
+) -> Confidence:
     """The confidence of a finding.
 
     Args:
         f: the finding; without evidence, what its method says of it stands.
         start: the initial model.
         residual: axes on which the learned model leaves a significant residual.
+        clock_in_doubt: see :func:`clock_in_doubt`.
     """
     own, of_set = f.confidence, f.together
     if f.evidence is not None and f.set_evidence is not None:
@@ -77,11 +82,24 @@ def confidence_of(f: Finding, start: Model, residual: Collection[str] = ()) -> C
         own, doubt = EVEN_ODDS, MAY_BE_NONE
     elif _may_be_lags(f, start):
         own, doubt = min(own, EVEN_ODDS), MAY_BE_LAGS
+    elif own > EVEN_ODDS and clock_in_doubt:
+        own, doubt = EVEN_ODDS, MAY_BE_CLOCK
     effect = start.ship.effects[f.id]
     # Waves are a residual themselves.
     if own > EVEN_ODDS and effect.search.by != "spectrum" and set(residual) & set(effect.axis):
         return Confidence(EVEN_ODDS, EVEN_ODDS, RESIDUAL)
     return Confidence(own, of_set, doubt)
+
+
+def clock_in_doubt(runs: Iterable[WeakWindows]) -> bool:
+    """Whether a log's clock may be so far off that it looks like another model.
+
+    Forces go with the square of the clock's rate: it matters where that is more than what a measured
+    coefficient is uncertain by.
+    """
+    found = (f for w in runs if w.smoothed.sensors for f in w.smoothed.sensors.findings)
+    rates = [f.value for f in found if f.aside and "clock_rate" in f.alike]
+    return any(abs(rate**2 - 1.0) > MEASURED for rate in rates)
 
 
 def _may_be_none(f: Finding) -> bool:
