@@ -252,7 +252,7 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
     there = np.isfinite(values).all(axis=1) & ~gone
     repeats = repeated(values, there)
     rows = np.flatnonzero(there & ~repeats)
-    step = (np.abs(np.diff(values[rows], axis=0)) > 1.5 * coarse[rows[1:]]).any(axis=1)
+    step = np.any(np.abs(np.diff(values[rows], axis=0)) > 1.5 * coarse[rows[1:]], axis=1)
     after = np.searchsorted(rows, np.flatnonzero(repeats))  # the value that follows, where there is one
     if after.size and step.size:
         by_step = step[np.minimum(after, step.size) - 1]
