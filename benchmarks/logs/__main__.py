@@ -15,6 +15,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from diagnosis.predictors import ship_with
 from diagnosis.runs import prepare, table_of
@@ -32,7 +33,7 @@ def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
     prepared = prepare(path, craft)
     s = prepared.smoothed
     run = s.track.run.rows(s.used)
-    table = table_of(run)[["time", *POSE, *run.commanded]]
+    table = pd.DataFrame(table_of(run), columns=["time", *POSE, *run.commanded])
     table["time"] -= table["time"].iloc[0]
     return Good(table, s.noise, ship, test)
 
