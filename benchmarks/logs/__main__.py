@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import CubicSpline
 
 from diagnosis.predictors import ship_with
 from diagnosis.runs import prepare, table_of
@@ -28,13 +29,20 @@ WITHIN = 0.3  # of the noise that there is; issue: the estimate counts as right
 
 
 def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
-    """A good log without channels beside pose and commands; stretches without a pose are cut off."""
-    craft = ship_with((), ship)
-    prepared = prepare(path, craft)
-    s = prepared.smoothed
-    run = s.track.run.rows(s.used)
-    table = pd.DataFrame(table_of(run), columns=["time", *POSE, *run.commanded])
-    table["time"] -= table["time"].iloc[0]
+    """A good log at even times, pose and commands alone, without spikes and stretches without a pose.
+
+    At each time it has the smoothed motion and the residual of the nearest sample, so that times that
+    were uneven are no noise.
+    """
+    s = prepare(path, ship_with((), ship)).smoothed
+    run, eta = s.track.run.rows(s.used), s.eta[s.used]
+    time = np.arange(run.time[0], run.time[-1], float(np.median(np.diff(run.time))))
+    before = np.searchsorted(run.time, time + 1e-9, side="right") - 1
+    after = np.minimum(before + 1, run.time.size - 1)
+    nearest = np.where(run.time[after] - time < time - run.time[before], after, before)
+    table = pd.DataFrame(table_of(run.rows(before)), columns=["time", *POSE, *run.commanded])
+    table["time"] = time - time[0]
+    table[POSE] = CubicSpline(run.time, eta)(time) + (s.track.pose[s.used] - eta)[nearest]
     return Good(table, s.noise, ship, test)
 
 

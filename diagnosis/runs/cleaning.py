@@ -21,6 +21,7 @@ from .files.telegrams import filled
 # Enterprise 1 grow at up to 0.18 1/s.
 HORIZON = 8.0
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
+EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
 CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 # Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of

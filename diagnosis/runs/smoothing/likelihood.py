@@ -107,7 +107,8 @@ class Likelihood:
                 beyond = float(np.clip(before + step, -DECADES, DECADES))
                 if excess(beyond) * step >= 0.0:
                     low, high = sorted((before, beyond))
-                    root: Any = toms748(excess, low, high)
+                    with np.errstate(invalid="ignore", divide="ignore"):  # of two equal values
+                        root: Any = toms748(excess, low, high)
                     return float(root)
             except LinAlgError:  # so little smoothing that the spline is not determined
                 break
