@@ -12,7 +12,7 @@ from cosim import InputError
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
-from .columns.unit_check import refuse_time, refuse_units
+from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 
@@ -135,7 +135,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
-    turned, _, lined = updates(run, HEADING, gone)
+    turned, constant, lined = updates(run, HEADING, gone)
+    if turned.sum() < FEWEST <= min(seen.sum(), constant.sum()):
+        turned = turned | _believed_constant(constant, where, anyway)
     # Where no heading is near, a place tells nothing of surge and sway.
     apart = max(WIDTH * scale.time, LONG * row)
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
@@ -180,6 +182,17 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
     return Track(run, pose, measured, frozen, dropped, between, period, out, tuple(notes), scale)
+
+
+def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.ndarray:
+    """Rows (n,) in which a heading repeats throughout, if that is believed.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not anyway:
+        raise InputError(f"{where}: psi never changes while the ship goes on; {GO_ON}")
+    return constant
 
 
 def long_gap(period: float, scale: Scale) -> float:
