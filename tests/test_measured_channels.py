@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis import Run
+from diagnosis import Model, Run
+from diagnosis.assessment.gathering import gather
 from diagnosis.runs import channels_of, prepare
+from diagnosis.search.findings import Finding
+from diagnosis.verdict.confidence import confidence_of, doubt_of_data
 
 H, SECONDS, NOISE = 0.1, 120.0, np.array([4e-3, 4e-3, 2e-3])
 
@@ -73,3 +76,14 @@ def test_a_noise_that_the_samples_contradict_is_doubted(factor, doubted):
     found = {c.name: c for c in channels_of(s)}
     assert (found["x"].noise, found["x"].noise_from) == (given["x"], "given")
     assert found["y"].noise_from == "estimated"
+
+
+@pytest.mark.parametrize(("every", "sure"), [(4, True), (10, False)])
+def test_of_rare_samples_nothing_is_sure(every, sure):
+    rare = sailed().rows(np.arange(0, round(SECONDS / H), every))
+    (windows,) = gather([rare], anyway=True)
+    assert np.diff(windows.smoothed.time).max() <= 0.5 + 1e-9
+    f = Finding("mass", {"mass": 30.0}, {"mass": (20.0, 40.0)}, 0.99, [], 0.9, 0.9, together=0.99)
+    seen = confidence_of(f, Model(), (), doubt_of_data([windows]))
+    assert seen.own == (0.99 if sure else 0.5)
+    assert ("too rare" in seen.doubt) != sure

@@ -39,7 +39,7 @@ class Inliers(NamedTuple):
     even: np.ndarray
 
 
-def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
+def robust(p: Problem, local: np.ndarray, least: np.ndarray, resolved: bool) -> Inliers:
     """Which samples are no outliers, their noise, and the smoothness of the spline through them.
 
     The problem has an even penalty. With a local smoothness its spline follows a few samples, and
@@ -49,6 +49,8 @@ def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
         p: with a first guess of the noise.
         local: (3,), smoothness to begin with.
         least: (3,), see :func:`.likelihood.with_noise`.
+        resolved: whether the ship's quickest motion takes several samples, so that one that sticks out at
+            first is no motion.
 
     Raises:
         TooFewError: in some stretch.
@@ -57,7 +59,7 @@ def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
     while (slow := _mostly_outside(p, weights)).any() and halvings < HALVINGS:
         local, halvings = np.where(slow, local / 2.0**DEGREE, local), halvings + 1
         weights = robust_weights(p, local)
-    weights, rounds = outlier_test(p, local, weights), 0
+    weights, rounds = (outlier_test(p, local, weights) if resolved else weights), 0
     while True:
         p, even = with_noise(p, likeliest(p, weights), weights, least)
         adapted, smoothness = adapt(p, even, weights)

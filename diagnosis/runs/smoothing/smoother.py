@@ -30,7 +30,8 @@ from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
-SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
+QUICKEST = 0.5  # s, of a motion (chosen)
+SPACING = 0.1 * QUICKEST  # s between knots, or a sampling period if that is longer
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
@@ -237,8 +238,9 @@ def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
         # A spline that follows a few samples: its time constant is two sampling periods.
         periods = [np.median(np.diff(time[there])) for there in track.fresh.T]
         local = 2.0 * (2.0 * np.array(periods) / even.spline.grid.spacing) ** DEGREE
+        resolved = 2.0 * max(periods) <= QUICKEST * track.scale.time
         try:
-            alone = robust(even, local, least)
+            alone = robust(even, local, least, resolved)
             return rows, even._replace(sigma=alone.problem.sigma), origin, alone
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
