@@ -49,8 +49,7 @@ def robust(p: Problem, local: np.ndarray, least: np.ndarray, resolved: bool) -> 
         p: with a first guess of the noise.
         local: (3,), smoothness to begin with.
         least: (3,), see :func:`.likelihood.with_noise`.
-        resolved: whether the ship's quickest motion takes several samples, so that one that sticks out at
-            first is no motion.
+        resolved: whether the ship's quickest motion takes several samples: what sticks out is none.
 
     Raises:
         TooFewError: in some stretch.
