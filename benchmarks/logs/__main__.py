@@ -10,7 +10,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -19,7 +19,7 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from diagnosis.predictors import ship_with
-from diagnosis.runs import prepare, table_of
+from diagnosis.runs import prepare, read, table_of
 
 from .recorded import SURE, Good, Recorded, recorded
 from .ways_to_log import POSE, WAYS
@@ -34,7 +34,8 @@ def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
     At each time it has the smoothed motion and the residual of the nearest sample, so that times that
     were uneven are no noise.
     """
-    s = prepare(path, ship_with((), ship)).smoothed
+    craft = ship_with((), ship)
+    s = prepare(replace(read(path, of=craft), measured={}), craft).smoothed
     run, eta = s.track.run.rows(s.used), s.eta[s.used]
     time = np.arange(run.time[0], run.time[-1], float(np.median(np.diff(run.time))))
     before = np.searchsorted(run.time, time + 1e-9, side="right") - 1
