@@ -10,7 +10,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -19,7 +19,7 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from diagnosis.predictors import ship_with
-from diagnosis.runs import prepare, read, table_of
+from diagnosis.runs import prepare, read_frame, table_of
 
 from .recorded import SURE, Good, Recorded, recorded
 from .ways_to_log import POSE, WAYS
@@ -35,7 +35,7 @@ def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
     were uneven are no noise.
     """
     craft = ship_with((), ship)
-    s = prepare(replace(read(path, of=craft), measured={}), craft).smoothed
+    s = prepare(path, craft).smoothed
     run, eta = s.track.run.rows(s.used), s.eta[s.used]
     time = np.arange(run.time[0], run.time[-1], float(np.median(np.diff(run.time))))
     before = np.searchsorted(run.time, time + 1e-9, side="right") - 1
@@ -44,7 +44,8 @@ def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
     table = pd.DataFrame(table_of(run.rows(before)), columns=["time", *POSE, *run.commanded])
     table["time"] = time - time[0]
     table[POSE] = CubicSpline(run.time, eta)(time) + (s.track.pose[s.used] - eta)[nearest]
-    return Good(table, s.noise, ship, test)
+    by_pose = prepare(read_frame(table, of=craft), craft).smoothed
+    return Good(table, by_pose.noise, ship, test)
 
 
 def line(o: Recorded, clean: Recorded | None) -> str:
