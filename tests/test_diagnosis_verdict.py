@@ -441,6 +441,16 @@ def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
     assert ("may be nothing" in seen.doubt) != sure
 
 
+@pytest.mark.parametrize(("second", "sure"), [((-0.02, 0.005), False), ((0.01, 0.05), True)])
+def test_an_effect_of_two_values_that_may_both_be_nothing_is_no_sure_finding(second, sure):
+    values = {"attack_point_dx": -0.04, "attack_point_dy": 0.02}
+    intervals = {"attack_point_dx": (-0.16, 0.08), "attack_point_dy": second}
+    f = Finding("attack_point", values, intervals, 0.93, [], 0.9, 0.9, together=0.93)
+    seen = confidence_of(f, Model())
+    assert seen.own == (0.93 if sure else 0.5)
+    assert ("may be nothing" in seen.doubt) != sure
+
+
 @pytest.mark.parametrize(
     ("name", "offset", "sure"),
     [("otter", -0.2, False), ("otter", 0.2, True), ("otter", -2.0, True), ("cse1", -0.2, True)],

@@ -9,7 +9,6 @@ the same axes.
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-import numpy as np
 from scipy.special import expit
 
 from ..predictors import Model, WeakWindows
@@ -29,7 +28,7 @@ FOUND = 0.8  # confidence from which on an effect is found; contract
 # effects from which on the set is a finding, and not only a possibility; contract.
 EVEN_ODDS = 0.5
 AT_LIMIT = "{0} is at the limit of what was looked for"
-MAY_BE_NONE = "by the interval of its value it may be nothing"
+MAY_BE_NONE = "by the intervals of its values it may be nothing"
 MAY_BE_LAGS = (
     "actuators that are faster than described, or commands that are measured states, look the same"
 )
@@ -109,11 +108,10 @@ def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
 
 
 def _may_be_none(f: Finding) -> bool:
-    """Whether the 95 % interval of the only value holds zero."""
-    if len(f.values) != 1:
-        return False
-    low, high = f.ci95.get(next(iter(f.values)), (np.nan, np.nan))
-    return low <= 0.0 <= high
+    """Whether the 95 % intervals of all its values hold zero; a value without one is known."""
+    return bool(f.values) and all(
+        name in f.ci95 and f.ci95[name][0] <= 0.0 <= f.ci95[name][1] for name in f.values
+    )
 
 
 def _may_be_lags(f: Finding, start: Model) -> bool:
