@@ -62,7 +62,7 @@ def test_the_right_file_is_read(tmp_path: Path) -> None:
     raft = read_ship(written(tmp_path, RIGHT))
     assert [a.name for a in raft.actuators] == ["port", "starboard"]
     m, I_z, _ = raft.inertia
-    assert (m.origin, m.share) == ("weighed", 0.01)
+    assert (m.origin, m.share, m.std) == ("weighed", 0.01, 0.5)
     assert (I_z.origin, I_z.share) == ("guessed", 0.5)
     assert ship(description=raft).vessel.params().inertia.Y_vdot == 0.0  # not that of another ship
 

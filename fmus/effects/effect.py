@@ -206,8 +206,8 @@ class Wording:
         family: effects of a kind, with the manoeuvre that brings them out.
         apart: id of another effect -> what to run so that the two can be told apart.
         pictures: curves to draw.
-        measured: what to measure in place of estimating a value, as a part of a sentence, from that value
-            and a function of names that gives the model's parameters.
+        measured: what to measure in place of estimating a value, as a part of a sentence, from that
+            value and a function of names that gives the model's parameters.
     """
 
     sentence: Callable[[Any], str] | None = None
