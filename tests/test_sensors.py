@@ -10,9 +10,9 @@ import pytest
 from support.measured import DATA
 
 import diagnosis
-from cosim import InputError
 from diagnosis import Run
 from diagnosis import repair as command
+from diagnosis.predictors import Model
 from diagnosis.runs import closure, examine
 from diagnosis.runs.files.telegrams import filled
 from diagnosis.runs.sensors import motion
@@ -20,6 +20,8 @@ from diagnosis.runs.sensors.clock_path import integral_of
 from diagnosis.runs.sensors.further_channels import accelerations, receivers
 from diagnosis.runs.sensors.wraps import unwrapped
 from diagnosis.runs.smoothing import smoother
+from diagnosis.search.findings import Finding
+from diagnosis.verdict.confidence import confidence_of, doubt_of_data
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE, Scale
 
@@ -237,15 +239,22 @@ def test_seconds_that_the_log_lacks_are_told():
     assert np.diff(found.run.time).max() == pytest.approx(gap.value, abs=0.3)
 
 
-def test_without_turns_clock_and_scale_are_one_and_learning_is_refused():
+@pytest.mark.parametrize("factor", [0.9, 0.98])
+def test_without_turns_clock_and_scale_are_one_and_the_speed_is_set_aside(factor):
+    """What is learned of it is not sure where a clock at that rate would matter."""
     straight = made(turning=0.0)
-    run = beside(straight, u=0.9 * straight.measured["u"], v=0.9 * straight.measured["v"])
+    run = beside(straight, u=factor * straight.measured["u"], v=factor * straight.measured["v"])
     found = told(run)["u", "scale"]
     assert found.alike == ("clock_rate",)
     assert not found.repaired
-    with pytest.raises(InputError, match="a clock that runs at this rate would look the same"):
-        diagnosis.gather([run])
-    assert diagnosis.gather([run], anyway=True)
+    assert found.aside == ("u", "v")
+    (prepared,) = diagnosis.gather([run])
+    assert not {"u", "v"} & {*prepared.run.measured, *prepared.smoothed.sensors.agreeing}
+    np.testing.assert_array_equal(prepared.run.time, run.time)
+    assert bool(doubt_of_data([prepared])) == (factor == 0.9)
+    f = Finding("mass", {"mass": 30.0}, {"mass": (20.0, 40.0)}, 0.99, [], 0.9, 0.9, together=0.99)
+    seen = confidence_of(f, Model(), (), doubt_of_data([prepared]))
+    assert (seen.own == 0.99) == (not seen.doubt) == (factor != 0.9)
 
 
 def test_an_angle_interpolated_through_its_wrap_is_put_on_the_short_way():

@@ -24,7 +24,7 @@ from .sensors.sensor_finding import Examined
 from .sensors.unit_faults import sway, units
 from .sensors.wraps import wraps
 from .smoothing.smoother import Smoothed, smooth
-from .thinning import thinned
+from .thinning import spaced
 
 # A part of a log contains less information on its clock than the whole.
 WHOLE_FIRST = "repair the whole log by its other channels (cybership repair) and take the part of that"
@@ -98,14 +98,16 @@ def prepare(
     of = of or ship()
     raw = source if isinstance(source, Run) else read(source, of=of, also=also)
     sensors = examine(raw, of.scale)
-    unrepaired = next((finding for finding in sensors.findings if not finding.repaired), None)
-    if unrepaired and not anyway:
+    unrepaired = [finding for finding in sensors.findings if not finding.repaired]
+    in_doubt = next((finding for finding in unrepaired if not finding.aside), None)
+    if in_doubt and not anyway:
         raise InputError(
-            f"run '{raw.name}': {unrepaired.sentence}; no other channel shows how to repair that; "
+            f"run '{raw.name}': {in_doubt.sentence}; no other channel shows how to repair that; "
             f"if it is a part of a log, {WHOLE_FIRST}; {GO_ON}"
         )
+    sensors = sensors.without({name for finding in unrepaired for name in finding.aside})
     repaired = replace(sensors.run, notes=(*sensors.run.notes, *sensors.notes))
-    return PreparedRun(raw, sensors, thinned(clean(repaired, anyway, of.scale)), anyway)
+    return PreparedRun(raw, sensors, spaced(clean(repaired, anyway, of.scale)), anyway)
 
 
 def examine(run: Run, scale: Scale) -> Examined:

@@ -185,7 +185,7 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     drift = path.std[TURN] * np.sqrt(e.time[-1] - e.time[0])
     turns = e.rate is not None and np.hypot(drift, path.std[HEADING]) < SURE * LEAST * np.ptp(e.psi)
     for c, x, s in zip(path.columns, path.constants.tolist(), path.deviation.tolist(), strict=True):
-        value, std, text, alike = x, s, "", ()
+        value, std, text, alike, aside = x, s, "", (), ()
         if c.kind == "scale":
             if by_clock:
                 continue
@@ -194,9 +194,10 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
             only = e.velocity is None and abs(value - 1.0) > LEAST
             if not found.wanders and (only or not turns):
                 alike, text = ("clock_rate",), f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}"
+                aside = (c.channel,) if c.needs == "rate" else e.by or ()
         fault = c.channel, c.kind, c.unit
         text = _told(c, value, e) + text
-        made.append(SensorFinding.estimated(fault, value, std, edges, text, alike, not alike))
+        made.append(SensorFinding.estimated(fault, value, std, edges, text, alike, not alike, aside))
     return made
 
 

@@ -1,7 +1,7 @@
 """What redundant channels say of each other."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class SensorFinding:
         sentence: the same for people.
         alike: what the same data would look like.
         repaired: whether the redundant channels repair it.
+        aside: channels without which there is no contradiction; empty: the pose itself is in doubt.
     """
 
     channel: str
@@ -39,6 +40,14 @@ class SensorFinding:
     sentence: str
     alike: tuple[str, ...] = ()
     repaired: bool = True
+    aside: tuple[str, ...] = ()
+
+    @property
+    def not_repaired(self) -> str:
+        """What becomes of a fault that is not repaired."""
+        return (
+            f" (not repaired; {' and '.join(self.aside)} set aside)" if self.aside else " (not repaired)"
+        )
 
     @classmethod
     def estimated(
@@ -50,11 +59,12 @@ class SensorFinding:
         sentence: str,
         alike: tuple[str, ...] = (),
         repaired: bool = True,
+        aside: tuple[str, ...] = (),
     ) -> "SensorFinding":
         """A fault (channel, kind, unit) with a normal error, from the first to the last of times [s]."""
         interval, (channel, kind, unit) = (value - Z95 * std, value + Z95 * std), fault
         ends = float(time[0]), float(time[-1])
-        return cls(channel, kind, value, unit, interval, *ends, sentence, alike, repaired)
+        return cls(channel, kind, value, unit, interval, *ends, sentence, alike, repaired, aside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +77,28 @@ class Examined:
         notes: what else is to be said, a line each.
         agreeing: channels in addition to the pose that agree with it -> standard deviation of their mean
             over the time between two samples of the pose, in SI.
+        aside: channels that were set aside.
     """
 
     run: Run
     findings: tuple[SensorFinding, ...] = ()
     notes: tuple[str, ...] = ()
     agreeing: dict[str, float] = field(default_factory=dict)
+    aside: dict[str, np.ndarray] = field(default_factory=dict)
 
     def plus(self, other: "Examined") -> "Examined":
         """What was found first, and then."""
         findings, notes = self.findings + other.findings, self.notes + other.notes
         return Examined(other.run, findings, notes, self.agreeing | other.agreeing)
+
+    def without(self, aside: Collection[str]) -> "Examined":
+        """The run with some channels set aside."""
+        measured = {name: x for name, x in self.run.measured.items() if name not in aside}
+        agreeing = {name: std for name, std in self.agreeing.items() if name not in aside}
+        set_aside = {name: x for name, x in self.run.measured.items() if name in aside}
+        return replace(
+            self, run=replace(self.run, measured=measured), agreeing=agreeing, aside=set_aside
+        )
 
 
 def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
@@ -91,4 +112,4 @@ def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
         found = [f for f in found if f.kind != "clock_rate"]
     for f in found:
         when = f", {f.start:.1f} to {f.end:.1f} s" if f.kind == "clock_rate" else ""
-        yield f"{f.sentence}{when}{'' if f.repaired else ' (not repaired)'}"
+        yield f"{f.sentence}{when}{'' if f.repaired else f.not_repaired}"
