@@ -1,4 +1,4 @@
-"""Propose the file beside a measurement: ``python -m diagnosis.propose_columns FILE [--write]``."""
+"""Propose the file beside a measurement: ``python -m diagnosis.propose_columns FILE... [--write]``."""
 
 if __name__ == "__main__":
     from cosim.supervision import supervised
@@ -7,8 +7,13 @@ if __name__ == "__main__":
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
 
 from cosim import InputError
 from cosim.command import command_parser, printable, run_command
@@ -17,58 +22,186 @@ from .commands.command_line import Done, anyway_option, run, ship_option
 from .execution.progress import Advance
 from .execution.result_folder import together
 
+if TYPE_CHECKING:
+    from fmus.ship import Ship
+
+    from .runs import Column, LikelyColumn, Proposal, Run
+    from .runs.smoothing.smoother import Smoothed
+
+TABLES = (".csv", ".parquet")
+HEADS = ("samples", "frozen", "dropped", "spikes", "used")  # what becomes of the samples
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = _parser().parse_args(arguments)
-    options.out = options.file.parent
+    options.out = options.file[0].parent
     return run(columns, options)
 
 
 def columns(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .assessment.gathering import gather
-    from .predictors import Model, ship_with
-    from .runs import propose  # only now: they take a second to import
+    from .predictors import ship_with  # only now: it takes a second to import
 
     craft = ship_with((), options.ship)
-    path = options.file
-    beside = path.with_name(f"{path.name}.json")
-    if options.write and not options.overwrite and beside.exists():
-        raise InputError(f"'{beside}' is there already; --overwrite replaces it")
+    if len(options.file) == 1:
+        return _of_file(options, craft, advance)
+    return _of_folder(options, craft, advance)
+
+
+def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Done:
+    """The file beside one measurement."""
+    from .runs import beside, propose, stated_layout
+
+    path = options.file[0]
+    target = beside(path)
+    _refuse_there(options, target)
     found = propose(path, craft)
-    (windows,) = gather([found.run], advance, options.anyway, Model(ship=craft))  # as all commands do
-    track, counts = windows.smoothed.track, windows.smoothed.counts
-    seconds = track.run.time[-1] - track.run.time[0]
-    shown = [
-        f"'{path}': {counts.samples} samples in {seconds:.4g} s, one each {track.period:.3g} s; "
-        f"{counts.frozen} frozen, {counts.dropped} dropped, {counts.spikes} spikes",
-        *track.notes,
-    ]
+    if found.run is None:
+        shown = [f"'{path}': no column is known for {', '.join(found.likely)}"]
+    else:
+        s = _smoothed(found.run, craft, options.anyway, advance)
+        shown = [
+            f"'{path}': {s.counts.samples} samples in {_seconds(s):.4g} s, one each "
+            f"{s.track.period:.3g} s; {s.counts.frozen} frozen, {s.counts.dropped} dropped, "
+            f"{s.counts.spikes} spikes",
+            *s.track.notes,
+        ]
     if found.unused:
         shown.append(f"not used: {', '.join(found.unused)}")
+    shown = list(map(printable, [*shown, *_blanks([found])]))
     if not found.needed:
-        return Done(0, [*map(printable, shown), f"nothing needs to be stated next to '{path}'"])
-    text = json.dumps(found.needed, indent=2, ensure_ascii=False)
-    if options.write:
-        with together(path.parent, (beside.name,)) as new:
-            (new / beside.name).write_text(f"{text}\n", encoding="utf-8")
-    stated = f"written into '{beside}':" if options.write else f"--write puts this into '{beside}':"
-    return Done(0, [*map(printable, [*shown, stated]), text])
+        return Done(0, [*shown, printable(f"nothing needs to be stated next to '{path}'")])
+    if found.layout == stated_layout(path):
+        return Done(0, [*shown, printable(f"what is stated next to '{path}' is all that it needs")])
+    return Done(0, [*shown, *_stated(target, found.needed, options.write)])
+
+
+def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Done:
+    """One file for all measurements of a folder, and a table of them."""
+    from .runs import FOLDER_FILE, Layout, as_json, common_layout, propose, read
+
+    tables = [path for path in options.file if path.suffix in TABLES or not path.exists()]
+    if not tables:
+        raise InputError("none of the files is a CSV or Parquet file")
+    if len(folders := {path.parent for path in tables}) > 1:
+        each = ", ".join(f"'{folder}'" for folder in sorted(folders))
+        raise InputError(f"each folder has a file of its own, and these are of several: {each}")
+    target = tables[0].with_name(FOLDER_FILE)
+    _refuse_there(options, target)
+    proposals = {path: propose(path, craft) for path in tables}
+    common, others = common_layout(proposals)
+    shown: list[RenderableType] = []
+    if left := [path.name for path in options.file if path not in proposals]:
+        shown.append(printable(f"no tables: {', '.join(left)}"))
+    runs = {
+        path: read(path, common.model_copy(update={"columns": {**common.columns, **own}}), craft)
+        for path, own in others.items()
+        if proposals[path].run is not None
+    }
+    shown += _tabulated(proposals, runs, craft, options.anyway, advance)
+    if unused := dict.fromkeys(name for found in proposals.values() for name in found.unused):
+        shown.append(printable(f"not used: {', '.join(unused)}"))
+    shown += map(printable, _blanks(proposals.values()))
+    if common != Layout():
+        shown += _stated(target, as_json(common), options.write)
+    shown += _own_entries(others)
+    return Done(0, shown)
+
+
+def _own_entries(others: Mapping[Path, Mapping[str, "Column"]]) -> Iterator[str]:
+    """Entries that the file of a folder cannot have, for the file beside each measurement."""
+    from .runs import Layout, as_json, beside, stated_layout
+
+    for path, own in others.items():
+        there = (stated_layout(path) or Layout()).columns
+        if more := {s: c for s, c in own.items() if c != there.get(s)}:
+            text = json.dumps(as_json(Layout(columns=more)), ensure_ascii=False)
+            yield printable(f"'{path}' needs in addition, in '{beside(path)}': {text}")
+
+
+def _tabulated(
+    paths: Iterable[Path], runs: Mapping[Path, "Run"], craft: "Ship", anyway: bool, advance: Advance
+) -> list[RenderableType]:
+    """A row for each measurement, and why those that cannot be used as they are cannot."""
+    table, refused = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), []
+    for k, name in enumerate(("file", "time", "every", *HEADS)):
+        table.add_column(name, justify="right" if k else "left", overflow="fold")
+    for path in paths:
+        cells = ["-"] * (2 + len(HEADS))
+        try:
+            if path in runs:
+                s = _smoothed(runs[path], craft, anyway, advance)
+                cells = [f"{_seconds(s):.4g} s", f"{s.track.period:.3g} s", *map(str, s.counts)]
+        except InputError as error:
+            refused.append(f"not usable as it is: {error}")
+        table.add_row(Text(printable(path.name)), *cells)
+    return [table, *map(printable, refused)]
+
+
+def _refuse_there(options: argparse.Namespace, target: Path) -> None:
+    if options.write and not options.overwrite and target.exists():
+        raise InputError(f"'{target}' is there already; --overwrite replaces it, and keeps its entries")
+
+
+def _smoothed(found: "Run", craft: "Ship", anyway: bool, advance: Advance) -> "Smoothed":
+    """The motion of a run, judged as all commands do."""
+    from .assessment.gathering import gather
+    from .predictors import Model
+
+    (windows,) = gather([found], advance, anyway, Model(ship=craft))
+    return windows.smoothed
+
+
+def _seconds(s: "Smoothed") -> float:
+    return float(s.track.run.time[-1] - s.track.run.time[0])
+
+
+def _blanks(proposals: Iterable["Proposal"]) -> Iterator[str]:
+    """For each blank name its likely columns, by the measurement that shows the most."""
+    found: dict[str, Sequence[LikelyColumn]] = {}
+    for each in proposals:
+        for signal, likely in each.likely.items():
+            before = found.setdefault(signal, likely)
+            if sum(c.score for c in likely) > sum(c.score for c in before):
+                found[signal] = likely
+    for signal, likely in found.items():
+        each = "; ".join(f"'{c.name}' ({', '.join(c.reasons)})" for c in likely)
+        yield f"blank: {signal}; likely columns: {each or 'none'}"
+
+
+def _stated(target: Path, content: Mapping[str, Any], write: bool) -> list[RenderableType]:
+    """The content of a file, which is written if it should be."""
+    text = json.dumps(content, indent=2, ensure_ascii=False)
+    if write:
+        with together(target.parent, (target.name,)) as new:
+            (new / target.name).write_text(f"{text}\n", encoding="utf-8")
+    head = f"written into '{target}':" if write else f"--write puts this into '{target}':"
+    return [printable(head), text]
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "diagnosis.propose_columns",
-        "Look at a measurement, and propose the JSON file beside it: names, units, "
-        "separator, decimal mark, lines before the names, encoding.",
+        "Look at measurements, and propose the JSON file beside them: names, units, "
+        "separator, decimal mark, lines before the names, encoding. What a JSON file there states is "
+        "kept. A signal of which no column is known gets a blank name, and likely columns are listed.",
         "examples:  %(prog)s my.csv\n"
         "           %(prog)s my.csv --ship otter --write\n"
+        "           %(prog)s folder/* --ship my_ship.toml --write\n"
         "exit codes: 0 done, 2 bad input (nothing is written), 130 interrupted (nothing is written)",
     )
-    parser.add_argument("file", metavar="FILE", type=Path, help="CSV or Parquet file")
+    parser.add_argument(
+        "file",
+        metavar="FILE",
+        type=Path,
+        nargs="+",
+        help="CSV or Parquet file; for several of a folder one JSON file holds, and they are tabulated",
+    )
     ship_option(parser)
-    parser.add_argument("--write", action="store_true", help="write it, as FILE.json")
+    parser.add_argument(
+        "--write", action="store_true", help="write it, as FILE.json; for several, as columns.json"
+    )
     parser.add_argument("--overwrite", action="store_true", help="also over one that is there")
     anyway_option(parser)
     return parser

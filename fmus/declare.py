@@ -86,11 +86,17 @@ class Known:
         group: a name for all coefficients of its kind, such as ``mass`` or ``damping``.
         origin: how the value was found.
         share: standard deviation, as a share of the value.
+        std: the same in the value's unit, which then holds for any value; 0: the share holds.
     """
 
     group: str
     origin: str
     share: float
+    std: float = 0.0
+
+    def deviation(self, value: float) -> float:
+        """Standard deviation of a value, in its unit."""
+        return self.std or abs(value) * self.share
 
 
 @dataclass(frozen=True)

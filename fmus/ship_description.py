@@ -22,21 +22,27 @@ class Value(NamedTuple):
         value: in the parameter's unit.
         origin: where it comes from: weighed, tank test, borrowed, guessed, or a publication.
         share: standard deviation, as a share of the value.
+        std: the same in the parameter's unit, where a file states that; 0: the share holds.
     """
 
     name: str
     value: float
     origin: str
     share: float
+    std: float = 0.0
+
+    def known(self, group: str) -> Known:
+        """Where it comes from, for the declaration of a parameter of some group."""
+        return Known(group, self.origin, self.share, self.std)
 
     def of(self, v: Variable, group: str) -> Variable:
         """The declaration of a parameter that starts at this value.
 
-        A zero stays zero; one of stated origin is a coefficient where another model of the ship has it.
+        A zero without a standard deviation stays zero; one of stated origin is a coefficient where
+        another model of the ship has it.
         """
-        stated = self.value != 0.0 or self.origin != GUESSED
-        known = Known(group, self.origin, self.share) if stated else None
-        return replace(v, start=self.value, known=known)
+        stated = self.value != 0.0 or self.std or self.origin != GUESSED
+        return replace(v, start=self.value, known=self.known(group) if stated else None)
 
 
 class Part(NamedTuple):

@@ -499,7 +499,6 @@ class TestColumns:
     @pytest.mark.parametrize(
         ("content", "message"),
         [
-            ("time,north,east,speed\n0,0,0,1\n1,0,1,1\n", "has no commands"),
             (
                 "time,x [fathom],y,psi,tau_X\n0,0,0,0,1\n1,0,1,1,1\n",
                 "column 'x [fathom]': 'fathom' is not a unit of x",
@@ -514,6 +513,16 @@ class TestColumns:
         done = command(propose_columns.main, tmp_path / "a.csv", "--write")
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
         assert message in done.stderr
+
+    def test_signals_without_a_known_column_are_blank(self, tmp_path):
+        (tmp_path / "a.csv").write_text("time,north,east,speed\n0,0,0,1\n1,0,1,1\n")
+        done = command(propose_columns.main, tmp_path / "a.csv", "--write")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "no column is known for psi, tau_X, tau_Y, tau_N" in " ".join(done.stdout.split())
+        told = json.loads((tmp_path / "a.csv.json").read_text())["columns"]
+        assert told == {"x": "north", "y": "east"} | dict.fromkeys(
+            ("psi", "tau_X", "tau_Y", "tau_N"), ""
+        )
 
     def test_lines_before_names_that_nobody_knows_are_told(self, tmp_path):
         """The hint about ``skip`` needs no name: the line of the names is the one above the numbers."""

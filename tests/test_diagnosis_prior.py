@@ -40,6 +40,41 @@ def test_a_zero_of_stated_origin_is_a_coefficient_of_a_model_that_has_it():
     assert "Y_rdot" not in OTTER.ship.coefficients, "a plain zero is nobody's"
 
 
+def raft(folder, inertia="", actuator=""):
+    """A model of a raft of one propeller, with further lines of its file."""
+    path = folder / "raft.toml"
+    path.write_text(
+        f"""name = "raft"\ntitle = "the raft"\nlength = 2.0\nbeam = 1.0
+[inertia]\nm = 50.0\nI_z = 20.0\n{inertia}
+[[actuators]]\nname = "stern"\nlaw = "fixed_propeller"\n{actuator}
+"""
+    )
+    return Model(ship=ship(description=read_ship(path)))
+
+
+def test_a_zero_with_a_standard_deviation_is_as_uncertain_as_that_and_a_plain_one_stays(tmp_path):
+    at_sea = raft(tmp_path, "x_g = { value = 0.0, std = 0.05 }", "y = { value = 0, std = 0.02 }")
+    for most in (np.inf, MEASURED):
+        prior = NominalPrior.of(at_sea, most=most)
+        assert [prior.mean["x_g"], prior.std["x_g"]] == [0.0, 0.05]
+        assert [prior.mean["plant_stern_y"], prior.std["plant_stern_y"]] == [0.0, 0.02]
+    moved = RefinedModel(at_sea, 2.0 * np.array([n == "x_g" for n in prior.mean])).model(prior)
+    assert moved.value("x_g") == 0.1
+    assert moved.value("plant_stern_y") == 0.0
+    assert "x_g" not in NominalPrior.of(at_sea, 0.1).mean, "a relative one of a zero is none"
+    assert (
+        not {"x_g", "plant_stern_y"}
+        & NominalPrior.of(raft(tmp_path, "x_g = 0.0", "y = 0.0")).mean.keys()
+    )
+
+
+def test_a_standard_deviation_holds_for_the_value_of_another_model_and_a_share_goes_with_it(tmp_path):
+    model = raft(tmp_path, "x_g = { value = 0.2, std = 0.05 }\nX_udot = { value = -5.0, share = 0.1 }")
+    prior = NominalPrior.of(model.plus({"x_g": 0.2, "X_udot": -5.0}))
+    assert [prior.std["x_g"], prior.std["X_udot"]] == [0.05, 1.0]
+    assert NominalPrior.of(model, most=MEASURED).std["x_g"] == pytest.approx(0.02)
+
+
 def test_what_was_weighed_is_known_better_than_what_was_borrowed():
     found = std()
     assert found["m"] < found["X_u"] < found["N_r"]

@@ -26,6 +26,7 @@ from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import lower_throughout, worse
 from diagnosis.verdict.confidence import confidence_of, probability
 from diagnosis.verdict.judging import verdict_name, with_confidence
@@ -242,7 +243,8 @@ def test_what_is_at_the_limit_of_what_was_looked_for_is_withdrawn_and_a_whole_sh
     )
     assert bool(kept.effects) == stays
     assert [w.id for w in gone] == ([] if stays else ["mass"])
-    assert stays or "limit of what was looked for" in gone[0].reason
+    text = "mass = 99 kg is at the upper limit of what was looked for, 100 kg (a ship of 113.8 kg: weigh it)"
+    assert stays or gone[0].reason == text
 
 
 def test_less_dissipation_needs_unseen_data_that_show_it():
@@ -431,6 +433,20 @@ def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     seen = confidence_of(f, start)
     assert (seen.own == 0.99) == is_finding
     assert ("limit of what was looked for" in seen.doubt) != is_finding
+
+
+@pytest.mark.parametrize(
+    ("effect", "value", "text"),
+    [
+        ("mass", -9.8, "mass = -9.8 kg is at the lower limit of what was looked for, -10 kg (a ship of 4.99 kg: weigh it)"),
+        ("mass", 99.0, "mass = 99 kg is at the upper limit of what was looked for, 100 kg (a ship of 113.8 kg: weigh it)"),
+        ("loss_surge", 0.98, "loss_surge = 0.98 is at the upper limit of what was looked for, 1"),
+        ("added_mass_Y", -9.8, "added_mass_Y = -9.8 kg is at the lower limit of what was looked for, -10 kg"),
+        ("mass", 90.0, ""),
+    ],
+)  # fmt: skip
+def test_a_value_at_its_limit_is_reported_with_the_limit_and_what_to_measure(effect, value, text):
+    assert " and ".join(map(str, at_limit(Model(), effect, {effect: value}))) == text
 
 
 @pytest.mark.parametrize(("interval", "sure"), [((-0.01, 0.05), False), ((0.01, 0.05), True)])

@@ -75,7 +75,7 @@ POSSIBILITIES = [effect("unlikely", 0.2, in_model=False, doubt="something acts")
 RANKING = [ranked(name, 12.3456 * k) for k, name in enumerate(("sure", "b", "c", "d", "e", "f"))]
 FOUND = {
     "verdict": "ambiguous",
-    "learned": learned(RANKING, [("N_r", -4.234, -2.3456)]),
+    "learned": learned(RANKING, [("N_r", -4.234, -2.3456), ("m", 3.5, 15.3)]),
     "withdrawn": [SimpleNamespace(id="gone", reason="worse on held-out runs")],
     "posterior": SimpleNamespace(together=[["N_r", "Y_r"], ["m", "X_u"]]),
 }
@@ -160,6 +160,7 @@ Withdrawn
 gone: worse on held-out runs
 Suspect coefficients
 N_r is rather -2.35 (-4.2 standard deviations of the prior)
+m is rather 15.3 (3.5 standard deviations of the prior), in kg: weigh the ship
 How sure the values are
 No unrecorded force.
 Known only together: N_r, Y_r.

@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from support.command import command
 from support.project import ROOT
 
+from diagnosis import propose_columns
 from fmus.actuators.law import Law
 from fmus.build import build
 from fmus.build.__main__ import main
@@ -19,7 +21,8 @@ from fmus.effects.text import Found
 from fmus.hull_functions import FUNCTIONS
 from fmus.ship import ship
 from fmus.ships.__main__ import main as schema_main
-from fmus.ships.ship_file import Term, read_ship, shipped_ships
+from fmus.ships.ship_file import Term, find_ship, read_ship, shipped_ships
+from fmus.ships.ship_warning import ShipWarning
 
 RIGHT = """
 name = "raft"
@@ -62,7 +65,7 @@ def test_the_right_file_is_read(tmp_path: Path) -> None:
     raft = read_ship(written(tmp_path, RIGHT))
     assert [a.name for a in raft.actuators] == ["port", "starboard"]
     m, I_z, _ = raft.inertia
-    assert (m.origin, m.share) == ("weighed", 0.01)
+    assert (m.origin, m.share, m.std) == ("weighed", 0.01, 0.5)
     assert (I_z.origin, I_z.share) == ("guessed", 0.5)
     assert ship(description=raft).vessel.params().inertia.Y_vdot == 0.0  # not that of another ship
 
@@ -120,6 +123,87 @@ CHANGES = [
     ('name = "port"', 'name = "plant_starboard"', "thrusters declares plant_starboard_"),
     ('name = "port"\nlaw = "fixed_propeller"', 'name = "tau"\nlaw = "given_force"', "tau_X"),
 ]  # fmt: skip
+
+
+# What is changed in the file -> line and beginning of the warning.
+DOUBTS = [
+    ("value = -10.0", "value = 10.0", 13, "X_u = 10 N.s/m drives the ship on at 0.0044 m/s in surge"),
+    (
+        "share = 0.2 }]", 'share = 0.2 },\n  { axis = "X", product = "|u|u", value = 1.0 }]', 14,
+        "X_absu_u = 1 N.s2/m2 drives the ship on at 14 m/s in surge",
+    ),
+    (
+        "share = 0.2 }]", 'share = 0.2 },\n  { axis = "N", product = "r", value = 1.0 }]', 14,
+        "N_r = 1 N.m.s/rad drives the ship on at 0.0022 rad/s in yaw",
+    ),
+    (
+        "share = 0.2 }]", 'share = 0.2 }, { axis = "Y", product = "vvv", value = 1.0 }]', 13,
+        "Y_vvv = 1 N.s3/m3 drives the ship on at 0.0044 m/s in sway",
+    ),
+    (
+        "share = 0.2 }]", 'share = 0.2 }]\n[hull.functions.resistance]\ndrag_ahead = -0.1', 14,
+        "resistance drives the ship on at 0.89 m/s in surge",
+    ),
+    ("X_udot = -5.0", "X_udot = 5.0", 10, "X_udot = 5 kg is positive"),
+    ("X_udot = -5.0", "Y_vdot = 5.0", 10, "Y_vdot = 5 kg is positive"),
+    ("X_udot = -5.0", "N_rdot = 0.5", 10, "N_rdot = 0.5 kg.m2 is positive"),
+    ("y = -0.4", "y = -40.0", 21, "actuator 'port' is at y = -40 m, outside of the outline, -0.5 to 0.5 m"),
+    ("y = 0.4", "y = 0.4\nx = -1.2", 28, "actuator 'starboard' is at x = -1.2 m, outside of the outline"),
+    ("value = 50.0", "value = 500.0", 8, "m = 500 kg is more than a box of length x beam x draft, 2 m x 1 m x 0.1 m"),
+]  # fmt: skip
+# What a ship may have: damping that resists at all speeds with a coefficient of either sign, an outboard motor.
+SOUND = [
+    ("share = 0.2 }]", """share = 0.2 }, { axis = "X", product = "|u|u", value = 1.0 },
+        { axis = "X", product = "uuu", value = -1.0 }]"""),
+    ("share = 0.2 }]", 'share = 0.2 }, { axis = "N", product = "v", value = 9.0 }]'),
+    ("X_udot = -5.0", "X_udot = -5.0\nY_rdot = 1.0"),
+    ("y = -0.4", "y = -0.4\nx = -1.05"),
+    ("value = 50.0", "value = 200.0"),
+]  # fmt: skip
+
+
+def doubted(folder: Path, old: str, new: str) -> list[str]:
+    """Warnings of a changed file."""
+    text = RIGHT.replace("[inertia]", "draft = 0.1\n[inertia]", 1).lstrip()
+    assert old in text
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        read_ship(written(folder, text.replace(old, new, 1)))
+    assert all(w.category is ShipWarning for w in found)
+    return [str(w.message) for w in found]
+
+
+@pytest.mark.parametrize(("old", "new", "line", "says"), DOUBTS)
+def test_a_number_that_no_ship_has_is_a_warning_with_its_line(
+    old: str, new: str, line: int, says: str, tmp_path: Path
+) -> None:
+    (text,) = doubted(tmp_path, old, new)
+    assert text.startswith(f"'{tmp_path / 'raft.toml'}', line {line}: {says}")
+
+
+@pytest.mark.parametrize(("old", "new"), SOUND)
+def test_what_a_ship_may_have_is_no_warning(old: str, new: str, tmp_path: Path) -> None:
+    assert doubted(tmp_path, old, new) == []
+
+
+@pytest.mark.parametrize("name", shipped_ships())
+def test_no_shipped_ship_has_a_warning(name: str, tmp_path: Path) -> None:
+    (tmp_path / "copy.toml").write_bytes(find_ship(name).read_bytes())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_ship(tmp_path / "copy.toml")
+
+
+def test_a_command_shows_a_warning_once_and_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    path = written(tmp_path, RIGHT.replace("X_udot = -5.0", "X_udot = 5.0"))
+    done = command(main, "--list", "vessel", "--ship", path)
+    assert done.returncode == 0
+    assert done.stderr.count("X_udot = 5 kg is positive") == 1
+    assert done.stderr.startswith(f"note: '{path}', line 10: ")
+    other = written(tmp_path / "other", RIGHT.replace("X_udot = -5.0", "X_udot = 6.0"))
+    done = command(propose_columns.main, tmp_path / "none.csv", "--ship", other)
+    assert done.stderr.count("warning: ") == done.stderr.count("X_udot = 6 kg is positive") == 1
 
 
 @pytest.mark.parametrize(("old", "new", "says"), CHANGES)

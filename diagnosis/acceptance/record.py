@@ -19,6 +19,7 @@ from cosim import InputError
 from ..execution.result_folder import together
 from ..predictors import ship_name
 from ..report.content import Content, fmu_result, part, sensor_results, versions
+from ..runs import side_cars
 from ..session import Comparison
 from .budget import Budget, Learned, read_learned, sources_of
 from .criterion import JUDGED, ReadCriteria, now, read_criteria
@@ -152,8 +153,7 @@ def _data(comparison: Comparison) -> Iterator[dict[str, str]]:
     for e in comparison.evaluations:
         if (path := e.weak_windows.run.file) is not None:
             yield entry("data", path)
-            beside = path.with_name(f"{path.name}.json")
-            if path.is_file() and beside.is_file():
+            for beside in side_cars(path) if path.is_file() else ():
                 yield entry("layout of data", beside)
 
 

@@ -5,6 +5,7 @@ import io
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +17,7 @@ from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_na
 from cosim.interrupts import Held
 from cybership.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
+from fmus.ships.ship_warning import ship_warnings_to
 
 from ..execution.progress import Advance, progress
 from ..execution.result_folder import clean, default_folder, keep_inputs, sha256
@@ -190,7 +192,7 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
             if options.out is None:
                 inputs = inputs_of(options)
                 options.out = default_folder(options.usual, inputs, options.overwrite)
-            with progress(errors) as advance:
+            with progress(errors) as advance, ship_warnings_to(partial(complain, kind="warning: ")):
                 done = work(options, advance)
         except InputError as error:
             complain(error)

@@ -17,6 +17,7 @@ from .headline import boundedness, headline, surest_first, told, verdict_title
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
 
+WEIGH = ", in kg: weigh the ship"  # behind a mass beyond its prior
 ASCII = str.maketrans("−–", "--")  # for any terminal
 
 
@@ -45,6 +46,7 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     if d.learned.suspects:
         suspects = [
             f"{s.name} is rather {_number(s.value)} ({_number(s.z, 2)} standard deviations of the prior)"
+            f"{WEIGH * (s.name == 'm')}"
             for s in d.learned.suspects
         ]
         yield from _lines("Suspect coefficients", suspects)

@@ -29,18 +29,22 @@ Prior = float | Mapping[str, float] | None
 MEASURED = 0.1
 
 
-def shares(ship: Ship, prior: Prior, most: float = inf) -> dict[str, float]:
-    """The relative standard deviation of each nominal coefficient.
+def shares(ship: Ship, prior: Prior) -> dict[str, float]:
+    """The relative standard deviation of each nominal coefficient that is not zero.
 
     Args:
         ship: its components declare what is known of each.
         prior: one for all, of which masses and thrusters have :data:`MEASURED` at the most; or of groups
             and single coefficients, where the single one counts. What is not named is as the ship says.
-        most: of those that are as the ship says.
 
     Raises:
         InputError: a name that is none, or a number that is negative or not finite.
     """
+    return {n: k.share for n, k in ship.coefficients.items()} | _given(ship, prior)
+
+
+def _given(ship: Ship, prior: Prior) -> dict[str, float]:
+    """The same, of those alone for which the prior gives one."""
     known = ship.coefficients
     given = prior if isinstance(prior, Mapping) else {}
     names = [*known, *dict.fromkeys(k.group for k in known.values())]
@@ -52,7 +56,8 @@ def shares(ship: Ship, prior: Prior, most: float = inf) -> dict[str, float]:
             raise InputError(f"the prior must be zero or more, not {share:g}")
     if isinstance(prior, float | int):
         return {n: prior if k.group == "damping" else min(prior, MEASURED) for n, k in known.items()}
-    return {n: given.get(n, given.get(k.group, min(k.share, most))) for n, k in known.items()}
+    named = {n: given.get(n, given.get(k.group)) for n, k in known.items()}
+    return {n: share for n, share in named.items() if share is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +74,26 @@ class NominalPrior:
 
     @classmethod
     def of(cls, model: Model, prior: Prior = None, most: float = inf) -> "NominalPrior":
-        """The prior about a model; arguments and errors as of :func:`shares`."""
-        share = shares(model.ship, prior, most)
-        mean = {name: value for name in share if (value := model.value(name)) != 0.0}
-        return cls(mean, {name: abs(value) * share[name] for name, value in mean.items()})
+        """The prior about a model.
+
+        Args:
+            model: its values are the means.
+            prior: see :func:`shares`.
+            most: relative standard deviation, at the most, of those that are as the ship says.
+
+        Raises:
+            InputError: see :func:`shares`.
+        """
+        given, mean, std = _given(model.ship, prior), {}, {}
+        for name, known in model.ship.coefficients.items():
+            value = model.value(name)
+            if name in given:
+                own = abs(value) * given[name]
+            else:  # a zero has no relative one
+                own = min(known.deviation(value), most * abs(value) if value else inf)
+            if value or own:
+                mean[name], std[name] = value, own
+        return cls(mean, std)
 
     @property
     def size(self) -> int:

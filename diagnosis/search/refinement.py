@@ -8,6 +8,7 @@ slope: they are found by segmentation, anew at each fit of all else.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -125,19 +126,45 @@ def bounded(start: Model, name: str, addition: float) -> float:
     return min(max(addition, low - present), high - present)
 
 
-def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[str]:
-    """Parameters of an effect with a value at a limit of their range, which the data did not choose.
+class ValueAtLimit(NamedTuple):
+    """A value of an effect at an end of its range.
+
+    Attributes:
+        name: of the parameter.
+        value: in the parameter's unit.
+        limit: the end of the range.
+        is_upper: whether that is the upper end.
+        unit: of both.
+        measured: what to measure in place of estimating it, as a part of a sentence; empty: not known.
+    """
+
+    name: str
+    value: float
+    limit: float
+    is_upper: bool
+    unit: str
+    measured: str = ""
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit != "1" else ""
+        end = f"{'upper' if self.is_upper else 'lower'} limit of what was looked for"
+        measured = f" ({self.measured})" if self.measured else ""
+        return f"{self.name} = {self.value:.4g}{unit} is at the {end}, {self.limit:.4g}{unit}{measured}"
+
+
+def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[ValueAtLimit]:
+    """Values of an effect at a limit of their range, which the data did not choose.
 
     A limit of zero is where an effect begins. The nodes of a free curve are not values of their own.
     """
-    if start.ship.effects[effect].search.smooth:
-        return []
-
-    def at(name: str) -> bool:
-        ends, value = limits(start.declared(name)), start.value(name) + additions[name]
-        return any(0.0 < abs(x) < np.inf and abs(value - x) <= NEAR_LIMIT * abs(x) for x in ends)
-
-    return [name for name in additions if at(name)]
+    e, found = start.ship.effects[effect], []
+    for name, addition in additions.items() if not e.search.smooth else ():
+        declared, value = start.declared(name), start.value(name) + addition
+        for is_upper, end in enumerate(limits(declared)):
+            if 0.0 < abs(end) < np.inf and abs(value - end) <= NEAR_LIMIT * abs(end):
+                measured = e.wording.measured(value, start.value) if e.wording.measured else ""
+                found.append(ValueAtLimit(name, value, end, bool(is_upper), declared.unit, measured))
+    return found
 
 
 def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:

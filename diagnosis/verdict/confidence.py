@@ -27,7 +27,6 @@ FOUND = 0.8  # confidence from which on an effect is found; contract
 # Confidence at the most where an unknown alternative is as likely as the effect; that of a set of
 # effects from which on the set is a finding, and not only a possibility; contract.
 EVEN_ODDS = 0.5
-AT_LIMIT = "{0} is at the limit of what was looked for"
 MAY_BE_NONE = "by the intervals of its values it may be nothing"
 MAY_BE_LAGS = (
     "actuators that are faster than described, or commands that are measured states, look the same"
@@ -77,7 +76,7 @@ def confidence_of(
     if f.evidence is not None and f.set_evidence is not None:
         own, of_set = probability(f.evidence), probability(f.set_evidence)
     if limits := at_limit(start, f.id, f.values):
-        return Confidence(0.0, 0.0, AT_LIMIT.format(" and ".join(limits)))
+        return Confidence(0.0, 0.0, " and ".join(map(str, limits)))
     doubt = ""
     if own > EVEN_ODDS and _may_be_none(f):
         own, doubt = EVEN_ODDS, MAY_BE_NONE

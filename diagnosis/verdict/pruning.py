@@ -12,7 +12,6 @@ from ..predictors import Model
 from ..search.findings import Finding, Findings
 from ..search.refinement import at_limit
 from ..search.significance import lower_throughout
-from .confidence import AT_LIMIT
 from .paired_errors import gain
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
@@ -99,9 +98,9 @@ def _at_limit(found: Findings, ids: Collection[str], start: Model) -> Withdrawn 
     A share may well be all there is, as of a force that is lost; other ranges end where nobody looked.
     """
     for f in found.effects:
-        names = at_limit(start, f.id, f.values) if f.id in ids else []
-        if names := [n for n in names if start.declared(n).unit != "1"]:
-            return Withdrawn(f.id, AT_LIMIT.format(" and ".join(names)))
+        values = at_limit(start, f.id, f.values) if f.id in ids else []
+        if texts := [str(x) for x in values if x.unit != "1"]:
+            return Withdrawn(f.id, " and ".join(texts))
     return None
 
 

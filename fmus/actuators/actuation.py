@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import cache
 
-from ..declare import POSITIVE, Fields, Known, Range, Variable, group_of, variables
+from ..declare import POSITIVE, Fields, Range, Variable, group_of, variables
 from ..effects import Thrust
 from ..hull import Triple
 from ..ops import Number, clip, wrap
@@ -106,9 +106,9 @@ def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type
         if v.name in given:
             value = given[v.name]
             start = value.value
-            fits = start != 0.0 and value.share > 0.0 and v.name not in a.law.limiting
+            fits = (value.std or (start and value.share)) and v.name not in a.law.limiting
             if known and fits:
-                fit = Known("place" if v.name in ("x", "y") else "thrust", value.origin, value.share)
+                fit = value.known("place" if v.name in ("x", "y") else "thrust")
         text = f"{title}: {v.description}"
         called = ship.called(f"{prefix}{name}_{v.name}")
         # The allocation divides by a full force; a real one may be lost.

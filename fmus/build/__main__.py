@@ -22,6 +22,7 @@ from ..interruption import program, run_interruptible
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ships.naming import described_ship
+from ..ships.ship_warning import ship_warnings_to
 from . import ledger
 from .building import build, came_compiled, export
 from .cached_fmu import cache_folder
@@ -104,7 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sweep()
     try:
         effects = plus_files(STANDARD, options.effects)
-        ship = described_ship(options.ship)
+        with ship_warnings_to(_note):
+            ship = described_ship(options.ship)
         if options.verify:
             _verify(options.names)
         elif options.list:

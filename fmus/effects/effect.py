@@ -206,12 +206,15 @@ class Wording:
         family: effects of a kind, with the manoeuvre that brings them out.
         apart: id of another effect -> what to run so that the two can be told apart.
         pictures: curves to draw.
+        measured: what to measure in place of estimating a value, as a part of a sentence, from that
+            value and a function of names that gives the model's parameters.
     """
 
     sentence: Callable[[Any], str] | None = None
     family: Family = UNKNOWN
     apart: Mapping[str, str] = field(default_factory=dict)
     pictures: tuple[Picture, ...] = ()
+    measured: Callable[[float, Callable[[str], float]], str] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,6 +42,7 @@ def water_sentence(name: str, how: str, unit: str) -> Callable[[Found], str]:
             "than the model believes."
         ),
         INERTIA,
+        measured=lambda more, model: f"a ship of {model('m') + more:.4g} kg: weigh it",
     ),
 )
 def mass(

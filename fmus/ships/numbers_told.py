@@ -39,8 +39,6 @@ class Number(StrictTable):
             raise ValueError("a number has value or prime")
         if self.std is not None and self.share is not None:
             raise ValueError("a number has std or share, not both")
-        if self.std is not None and 0.0 in (self.value, self.prime):
-            raise ValueError("a number that is 0 has no std: it stays as it is")
         return self
 
     def named(self, name: str, unit: str, of: "Prime | None") -> Value:
@@ -56,10 +54,8 @@ class Number(StrictTable):
         """
         size = 1.0 if self.prime is None else _size(name, unit, of)
         value = size * (self.prime or self.value or 0.0)
-        share = 0.5 if self.share is None else self.share
-        if self.std is not None:
-            share = size * self.std / abs(value)
-        return Value(name, value, self.origin, share)
+        share, std = 0.5 if self.share is None else self.share, size * (self.std or 0.0)
+        return Value(name, value, self.origin, std / abs(value) if std and value else share, std)
 
 
 class Prime(NamedTuple):

@@ -1,6 +1,7 @@
 """Reads the description of a ship: a TOML file, checked as a whole before anything is made of it."""
 
 import keyword
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -28,6 +29,8 @@ from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
 from .hull_errors import WIND_SETTINGS
 from .numbers_told import Finite, Given, Number, Prime, StrictTable, Term, valued
+from .ship_doubts import doubts, line_of
+from .ship_warning import ShipWarning
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
@@ -71,6 +74,9 @@ class ShipTable(StrictTable):
     source: str = ""
     length: Annotated[Finite, Field(gt=0.01, lt=1000.0, description="L_pp [m]")]
     beam: Annotated[Finite, Field(gt=0.001, lt=200.0, description="[m]")]
+    draft: Annotated[Finite, Field(gt=0.0, lt=100.0)] | None = Field(
+        None, description="[m], of the box that the mass is compared with"
+    )
     outline: list[tuple[Finite, Finite]] = Field(
         [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
     )
@@ -145,9 +151,19 @@ def _read(path: Path, _changed: int) -> Description:
     except ValidationError as error:
         raise DeclarationError(f"'{path}': {_told(error)}") from None
     try:
-        return _description(table)
+        found = _description(table)
     except DeclarationError as error:
         raise DeclarationError(f"'{path}': {brief(str(error))}") from None
+    _warn(path, found, table.draft or (table.prime and table.prime.draft))
+    return found
+
+
+def _warn(path: Path, ship: Description, draft: float | None) -> None:
+    """Warn of each number that no ship has, with its line."""
+    for doubt in doubts(ship, draft):
+        line = line_of(doubt, path.read_text(encoding="utf-8"))
+        where = f"'{path}'" if line is None else f"'{path}', line {line}"
+        warnings.warn(ShipWarning(f"{where}: {doubt.text}"), stacklevel=2)
 
 
 def _toml(path: Path) -> Any:

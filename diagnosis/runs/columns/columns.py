@@ -13,7 +13,8 @@ called, in which unit it is, and how its axis lies::
         },
     }
 
-Columns that it does not name keep their names and SI units. What each signal means:
+Columns that it does not name keep their names and SI units. ``columns.json`` in a folder says the same
+of all files there, and the file beside a measurement goes over it. What each signal means:
 docs/measurements.md.
 """
 
@@ -46,6 +47,7 @@ from fmus.ship import Ship
 
 from .unit_check import UNITS
 
+FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
 PREAMBLE = 1000  # lines; chosen: far more than any file has before its names
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
@@ -231,15 +233,48 @@ def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
         return (factor * values + column.offset) * units.get(column.unit or "", 1.0)
 
 
+def beside(path: Path) -> Path:
+    """The JSON file of a measurement alone."""
+    return path.with_name(f"{path.name}.json")
+
+
+def side_cars(path: Path) -> list[Path]:
+    """The JSON files that say how to read a measurement: that of its folder, then its own."""
+    return [file for file in (path.with_name(FOLDER_FILE), beside(path)) if file.is_file()]
+
+
 def read_layout(path: Path) -> Layout | None:
-    """What the JSON file beside a measurement says; None if there is none.
+    """What the JSON file beside a measurement says, and that of its folder; None if there is neither.
 
     Raises:
-        InputError: it is not as it should be.
+        InputError: one is not as it should be, or leaves a name blank.
     """
-    beside = path.with_name(path.name + ".json")
-    if not beside.is_file():
+    found = stated_layout(path)
+    blank = next((s for s, c in found.columns.items() if not c.name.strip()), None) if found else None
+    if blank is not None:
+        *_, file = (f for f in side_cars(path) if blank in _layout_in(f).columns)
+        raise InputError(
+            f"'{file}': columns.{blank} is blank; put the name of its column there "
+            f"(cybership columns '{path}' lists likely ones), or delete the entry"
+        )
+    return found
+
+
+def stated_layout(path: Path) -> Layout | None:
+    """The same, in which names may be blank.
+
+    Raises:
+        InputError: one is not as it should be.
+    """
+    found = [_layout_in(file).model_dump(exclude_unset=True) for file in side_cars(path)]
+    if not found:
         return None
+    columns = {s: c for layout in found for s, c in layout.get("columns", {}).items()}
+    stated = {key: value for layout in found for key, value in layout.items()}
+    return Layout.model_validate(stated | {"columns": columns})
+
+
+def _layout_in(beside: Path) -> Layout:
     try:
         return Layout.model_validate(json.loads(beside.read_text(encoding="utf-8")))
     except ValidationError as error:
@@ -269,9 +304,8 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
     Raises:
         InputError: a column is missing, or there twice.
     """
-    own = [tuple(form) for form in of.command_forms]
-    every = (TAU, *own) if of.fully_actuated else (*own, TAU)
-    groups: list[tuple[str, ...]] = [g for g in every if any(layout.column(s).name in names for s in g)]
+    every = _forms(of)
+    groups = [g for g in every if any(layout.column(s).name in names for s in g)]
     known = quantities(of)
     strange = next((signal for signal in layout.columns if signal not in known), None)
     if strange:
@@ -284,7 +318,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
             f"if they have other names, put {told} into a file of the same name with .json behind it"
         )
     power = of.power_settings
-    if own[-1] in groups and any(layout.column(s).name in names for s in power):
+    if tuple(of.command_forms[-1]) in groups and any(layout.column(s).name in names for s in power):
         groups.append(power)
     wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g]])
     named: Collection[str] = ()
@@ -303,6 +337,27 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
             meant = f" (for {signal})" if name != signal else ""
             raise InputError(f"{where} has no column '{name}'{meant}{nearest(name, names)}")
     return list(wanted)
+
+
+def missing(layout: Layout, names: Sequence[str], of: Ship) -> list[str]:
+    """Signals that a run must have, and of which no column is known.
+
+    Args:
+        layout: which column is which signal.
+        names: columns of the file.
+        of: the ship that was measured.
+    """
+    every = _forms(of)
+    there = [g for g in every if any(layout.column(s).name in names for s in g)]
+    # Of forces that are there, those on other axes are taken as zero.
+    needed = [s for g in there if g != TAU for s in g] if there else every[0]
+    return [s for s in ("time", *POSE, *needed) if layout.column(s).name not in names]
+
+
+def _forms(of: Ship) -> list[tuple[str, ...]]:
+    """Forms of a ship's commands, the one that is meant where there is none first."""
+    own = [tuple(form) for form in of.command_forms]
+    return [TAU, *own] if of.fully_actuated else [*own, TAU]
 
 
 def _named_so(signal: str, names: Sequence[str]) -> bool:

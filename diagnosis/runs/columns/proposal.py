@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..cleaning import in_order, lost, repeated
 from ..files.reading import Run, column_names, read
+from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from .columns import (
+    POSE,
     QUANTITY,
     UNITS,
     UTF_8,
@@ -22,10 +25,14 @@ from .columns import (
     Column,
     Layout,
     log_of,
+    missing,
     no_unit,
     quantities,
     signals,
+    stated_layout,
+    to_si,
 )
+from .likely_columns import LikelyColumn, likely_columns, meaning_of_words, motion_of
 from .unit_check import OFTENEST, RAREST, doubts, likely_unit
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
@@ -81,58 +88,74 @@ class Proposal(NamedTuple):
     """How a measurement seems to be meant.
 
     Attributes:
-        layout: the content of the file beside it.
+        layout: the content of the file beside it, what is stated there kept; names of signals of which
+            no column is known are blank.
         unused: names of columns that are no signals, as far as is known.
-        run: the measurement, read so.
+        run: the measurement, read so; None where a name is blank.
+        likely: signal of a blank name -> columns that may be its own, the likeliest first.
     """
 
     layout: Layout
     unused: Sequence[str]
-    run: Run
+    run: Run | None
+    likely: Mapping[str, Sequence[LikelyColumn]] = {}
 
     @property
     def needed(self) -> dict[str, Any]:
         """What has to be stated, as JSON holds it; a log of this project needs nothing."""
         if self.layout.column("x") == log_of(()).column("x"):
             return {}
-        told = self.layout.model_dump(exclude_defaults=True)
-        for signal, column in told.get("columns", {}).items():
-            told["columns"][signal] = column["name"] if column.keys() == {"name"} else column
-        return told
+        return as_json(self.layout)
+
+
+def as_json(layout: Layout) -> dict[str, Any]:
+    """The content of the file beside a measurement, without what need not be said."""
+    told = layout.model_dump(exclude_defaults=True)
+    for signal, column in told.get("columns", {}).items():
+        told["columns"][signal] = column["name"] if column.keys() == {"name"} else column
+    return told
 
 
 def propose(path: Path, of: Ship | None = None) -> Proposal:
     """Look at a file: its text, its names and units, and at the numbers where units are not told.
 
     Args:
-        path: a CSV or Parquet file; what is told beside it does not count.
+        path: a CSV or Parquet file; what is stated beside it stands.
         of: the ship that was measured; None: the default ship.
 
     Raises:
-        InputError: no such file, no table of numbers below names, a unit that is not known, or a signal
-            without a column.
+        InputError: no such file, no table of numbers below names, a unit that is not known, or a file
+            beside it that does not fit.
     """
     of = of or ship()
     quantity = quantities(of)
     if path.suffix not in (".csv", ".parquet") or path.is_dir():
         raise InputError(f"'{path}' is not a CSV or Parquet file, whose columns have names")
-    text = Layout()
+    stated, text = stated_layout(path) or Layout(), Layout()
     if path.is_file() and path.suffix == ".csv":
-        encoding = _encoding(path)
+        encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)
         if found is None:
             raise InputError(f"'{path}' has no table of numbers below a line of names")
         text = found.model_copy(update={"encoding": encoding})
     elif not path.is_file():
-        read(path, of=of)  # says so
+        read(path, of=of)  # refuses it
+    text = text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
     names = column_names(path, text)
     log = log_of(of.commands)
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
     units = _units_line(path, text) if text.units_line else [""] * len(names)
-    columns = _columns(path, names, units, quantity)
+    kept = {s: c for s, c in stated.columns.items() if c.name.strip()}
+    columns = _columns(path, names, units, quantity, kept)
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
+    if blank := missing(layout, names, of):
+        needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
+        blanks = text.model_copy(update={"columns": needed | {s: Column(name="") for s in blank}})
+        below = dict(zip(names, units, strict=False))
+        likely = _likely(path, layout, {n: below.get(n, "") for n in unused}, blank, quantity)
+        return Proposal(blanks, unused, None, likely)
     try:
         signals(layout, names, f"'{path}'", of)
     except InputError as error:
@@ -140,11 +163,45 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         raise InputError(f"{error}{more}") from None
     run = read(path, layout, of)
     for signal, unit in _seen_units(run):
-        if not layout.column(signal).unit:
+        if signal not in kept and not layout.column(signal).unit:
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
-    needed = {s: c for s, c in columns.items() if c != Column(name=s)}
+    needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
     return Proposal(layout, unused, read(path, layout, of))
+
+
+def common_layout(
+    proposals: Mapping[Path, Proposal],
+) -> tuple[Layout, dict[Path, dict[str, Column]]]:
+    """What one file for all measurements of a folder says, and the columns of each that it cannot have.
+
+    A unit that the numbers of some alone show is that of all in which the column has the same name.
+
+    Raises:
+        InputError: their texts are laid out otherwise.
+    """
+    layouts = {path: found.layout for path, found in proposals.items()}
+    texts = {path: layout.model_copy(update={"columns": {}}) for path, layout in layouts.items()}
+    first, *others = texts
+    for path in others:
+        if texts[path] != texts[first]:
+            raise InputError(
+                f"'{path}' is laid out otherwise than '{first}': separator, decimal mark, encoding, "
+                "lines before the names, or what a file beside it says; propose for each alone"
+            )
+    common: dict[str, Column] = {}
+    for signal in dict.fromkeys(s for layout in layouts.values() for s in layout.columns):
+        found = [layout.column(signal) for layout in layouts.values()]
+        units = {column.unit for column in found} - {None}
+        if len(units) == 1:
+            found = [column.model_copy(update={"unit": min(units)}) for column in found]
+        if all(column == found[0] for column in found):
+            common[signal] = found[0]
+    own = {
+        path: {s: c for s, c in layout.columns.items() if s not in common}
+        for path, layout in layouts.items()
+    }
+    return texts[first].model_copy(update={"columns": common}), own
 
 
 def _encoding(path: Path) -> str:
@@ -164,18 +221,24 @@ def _units_line(path: Path, text: Layout) -> list[str]:
 
 
 def _columns(
-    path: Path, names: Sequence[str], units: Sequence[str], quantity: Mapping[str, str]
+    path: Path,
+    names: Sequence[str],
+    units: Sequence[str],
+    quantity: Mapping[str, str],
+    kept: Mapping[str, Column],
 ) -> dict[str, Column]:
     """The columns that names and units tell; of two for one signal, that of its own name or the first.
+
+    Those that are stated are kept. A name of which words alone are known counts where it has a unit of
+    the signal, and no other column is as likely.
 
     Raises:
         InputError: a unit that is none of the signal.
     """
-    columns: dict[str, Column] = {}
-    pairs = zip(names, units, strict=False)
-    for name, below in sorted(pairs, key=lambda pair: pair[0] not in quantity):
-        told = WITH_UNIT.fullmatch(name)
-        bare, unit = (told[1], told[2]) if told else (name, bare_unit(below))
+    columns = dict(kept)
+    free = [pair for pair in zip(names, units, strict=False) if pair[0] not in _names_of(kept)]
+    for name, below in sorted(free, key=lambda pair: pair[0] not in quantity):
+        bare, unit = _bare(name, below)
         signal, flip = meaning(bare, quantity)
         if not signal:
             bare, _, unit = bare.rpartition("_")  # as x_mm
@@ -189,7 +252,47 @@ def _columns(
             raise InputError(f"'{path}', column '{name}': {no_unit(unit, signal, known)}")
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
-    return columns
+    found: dict[str, list[Column]] = {}
+    for name, below in free:
+        bare, unit = _bare(name, below)
+        signal = meaning_of_words(bare, unit, quantity)
+        if name not in _names_of(columns) and signal:
+            is_si = UNITS[quantity[signal]][unit] == 1.0
+            found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
+    columns |= {s: each[0] for s, each in found.items() if len(each) == 1}
+    return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _names_of(columns: Mapping[str, Column]) -> set[str]:
+    return {column.name for column in columns.values()}
+
+
+def _bare(name: str, below: str) -> tuple[str, str]:
+    """A column's name without its unit, and the unit, which may stand below it."""
+    told = WITH_UNIT.fullmatch(name)
+    return (told[1], told[2]) if told else (name, bare_unit(below))
+
+
+def _likely(
+    path: Path,
+    layout: Layout,
+    unused: Mapping[str, str],
+    blank: Sequence[str],
+    quantity: Mapping[str, str],
+) -> dict[str, Sequence[LikelyColumn]]:
+    """Columns that may be those of signals without one, of unused ones with the units below them."""
+    known = {s: layout.column(s) for s in ("time", *POSE) if s not in blank}
+    table = table_of_file(path, layout, {*unused, *_names_of(known)})
+    pose = {s: to_si(_numbers(table[c.name], s), s, c, quantity[s]) for s, c in known.items()}
+    named = {n: (*_bare(n, below), _numbers(table[n], n)) for n, below in unused.items()}
+    motion = motion_of(pose)
+    return {s: likely_columns(s, quantity[s], named, motion) for s in blank}
+
+
+def _numbers(cells: pd.Series, signal: str) -> np.ndarray:
+    """A column as floats, NaN where it is none; date stamps as seconds."""
+    stamps = date_stamps(cells, signal) if signal == "time" else None
+    return np.asarray(pd.to_numeric(cells, errors="coerce"), float) if stamps is None else stamps
 
 
 def _seen_units(run: Run) -> Iterable[tuple[str, str]]:

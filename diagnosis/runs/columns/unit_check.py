@@ -19,7 +19,7 @@ OTHERS: dict[str, tuple[str, dict[str, float]]] = {
     "force": ("N", {"mN": c.milli, "kN": c.kilo}),
     "moment": ("N.m", {"N.mm": c.milli, "N.cm": c.centi, "kN.m": c.kilo}),
     "command": ("1", {"%": c.centi}),
-    "shaft speed": ("1/s", {"rpm": 1.0 / c.minute, "rad/s": 1.0 / math.tau}),
+    "shaft speed": ("1/s", {"rps": 1.0, "rpm": 1.0 / c.minute, "rad/s": 1.0 / math.tau}),
     "speed": ("m/s", {"mm/s": c.milli, "cm/s": c.centi, "km/h": c.kmh, "kn": c.knot}),
     "rate": ("rad/s", {"deg/s": c.degree, "°/s": c.degree, "deg/min": c.degree / c.minute}),
     "acceleration": ("m/s2", {"mm/s2": c.milli, "g": c.g}),

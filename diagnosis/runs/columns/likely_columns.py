@@ -1,0 +1,211 @@
+"""Which columns of a measurement a signal is likely to be: by name, unit, range and motion."""
+
+import re
+from collections.abc import Mapping, Sequence
+from difflib import SequenceMatcher
+from typing import NamedTuple
+
+import numpy as np
+
+from .unit_check import UNITS, doubts
+
+# Words of names that say how a signal was found or what quantity it is, which its unit says as well.
+FILLERS = frozenset(
+    (
+        *("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
+        *("mid", "midship", "position", "pos", "coordinate", "angle", "dir", "direction"),
+        *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
+        *("order", "command", "cmd", "actual"),
+    )
+)
+# Quantity -> word that is left of a name -> signal.
+WORDS = {
+    "length": {"x": "x", "north": "x", "northing": "x", "y": "y", "east": "y", "easting": "y"},
+    "angle": {
+        **dict.fromkeys(("psi", "heading", "yaw", "hdg"), "psi"),
+        **dict.fromkeys(("course", "cog"), "course"),
+        "wind": "wind_direction",
+    },
+    "speed": {"u": "u", "surge": "u", "v": "v", "vm": "v", "sway": "v", "wind": "wind_speed"},
+    "rate": dict.fromkeys(("r", "yaw", "psi", "heading"), "r"),
+}
+REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
+# What a signal is compared with of the motion; other commands with all of it.
+MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
+MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
+SMOOTHED = 1.0  # s, over which speeds are taken (chosen)
+FEWEST = 20  # rows of which a correlation says anything (chosen)
+SHOWN = 3
+LIKELY = 0.4  # correlation or likeness of names from which on it counts (chosen)
+# Largest numbers of an angle and of a command in any of their units, with what overshoots (chosen).
+LARGEST = {"angle": 400.0, "command": 105.0}
+
+
+class LikelyColumn(NamedTuple):
+    """A column that may be that of a signal.
+
+    Attributes:
+        name: of the column.
+        reasons: what speaks for it, as parts of a sentence.
+        score: by which columns are compared.
+    """
+
+    name: str
+    reasons: Sequence[str]
+    score: float
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name, small letters."""
+    return re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+
+
+def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
+    """The signal that words of a column's name and its unit tell; empty if they tell none, or several.
+
+    Args:
+        name: of the column, without its unit.
+        unit: of the column; without one nothing is told.
+        quantity: signal -> quantity.
+    """
+    words = words_of(name)
+    left = [w for w in words if w not in FILLERS]
+    found = {
+        signals[left[0]]
+        for q, signals in WORDS.items()
+        if unit in UNITS[q] and len(left) == 1 and signals.get(left[0]) in quantity
+    }
+    found |= {
+        s for s, q in quantity.items() if "." in s and unit in UNITS[q] and _is_of_actuator(words, s, q)
+    }
+    return found.pop() if len(found) == 1 else ""
+
+
+def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
+    """Whether words name an actuator, or the beginning of it, its command and nothing else."""
+    actuator, _, command = signal.partition(".")
+    left = list(words)
+    for word in words_of(actuator):
+        same = [w for w in left if w == word or (len(w) > 2 and word.startswith(w))]
+        if not same:
+            return False
+        left.remove(same[0])
+    said = {command} | (REVOLUTIONS if quantity == "shaft speed" else set())
+    return not set(left) - said - FILLERS
+
+
+def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What is known of the motion by a pose, smoothed: speeds and accelerations along each axis.
+
+    Args:
+        known: time, x, y and psi (n,), SI, as far as they are known.
+
+    Returns:
+        Such as ``surge speed`` -> (n,); empty without time and position.
+    """
+    if not {"time", "x", "y"} <= known.keys() or known["time"].size < FEWEST:
+        return {}
+    t = known["time"]
+    apart = float(np.nanmedian(np.diff(t)))
+    width = max(int(SMOOTHED / apart), 1) if apart > 0.0 else 1
+
+    def rate(values: np.ndarray) -> np.ndarray:
+        half = (width + 1) // 2
+        found = np.full(values.size, np.nan)
+        found[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
+        return found
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        north, east = rate(known["x"]), rate(known["y"])
+        found = {"course": _unwrapped(np.arctan2(east, north))}
+        if "psi" in known:
+            pose = np.column_stack([known["x"], known["y"], known["psi"]])
+            rows = np.isfinite(pose).all(axis=1) & np.isfinite(t)
+            degrees = any("psi" in doubt.signals for doubt in doubts(t[rows], pose[rows]))
+            psi = _unwrapped(np.radians(known["psi"]) if degrees else known["psi"])
+            cos, sin = np.cos(psi), np.sin(psi)
+            speeds = {
+                "surge": cos * north + sin * east,
+                "sway": cos * east - sin * north,
+                "yaw": rate(psi),
+            }
+            found |= {f"{axis} speed": speed for axis, speed in speeds.items()}
+            found |= {f"{axis} acceleration": rate(speed) for axis, speed in speeds.items()}
+    return found
+
+
+def _unwrapped(angle: np.ndarray) -> np.ndarray:
+    there = np.isfinite(angle)
+    found = np.full(angle.size, np.nan)
+    found[there] = np.unwrap(angle[there])
+    return found
+
+
+def likely_columns(
+    signal: str,
+    quantity: str,
+    named: Mapping[str, tuple[str, str, np.ndarray]],
+    motion: Mapping[str, np.ndarray],
+) -> list[LikelyColumn]:
+    """Columns that may be that of a signal, the likeliest first.
+
+    Args:
+        signal, quantity: the signal.
+        named: column -> its name without the unit, its unit (empty if not known) and its numbers (n,).
+        motion: of :func:`motion_of`.
+    """
+    found = [
+        LikelyColumn(name, *told)
+        for name, (bare, unit, values) in named.items()
+        if (told := _evidence(signal, quantity, bare, unit, values, motion))
+    ]
+    return sorted(found, key=lambda c: -c.score)[:SHOWN]
+
+
+def _evidence(
+    signal: str,
+    quantity: str,
+    bare: str,
+    unit: str,
+    values: np.ndarray,
+    motion: Mapping[str, np.ndarray],
+) -> tuple[list[str], float] | None:
+    """What speaks for a column, and how much; None where something excludes it, or nothing does."""
+    numbers = values[np.isfinite(values)]
+    if numbers.size < 2 or np.ptp(numbers) == 0.0 or unit not in ("", "-", *UNITS[quantity]):
+        return None
+    if np.abs(numbers).max() > LARGEST.get(quantity, np.inf):
+        return None
+    reasons, score, like = [], 0.0, _likeness(signal, bare)
+    if quantity == "time":
+        if not np.all(np.diff(numbers) > 0.0):
+            return None
+        reasons, score = ["rises in each row"], 1.0
+    if like >= LIKELY:
+        reasons, score = [*reasons, "by its name"], score + like
+    if unit in UNITS[quantity]:
+        reasons, score = [*reasons, f"by its unit {unit}"], score + 0.5
+    axes = MOVES.get(signal) or MOVED.get(quantity, ("surge", "sway", "yaw"))
+    pairs = {n: _correlation(values, m) for n, m in motion.items() if n.partition(" ")[0] in axes}
+    best = max(pairs, key=lambda name: abs(pairs[name]), default="")
+    if best and abs(pairs[best]) >= LIKELY:
+        reasons, score = (
+            [*reasons, f"correlates {pairs[best]:+.2f} with the {best}"],
+            score + abs(pairs[best]),
+        )
+    return (reasons, score) if reasons else None
+
+
+def _likeness(signal: str, name: str) -> float:
+    """How alike two names are, from 0 to 1: by words or beginnings that they share, or by letters."""
+    own, words = words_of(signal.replace("tau", "force")), words_of(name)
+    shared = [w for w in words if any(w == o or (len(w) > 2 and o.startswith(w)) for o in own)]
+    letters = SequenceMatcher(None, "".join(own), "".join(words)).ratio()
+    return max(letters if letters > 0.6 else 0.0, len(set(shared)) / len(own))
+
+
+def _correlation(values: np.ndarray, motion: np.ndarray) -> float:
+    there = np.isfinite(values) & np.isfinite(motion)
+    if there.sum() < FEWEST or not (np.ptp(values[there]) > 0.0 and np.ptp(motion[there]) > 0.0):
+        return 0.0
+    return float(np.corrcoef(values[there], motion[there])[0, 1])

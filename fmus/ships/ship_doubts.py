@@ -1,0 +1,157 @@
+"""What no ship has: damping that drives it on, negative added mass, actuators outside, too much mass."""
+
+import re
+from collections.abc import Iterator
+from math import sqrt
+from typing import NamedTuple
+
+from ..declare import parameters_of
+from ..hull import term, term_force, term_variable
+from ..hull_functions import FUNCTIONS
+from ..ship_description import Description, Part
+
+G = 9.81  # m/s2
+SEA_WATER = 1025.0  # kg/m3, where the file has no density
+# Speeds at which the damping of products is looked at, over sqrt(g L), rates over sqrt(g / L): from far
+# below to far above all that ships reach, where the lowest and the highest power decide (chosen).
+FROUDE_NUMBERS = [10.0 ** (k / 6.0) for k in range(-18, 19)]
+AHEAD, ASIDE = 0.2, 0.02  # those of other functions: a usual speed, and a little drift on it (chosen)
+OVERHANG = 0.05  # of length and beam: outboard motors and rudders hang behind the outline (chosen)
+MOTIONS = ("surge", "sway", "yaw")
+
+
+class ShipDoubt(NamedTuple):
+    """A number that is none of a ship.
+
+    Attributes:
+        header: of the table of the file in which it stands; of a term "product".
+        place: number of that table or term among its like.
+        key: of the number; empty: the whole table.
+        text: what is wrong.
+    """
+
+    header: str
+    place: int
+    key: str
+    text: str
+
+
+def doubts(ship: Description, draft: float | None = None) -> Iterator[ShipDoubt]:
+    """Numbers of a description that no ship has.
+
+    Args:
+        ship: the description.
+        draft: [m]; None: that of a function of its hull, if it has one.
+    """
+    yield from _inertia(ship, draft)
+    yield from _products(ship)
+    yield from _functions(ship)
+    for k, part in enumerate(ship.actuators):
+        yield from _place(ship, k, part)
+
+
+def _inertia(ship: Description, draft: float | None) -> Iterator[ShipDoubt]:
+    values = ship.values()
+    for name, motion in zip(("X_udot", "Y_vdot", "N_rdot"), MOTIONS, strict=True):
+        if name in values and values[name].value > 0.0:
+            unit = "kg.m2" if motion == "yaw" else "kg"
+            text = f"is positive: the water that moves along in {motion} has a negative {name}"
+            yield ShipDoubt("inertia", 0, name, f"{name} = {values[name].value:.4g} {unit} {text}")
+    numbers = {v.name.rpartition("_")[2]: v.value for part in ship.functions for v in part.values}
+    draft = draft or numbers.get("draft")
+    if draft is None:
+        return
+    box = numbers.get("density", SEA_WATER) * ship.length * ship.beam * draft
+    if (m := values["m"].value) > box:
+        size = f"{ship.length:g} m x {ship.beam:g} m x {draft:g} m"
+        text = f"more than a box of length x beam x draft, {size}, displaces: {box:.4g} kg"
+        yield ShipDoubt("inertia", 0, "m", f"m = {m:.4g} kg is {text}")
+
+
+def _products(ship: Description) -> Iterator[ShipDoubt]:
+    """Products of one speed alone that drive the ship along with it at some speed, ahead or astern."""
+    names = [v.name for v in ship.terms]
+    for axis, motion in enumerate(MOTIONS):
+        own = [
+            v
+            for v in ship.terms
+            if term(v.name)[0] == axis and {k for _, k in term(v.name)[1]} == {axis}
+        ]
+        unit = _unit_of_speed(ship, axis)
+        for speed in (side * x * unit for x in FROUDE_NUMBERS for side in (1.0, -1.0)):
+            push = [term_force(v.name, v.value, *_along(axis, speed))[axis] * speed for v in own]
+            if sum(push) > 0.0:
+                worst = own[push.index(max(push))]
+                value = f"{worst.name} = {worst.value:.4g} {term_variable(worst.name).unit}"
+                yield ShipDoubt(
+                    "product",
+                    names.index(worst.name),
+                    "product",
+                    f"{value} drives the ship on at {_told(axis, speed)} in {motion}: damping resists",
+                )
+                break
+
+
+def _functions(ship: Description) -> Iterator[ShipDoubt]:
+    """Other functions of the hull that drive the ship along with a speed."""
+    for part in ship.functions:
+        names = [v.name for v in parameters_of(part.law, 3, FUNCTIONS[part.law])]
+        numbers = {v.name: v.value for v in part.values if v.name in names}
+        for axis, motion in enumerate(MOTIONS):
+            base = AHEAD * _unit_of_speed(ship, 0) if axis else 0.0
+            size = (ASIDE if axis else AHEAD) * _unit_of_speed(ship, axis)
+            for speed in (size, -size):
+                u, v, r = _along(axis, speed)
+                with_it = FUNCTIONS[part.law](u + base, v, r, **numbers)
+                without = FUNCTIONS[part.law](base, 0.0, 0.0, **numbers)
+                if (with_it[axis] - without[axis]) * speed > 0.0:
+                    text = f"{part.law} drives the ship on at {_told(axis, speed)} in {motion}"
+                    yield ShipDoubt(f"hull.functions.{part.law}", 0, "", f"{text}: damping resists")
+                    break
+
+
+def _unit_of_speed(ship: Description, axis: int) -> float:
+    """That of Froude number 1 [m/s or rad/s]."""
+    return sqrt(G / ship.length) if axis == 2 else sqrt(G * ship.length)
+
+
+def _along(axis: int, speed: float) -> tuple[float, float, float]:
+    u, v, r = (speed if k == axis else 0.0 for k in range(3))
+    return u, v, r
+
+
+def _told(axis: int, speed: float) -> str:
+    return f"{speed:.2g} {'rad/s' if axis == 2 else 'm/s'}"
+
+
+def _place(ship: Description, k: int, part: Part) -> Iterator[ShipDoubt]:
+    """An actuator outside of the outline."""
+    apart = part.number("abreast")
+    for j, (name, room, sides) in enumerate(
+        (("x", ship.length, (0.0,)), ("y", ship.beam, (-apart, apart)))
+    ):
+        corners = [corner[j] for corner in ship.outline]
+        low, high = min(corners), max(corners)
+        at = part.number(name)
+        if any(not low - OVERHANG * room <= at + side <= high + OVERHANG * room for side in sides):
+            text = f"{name} = {at:.4g} m, outside of the outline, {low:.4g} to {high:.4g} m"
+            yield ShipDoubt("actuators", k, name, f"actuator '{part.name}' is at {text}")
+
+
+def line_of(doubt: ShipDoubt, text: str) -> int | None:
+    """The line of a ship's file in which a doubtful number stands; None: it is not found."""
+    lines = [line.partition("#")[0] for line in text.splitlines()]
+    if doubt.header == "product":
+        found = [k for k, line in enumerate(lines, 1) for _ in re.findall(r"\bproduct\s*=", line)]
+        return found[doubt.place] if doubt.place < len(found) else None
+    header = re.compile(rf"\s*\[+\s*{re.escape(doubt.header)}\s*\]")
+    heads = [k for k, line in enumerate(lines) if header.match(line)]
+    if doubt.place >= len(heads):
+        return None
+    first = heads[doubt.place]
+    for k, line in enumerate(lines[first + 1 :], first + 2):
+        if line.lstrip().startswith("["):
+            break
+        if doubt.key and re.match(rf"\s*{re.escape(doubt.key)}\s*=", line):
+            return k
+    return first + 1
