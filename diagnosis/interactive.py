@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim import InputError, Result
+from cosim import InputError
 
 from . import session
 from .assessment.gathering import gather
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     import pandas
+
+    from cosim import Result
 
     Source: TypeAlias = str | Path | Result | pandas.DataFrame
 
@@ -61,7 +63,9 @@ def load(
     Raises:
         InputError: a run cannot be used, or is given twice.
     """
-    import pandas
+    import pandas  # a library, and simulations, that take as long to import as a run to read
+
+    from cosim import Result
 
     every = _listed(sources)
     model = _model_of(model, ship, every)
@@ -93,7 +97,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
     if loaded and name is None:
         return nominal(loaded)
     if name is None:
-        files = [run.folder if isinstance(run, Result) else run for run in runs]
+        files = [getattr(run, "folder", run) for run in runs]  # of a result of a simulation
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
         name = told[0] if told else None
     return Model(ship=ship_with((), name))

@@ -275,12 +275,9 @@ def free_runs(
     left = float(smoothed.time[-1] - smoothed.time[first])
     seconds = min(left, LONGEST_FREE * smoothed.scale.time)
     starts = WindowStarts(((smoothed, np.array([first])),), h, int(seconds / h))
-    found: dict[int, np.ndarray] = {}
-    for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
-        poses = predict(starts, together)
-        found |= {k: poses[:, :, min(n, poses.shape[2] - 1), 0] for n, k in enumerate(chosen)}
-    times = smoothed.time[first] + h * np.arange(starts.steps + 1)
-    return times, [found[k] for k in range(len(models))]
+    # One model after the other takes half the time of all at once.
+    found = [predict(starts, m.during(smoothed.track.run.name))[:, :, 0, 0] for m in models]
+    return smoothed.time[first] + h * np.arange(starts.steps + 1), found
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
