@@ -39,7 +39,7 @@ from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import DecidedFindings, judge
-from .verdict.prediction_gain import PredictionGain, prediction_gain
+from .verdict.prediction_gain import PredictionGain, gain_of_search, prediction_gain
 from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
 
@@ -285,14 +285,10 @@ class Session:
 
     def _gained(self, verdict: DecidedFindings, data: ValidationData) -> PredictionGain | None:
         """What the search for effects gained over calibration alone."""
-        before, after = self.calibration, verdict.learned
         self.advance("what the search gained over calibration")
-        learned = after.model if self.validate else after
-        return prediction_gain(
-            data,
-            self.start if before is None else before.findings,
-            learned if verdict.changed else self.start,
-        )
+        calibrated = None if self.calibration is None else self.calibration.findings
+        learned = verdict.learned.model if verdict.changed else self.start
+        return gain_of_search(data, self.start, calibrated, verdict.learned, learned)
 
     def _region(self) -> OperatingRegion:
         """The motions that the training runs hold."""

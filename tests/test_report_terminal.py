@@ -202,7 +202,7 @@ def test_a_diagnosis_has_what_is_sure_first_and_errors_before_and_after():
 @pytest.mark.parametrize("gained", [True, False])
 def test_what_the_search_gained_is_the_first_sentence(gained):
     change = PairedChange(0.032, 0.0089, 9.4e-4, 1.1e-4)
-    gain = PredictionGain("validation runs", 54, change, change, gained)
+    gain = PredictionGain("validation runs", 54, change, change, gained, "calibrated")
     made = found(gain=gain)
     shown = lines(show_diagnosis(made, "out"))
     first = SEARCH_GAINED if gained else SEARCH_GAINED_NOTHING
@@ -211,6 +211,7 @@ def test_what_the_search_gained_is_the_first_sentence(gained):
     assert first_sentences(made).startswith(SEARCH_GAINED_NOTHING) is not gained
     assert gain_content(gain, ["One.", "Two."]) == {
         "gained": gained,
+        "over": "calibrated",
         "where": "validation runs",
         "windows": 54,
         "position": vars(change),

@@ -184,7 +184,7 @@ def gain_content(gain: PredictionGain | None, sentences: Sequence[str]) -> dict[
     if gain is None:
         return None
     changes = {n: part(getattr(gain, n), CHANGE) for n in ("position", "heading")}
-    return part(gain, "gained where windows") | changes | {"sentence": " ".join(sentences)}
+    return part(gain, "gained over where windows") | changes | {"sentence": " ".join(sentences)}
 
 
 def part(of: Any, keys: str) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from .reported_effect import ReportedEffect
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
+NO_CALIBRATION = "The initial model stands for calibration here, which does not predict better."
 CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
 CALIBRATION_GAINED_NOTHING = "Calibration gains nothing over the initial model."
 NOTHING_FOUND = "Nothing is missing that these data show."
@@ -85,7 +86,8 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
 def gain_of_search(r: ReportData) -> list[str]:
     """What the search for effects gained over calibration alone; empty where that is not known."""
     gain = None if r.diagnosis is None else r.diagnosis.gain
-    return gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
+    said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
+    return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
 
 
 def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]:

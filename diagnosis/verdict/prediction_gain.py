@@ -1,6 +1,7 @@
 """What one model predicts better than another: paired errors in the same windows of data that decide."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -33,8 +34,8 @@ class PairedChange:
         if before.size < 2:
             return cls(np.nan, np.nan, np.nan, np.nan)
         d = before - after
-        rms = np.sqrt([before.mean(), after.mean()]).tolist()
-        return cls(*rms, float(d.mean()), float(d.std(ddof=1) / np.sqrt(d.size)))
+        error = float(d.std(ddof=1) / np.sqrt(d.size))
+        return cls(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), float(d.mean()), error)
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class PredictionGain:
         windows: their number.
         position, heading: errors of both models.
         gained: whether the predictions are better by more than twice their paired standard error.
+        over: the model with which it is compared: "initial" or "calibrated".
     """
 
     where: str
@@ -53,6 +55,7 @@ class PredictionGain:
     position: PairedChange
     heading: PairedChange
     gained: bool
+    over: Literal["initial", "calibrated"] = "initial"
 
 
 def prediction_gain(
@@ -75,3 +78,29 @@ def prediction_gain(
         return None
     position, heading = (PairedChange.of(*pair) for pair in zip(others[1:], its[1:], strict=True))
     return PredictionGain(data.where, its.position.size, position, heading, predicts_worse(others, its))
+
+
+def gain_of_search(
+    data: ValidationData, start: Model, calibrated: Findings | None, found: Findings, learned: Model
+) -> PredictionGain | None:
+    """What the search for effects gained over calibration alone.
+
+    A calibration that predicts worse than the initial model is none that anybody would use: the initial
+    model takes its place. A search that ends without an effect gains nothing.
+
+    Args:
+        data: the data that decide.
+        start: the initial model.
+        calibrated: the calibration; None: there is none.
+        found, learned: the end of the search; the model is the initial one where nothing was learned.
+
+    Returns:
+        None where that is not known, see :func:`prediction_gain`.
+    """
+    after = learned if data.validate or learned is start else found
+    if calibrated is None or predicts_worse(*data.losses(calibrated, start)):
+        gain = prediction_gain(data, start, after)
+    else:
+        gain = prediction_gain(data, calibrated, after)
+        gain = gain and replace(gain, over="calibrated")
+    return gain and replace(gain, gained=gain.gained and bool(found.effects))
