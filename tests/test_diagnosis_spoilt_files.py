@@ -19,6 +19,7 @@ from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import refuse_implausible
 from diagnosis.assessment.readings import Reading, of_commands, of_pose, reread
 from diagnosis.predictors.thrust import full_thrust
+from diagnosis.runs import channels_of
 from diagnosis.search import shortlist
 
 RATE = 20  # Hz
@@ -100,14 +101,37 @@ def test_line_that_is_told_mends_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (lambda t: t.iloc[::15], "a measurement every 0.75 s is too rare"),
-        (lambda t: struck("x", 0.15, 1.0)(t, np.random.default_rng(0)), "where all others say"),
+        (
+            lambda t: t.iloc[np.arange(len(t)) // 70 * 70].assign(time=t["time"].to_numpy()),
+            "every 3.5 s is",
+        ),
+        (lambda t: t.assign(psi=0.3), "psi never changes while the ship goes on"),
     ],
 )
 def test_pose_that_gives_no_velocity_is_refused(table, message, tmp_path):
     path = written(tmp_path, table(good()))
     with pytest.raises(InputError, match=message):
         diagnosis.load(path)
+
+
+@pytest.mark.parametrize(
+    ("table", "rate"),
+    [
+        (lambda t: t.iloc[::15], 1.0 / 0.75),
+        (lambda t: struck("x", 0.15, 1.0)(t, np.random.default_rng(0)), 20.0),
+    ],
+)
+def test_rare_samples_and_many_outliers_still_give_a_motion(table, rate, tmp_path):
+    (clean,), (found,) = (diagnosis.load(written(tmp_path, t)) for t in (good(), table(good())))
+    (channel, *_) = channels_of(found.smoothed)
+    assert channel.rate == pytest.approx(rate, rel=0.01)
+    time = found.smoothed.time
+    true = np.column_stack([np.interp(time, clean.smoothed.time, x) for x in clean.smoothed.nu.T])
+    there = np.isfinite(found.smoothed.nu + true).all(axis=1)
+    off = (found.smoothed.nu - true)[there]
+    assert np.sqrt((off**2).mean(axis=0)) == pytest.approx(0.0, abs=0.02)
+    reach = 3.0 * np.hypot(found.smoothed.nu_std[there], 1e-3)
+    assert (np.abs(off) < reach).mean() > 0.95
 
 
 @pytest.mark.parametrize("way", ["outliers_1", "rounded_1_cm", "tau_double", "half"])

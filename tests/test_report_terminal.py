@@ -21,6 +21,7 @@ from diagnosis.report.headline import (
     first_sentences,
 )
 from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
+from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.sensors.sensor_finding import SensorFinding
 from diagnosis.verdict.prediction_gain import PairedChange, PredictionGain
 
@@ -57,7 +58,11 @@ TRIAL = {"tactical_diameter": [3.4, 3.0, 3.35], "overshoot": [[0.2, 0.1, 0.19], 
 FAULT = SensorFinding("r", "scale", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "r reads too much", (), False)
 RATE = SensorFinding("time", "clock_rate", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "its clock is fast")
 OURS = SimpleNamespace(parametric=True, description=lambda: None)
-DERIVED = {"trials": [None, TRIAL], "measured": [{}, {"port.thrust": (12.0, 3.0)}]}
+CHANNELS = [
+    ("a", [MeasuredChannel("x", 20.0, 0.0, 0.002, "m", "given", 0.0, 0.0, 2, (1.5, 3.0))]),
+    ("b", [MeasuredChannel("x", 10.0, 0.5, 0.004, "m", "given", 0.0, 0.0, 1, (7.0,))]),
+]
+DERIVED = {"channels": CHANNELS, "trials": [None, TRIAL], "measured": [{}, {"port.thrust": (12.0, 3.0)}]}
 
 
 def compared(learned, faults=(FAULT, RATE), notes=("a gap",)):
@@ -110,6 +115,9 @@ DATA = """Data
 run time samples frozen dropped spikes used
 a 96.04 s 100 1 2 3 94
 b 48 s 100 1 2 3 94
+Channels, medians of all runs
+channel rate held noise outliers used
+x 15 Hz 25 % 0.003 m given 3: a 1.5 s yes
 Found in the data
 a: a gap
 What channels say of each other

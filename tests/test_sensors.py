@@ -21,7 +21,7 @@ from diagnosis.runs.sensors.further_channels import accelerations, receivers
 from diagnosis.runs.sensors.wraps import unwrapped
 from diagnosis.runs.smoothing import smoother
 from diagnosis.search.findings import Finding
-from diagnosis.verdict.confidence import clock_in_doubt, confidence_of
+from diagnosis.verdict.confidence import confidence_of, doubt_of_data
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE, Scale
 
@@ -251,9 +251,9 @@ def test_without_turns_clock_and_scale_are_one_and_the_speed_is_set_aside(factor
     (prepared,) = diagnosis.gather([run])
     assert not {"u", "v"} & {*prepared.run.measured, *prepared.smoothed.sensors.agreeing}
     np.testing.assert_array_equal(prepared.run.time, run.time)
-    assert clock_in_doubt([prepared]) == (factor == 0.9)
+    assert bool(doubt_of_data([prepared])) == (factor == 0.9)
     f = Finding("mass", {"mass": 30.0}, {"mass": (20.0, 40.0)}, 0.99, [], 0.9, 0.9, together=0.99)
-    seen = confidence_of(f, Model(), (), clock_in_doubt([prepared]))
+    seen = confidence_of(f, Model(), (), doubt_of_data([prepared]))
     assert (seen.own == 0.99) == (not seen.doubt) == (factor != 0.9)
 
 

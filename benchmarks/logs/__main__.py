@@ -15,9 +15,11 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
 
 from diagnosis.predictors import ship_with
-from diagnosis.runs import prepare, table_of
+from diagnosis.runs import prepare, read_frame, table_of
 
 from .recorded import SURE, Good, Recorded, recorded
 from .ways_to_log import POSE, WAYS
@@ -27,14 +29,23 @@ WITHIN = 0.3  # of the noise that there is; issue: the estimate counts as right
 
 
 def good_log(path: Path, ship: str | None, test: Path | None) -> Good:
-    """A good log without channels beside pose and commands; stretches without a pose are cut off."""
+    """A good log at even times, pose and commands alone, without spikes and stretches without a pose.
+
+    At each time it has the smoothed motion and the residual of the nearest sample, so that times that
+    were uneven are no noise.
+    """
     craft = ship_with((), ship)
-    prepared = prepare(path, craft)
-    s = prepared.smoothed
-    run = s.track.run.rows(s.used)
-    table = table_of(run)[["time", *POSE, *run.commanded]]
-    table["time"] -= table["time"].iloc[0]
-    return Good(table, s.noise, ship, test)
+    s = prepare(path, craft).smoothed
+    run, eta = s.track.run.rows(s.used), s.eta[s.used]
+    time = np.arange(run.time[0], run.time[-1], float(np.median(np.diff(run.time))))
+    before = np.searchsorted(run.time, time + 1e-9, side="right") - 1
+    after = np.minimum(before + 1, run.time.size - 1)
+    nearest = np.where(run.time[after] - time < time - run.time[before], after, before)
+    table = pd.DataFrame(table_of(run.rows(before)), columns=["time", *POSE, *run.commanded])
+    table["time"] = time - time[0]
+    table[POSE] = CubicSpline(run.time, eta)(time) + (s.track.pose[s.used] - eta)[nearest]
+    by_pose = prepare(read_frame(table, of=craft), craft).smoothed
+    return Good(table, by_pose.noise, ship, test)
 
 
 def line(o: Recorded, clean: Recorded | None) -> str:

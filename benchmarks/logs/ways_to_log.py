@@ -4,7 +4,7 @@ The table has the columns time [s], x, y [m], psi [rad], and commands. A way say
 has then, by that of the good log, where that can be said.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -34,8 +34,8 @@ class Way:
 
     record: Record
     noise: Noise | None = lambda sigma, _: sigma
-    given: dict[str, float] = field(default_factory=dict)
-    columns: dict[str, dict[str, object]] = field(default_factory=dict)
+    given: Mapping[str, float] = field(default_factory=dict)
+    columns: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
 
 def sampled(table: pd.DataFrame, time: np.ndarray) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from cosim import InputError
 from ..execution.parallel import for_each
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows, weak_windows
-from ..predictors.weak_form import EVERY, WIDTH
+from ..predictors.weak_form import WIDTH
 from ..runs import PreparedRun, Run, Smoothed, prepare, read_each
 from ..runs.columns.unit_check import GO_ON
 from .plausibility import refuse_implausible
@@ -65,19 +65,15 @@ def gather(
 def motion(prepared: PreparedRun) -> Smoothed:
     """The smoothed motion of a run that has a sample at least for each window of the weak form.
 
-    With six in a window the slope of its kernel integrates a velocity that grows evenly to 2 %, with
-    five to 3 %, with three to 23 %.
-
     Raises:
-        InputError: they are, or do not determine a motion.
+        InputError: they are rarer, or do not determine a motion.
     """
     track = prepared.track
-    width, every = WIDTH * track.scale.time, EVERY * track.scale.time
-    if not prepared.anyway and round(width / track.period) < WIDTH / EVERY:
+    width = WIDTH * track.scale.time
+    if track.period > width and not prepared.anyway:
         raise InputError(
             f"run '{track.run.name}': a measurement every {track.period:.3g} s is too rare where forces "
-            f"are averaged over {width:.3g} s; log one every {every:.3g} s or "
-            f"more often; {GO_ON}"
+            f"are averaged over {width:.3g} s; {GO_ON}"
         )
     return prepared.smoothed
 

@@ -18,7 +18,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from ..runs.cleaning import HORIZON, WIDTH
+from ..runs.cleaning import EVERY, HORIZON, WIDTH
 from ..runs.files.reading import Run
 from ..runs.smoothing.smoother import breaks
 from .prediction import at_rest, true_motion
@@ -26,7 +26,6 @@ from .ship_model import Model
 from .thrust import Response, inflow, thrust
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-EVERY = 0.5  # s
 # Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0

@@ -15,6 +15,7 @@ from typing_extensions import deprecated
 from ..assessment.regions import ErrorRegions
 from ..predictors.evaluation import Evaluation
 from ..predictors.ship_model import parameter_and_run
+from ..runs import channels_of
 from ..runs.cleaning import Z95
 from ..session import CalibratedModel, Comparison, Diagnosis
 from ..verdict.prediction_gain import PredictionGain
@@ -256,7 +257,10 @@ def _data(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
     """Numbers of samples of all runs together, and of each, with its duration [s] and notes on it."""
     counts = [part(e.smoothed.counts, COUNTS) for e in evaluations]
     runs = [
-        c | part(e, "run=name held_out") | {"seconds": seconds(e), "notes": list(e.smoothed.notes)}
+        c
+        | part(e, "run=name held_out")
+        | {"seconds": seconds(e), "notes": list(e.smoothed.notes)}
+        | {"channels": [finite(vars(x)) for x in channels_of(e.smoothed)]}
         for c, e in zip(counts, evaluations, strict=True)
     ]
     return {name: sum(c[name] for c in counts) for name in COUNTS.split()} | {"runs": runs}

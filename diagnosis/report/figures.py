@@ -5,10 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.results import thin
+from fmus.ops import wrap
 
 from ..assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
 from ..assessment.regions import Profile
 from ..predictors.evaluation import Evaluation
+from ..runs import Smoothed
 from ..runs.cleaning import Z95
 from ..search.findings import Ranked
 from ..search.shortlist import TIE
@@ -18,6 +20,7 @@ from .shape import Curve
 
 MAX_RANKED = 14  # candidates in the chart; chosen
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
+RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {
     SPEED: "surge speed [m/s]",
@@ -49,6 +52,28 @@ def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> Chart:
         if learned:
             explained = interrupted((measured - e.after.omega[:, axis])[rows], segment[rows])
             panel.draw(t, explained, AFTER, "explained")
+        panels.append(panel)
+    return Chart(WIDTH, panels)
+
+
+def residuals(s: Smoothed) -> Chart:
+    """Residuals of the measured pose against the smoothed one over time, outliers marked."""
+    off = s.track.run.pose - s.eta
+    off = np.column_stack([1e3 * off[:, :2], np.degrees(wrap(off[:, 2]))])
+    unit = 1e3 * s.noise[:2], np.degrees(s.noise[2:])
+    panels = []
+    for k, (label, std) in enumerate(zip(RESIDUALS, np.concatenate(unit).tolist(), strict=True)):
+        panel = Panel(ChartAxis("time [s]", shown=k == 2), ChartAxis(label), zero=True)
+        right, wrong = s.agrees[:, k], s.track.fresh[:, k] & ~s.agrees[:, k] & np.isfinite(off[:, k])
+        rows = np.flatnonzero(right & np.isfinite(off[:, k]))
+        ends = s.time[rows[[0, -1]]] if rows.size else np.zeros(2)
+        panel.fill(ends, np.full(2, -Z95 * std), np.full(2, Z95 * std), BAND, "noise, 95 %")
+        shown = rows[thin(np.arange(rows.size), off[rows, k])[0]]
+        panel.draw(s.time[shown], off[shown, k], BEFORE, "measured less smoothed")
+        if wrong.any():
+            most = max(np.abs(off[rows, k]).max(initial=0.0), Z95 * std)
+            at = np.clip(off[wrong, k], -most, most)
+            panel.draw(s.time[wrong], at, AFTER, "outliers, at most to the edge", dots=True)
         panels.append(panel)
     return Chart(WIDTH, panels)
 

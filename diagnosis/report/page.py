@@ -75,7 +75,7 @@ def write_report(
     """
     path = Path(path)
     advance("report: figures")
-    sections = (_tracks, _growth, _free, _omega, _places, _profiles, _shapes, _ranking)
+    sections = (_tracks, _growth, _free, _omega, _places, _profiles, _shapes, _ranking, _residuals)
     drawn = {section.__name__.strip("_"): [*section(data)] for section in sections}
     advance("report: page")
     made_with = [*_provenance(data), *origin.items()]
@@ -142,6 +142,13 @@ def _tracks(r: ReportData) -> Iterator[Drawing]:
         if heading := tracks.heading_bands(e):
             caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
             yield drawing(heading, f"heading-{k}", caption)
+
+
+def _residuals(r: ReportData) -> Iterator[Drawing]:
+    for k, e in enumerate(r.evaluations):
+        yield drawing(
+            figures.residuals(e.smoothed), f"residuals-{k}", f"{e.name}: residuals of the pose."
+        )
 
 
 def _growth(r: ReportData) -> Iterator[Drawing]:

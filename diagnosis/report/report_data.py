@@ -12,6 +12,7 @@ from cosim.trials import DEGREES, MEASURES
 from ..assessment.trial_errors import TrialErrors, trial_errors
 from ..predictors.evaluation import Evaluation
 from ..predictors.measured_outputs import inseparable, named, rms
+from ..runs import MeasuredChannel, channels_of
 from ..search.findings import Ranked
 from ..session import Comparison, Diagnosis
 from .reported_effect import ReportedEffect, reported_effects
@@ -91,6 +92,11 @@ class ReportData:
             names = named(w, e.model) if e.predictor.parametric else ()
             found.append({name: (rms(w, e.model, name), rms(w, last, name)) for name in names})
         return found
+
+    @cached_property
+    def channels(self) -> list[tuple[str, list[MeasuredChannel]]]:
+        """Name of each run and its channels as they were measured."""
+        return [(e.name, [*channels_of(e.smoothed)]) for e in self.evaluations]
 
     @cached_property
     def inseparable(self) -> list[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from math import degrees
+from statistics import median
 
 from rich.console import RenderableType
 from rich.padding import Padding
@@ -128,6 +129,25 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     for e in r.evaluations:
         table.add_row(Text(r.called(e)), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
     yield from _titled("Data", table)
+    table = _table("channel", "rate", "held", "noise", "", "outliers", "used")
+    for name in dict.fromkeys(c.name for _, channels in r.channels for c in channels):
+        of = [(run, c) for run, channels in r.channels for c in channels if c.name == name]
+        every = [c for _, c in of]
+        rate, held, noise = (
+            median(x) for x in zip(*((c.rate, c.held, c.noise) for c in every), strict=True)
+        )
+        first = next((f": {run} {_number(c.outlier_times[0])} s" for run, c in of if c.outliers), "")
+        table.add_row(
+            name,
+            f"{_number(rate)} Hz",
+            _percent(held),
+            f"{_number(noise, 2)} {every[0].unit}",
+            every[0].noise_from,
+            f"{sum(c.outliers for c in every)}{first}",
+            next((c.reason for c in every if c.reason), "yes"),
+        )
+    if r.channels:
+        yield from _titled("Channels, medians of all runs", table)
     notes = [f"{e.name}: {note}" for e in r.evaluations for note in e.smoothed.notes]
     if notes:
         yield from _lines("Found in the data", notes)

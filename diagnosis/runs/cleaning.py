@@ -12,7 +12,7 @@ from cosim import InputError
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
-from .columns.unit_check import refuse_time, refuse_units
+from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 
@@ -21,6 +21,7 @@ from .files.telegrams import filled
 # Enterprise 1 grow at up to 0.18 1/s.
 HORIZON = 8.0
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
+EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
 CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 # Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
@@ -134,7 +135,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
-    turned, _, lined = updates(run, HEADING, gone)
+    turned, constant, lined = updates(run, HEADING, gone)
+    if turned.sum() < FEWEST <= min(seen.sum(), constant.sum()):
+        turned = turned | _believed_constant(constant, where, anyway)
     # Where no heading is near, a place tells nothing of surge and sway.
     apart = max(WIDTH * scale.time, LONG * row)
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
@@ -179,6 +182,17 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
     return Track(run, pose, measured, frozen, dropped, between, period, out, tuple(notes), scale)
+
+
+def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.ndarray:
+    """Rows (n,) in which a heading repeats throughout, if that is believed.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not anyway:
+        raise InputError(f"{where}: psi never changes while the ship goes on; {GO_ON}")
+    return constant
 
 
 def long_gap(period: float, scale: Scale) -> float:
@@ -252,7 +266,7 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
     there = np.isfinite(values).all(axis=1) & ~gone
     repeats = repeated(values, there)
     rows = np.flatnonzero(there & ~repeats)
-    step = (np.abs(np.diff(values[rows], axis=0)) > 1.5 * coarse[rows[1:]]).any(axis=1)
+    step = np.any(np.abs(np.diff(values[rows], axis=0)) > 1.5 * coarse[rows[1:]], axis=1)
     after = np.searchsorted(rows, np.flatnonzero(repeats))  # the value that follows, where there is one
     if after.size and step.size:
         by_step = step[np.minimum(after, step.size) - 1]

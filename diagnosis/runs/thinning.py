@@ -1,4 +1,4 @@
-"""Long runs that are sampled far faster than a ship moves, at a rate that their analysis can bear."""
+"""Rows at a rate that the analysis of a run can bear: of many fewer, and more where they are rare."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,10 +6,50 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .cleaning import BRIEF, DIGITS, Track, impulse
+from .cleaning import BRIEF, DIGITS, EVERY, Track, impulse, long_gap
 
 # Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
+
+
+def spaced(track: Track) -> Track:
+    """A run with rows neither more frequent nor rarer than its analysis can bear."""
+    return filled_up(thinned(track))
+
+
+def filled_up(track: Track) -> Track:
+    """A run with more rows, without measurements, where its rows are rarer than windows of forces.
+
+    There the smoothed motion leads from one sample to the next, and commands are held.
+
+    Args:
+        track: a run with its samples judged.
+    """
+    time = track.run.time
+    steps = np.diff(time)
+    row = float(np.median(steps))
+    parts = np.ceil(steps / (EVERY * track.scale.time) - DIGITS)
+    # A longer step is a gap.
+    parts = np.where(steps < long_gap(row, track.scale), parts, 1.0).astype(int)
+    if not (parts > 1).any():
+        return track
+    many = np.append(parts, 1)
+    last = np.repeat(np.arange(time.size), many)
+    within = np.arange(last.size) - np.repeat(np.cumsum(many) - many, many)
+    new, track = within > 0, track.rows(last)
+    run = track.run
+    between = np.append(steps / parts, 0.0)[last] * within
+    measured = {name: np.where(new, np.nan, values) for name, values in run.measured.items()}
+    pose = np.where(new[:, None], np.nan, track.pose)
+    return replace(
+        track,
+        run=replace(run, time=run.time + between, pose=pose, measured=measured),
+        pose=pose,
+        fresh=track.fresh & ~new[:, None],
+        frozen=track.frozen & ~new,
+        dropped=track.dropped & ~new,
+        between=track.between | new,
+    )
 
 
 def thinned(track: Track) -> Track:

@@ -6,13 +6,14 @@ the limit of its range, an interval that holds zero, an alternative that looks t
 the same axes.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit
 
 from ..predictors import Model, WeakWindows
+from ..runs.cleaning import DIGITS, EVERY
 from ..search.effect_evidence import EffectEvidence
 from ..search.findings import Finding
 from ..search.prior import MEASURED
@@ -33,6 +34,7 @@ MAY_BE_LAGS = (
     "actuators that are faster than described, or commands that are measured states, look the same"
 )
 MAY_BE_CLOCK = "a channel was set aside that tells of a clock at another rate, which may look the same"
+RARE = "samples are too rare for quick forces: fewer than six in the time over which these are averaged"
 RESIDUAL = "something that it does not explain acts on the same axis"
 
 
@@ -62,7 +64,7 @@ def probability(e: EffectEvidence) -> float:
 
 
 def confidence_of(
-    f: Finding, start: Model, residual: Collection[str] = (), clock_in_doubt: bool = False
+    f: Finding, start: Model, residual: Collection[str] = (), of_data: str = ""
 ) -> Confidence:
     """The confidence of a finding.
 
@@ -70,7 +72,7 @@ def confidence_of(
         f: the finding; without evidence, what its method says of it stands.
         start: the initial model.
         residual: axes on which the learned model leaves a significant residual.
-        clock_in_doubt: see :func:`clock_in_doubt`.
+        of_data: see :func:`doubt_of_data`.
     """
     own, of_set = f.confidence, f.together
     if f.evidence is not None and f.set_evidence is not None:
@@ -82,8 +84,8 @@ def confidence_of(
         own, doubt = EVEN_ODDS, MAY_BE_NONE
     elif _may_be_lags(f, start):
         own, doubt = min(own, EVEN_ODDS), MAY_BE_LAGS
-    elif own > EVEN_ODDS and clock_in_doubt:
-        own, doubt = EVEN_ODDS, MAY_BE_CLOCK
+    elif own > EVEN_ODDS and of_data:
+        own, doubt = EVEN_ODDS, of_data
     effect = start.ship.effects[f.id]
     # Waves are a residual themselves.
     if own > EVEN_ODDS and effect.search.by != "spectrum" and set(residual) & set(effect.axis):
@@ -91,15 +93,19 @@ def confidence_of(
     return Confidence(own, of_set, doubt)
 
 
-def clock_in_doubt(runs: Iterable[WeakWindows]) -> bool:
-    """Whether a log's clock may be so far off that it looks like another model.
+def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
+    """What speaks against any finding of some runs, as a part of a sentence; empty: nothing.
 
-    Forces go with the square of the clock's rate: it matters where that is more than what a measured
-    coefficient is uncertain by.
+    A clock may be so far off that it looks like another model: forces go with the square of its rate,
+    and it matters where that is more than what a measured coefficient is uncertain by. Samples may be
+    rarer than six in a window, so that a quick force is one sample's step.
     """
-    found = (f for w in runs if w.smoothed.sensors for f in w.smoothed.sensors.findings)
+    found = [f for w in runs if w.smoothed.sensors for f in w.smoothed.sensors.findings]
     rates = [f.value for f in found if f.aside and "clock_rate" in f.alike]
-    return any(abs(rate**2 - 1.0) > MEASURED for rate in rates)
+    if any(abs(rate**2 - 1.0) > MEASURED for rate in rates):
+        return MAY_BE_CLOCK
+    tracks = [w.smoothed.track for w in runs]
+    return RARE if any(t.period > EVERY * t.scale.time + DIGITS for t in tracks) else ""
 
 
 def _may_be_none(f: Finding) -> bool:

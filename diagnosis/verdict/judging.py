@@ -20,7 +20,7 @@ from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
-from .confidence import FOUND, Confidence, clock_in_doubt, confidence_of
+from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
 from .paired_errors import harms
 from .pruning import NOTHING, Withdrawn, prune
 from .pruning_criteria import Harm
@@ -133,7 +133,7 @@ def judge(
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
-    learned = with_confidence(fit.findings, remainder, start, clock_in_doubt(train))
+    learned = with_confidence(fit.findings, remainder, start, doubt_of_data(train))
     explained = shares(learned, start, data.validate)
     alone = unique_shares(learned, start, train, data.validate)
     known, force = fit.posterior, fit.unrecorded
@@ -142,13 +142,11 @@ def judge(
     )
 
 
-def with_confidence(
-    found: Findings, remainder: Remainder, start: Model, clock: bool = False
-) -> Findings:
+def with_confidence(found: Findings, remainder: Remainder, start: Model, of_data: str = "") -> Findings:
     """The findings with their confidence: the one place where it is set.
 
     A significant residual on the axes of an effect makes it even odds at the most; waves that are found
-    account for the one that is left in addition to them. A clock that is in doubt does the same to all.
+    account for the one that is left in addition to them. So does what speaks against the data, to all.
     """
     axes: Collection[str] = {axis for axis, r in remainder.axes.items() if r.significant}
     waves = [f for f in found.effects if start.ship.effects[f.id].search.by == "spectrum"]
@@ -156,7 +154,7 @@ def with_confidence(
         axes = ()
     effects = []
     for f in found.effects:
-        c = confidence_of(f, start, axes, clock)
+        c = confidence_of(f, start, axes, of_data)
         effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
     return replace(found, effects=effects)
 

@@ -77,12 +77,14 @@ class Examined:
         notes: what else is to be said, a line each.
         agreeing: channels in addition to the pose that agree with it -> standard deviation of their mean
             over the time between two samples of the pose, in SI.
+        aside: channels that were set aside.
     """
 
     run: Run
     findings: tuple[SensorFinding, ...] = ()
     notes: tuple[str, ...] = ()
     agreeing: dict[str, float] = field(default_factory=dict)
+    aside: dict[str, np.ndarray] = field(default_factory=dict)
 
     def plus(self, other: "Examined") -> "Examined":
         """What was found first, and then."""
@@ -93,7 +95,10 @@ class Examined:
         """The run with some channels set aside."""
         measured = {name: x for name, x in self.run.measured.items() if name not in aside}
         agreeing = {name: std for name, std in self.agreeing.items() if name not in aside}
-        return replace(self, run=replace(self.run, measured=measured), agreeing=agreeing)
+        set_aside = {name: x for name, x in self.run.measured.items() if name in aside}
+        return replace(
+            self, run=replace(self.run, measured=measured), agreeing=agreeing, aside=set_aside
+        )
 
 
 def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:

@@ -82,7 +82,7 @@ class Likelihood:
         expected = float(e.counts[JERK]) - system.trace(JERK)
         if not (np.isfinite(found) and expected > 0.0):
             raise LinAlgError("the likelihood of its smoothness is not finite")
-        return float(np.log(found / expected)) if found > 0.0 else -np.inf
+        return float(np.log(max(found, np.finfo(float).tiny) / expected))
 
     def variance(self, decades: float) -> float:
         """Likeliest variance of the noise, in units of the present one, all else given.
@@ -92,8 +92,8 @@ class Likelihood:
         """
         system, off = self._solved(decades)
         e = self._equations
-        of_pose = off[e.group == POSE]
-        return float(np.sum(of_pose**2)) / max(float(e.counts[POSE]) - system.trace(POSE), 1.0)
+        freedom = max(float(e.counts[POSE]) - system.trace(POSE), 1.0)
+        return float(np.sum(off[e.group == POSE] ** 2)) / freedom
 
     def minimum(self, near: float) -> float:
         """Where it is least [decades]; searched downhill from nearby.
@@ -107,7 +107,8 @@ class Likelihood:
                 beyond = float(np.clip(before + step, -DECADES, DECADES))
                 if excess(beyond) * step >= 0.0:
                     low, high = sorted((before, beyond))
-                    root: Any = toms748(excess, low, high)
+                    with np.errstate(invalid="ignore", divide="ignore"):  # of two equal values
+                        root: Any = toms748(excess, low, high)
                     return float(root)
             except LinAlgError:  # so little smoothing that the spline is not determined
                 break

@@ -39,7 +39,7 @@ class Inliers(NamedTuple):
     even: np.ndarray
 
 
-def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
+def robust(p: Problem, local: np.ndarray, least: np.ndarray, resolved: bool) -> Inliers:
     """Which samples are no outliers, their noise, and the smoothness of the spline through them.
 
     The problem has an even penalty. With a local smoothness its spline follows a few samples, and
@@ -49,25 +49,29 @@ def robust(p: Problem, local: np.ndarray, least: np.ndarray) -> Inliers:
         p: with a first guess of the noise.
         local: (3,), smoothness to begin with.
         least: (3,), see :func:`.likelihood.with_noise`.
+        resolved: whether the ship's quickest motion takes several samples: what sticks out is none.
 
     Raises:
         TooFewError: in some stretch.
     """
-    for _ in range(HALVINGS):
+    weights, halvings = robust_weights(p, local), 0
+    while (slow := _mostly_outside(p, weights)).any() and halvings < HALVINGS:
+        local, halvings = np.where(slow, local / 2.0**DEGREE, local), halvings + 1
         weights = robust_weights(p, local)
-        outside = (weights < Z95 / OUTLIER) & (p.share > 0.0)
-        slow = 2 * np.count_nonzero(outside, axis=0) > np.count_nonzero(p.share, axis=0)
-        if not slow.any():
-            break
-        local = np.where(slow, local / 2.0**DEGREE, local)
-    weights = outlier_test(p, local, weights)
-    for _ in range(REWEIGHTINGS):
+    weights, rounds = (outlier_test(p, local, weights) if resolved else weights), 0
+    while True:
         p, even = with_noise(p, likeliest(p, weights), weights, least)
         adapted, smoothness = adapt(p, even, weights)
         before, weights = weights, outlier_test(adapted, smoothness, weights)
-        if np.mean(weights != before) < CHANCE:
-            break
-    return Inliers(adapted, smoothness, weights, even)
+        rounds += 1
+        if np.mean(weights != before) < CHANCE or rounds == REWEIGHTINGS:
+            return Inliers(adapted, smoothness, weights, even)
+
+
+def _mostly_outside(p: Problem, weights: np.ndarray) -> np.ndarray:
+    """(3,), whether most samples of a channel are far from a spline that gives them weights (n, 3)."""
+    outside = (weights < Z95 / OUTLIER) & (p.share > 0.0)
+    return 2 * np.count_nonzero(outside, axis=0) > np.count_nonzero(p.share, axis=0)
 
 
 def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:
@@ -105,10 +109,10 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
         leverage = np.minimum(weights * spread, 0.999)
         expected = np.where(leverage > 0.0, np.sqrt(1.0 - leverage), np.sqrt(1.0 + spread))
         kept = _of_receivers((off <= OUTLIER * expected).astype(float))
-        if (kept == weights).all():
+        if np.array_equal(kept, weights):
             break
         agree = np.array([np.bincount(stretch, seen) for seen in (kept * (p.share > 0.0)).T])
-        few = (agree < WIDTH).any(axis=0)  # a spline of degree 5 follows any six
+        few = np.any(agree < WIDTH, axis=0)  # a spline of degree 5 follows any six
         if few.any():
             raise TooFewError(p.rows[few[stretch]])
         weights = kept

@@ -7,7 +7,7 @@ time follows from the jerk that is found (:mod:`.likelihood`). A sample further 
 deviations from its prediction by all others is a spike.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,21 +18,25 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import BRIEF, HORIZON, LONG, WIDTH, Counts, Track, noise
+from ..cleaning import BRIEF, CHANCE, HORIZON, LONG, WIDTH, Counts, Track, noise
 from ..columns.columns import POSE
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
-from .likelihood import adapt
+from .likelihood import adapt, criteria, likeliest, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
-SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
+QUICKEST = 0.5  # s, of a motion (chosen)
+SPACING = 0.1 * QUICKEST  # s between knots, or a sampling period if that is longer
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
+# Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
+# of channels against each other are wrong by less than four.
+MISSTATED = 2.0
 
 # Channel -> standard deviation of what it says over a sampling period, in SI.
 Agreeing = Mapping[str, float]
@@ -73,6 +77,7 @@ class Smoothed:
         track: the run with its samples judged; a heading that was not measured with a position, or is a
             spike, is the smoothed one.
         spikes: (n,), samples of the position refused by the outlier test.
+        agrees: (n, 3), which channels were measured anew and are no outliers.
         eta, eta_dot, eta_ddot: pose, heading continuous, and derivatives [m, m, rad; /s; /s2].
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
@@ -81,11 +86,13 @@ class Smoothed:
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
         late: whether the whole run agrees on that delay.
         pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
+        doubted: lines on noise that was given and contradicts the samples.
         sensors: what the run's channels say of each other; None where nobody asked.
     """
 
     track: Track
     spikes: np.ndarray
+    agrees: np.ndarray
     eta: np.ndarray
     eta_dot: np.ndarray
     eta_ddot: np.ndarray
@@ -99,6 +106,7 @@ class Smoothed:
     delay: float
     late: bool
     pose_only: PoseOnly
+    doubted: tuple[str, ...] = ()
     sensors: Examined | None = None
 
     @property
@@ -119,12 +127,13 @@ class Smoothed:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was found in the data, a line each."""
+        notes = (*self.track.notes, *self.doubted)
         if not (self.late and self.delay >= BRIEF * self.scale.time):
-            return self.track.notes
+            return notes
         delay = (
             f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
         )
-        return (*self.track.notes, delay)
+        return (*notes, delay)
 
     @property
     def counts(self) -> Counts:
@@ -186,15 +195,21 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     grid = knots(*stretches(rows[track.valid[rows]], track), spacing)
     dense = rows[within(grid, time[rows])]
     z = track.pose[dense] - origin
-    given, least = given_noise(track), least_noise(track)
-    guess = [noise(z[there, k : k + 1])[0] for k, there in enumerate(track.fresh[dense].T)]
-    sigma = np.where(np.isnan(given), np.maximum(guess, least), given)
+    given = given_noise(track)
+    sigma = np.where(np.isnan(given), _first_guess(track, dense), given)
     share = np.where(track.fresh[dense], _share(track, sigma, dense), 0.0)
     stiffness = np.ones((3, int(grid.intervals.sum())))
     # The squared jerk is averaged over a prediction window.
     average = max(1, round(HORIZON * scale.time / grid.spacing))
     spline = Spline(grid, basis(grid, time[dense]), stiffness, Rates.none(grid))
     return Problem(dense, np.where(share > 0.0, z, 0.0), sigma, share, average, spline), origin
+
+
+def _first_guess(track: Track, rows: np.ndarray) -> np.ndarray:
+    """(3,), noise of the pose by third differences, of some rows of a run [m, m, rad]."""
+    pose = track.pose[rows]
+    guess = [noise(pose[there, k : k + 1])[0] for k, there in enumerate(track.fresh[rows].T)]
+    return np.maximum(guess, least_noise(track))
 
 
 def given_noise(track: Track) -> np.ndarray:
@@ -223,8 +238,9 @@ def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
         # A spline that follows a few samples: its time constant is two sampling periods.
         periods = [np.median(np.diff(time[there])) for there in track.fresh.T]
         local = 2.0 * (2.0 * np.array(periods) / even.spline.grid.spacing) ** DEGREE
+        resolved = 2.0 * max(periods) <= QUICKEST * track.scale.time
         try:
-            alone = robust(even, local, least)
+            alone = robust(even, local, least, resolved)
             return rows, even._replace(sigma=alone.problem.sigma), origin, alone
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
@@ -264,6 +280,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     return Smoothed(
         track,
         spikes,
+        measured,
         *motion,
         eta_std,
         eta_dot_std,
@@ -274,7 +291,33 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         response.delay,
         response.sure,
         pose_only,
+        tuple(_doubted(track, alone, even)),
     )
+
+
+def _doubted(track: Track, found: Inliers, even: Problem) -> Iterator[str]:
+    """Given noise that the samples contradict, a line each: a free one is far likelier, and far off."""
+    given = given_noise(track)
+    if np.isnan(given).all():
+        return
+    free = even._replace(sigma=_first_guess(track, even.rows))
+    free, smoothness = with_noise(
+        free, likeliest(free, found.weights), found.weights, least_noise(track)
+    )
+    pairs = zip(criteria(even, found.weights), criteria(free, found.weights), strict=True)
+    for k, (held, other) in enumerate(pairs):
+        size = float(free.sigma[k] / given[k])
+        if np.isnan(size) or 1.0 / MISSTATED < size < MISSTATED:
+            continue
+        fall = held.cost(np.log10(found.even[k])) - other.cost(np.log10(smoothness[k]))
+        decades = 0.5 * fall / float(np.log(10.0))
+        if decades > -np.log10(CHANCE):
+            unit = "rad" if POSE[k] == "psi" else "m"
+            odds = f"10^{decades:.0f}" if decades < 100.0 else "more than 10^100"
+            yield (
+                f"the noise of {POSE[k]} is given as {given[k]:.3g} {unit}, its samples scatter by "
+                f"{free.sigma[k]:.2g} {unit} ({odds} : 1): leave it out, and it is estimated"
+            )
 
 
 def measured_rates(

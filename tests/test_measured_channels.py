@@ -1,0 +1,89 @@
+"""The table of channels: what was recorded is found again, and a noise that is given wrongly is doubted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis import Model, Run
+from diagnosis.assessment.gathering import gather
+from diagnosis.runs import channels_of, prepare
+from diagnosis.search.findings import Finding
+from diagnosis.verdict.confidence import confidence_of, doubt_of_data
+
+H, SECONDS, NOISE = 0.1, 120.0, np.array([4e-3, 4e-3, 2e-3])
+
+
+def sailed(seed=0):
+    """A smooth motion at 10 Hz with white noise, its yaw rate measured in addition."""
+    t = np.arange(0.0, SECONDS, H)
+    r = 0.1 * np.sin(0.25 * t)
+    psi = np.cumsum(r) * H
+    u = 0.3 + 0.05 * np.sin(0.1 * t)
+    x, y = np.cumsum(u * np.cos(psi)) * H, np.cumsum(u * np.sin(psi)) * H
+    rng = np.random.default_rng(seed)
+    pose = np.column_stack([x, y, psi]) + NOISE * rng.standard_normal((t.size, 3))
+    tau = np.column_stack([1.0 + 0.2 * np.sin(0.1 * t), 0.0 * t, 0.1 * np.cos(0.25 * t)])
+    return Run("sailed", t, pose, tau, measured={"r": r + 1e-3 * rng.standard_normal(t.size)})
+
+
+def table(run):
+    return {c.name: c for c in channels_of(prepare(run).smoothed)}
+
+
+def test_each_channel_has_its_own_rate_and_noise():
+    run = sailed()
+    place = run.pose.copy()
+    rows = np.arange(run.time.size) // 5 * 5
+    place[:, :2] = run.pose[rows, :2]
+    found = table(replace(run, pose=place))
+    assert [found[n].rate for n in ("x", "y", "psi", "r")] == pytest.approx([2.0, 2.0, 10.0, 10.0])
+    assert [found[n].held for n in ("x", "psi")] == pytest.approx([0.8, 0.0], abs=0.01)
+    assert [found[n].noise for n in ("x", "y", "psi")] == pytest.approx(NOISE, rel=0.3)
+    assert found["r"].noise == pytest.approx(1e-3, rel=0.2)
+    assert {c.noise_from for c in found.values()} == {"estimated"}
+    assert {c.reason for c in found.values()} == {""}
+    assert [found[n].unit for n in ("x", "psi", "r")] == ["m", "rad", "rad/s"]
+
+
+def test_outliers_of_a_channel_are_counted_with_their_times():
+    run = sailed()
+    pose = run.pose.copy()
+    hit = [200, 500, 800, 1000]
+    pose[hit, 2] += 0.3
+    found = table(replace(run, pose=pose))
+    assert found["psi"].outliers == len(hit)
+    assert found["psi"].outlier_times == pytest.approx(run.time[hit[:3]])
+    assert found["x"].outliers == 0
+
+
+def test_residuals_of_white_noise_are_white_and_those_behind_a_filter_are_not():
+    run, rng = sailed(), np.random.default_rng(1)
+    assert [c.correlation for c in table(run).values()] == [0.0] * 4
+    slow = np.convolve(rng.standard_normal(run.time.size), np.exp(-np.arange(40) / 4.0), "same")
+    pose = run.pose + np.column_stack([0.02 * slow, 0.0 * slow, 0.0 * slow])
+    given = replace(run, pose=pose, noise={"x": 0.1})
+    assert table(given)["x"].correlation == pytest.approx(0.4, rel=0.5)
+
+
+@pytest.mark.parametrize(("factor", "doubted"), [(0.1, True), (1.0, False), (10.0, True)])
+def test_a_noise_that_the_samples_contradict_is_doubted(factor, doubted):
+    given = {"x": float(factor * NOISE[0]), "psi": float(NOISE[2])}
+    s = prepare(replace(sailed(), noise=given)).smoothed
+    lines = [note for note in s.notes if "is given as" in note]
+    assert [line.split()[3] for line in lines] == ["x"] * doubted
+    assert all("leave it out" in line for line in lines)
+    found = {c.name: c for c in channels_of(s)}
+    assert (found["x"].noise, found["x"].noise_from) == (given["x"], "given")
+    assert found["y"].noise_from == "estimated"
+
+
+@pytest.mark.parametrize(("every", "sure"), [(4, True), (10, False)])
+def test_of_rare_samples_nothing_is_sure(every, sure):
+    rare = sailed().rows(np.arange(0, round(SECONDS / H), every))
+    (windows,) = gather([rare], anyway=True)
+    assert np.diff(windows.smoothed.time).max() <= 0.5 + 1e-9
+    f = Finding("mass", {"mass": 30.0}, {"mass": (20.0, 40.0)}, 0.99, [], 0.9, 0.9, together=0.99)
+    seen = confidence_of(f, Model(), (), doubt_of_data([windows]))
+    assert seen.own == (0.99 if sure else 0.5)
+    assert ("too rare" in seen.doubt) != sure
