@@ -8,6 +8,7 @@ from .assessment.gathering import gather as gather
 from .assessment.stability import Stability as Stability
 from .assessment.stability import check_stability as check_stability
 from .interactive import ShownDiagnosis as ShownDiagnosis
+from .interactive import calibrate as calibrate
 from .interactive import diagnose as diagnose
 from .interactive import load as load
 from .predictors import Fmu as Fmu
@@ -42,6 +43,7 @@ from .runs import smooth as smooth
 from .search import Finding as Finding
 from .search import Findings as Findings
 from .search import method as method
+from .session import CalibratedModel as CalibratedModel
 from .session import Comparison as Comparison
 from .session import Diagnosis as Diagnosis
 from .session import evaluate as evaluate

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cosim import InputError, Result
+from cosim import InputError
 
 from . import session
 from .assessment.gathering import gather
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     import pandas
+
+    from cosim import Result
 
     Source: TypeAlias = str | Path | Result | pandas.DataFrame
 
@@ -61,7 +63,9 @@ def load(
     Raises:
         InputError: a run cannot be used, or is given twice.
     """
-    import pandas
+    import pandas  # a library, and simulations, that take as long to import as a run to read
+
+    from cosim import Result
 
     every = _listed(sources)
     model = _model_of(model, ship, every)
@@ -93,7 +97,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
     if loaded and name is None:
         return nominal(loaded)
     if name is None:
-        files = [run.folder if isinstance(run, Result) else run for run in runs]
+        files = [getattr(run, "folder", run) for run in runs]  # of a result of a simulation
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
         name = told[0] if told else None
     return Model(ship=ship_with((), name))
@@ -250,11 +254,55 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
+    parts = _loaded(runs, validate, held_out, prior, model, ship)
+    found = session.diagnose(*parts.first, prior, parts.model, advance, seed, by, parts.decide, pruning)
+    return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
+
+
+class _Loaded(NamedTuple):
+    """What a function of :mod:`.session` is given: train and test runs, runs that decide, a model."""
+
+    first: tuple[Sequence[WeakWindows], Sequence[WeakWindows]]
+    decide: Sequence[WeakWindows]
+    model: Model | ModelSource
+
+
+def _loaded(
+    runs: Any, validate: Any, held_out: Any, prior: Prior, model: Any, ship: str | Path | None
+) -> _Loaded:
+    """Runs and model, read where they are not; arguments as of :func:`diagnose`."""
     parts = [_listed(runs), _listed(validate), _listed(held_out)]
     model, of = _opened(model, None, ship, [r for p in parts for r in p])
     shares(of.ship, prior)  # before any work
     train, decide, test = (
         p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
     )
-    found = session.diagnose(train, test, prior, model, advance, seed, by, decide, pruning)
-    return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
+    return _Loaded((train, test), decide, model)
+
+
+def calibrate(
+    runs: Sequence[WeakWindows] | Source | Sequence[Source],
+    held_out: Sequence[WeakWindows] | Source | Sequence[Source] = (),
+    prior: Prior = None,
+    model: Model | ModelSource | str | Path | None = None,
+    advance: Advance = silent,
+    ship: str | Path | None = None,
+    validate: Sequence[WeakWindows] | Source | Sequence[Source] = (),
+) -> session.CalibratedModel:
+    """Fit the coefficients of a model to runs, without an effect: what ``learn --quick`` does.
+
+    Args:
+        runs, held_out, prior, model, advance, ship, validate: as of :func:`diagnose`.
+
+    Returns:
+        The calibrated model, its errors, and what it gains over the initial one.
+
+    Raises:
+        InputError: too little data, a prior that is negative or not finite, or no coefficient to fit.
+    """
+    parts = _loaded(runs, validate, held_out, prior, model, ship)
+    task = session.begin(*parts.first, prior, parts.model, advance, validate=parts.decide)
+    found = task.calibrate()
+    if found is None:
+        raise InputError("there is no coefficient to calibrate, or the runs do not determine them")
+    return found

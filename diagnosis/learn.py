@@ -1,4 +1,8 @@
-"""Learn what a model lacks: ``python -m diagnosis.learn TRAIN... [--test RUN...]``."""
+"""Learn what a model lacks: ``python -m diagnosis.learn TRAIN... [--test RUN...]``.
+
+It gives three answers in growing order of time, each shown and written as soon as it is there: the
+error of the initial model, its error with calibrated coefficients, and the effect that it lacks.
+"""
 
 if __name__ == "__main__":
     from cosim.supervision import supervised
@@ -6,8 +10,9 @@ if __name__ == "__main__":
     supervised()  # before all other imports, which take a while
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cosim import InputError
 from cosim.command import FAILED, run_command
@@ -29,6 +34,10 @@ from .search.methods import DEFAULT, METHODS, method
 from .verdict.pruning_criteria import CRITERIA, criterion
 from .verdict.pruning_criteria import USUAL as PAIRED
 
+if TYPE_CHECKING:
+    from .session import Session
+
+COMPARISON, CALIBRATED, CALIBRATION = EARLY = "comparison.json", "calibrated.ssv", "calibrated.json"
 DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "diagnosis.json",
     "model.ssv",
@@ -38,6 +47,7 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.tex",
 )
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
+UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,67 +55,132 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run(learn, _parser().parse_args(arguments))
 
 
-def learn(options: argparse.Namespace, advance: Advance) -> Done:
-    """Run the command with parsed options."""
+def learn(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
+    """Run the command with parsed options: the three answers, each when its files are there."""
+    task = _begun(options, advance)
+    yield _compared(task, options)
+    calibrated = _calibrated(task, options)
+    if calibrated is not None:
+        yield calibrated
+    if not options.quick:
+        yield _diagnosed(task, options, advance)
+
+
+def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
+    """The runs and the model, read and checked."""
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .predictors import WRITTEN, DescribedShip, ship_with
+    from .predictors import DescribedShip, ship_with
     from .search import shares
 
     by = method(options.method)  # before any work: an unknown name, or a library that is missing
     criterion(options.pruning)
-    possible = [*dict.fromkeys((*FILES, *WRITTEN))]
-    with together(options.out, possible) as new:
-        craft = ship_with(options.effects, options.ship)
-        model = initial_model(options.model, options.map, craft)
-        start = model.start
-        if options.fit and not model.parametric:
-            raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
-        shares(craft, options.prior)
-        paths = [*options.train, *options.validate, *options.test]
-        runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
-        from . import session
-        from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
-        from .report.document import write_json
-        from .search.prediction_fit.output_fit import fitted
+    craft = ship_with(options.effects, options.ship)
+    model = initial_model(options.model, options.map, craft)
+    start = model.start
+    if options.fit and not model.parametric:
+        raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
+    shares(craft, options.prior)
+    paths = [*options.train, *options.validate, *options.test]
+    runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
+    from . import session
+    from .search.prediction_fit.output_fit import fitted
 
-        train, decide = len(options.train), len(options.train) + len(options.validate)
-        if options.fit and start is not None:
-            model = DescribedShip(fitted(runs[:train], start, options.prior, options.fit))
-        with proposing():
-            diagnosis = session.diagnose(
-                runs[:train],
-                runs[decide:],
-                options.prior,
-                model,
-                advance,
-                by=by,
-                validate=runs[train:decide],
-                pruning=options.pruning,
-            )
+    train, decide = len(options.train), len(options.train) + len(options.validate)
+    if options.fit and start is not None:
+        model = DescribedShip(fitted(runs[:train], start, options.prior, options.fit))
+    parts = runs[:train], runs[decide:]
+    with proposing():
+        return session.begin(
+            *parts,
+            options.prior,
+            model,
+            advance,
+            by=by,
+            validate=runs[train:decide],
+            pruning=options.pruning,
+        )
+
+
+def _compared(task: "Session", options: argparse.Namespace) -> Done:
+    """First answer: the initial model against the runs. Files of an older result go away."""
+    from .predictors import WRITTEN
+    from .report import ReportData, file_content, show_comparison
+    from .report.document import write_json
+
+    report = ReportData.of(task.compare(), options.model, [COMPARISON])
+    with together(options.out, [*dict.fromkeys((*EARLY, *FILES, *WRITTEN))]) as new:
+        write_json(new / COMPARISON, file_content(report))
+    return Done(0, [FIRST, *show_comparison(report, str(options.out))], more=True)
+
+
+def _calibrated(task: "Session", options: argparse.Namespace) -> Done | None:
+    """Second answer: the coefficients alone; None: there is none to fit, and a search follows."""
+    from .predictors import write_model
+    from .report import ReportData, calibration_content, show_calibration, write_report
+    from .report.document import write_json
+
+    calibrated, more = task.calibrate(), not options.quick
+    left_out = [] if more else [LEFT_OUT]
+    if calibrated is None:
+        return None if more else Done(0, [NOTHING_TO_FIT, *left_out])
+    files = [COMPARISON, CALIBRATED, CALIBRATION, *([] if more else [REPORT])]
+    report = ReportData.of(calibrated.comparison, options.model, files)
+    with together(options.out, files[1:]) as new:
+        write_model(new / CALIBRATED, calibrated.model)
+        write_json(new / CALIBRATION, calibration_content(calibrated, report, left_out))
+        if not more:
+            write_report(new / REPORT, report, task.advance, _origin(options))
+    shown = show_calibration(calibrated, report, str(options.out))
+    return Done(0, [SECOND, *shown, *left_out], more)
+
+
+def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -> Done:
+    """Third answer: which effect is missing."""
+    from .predictors import WRITTEN
+    from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
+    from .report.document import write_json
+
+    possible = [*dict.fromkeys((*FILES, *WRITTEN))]
+    diagnosis = task.diagnose()
+    with together(options.out, possible) as new:
         refused, notes, predictor = "", [], diagnosis.comparison.predictor
         if not (diagnosis.sound or options.allow_unstable):
             refused = UNSOUND
         else:
             try:
-                notes = predictor.write(new, diagnosis.learned.model, runs)
+                notes = predictor.write(new, diagnosis.learned.model, task.runs)
                 if predictor.parametric:
                     diagnosis.posterior.write(new / POSTERIOR)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
-        files = [name for name in possible if (new / name).exists() or name in LATER]
+        early = [name for name in EARLY if (options.out / name).exists()]
+        files = [*early, *(name for name in possible if (new / name).exists() or name in LATER)]
         report = ReportData.of(diagnosis, options.model, files)
         write_json(new / DIAGNOSIS, file_content(report))
         write_coefficients(diagnosis, new / CSV, new / TEX)
-        origin = {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
-        write_report(new / REPORT, report, advance, origin)
-    shown = [*show_diagnosis(report, str(options.out)), *notes]
+        write_report(new / REPORT, report, advance, _origin(options))
+    shown = [THIRD, *show_diagnosis(report, str(options.out)), *notes]
     if refused:
         return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
     return Done(0, shown)
 
 
-UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
+def _origin(options: argparse.Namespace) -> dict[str, object]:
+    """What a report was made with."""
+    return {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
+
+
+FIRST = "Answer 1 of 3: the initial model compared with the runs\n"
+SECOND = "Answer 2 of 3: the coefficients calibrated, without an effect\n"
+THIRD = "Answer 3 of 3: the missing effect\n"
+NOTHING_TO_FIT = (
+    "Answer 2 of 3: the model has no coefficient to calibrate, or the runs do not determine them."
+)
+LEFT_OUT = (
+    "Left out by --quick: the search for a missing effect, its confidence, and the stability of the "
+    f"learned model ({DIAGNOSIS}, {MODEL})."
+)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -113,12 +188,13 @@ def _parser() -> argparse.ArgumentParser:
         "learn",
         "Learn from measured runs which physical effect a model lacks, and how sure that is.",
         "examples:  %(prog)s run1.csv run2.csv --test run3.csv\n"
+        "           %(prog)s run1.csv run2.csv --quick\n"
         "           %(prog)s run1.csv run2.csv --validate run3.csv --test run4.csv\n"
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
         "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
         "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
-        "            130 interrupted (nothing is written)",
+        "            130 interrupted (the files of answers that were shown are kept)",
     )
     made.add_argument(
         "train",
@@ -140,6 +216,12 @@ def _parser() -> argparse.ArgumentParser:
             default=[],
             help=f"runs that {what}",
         )
+    made.add_argument(
+        "--quick",
+        action="store_true",
+        help="stop after the comparison and the calibration of the coefficients, without a search for "
+        "effects",
+    )
     made.add_argument(
         "--prior",
         type=prior,

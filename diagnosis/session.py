@@ -1,7 +1,7 @@
 """The two tasks of the commands as functions: evaluate a model on runs, and diagnose what it lacks."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,13 +30,17 @@ from .predictors import (
 )
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
-from .search import DEFAULT, Method, Prior, method
+from .search import DEFAULT, Findings, Method, Prior, method
 from .search.gram import PARTS
+from .search.prediction_fit.coefficient_calibration import Calibrator
+from .search.prediction_fit.joint_posterior import JointPosterior
 from .search.prediction_fit.predicted_bands import prediction_bands
+from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import DecidedFindings, judge
-from .verdict.pruning_criteria import USUAL, criterion
+from .verdict.prediction_gain import PredictionGain, gain_of_search, prediction_gain
+from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
 
 
@@ -74,6 +78,32 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
+class CalibratedModel:
+    """The initial model with other values of its coefficients, and without an effect.
+
+    Attributes:
+        learned: the findings, of which there are none, with the model.
+        posterior: of the coefficients.
+        start: the initial model.
+        comparison: errors of the initial and of the calibrated model.
+        gain: what it gains over the initial model in the data that decide; None where that is not known.
+        prior: of the coefficients, as it was given.
+    """
+
+    learned: Findings
+    posterior: JointPosterior
+    start: Model
+    comparison: Comparison
+    gain: PredictionGain | None
+    prior: Prior
+
+    @property
+    def model(self) -> Model:
+        """The calibrated model."""
+        return self.learned.model
+
+
+@dataclass(frozen=True, eq=False)
 class Diagnosis(DecidedFindings):
     """A verdict, and what it rests on.
 
@@ -84,6 +114,8 @@ class Diagnosis(DecidedFindings):
         speeds: u, v, r that hold 99 % of the training runs [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
+        gain: what the search for effects gains over calibration alone in the data that decide; None
+            where that is not known.
     """
 
     comparison: Comparison
@@ -92,6 +124,7 @@ class Diagnosis(DecidedFindings):
     speeds: tuple[float, float, float]
     prior: Prior
     seed: int
+    gain: PredictionGain | None = None
 
     @property
     def sound(self) -> bool:
@@ -170,7 +203,158 @@ def _compared(
     return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 
+@dataclass(frozen=True, eq=False)
+class Session:
+    """The five steps of ``learn``, in growing order of time: each is a method, and needs those before.
+
+    Attributes:
+        train, validate, test: runs to learn from, runs that decide, and runs that judge only.
+        predictor: of the initial model.
+        prior: of the nominal coefficients, as it was given.
+        method: of identification.
+        harms: criterion of pruning.
+        advance: receives the name of each step when it begins.
+        seed: of everything random.
+    """
+
+    train: Sequence[WeakWindows]
+    validate: Sequence[WeakWindows]
+    test: Sequence[WeakWindows]
+    predictor: Predictor
+    prior: Prior
+    method: Method
+    harms: Harm
+    advance: Advance
+    seed: int
+
+    @property
+    def runs(self) -> list[WeakWindows]:
+        """All runs."""
+        return [*self.train, *self.validate, *self.test]
+
+    @property
+    def start(self) -> Model:
+        """The initial model."""
+        return self.predictor.model
+
+    @cached_property
+    def known(self) -> NominalPrior:
+        """The prior of each nominal coefficient."""
+        return NominalPrior.of(self.start, self.prior)
+
+    def data(self, sigma: np.ndarray) -> ValidationData:
+        """The data that decide, by the noise (3,) of the model error [N, N, N m]."""
+        return ValidationData(self.train, self.validate, self.start, sigma)
+
+    @well_posed()
+    def compare(self) -> Comparison:
+        """First answer: the errors of the initial model."""
+        return self._compared(None)
+
+    @cached_property
+    def calibration(self) -> RefitOutcome | None:
+        """The coefficients fitted to predictions; None: there are none, or runs do not tell them."""
+        if not (self.predictor.parametric and any(self.known.std.values())):
+            return None
+        nothing = Findings(model=self.start, searched=self.known)
+        calibrator = Calibrator(nothing, self.train, self.start, self.known)
+        self.advance("calibration of the coefficients")
+        with suppress(LinAlgError):  # the runs do not determine them
+            return calibrator.coefficients() if calibrator.windows else None
+        return None
+
+    @well_posed()
+    def calibrate(self) -> CalibratedModel | None:
+        """Second answer: the coefficients alone, without an effect; None: there is none to fit."""
+        fit = self.calibration
+        if fit is None:
+            return None
+        gain = prediction_gain(self.data(fit.findings.sigma), self.start, fit.findings)
+        compared = self._compared(fit.findings.model)
+        return CalibratedModel(fit.findings, fit.posterior, self.start, compared, gain, self.prior)
+
+    @well_posed()
+    def diagnose(self) -> Diagnosis:
+        """Third answer: which effect is missing, and how sure that is."""
+        found = self.method.fit(self.train, self.start, self.prior, self.advance, self.seed)
+        data, region = self.data(found.sigma), self._region()
+        calibrates = self.predictor.parametric
+        verdict = judge(found, data, self.known, self.harms, region, calibrates, self.advance)
+        gain = self._gained(verdict, data) if self.predictor.parametric else None
+        return self._concluded(verdict, data, region, gain)
+
+    def _gained(self, verdict: DecidedFindings, data: ValidationData) -> PredictionGain | None:
+        """What the search for effects gained over calibration alone."""
+        self.advance("what the search gained over calibration")
+        calibrated = None if self.calibration is None else self.calibration.findings
+        learned = verdict.learned.model if verdict.changed else self.start
+        return gain_of_search(data, self.start, calibrated, verdict.learned, learned)
+
+    def _region(self) -> OperatingRegion:
+        """The motions that the training runs hold."""
+        nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
+        return OperatingRegion.of(nu, self.start.ship.scale)
+
+    def _compared(self, after: Model | None) -> Comparison:
+        decide = len(self.train) + len(self.validate)
+        runs = self.runs
+        return _compared(self.predictor, runs[:decide], after, runs[decide:], self.advance)
+
+    def _concluded(
+        self,
+        verdict: DecidedFindings,
+        data: ValidationData,
+        region: OperatingRegion,
+        gain: PredictionGain | None,
+    ) -> Diagnosis:
+        """The diagnosis by a verdict: errors of predictions, and whether the learned model is stable."""
+        comparison = _predicted(verdict, self.predictor, self.runs, data, self.advance)
+        self.advance("stability")
+        stability = check_stability(verdict.learned.model, self.start, self.advance, region)
+        return Diagnosis(
+            **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
+            comparison=comparison,
+            start=self.start,
+            stability=stability,
+            speeds=region,
+            prior=self.prior,
+            seed=self.seed,
+            gain=gain,
+        )
+
+
 @well_posed()
+def begin(
+    train: Sequence[WeakWindows],
+    held_out: Sequence[WeakWindows] = (),
+    prior: Prior = None,
+    model: Model | ModelSource | str | Path | None = None,
+    advance: Advance = silent,
+    seed: int = 0,
+    by: str | Method = DEFAULT,
+    validate: Sequence[WeakWindows] = (),
+    pruning: str = USUAL,
+) -> Session:
+    """Check what is given, before any work; arguments as of :func:`diagnosis.diagnose`, of loaded runs.
+
+    Raises:
+        InputError: too little data, or an argument that is not what it should be.
+    """
+    runs = told_apart([*train, *validate, *held_out])
+    source = _source(model, runs)
+    prior_shares((source.start or nominal(runs)).ship, prior)
+    harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
+    blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
+    if blocks < PARTS:
+        raise InputError(
+            f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
+            f"at least {PARTS * block:.3g} s are needed"
+        )
+    first, last = len(train), len(runs) - len(held_out)
+    parts = runs[:first], runs[first:last], runs[last:]
+    return Session(*parts, source.on(runs, advance), prior, chosen, harms, advance, seed)
+
+
 def diagnose(
     train: Sequence[WeakWindows],
     held_out: Sequence[WeakWindows] = (),
@@ -183,38 +367,7 @@ def diagnose(
     pruning: str = USUAL,
 ) -> Diagnosis:
     """Learn what a model lacks; arguments as of :func:`diagnosis.diagnose`, of runs that are loaded."""
-    runs = told_apart([*train, *validate, *held_out])
-    source = _source(model, runs)
-    prior_shares((source.start or nominal(runs)).ship, prior)  # before any work
-    harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
-    blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
-    if blocks < PARTS:
-        raise InputError(
-            f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
-            f"at least {PARTS * block:.3g} s are needed"
-        )
-    train, validate = runs[: len(train)], runs[len(train) : len(runs) - len(held_out)]
-
-    predictor = source.on(runs, advance)
-    start = predictor.model
-    nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
-    region = OperatingRegion.of(nu, start.ship.scale)
-    found = chosen.fit(train, start, prior, advance, seed)
-    data = ValidationData(train, validate, start, found.sigma)
-    known = NominalPrior.of(start, prior)
-    verdict = judge(found, data, known, harms, region, predictor.parametric, advance)
-    comparison = _predicted(verdict, predictor, runs, data, advance)
-    advance("stability")
-    stability = check_stability(verdict.learned.model, start, advance, region)
-    return Diagnosis(
-        **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
-        comparison=comparison,
-        start=start,
-        stability=stability,
-        speeds=region,
-        prior=prior,
-        seed=seed,
-    )
+    return begin(train, held_out, prior, model, advance, seed, by, validate, pruning).diagnose()
 
 
 def _predicted(

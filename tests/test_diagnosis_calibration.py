@@ -75,7 +75,7 @@ def test_the_drag_is_found_beside_constants_of_each_run():
     )
     assert after - true < 0.3 * (before - true)
     assert [model.value(n) for n in CONSTANTS] == [0.0, 0.0]
-    assert len(problem.without_each_run(fitted.estimate)) == 4
+    assert len(problem.without_each_fold(fitted.estimate)) == 4
 
 
 @pytest.mark.slow

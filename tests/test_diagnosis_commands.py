@@ -31,6 +31,7 @@ from diagnosis.assessment.stability import OPERATING, least_dissipation
 from diagnosis.execution.result_folder import together
 from diagnosis.predictors import DescribedShip
 from diagnosis.report.formatting import finite
+from diagnosis.report.headline import SEARCH_GAINED, SEARCH_GAINED_NOTHING
 from fmus.effects import STANDARD
 from fmus.ship import ship
 
@@ -99,8 +100,11 @@ def test_the_files_are_there_and_nothing_else(learned):
     out, code, _ = learned
     assert code == 0
     assert sorted(p.name for p in out.iterdir()) == [
+        "calibrated.json",
+        "calibrated.ssv",
         "coefficients.csv",
         "coefficients.tex",
+        "comparison.json",
         "diagnosis.json",
         "model.ssv",
         "posterior.json",
@@ -209,7 +213,7 @@ def test_the_files_agree_with_each_other_and_with_the_model(learned):
     assert [(r["run"], r["seconds"], r["samples"]) for r in content["data"]["runs"]] == [("a", 96.0, 1920), ("b", 48.0, 960)]  # fmt: skip
     assert content["windows"] == {"prediction": 8.0, "model_error": 3.0}
     assert (content["runs"], content["model"], content["seed"], content["prior"]) == (["a", "b"], None, 0, None)  # fmt: skip
-    assert content["files"] == ["diagnosis.json", "model.ssv", "posterior.json", "report.html", "coefficients.csv", "coefficients.tex"]  # fmt: skip
+    assert content["files"] == [*learn.EARLY, "diagnosis.json", "model.ssv", "posterior.json", "report.html", "coefficients.csv", "coefficients.tex"]  # fmt: skip
     assert content["versions"]["numpy"] == np.__version__
     scores = [r["score"] for r in content["ranking"]]
     assert scores == sorted(scores)
@@ -490,7 +494,10 @@ def written(monkeypatch, tmp_path):
     ):
         monkeypatch.setattr(f"diagnosis.report.{name}", stub)
     monkeypatch.setattr("diagnosis.assessment.gathering.gather", lambda paths, *_: list(paths))
-    monkeypatch.setattr(session, "diagnose", lambda *_, **__: given)
+    task = SimpleNamespace(
+        compare=lambda: given.comparison, calibrate=lambda: None, diagnose=lambda: given, runs=[]
+    )
+    monkeypatch.setattr(session, "begin", lambda *_, **__: task)
     monkeypatch.setattr(session, "evaluate", lambda *_, **__: given.comparison)
     return given
 
@@ -504,7 +511,7 @@ def test_model_that_is_not_sound_is_not_written_unless_it_is_asked_for(
 ):
     written.sound = sound
     code, text = run(learn.main, tmp_path / "a.csv", "--out", tmp_path / "out", *options)
-    files = set(learn.FILES) - (set() if kept else {learn.MODEL, learn.POSTERIOR})
+    files = {learn.COMPARISON, *learn.FILES} - (set() if kept else {learn.MODEL, learn.POSTERIOR})
     assert code == (0 if kept else 3)
     assert {path.name for path in (tmp_path / "out").iterdir()} == files == set(written.files)
     assert ("model.ssv is NOT written" in text) is not kept
@@ -647,18 +654,122 @@ def test_an_effect_of_the_user_is_found(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
-def test_ctrl_c_leaves_nothing(runs, tmp_path):
+def test_ctrl_c_leaves_the_answers_that_are_there(runs, tmp_path):
     out = tmp_path / "out"
     ended = in_a_process("learn", runs / "a.csv", "--out", out)
-    while not out.exists():
+    while not (out / learn.CALIBRATION).exists():
         time.sleep(0.02)
         assert ended.poll() is None
     ended.send_signal(signal.SIGINT)
-    assert "interrupted" in ended.communicate()[1]
+    shown, said = ended.communicate()
+    assert "interrupted" in said
     assert ended.returncode == 130
-    assert not list(tmp_path.iterdir())
+    assert {path.name for path in out.iterdir()} == {*learn.EARLY}
+    assert learn.SECOND in shown
+    assert learn.THIRD not in shown
 
 
 def test_numbers_that_are_none_are_null():
     found = finite({"a": math.nan, "b": [np.inf, np.float64(1.0)], "c": np.array([np.nan, 2.0])})
     assert found == {"a": None, "b": [None, 1.0], "c": [None, 2.0]}
+
+
+@pytest.fixture(scope="session")
+def quick(runs, shared):
+    """Folder, exit code and terminal of one run of learn --quick."""
+
+    def work(folder):
+        done = run(
+            learn.main, runs / "a.csv", "--test", runs / "b.csv", "--quick", "--out", folder / "out"
+        )
+        (folder / "done").write_text(json.dumps(done))
+
+    folder = once(shared / "quick", work)
+    return folder / "out", *json.loads((folder / "done").read_text())
+
+
+def test_quick_stops_after_the_second_answer_and_says_what_is_left_out(quick):
+    out, code, text = quick
+    files = {path.name for path in out.iterdir()}
+    content = strict(out / learn.CALIBRATION)
+    assert code == 0
+    assert files == {*learn.EARLY, learn.REPORT} == set(content["files"])
+    assert strict(out / learn.COMPARISON)["files"] == [learn.COMPARISON]
+    assert text.index(learn.FIRST) < text.index(learn.SECOND)
+    assert " ".join(learn.LEFT_OUT.split()) in " ".join(text.split())
+    assert content["left_out"] == [learn.LEFT_OUT]
+    assert [e["use"] if "use" in e else e["held_out"] for e in content["errors"]] == [False, True]
+
+
+def test_the_calibrated_parameter_set_has_the_error_that_is_told(quick, runs):
+    out, _, _ = quick
+    compared = diagnosis.compare([runs / "a.csv", runs / "b.csv"], model=out / learn.CALIBRATED)
+    first = strict(out / learn.COMPARISON)["errors"]
+    for e, before, told in zip(
+        compared.evaluations, first, strict(out / learn.CALIBRATION)["errors"], strict=True
+    ):
+        assert e.before.position == pytest.approx(told["window_position_rmse"]["after"], rel=1e-6)
+        assert before["window_position_rmse"]["before"] == told["window_position_rmse"]["before"]
+
+
+def test_all_effects_of_the_calibrated_model_are_those_of_the_initial_one(quick):
+    model = import_module("diagnosis.predictors").read_model(quick[0] / learn.CALIBRATED)
+    assert not [name for name in model.vessel if name.startswith("delta_")]
+
+
+def test_three_answers_come_in_their_order_and_the_search_gains_where_an_effect_is_hidden(learned):
+    out, _, text = learned
+    places = [text.index(answer) for answer in (learn.FIRST, learn.SECOND, learn.THIRD)]
+    assert places == sorted(places)
+    content, after = strict(out / "diagnosis.json"), text[places[-1] :]
+    gain = content["gain"]["position"]
+    assert content["gain"]["gained"]
+    assert gain["difference"] > 2.0 * gain["standard_error"]
+    assert gain["difference"] == pytest.approx(gain["before"] ** 2 - gain["after"] ** 2)
+    assert SEARCH_GAINED in " ".join(after.split())
+    assert SEARCH_GAINED_NOTHING not in content["sentence"] + after
+
+
+@pytest.mark.slow
+def test_the_search_gains_nothing_where_no_effect_is_hidden(runs, tmp_path):
+    code, text = run(learn.main, runs / "c.csv", "--out", tmp_path / "out")
+    content, page = strict(tmp_path / "out" / "diagnosis.json"), (tmp_path / "out" / "report.html")
+    third = " ".join(text[text.index(learn.THIRD) :].split())
+    assert code == 0
+    assert not content["gain"]["gained"]
+    assert content["sentence"].startswith(SEARCH_GAINED_NOTHING)
+    assert third.startswith(f"{learn.THIRD.strip()} What the search gained {SEARCH_GAINED_NOTHING}")
+    assert f'<p class="lead">{SEARCH_GAINED_NOTHING}' in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("answers", [0, 1, 2])
+def test_an_interrupt_keeps_the_answers_that_are_there(answers, runs, tmp_path, monkeypatch):
+    def interrupt(task):
+        raise KeyboardInterrupt
+
+    name = ("compare", "calibrate", "diagnose")[answers]
+    monkeypatch.setattr(session.Session, name, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run(learn.main, runs / "b.csv", "--out", tmp_path / "out")
+    there = {path.name for path in tmp_path.rglob("*") if path.is_file()}
+    assert there == {*([], learn.EARLY[:1], learn.EARLY)[answers]}
+
+
+def test_files_of_an_older_result_go_away_with_the_first_answer(runs, tmp_path, monkeypatch):
+    def refuse(task):
+        raise InputError("refused")
+
+    monkeypatch.setattr(session.Session, "calibrate", refuse)
+    (tmp_path / learn.DIAGNOSIS).write_text("{}")
+    code, _ = run(learn.main, runs / "b.csv", "--out", tmp_path)
+    assert code == 2
+    assert {path.name for path in tmp_path.iterdir()} == {learn.COMPARISON}
+
+
+def test_exact_coefficients_are_not_calibrated(runs, tmp_path):
+    code, text = run(learn.main, runs / "b.csv", "--prior", "0", "--quick", "--out", tmp_path / "out")
+    assert code == 0
+    assert " ".join(learn.NOTHING_TO_FIT.split()) in " ".join(text.split())
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {learn.COMPARISON}
+    with pytest.raises(InputError, match="no coefficient to calibrate"):
+        diagnosis.calibrate(runs / "b.csv", prior=0.0)

@@ -112,7 +112,7 @@ def test_the_file_is_spoilt_and_repaired(prepared):
 @pytest.mark.parametrize(
     ("main", "place"),
     [
-        slow((learn.main, "diagnosis.session.diagnose")),
+        slow((learn.main, "diagnosis.session.begin")),
         (compare.main, "diagnosis.session.evaluate"),
     ],
 )

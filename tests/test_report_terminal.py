@@ -13,10 +13,17 @@ from diagnosis import Counts
 from diagnosis.assessment.covariates import SPEED
 from diagnosis.report import figures, notebook, tracks
 from diagnosis.report.chart import Chart, Panel
-from diagnosis.report.headline import NOTHING_FOUND
+from diagnosis.report.content import gain_content
+from diagnosis.report.headline import (
+    NOTHING_FOUND,
+    SEARCH_GAINED,
+    SEARCH_GAINED_NOTHING,
+    first_sentences,
+)
 from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.sensors.sensor_finding import SensorFinding
+from diagnosis.verdict.prediction_gain import PairedChange, PredictionGain
 
 
 def run(name, use, size=1.0, notes=(), faults=(), learned=True):
@@ -198,8 +205,33 @@ def test_a_comparison_has_its_data_and_errors_before():
 
 def test_a_diagnosis_has_what_is_sure_first_and_errors_before_and_after():
     shown = lines(show_diagnosis(found(), "out/folder"))
-    of_uses = DATA.replace("a 96.04", "a (learned from) 96.04").replace("b 48", "b (seen only now) 48")
-    assert shown == f"{of_uses}\n{DIAGNOSIS}".splitlines()
+    assert shown == DIAGNOSIS.splitlines()
+
+
+@pytest.mark.parametrize("gained", [True, False])
+def test_what_the_search_gained_is_the_first_sentence(gained):
+    change = PairedChange(0.032, 0.0089, 9.4e-4, 1.1e-4)
+    gain = PredictionGain("validation runs", 54, change, change, gained, "calibrated")
+    made = found(gain=gain)
+    shown = lines(show_diagnosis(made, "out"))
+    first = SEARCH_GAINED if gained else SEARCH_GAINED_NOTHING
+    assert shown[:2] == ["What the search gained", first]
+    assert "mean square falls by 940 ± 110 mm²" in " ".join(shown)
+    assert first_sentences(made).startswith(SEARCH_GAINED_NOTHING) is not gained
+    assert gain_content(gain, ["One.", "Two."]) == {
+        "gained": gained,
+        "over": "calibrated",
+        "where": "validation runs",
+        "windows": 54,
+        "position": vars(change),
+        "heading": vars(change),
+        "sentence": "One. Two.",
+    }
+
+
+def test_without_a_gain_nothing_is_said_of_it():
+    assert "What the search gained" not in lines(show_diagnosis(found(), "out"))
+    assert gain_content(None, []) is None
 
 
 def test_where_nothing_is_found_the_sentence_is_the_finding():

@@ -4,7 +4,7 @@ import argparse
 import io
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -48,10 +48,17 @@ def _share(text: str) -> float:
 
 
 class Done(NamedTuple):
-    """How a command ended: its exit code, and what it shows."""
+    """How a command ended, or one of its answers: its exit code, and what it shows.
+
+    ``more`` says whether another answer follows, which may take longer.
+    """
 
     code: int
     shown: Iterable[RenderableType]
+    more: bool = False
+
+
+Work = Callable[[argparse.Namespace, Advance], Done | Iterator[Done]]
 
 
 def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
@@ -168,11 +175,11 @@ def _take_ship_of_logs(options: argparse.Namespace) -> None:
     options.ship = ship
 
 
-def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.Namespace) -> int:
-    """Do the work of a command, and show what it found.
+def run(work: Work, options: argparse.Namespace) -> int:
+    """Do the work of a command, and show what it found: each answer as soon as its files are there.
 
     Args:
-        work: is given the options and a callback for progress.
+        work: is given the options and a callback for progress; gives one answer, or one after the other.
         options: of the command line; ``out`` is filled in.
 
     Returns:
@@ -182,6 +189,7 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
         sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
     sweep()
+    code = 0
     with Held() as interrupts:
         interrupts.allow()
         try:
@@ -192,19 +200,30 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
             if options.out is None:
                 inputs = inputs_of(options)
                 options.out = default_folder(options.usual, inputs, options.overwrite)
-            with progress(errors) as advance, ship_warnings_to(partial(complain, kind="warning: ")):
-                done = work(options, advance)
+            with progress(errors) as line, ship_warnings_to(partial(complain, kind="warning: ")):
+                given = work(options, line)
+                for done in [given] if isinstance(given, Done) else given:
+                    interrupts.hold()  # the files are there: what was found is shown
+                    code = done.code
+                    if inputs is not None:
+                        keep_inputs(options.out, inputs)
+                    with line.paused():
+                        _show(done.shown)
+                        if inputs is not None and not done.more and options.out != options.usual:
+                            note = "another result is in '{}'; this one is in '{}'"
+                            complain(note.format(options.usual, options.out), "note: ")
+                    if done.more:
+                        interrupts.allow()
         except InputError as error:
             complain(error)
             return BAD_INPUT
-        interrupts.hold()  # the files are there: what was found is shown
-        if inputs is not None:
-            keep_inputs(options.out, inputs)
-            if options.out != options.usual:
-                note = f"another result is in '{options.usual}'; this one is in '{options.out}'"
-                complain(note, "note: ")
-        output = Output(highlight=False, markup=False)
-        for part in done.shown:
-            output.print(part)
         interrupts.finish()
-    return done.code
+    return code
+
+
+def _show(parts: Iterable[RenderableType]) -> None:
+    """Print an answer, at once though it goes into a pipe."""
+    output = Output(highlight=False, markup=False)
+    for part in parts:
+        output.print(part)
+    sys.stdout.flush()

@@ -275,12 +275,11 @@ def free_runs(
     left = float(smoothed.time[-1] - smoothed.time[first])
     seconds = min(left, LONGEST_FREE * smoothed.scale.time)
     starts = WindowStarts(((smoothed, np.array([first])),), h, int(seconds / h))
-    found: dict[int, np.ndarray] = {}
-    for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
-        poses = predict(starts, together)
-        found |= {k: poses[:, :, min(n, poses.shape[2] - 1), 0] for n, k in enumerate(chosen)}
+    # One after the other takes half the time of all at once; where nothing is learned they are one.
+    distinct = {id(m): m.during(smoothed.track.run.name) for m in models}
+    found = {k: predict(starts, m)[:, :, 0, 0] for k, m in distinct.items()}
     times = smoothed.time[first] + h * np.arange(starts.steps + 1)
-    return times, [found[k] for k in range(len(models))]
+    return times, [found[id(m)] for m in models]
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:

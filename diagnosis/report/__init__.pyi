@@ -4,6 +4,7 @@ from .chart import BEFORE as BEFORE
 from .chart import GRID as GRID
 from .chart import INK as INK
 from .chart import THIRD as THIRD
+from .content import calibration_content as calibration_content
 from .content import comparison_content as comparison_content
 from .content import diagnosis_content as diagnosis_content
 from .content import file_content as file_content
@@ -21,5 +22,6 @@ from .page import write_report as write_report
 from .report_data import ReportData as ReportData
 from .shape import Curve as Curve
 from .shape import curves as curves
+from .terminal import show_calibration as show_calibration
 from .terminal import show_comparison as show_comparison
 from .terminal import show_diagnosis as show_diagnosis

@@ -17,9 +17,10 @@ from ..predictors.evaluation import Evaluation
 from ..predictors.ship_model import parameter_and_run
 from ..runs import channels_of
 from ..runs.cleaning import Z95
-from ..session import Comparison, Diagnosis
+from ..session import CalibratedModel, Comparison, Diagnosis
+from ..verdict.prediction_gain import PredictionGain
 from .formatting import as_json, finite
-from .headline import headline
+from .headline import first_sentences, gain_of_calibration, gain_of_search
 from .report_data import ReportData, seconds
 
 LIBRARIES = ("cybership", "numpy", "scipy")
@@ -37,6 +38,7 @@ RANKED = "id score q2 beyond behind behind_std"
 STABILITY = (
     "nominal_min_dissipation learned_min_dissipation bounded region mass_definite closed_loop notes"
 )
+CHANGE = "before after difference standard_error"
 UNRECORDED = "size=push.size time=push.time values=differing stretches sentence"
 ERRORS = {
     "window_position_rmse": "position",
@@ -129,7 +131,8 @@ def file_content(r: ReportData) -> Content:
     d, learned = r.diagnosis, r.diagnosis.learned
     found = {
         "verdict": d.verdict,
-        "sentence": headline(r),
+        "sentence": first_sentences(r),
+        "gain": gain_content(d.gain, gain_of_search(r)),
         "remainder": {
             "significant": d.remainder.significant,
             "axes": {axis: part(a, "rms uncertainty share") for axis, a in d.remainder.axes.items()},
@@ -158,6 +161,33 @@ def file_content(r: ReportData) -> Content:
     return Content.of(finite(found | runs | last | origin))
 
 
+def calibration_content(calibrated: CalibratedModel, r: ReportData, left_out: Sequence[str]) -> Content:
+    """The content of ``calibrated.json``.
+
+    Args:
+        calibrated: the calibrated model.
+        r: the report of its comparison with the initial model.
+        left_out: what the command did not do, a sentence each.
+    """
+    known = {
+        "gain": gain_content(calibrated.gain, gain_of_calibration(calibrated, r)),
+        "coefficients": [*coefficients(calibrated)],
+        "moved": calibrated.learned.moved,
+        "correlation": part(calibrated.posterior, "names matrix=correlation together"),
+        "prior": calibrated.prior,
+        "left_out": [*left_out],
+    }
+    return Content.of(finite(known | file_content(r)))
+
+
+def gain_content(gain: PredictionGain | None, sentences: Sequence[str]) -> dict[str, Any] | None:
+    """What a model gains over another [m], [m2], [rad], [rad2]; None: not known."""
+    if gain is None:
+        return None
+    changes = {n: part(getattr(gain, n), CHANGE) for n in ("position", "heading")}
+    return part(gain, "gained over where windows") | changes | {"sentence": " ".join(sentences)}
+
+
 def part(of: Any, keys: str) -> dict[str, Any]:
     """Attributes of an object by the keys of the files."""
     pairs = (key.split("=") for key in keys.split())
@@ -175,7 +205,7 @@ class CoefficientChange(NamedTuple):
     origin: str
 
 
-def coefficients(diagnosis: Diagnosis) -> Iterator[CoefficientChange]:
+def coefficients(diagnosis: Diagnosis | CalibratedModel) -> Iterator[CoefficientChange]:
     """The nominal coefficients that are not zero, then what else was fitted."""
     start, model, std = diagnosis.start, diagnosis.learned.model, diagnosis.posterior.std
     known = start.ship.coefficients

@@ -1,15 +1,24 @@
 """The result in a few sentences: what is sure first, what is only possible below it."""
 
 from collections.abc import Sequence
+from math import degrees
 
 import numpy as np
 
 from ..assessment.stability import Stability
+from ..session import CalibratedModel
 from ..verdict.confidence import FOUND
+from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
+from .formatting import number
 from .report_data import ReportData
 from .reported_effect import ReportedEffect
 
+SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
+SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
+NO_CALIBRATION = "The initial model stands for calibration here, which does not predict better."
+CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
+CALIBRATION_GAINED_NOTHING = "Calibration gains nothing over the initial model."
 NOTHING_FOUND = "Nothing is missing that these data show."
 TOO_LITTLE = "What is missing is more than noise, but too little to matter."
 UNEXPLAINED = "Something is missing, and no effect that is known here explains it."
@@ -50,6 +59,46 @@ def told(e: ReportedEffect) -> str:
     doubt = f" But {e.doubt}." if e.doubt else ""
     model = "" if e.in_model else " The learned model does not have it."
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
+
+
+def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over: float) -> list[str]:
+    """What one model gains over another, in words and in numbers; none where that is not known.
+
+    Args:
+        gain: of the other model.
+        gained, nothing: the first sentence where it gains, and where it does not.
+        over: length of the windows [s].
+    """
+    if gain is None:
+        return []
+    parts = []
+    for name, unit, factor, change in (
+        ("position", "mm", 1e3, gain.position),
+        ("heading", "°", degrees(1.0), gain.heading),
+    ):
+        errors = " → ".join(number(x, 3, factor) for x in (change.before, change.after))
+        fall, std = (number(x, 2, factor**2) for x in (change.difference, change.standard_error))
+        parts.append(f"{name} {errors} {unit} (the mean square falls by {fall} ± {std} {unit}²)")
+    where = f"Predictions over {number(over)} s in {gain.windows} windows of {gain.where}"
+    return [gained if gain.gained else nothing, f"{where}: {', '.join(parts)}."]
+
+
+def gain_of_search(r: ReportData) -> list[str]:
+    """What the search for effects gained over calibration alone; empty where that is not known."""
+    gain = None if r.diagnosis is None else r.diagnosis.gain
+    said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
+    return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
+
+
+def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]:
+    """What calibration gained over the initial model; empty where that is not known."""
+    return gain_sentences(calibrated.gain, CALIBRATION_GAINED, CALIBRATION_GAINED_NOTHING, r.lengths[0])
+
+
+def first_sentences(r: ReportData) -> str:
+    """The headline, after the sentence that the search gained nothing where that is so."""
+    gain = gain_of_search(r)
+    return " ".join([*(s for s in gain if s == SEARCH_GAINED_NOTHING), headline(r)])
 
 
 def verdict_title(r: ReportData) -> str:

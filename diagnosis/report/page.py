@@ -15,7 +15,7 @@ from ..predictors.evaluation import Evaluation
 from . import figures, formatting, tracks
 from .chart import data_uri, themed
 from .content import coefficients, versions
-from .headline import boundedness, headline, told, verdict_title
+from .headline import boundedness, gain_of_search, headline, told, verdict_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
 
@@ -87,6 +87,7 @@ def write_report(
         title="Model against measurements" if data.diagnosis is None else "Diagnosis",
         verdict=verdict_title(data),
         sentence=headline(data),
+        gain=gain_of_search(data),
         pictures=drawn,
         tiles=[*_tiles(data)],
         trials=[*trial_rows(data)],

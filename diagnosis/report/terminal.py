@@ -11,9 +11,18 @@ from rich.text import Text
 
 from ..assessment.stability import Stability
 from ..runs import sensor_lines
+from ..session import CalibratedModel
 from .finding_text import SHOWN
 from .formatting import number, percent
-from .headline import boundedness, headline, surest_first, told, verdict_title
+from .headline import (
+    boundedness,
+    gain_of_calibration,
+    gain_of_search,
+    headline,
+    surest_first,
+    told,
+    verdict_title,
+)
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
 
@@ -28,11 +37,25 @@ def show_comparison(r: ReportData, out: str) -> Iterator[RenderableType]:
     yield from _files(r, out)
 
 
+def show_calibration(calibrated: CalibratedModel, r: ReportData, out: str) -> Iterator[RenderableType]:
+    """Output of the second answer of ``diagnosis.learn``."""
+    gain = gain_of_calibration(calibrated, r)
+    if gain:
+        yield from _lines("What calibration gained", map(_plain, gain))
+    moved = calibrated.learned.moved
+    furthest = sorted(moved, key=lambda name: -abs(moved[name]))[:SHOWN]
+    by = (f"{n} is {_number(calibrated.model.value(n))} ({_number(moved[n], 2)})" for n in furthest)
+    yield from _lines("Coefficients that moved most, in standard deviations of the prior", by)
+    yield from _errors(r)
+    yield from _files(r, out)
+
+
 def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
-    """Output of ``diagnosis.learn``."""
+    """Output of the third answer of ``diagnosis.learn``; the first one has shown the data."""
     d = r.diagnosis
     assert d is not None
-    yield from _runs(r)
+    if gain := gain_of_search(r):
+        yield from _lines("What the search gained", map(_plain, gain))
     yield from _lines("What is left without an explanation", [d.remainder.sentence])
     if not r.effects:
         yield from _lines("Finding", [headline(r)])
@@ -192,6 +215,11 @@ def _stability(s: Stability) -> Iterator[str]:
     if s.region:
         yield f"warning: less dissipation than at first: {s.region}"
     yield from s.notes
+
+
+def _plain(text: str) -> str:
+    """A text for any terminal."""
+    return text.replace("→", "->").translate(ASCII)
 
 
 def _number(x: float | None, digits: int = 3) -> str:

@@ -14,21 +14,26 @@ PREDICTS = "predictions of {where} are worse"
 def harm(its: Losses, others: Losses, more: int = 0) -> str:
     """In which loss a model is worse than another by more than two paired standard errors.
 
-    Where it predicts positions better and headings worse by as much, or the reverse, the relative
-    changes of both mean squares count together.
-
     Arguments and result are those of :class:`.pruning_criteria.Harm`; ``more`` is not used, as the data
     were not fitted.
     """
     if worse(its.omega, others.omega):
         return FITS
+    return PREDICTS if predicts_worse(its, others) else ""
+
+
+def predicts_worse(its: Losses, others: Losses) -> bool:
+    """Whether a model predicts worse than another by more than two paired standard errors.
+
+    Where it predicts positions better and headings worse by as much, or the reverse, the relative
+    changes of both mean squares count together.
+    """
     pairs = [(its.position, others.position), (its.heading, others.heading)]
     if not its.position.size or not any(worse(a, b) for a, b in pairs):
-        return ""
+        return False
     if any(worse(b, a) for a, b in pairs):
-        change = sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs)
-        return PREDICTS if change > 0.0 else ""
-    return PREDICTS
+        return bool(sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs) > 0.0)
+    return True
 
 
 def harms(data: ValidationData, found: Findings | Model, other: Findings | Model) -> str:

@@ -59,6 +59,7 @@ def diagnosis(**changes):
         "stability": STABILITY,
         "prior": 0.1,
         "seed": 0,
+        "gain": None,
     }
     return SimpleNamespace(**made | changes)
 

@@ -19,6 +19,7 @@ from ...predictors import Model, WeakWindows
 from ...predictors.shooting import Shooting
 from ..candidates import SMALL, model_error
 from ..findings import Findings
+from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance
@@ -43,12 +44,26 @@ FLOOR = 0.05  # of the mean square that is missed: what is not linear about a pr
 
 
 class Calibration(PredictionFit):
-    """The fit: coefficients of all runs, with constants of each run integrated out.
+    """The fit: coefficients of all runs, with constants of each fold of the runs integrated out.
 
     Attributes:
-        of_runs: (runs, q, q) and (runs, q), what each run says, as H and g of the last information.
-        constant: of each group of windows, by run its rows, slopes of the constants and covariance.
+        of_folds: (folds, q, q) and (folds, q), what each fold says, as H and g of the last information.
+        constant: of each group of windows, by fold its rows, slopes of the constants and covariance.
     """
+
+    @cached_property
+    def _folds(self) -> list[np.ndarray]:
+        """Of each group of windows the fold (w,) in which each begins, a number of ``run_folds``."""
+        folds, begins = run_folds(self.runs), [w.middle[np.unique(w.block, True)[1]] for w in self.runs]
+        found = []
+        for s in self.windows:
+            of = np.array([self._place[id(run)] for run in s.runs])[s.run]
+            place = np.zeros(of.size, int)
+            for k, (run, blocks) in enumerate(folds):
+                first = -np.inf if blocks[0] == 0 else begins[run][blocks[0]]
+                place[(of == run) & (s.start >= first)] = k
+            found.append(place)
+        return found
 
     def information(self, at: RefinedModel) -> Information:
         model, q = at.model(self.prior), self.unit.size
@@ -56,26 +71,26 @@ class Calibration(PredictionFit):
         self.assumed = ForceDisturbance(np.median([p.size for p in pushes], axis=0), whole.time)
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
         unit = np.concatenate([self.unit, self.assumed.size[1:]])
-        H, g = np.zeros((len(self.runs), q, q)), np.zeros((len(self.runs), q))
+        folds = len(run_folds(self.runs))
+        H, g = np.zeros((folds, q, q)), np.zeros((folds, q))
         weights, self.constant = [], []
-        for s in self.windows:
+        for s, of in zip(self.windows, self._folds, strict=True):
             around = s.around(model, steps)
             W = self.whitening(s, around)
             A, r = whitened(W, around.slopes * unit), whitened(W, around.residuals)
             constant = []
-            for k, run in enumerate(s.runs):
-                rows = s.run == k
+            for place in np.unique(of):
+                rows = of == place
                 both, left = A[rows].reshape(-1, unit.size), r[rows].ravel()
                 J, U = both[:, :q], both[:, q:]
                 K = np.linalg.inv(U.T @ U + np.eye(len(CONSTANTS)))
                 J_U = J.T @ U @ K
-                place = self._place[id(run)]
                 H[place] += J.T @ J - J_U @ U.T @ J
                 g[place] += J.T @ left - J_U @ (U.T @ left)
                 constant.append((rows, U, K))
             weights.append(W)
             self.constant.append(constant)
-        self.of_runs = H, g
+        self.of_folds = H, g
         whole_H = H.sum(axis=0)
         return Information(whole_H, whole_H, g.sum(axis=0), weights, self.assumed)
 
@@ -92,9 +107,9 @@ class Calibration(PredictionFit):
             total += float(left @ left - along @ K @ along)
         return total
 
-    def without_each_run(self, at: RefinedModel) -> list[Model]:
-        """The model fitted without each run, by one step about the fit to all, which ended last."""
-        P, (H, g) = self.precision, self.of_runs
+    def without_each_fold(self, at: RefinedModel) -> list[Model]:
+        """The model fitted without each fold, by one step about the fit to all, which ended last."""
+        P, (H, g) = self.precision, self.of_folds
         whole_H, whole_g, prior = H.sum(axis=0), g.sum(axis=0), P @ self.theta(at)
         return [
             self.moved(at, np.linalg.solve(whole_H - h + P, whole_g - v - prior)).model(self.prior)
@@ -132,11 +147,15 @@ class Calibrator:
         near = still.findings.estimate
         return self._fitted(begin(self.start, self.prior, {"current": STREAM}, near))
 
+    def coefficients(self) -> RefitOutcome:
+        """The first model with other values of the nominal coefficients, and nothing else."""
+        return self._fitted(RefinedModel.at(self.start, self.prior))
+
     def _fitted(self, at: RefinedModel) -> RefitOutcome:
         problem = Calibration(self.train, self.windows, at, self.prior)
         fitted = fit_to(problem, at)
         at = fitted.estimate
-        model, folds = at.model(self.prior), problem.without_each_run(at)
+        model, folds = at.model(self.prior), problem.without_each_fold(at)
         moved = dict(zip(self.prior.mean, at.offset.tolist(), strict=True))
         f = self.found
         learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)

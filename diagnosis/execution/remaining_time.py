@@ -1,0 +1,97 @@
+"""How long a search for effects still takes, by the steps that have ended and those that usually follow.
+
+The number of effects is known only in the end: that of the rounds is the usual one, or the present one
+and half a round more. How long a step takes is scaled by what the steps so far took.
+"""
+
+import re
+import time
+from collections.abc import Callable
+
+# s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count.
+ROUND = {"every effect as a candidate": 0.8, "candidates refined": 1.0}
+AGAIN = {"its place searched again": 3.0}
+LAST = {
+    "waves": 1.2,
+    "validation data are predicted better": 4.0,
+    "fit to predictions": 4.5,
+    "residual": 0.2,
+    "gained over calibration": 0.3,
+    "predicting": 1.0,
+    "stability": 1.4,
+    "report: figures": 1.5,
+    "report: page": 0.5,
+}
+FIRST = {"reading": 0.2, "smoothing": 1.7, "calibration of the coefficients": 2.5}
+USUAL = {**FIRST, **ROUND, **AGAIN, **LAST}
+ROUNDS = 3.0  # usual number, the last of which finds nothing; chosen
+LATE = (
+    0.3  # share of its time that a step is taken to go on for where it takes longer than usual; chosen
+)
+
+
+class RemainingTime:
+    """The remaining time of ``learn``, once its search has begun.
+
+    Args:
+        now: the time [s].
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now, self._started = now, now()
+        self._step, self._begun, self._round, self._again = "", self._started, 0, 0
+        self._took, self._usual = 0.0, 0.0
+        self._left: dict[str, float] = {}
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the start [s]."""
+        return self._now() - self._started
+
+    @property
+    def seconds(self) -> float | None:
+        """The remaining time [s]; None: the search has not begun."""
+        if not self._round:
+            return None
+        usual = self._scale * USUAL.get(self._step, 0.0)
+        spent = self._now() - self._begun
+        return max(usual - spent, LATE * spent) + self._scale * sum(self._left.values())
+
+    @property
+    def share(self) -> float | None:
+        """The share of the whole time that is over; None: not known."""
+        left = self.seconds
+        return None if left is None else self.elapsed / max(self.elapsed + left, 1e-9)
+
+    @property
+    def _scale(self) -> float:
+        """Time of the steps so far over their usual one."""
+        return self._took / self._usual if self._usual else 1.0
+
+    def begin(self, what: str) -> None:
+        """A step begins, and the one before it has ended."""
+        now = self._now()
+        if self._step:
+            self._took += now - self._begun
+            self._usual += USUAL[self._step]
+        self._step, self._begun = next((name for name in USUAL if name in what), ""), now
+        if self._step in ROUND or self._step in AGAIN:
+            self._again = self._again + 1 if self._step in AGAIN else 0
+            number = re.match(r"effect (\d+)", what)
+            self._round = max(self._round, int(number[1]) if number else 1)
+            self._left = self._following()
+        elif self._step in LAST and self._round:
+            names = [*LAST]
+            self._left = {name: LAST[name] for name in names[names.index(self._step) + 1 :]}
+
+    def _following(self) -> dict[str, float]:
+        """The time of each kind of step that usually follows the present one of a round."""
+        rounds = max(ROUNDS, self._round + 0.5)
+        left = {name: (rounds - self._round) * usual for name, usual in ROUND.items()}
+        # A place is searched again twice for each effect but one, and goes on where it went on long.
+        again = rounds * (rounds - 1.0) - self._round * (self._round - 1.0)
+        if self._again:
+            again = max(2.0 - self._again, 0.5 * self._again)
+        if self._step == next(iter(ROUND)):
+            left["candidates refined"] += ROUND["candidates refined"]
+        return left | {name: again * usual for name, usual in AGAIN.items()} | LAST

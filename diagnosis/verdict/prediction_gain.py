@@ -1,0 +1,106 @@
+"""What one model predicts better than another: paired errors in the same windows of data that decide."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..predictors import Model
+from ..search.findings import Findings
+from .paired_errors import predicts_worse
+from .validation_data import ValidationData
+
+
+@dataclass(frozen=True)
+class PairedChange:
+    """The error of two models in the same windows.
+
+    Attributes:
+        before, after: root mean square error of each [m] or [rad].
+        difference: mean of the paired differences of the squares, before minus after [m2] or [rad2].
+        standard_error: of ``difference``.
+    """
+
+    before: float
+    after: float
+    difference: float
+    standard_error: float
+
+    @classmethod
+    def of(cls, before: np.ndarray, after: np.ndarray) -> "PairedChange":
+        """The change between mean squares (windows,), but where a model runs away."""
+        known = np.isfinite(before) & np.isfinite(after)
+        before, after = before[known], after[known]
+        if before.size < 2:
+            return cls(np.nan, np.nan, np.nan, np.nan)
+        d = before - after
+        error = float(d.std(ddof=1) / np.sqrt(d.size))
+        return cls(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), float(d.mean()), error)
+
+
+@dataclass(frozen=True)
+class PredictionGain:
+    """What a model gains over another in the predictions of the data that decide.
+
+    Attributes:
+        where: these data, in words.
+        windows: their number.
+        position, heading: errors of both models.
+        gained: whether the predictions are better by more than twice their paired standard error.
+        over: the model with which it is compared: "initial" or "calibrated".
+    """
+
+    where: str
+    windows: int
+    position: PairedChange
+    heading: PairedChange
+    gained: bool
+    over: Literal["initial", "calibrated"] = "initial"
+
+
+def prediction_gain(
+    data: ValidationData, before: Findings | Model, after: Findings | Model
+) -> PredictionGain | None:
+    """The gain of a model over another; findings are fitted without the fold that they are judged on.
+
+    Args:
+        data: the data that decide.
+        before, after: the two models.
+
+    Returns:
+        None where that is not known: no window has enough samples, or a method does not fit its findings
+        without a part of the data.
+    """
+    if not all(isinstance(each, Model) or data.judges(each) for each in (before, after)):
+        return None
+    its, others = data.losses(after, before)
+    if its.position.size < 2:
+        return None
+    position, heading = (PairedChange.of(*pair) for pair in zip(others[1:], its[1:], strict=True))
+    return PredictionGain(data.where, its.position.size, position, heading, predicts_worse(others, its))
+
+
+def gain_of_search(
+    data: ValidationData, start: Model, calibrated: Findings | None, found: Findings, learned: Model
+) -> PredictionGain | None:
+    """What the search for effects gained over calibration alone.
+
+    A calibration that predicts worse than the initial model is none that anybody would use: the initial
+    model takes its place. A search that ends without an effect gains nothing.
+
+    Args:
+        data: the data that decide.
+        start: the initial model.
+        calibrated: the calibration; None: there is none.
+        found, learned: the end of the search; the model is the initial one where nothing was learned.
+
+    Returns:
+        None where that is not known, see :func:`prediction_gain`.
+    """
+    after = learned if data.validate or learned is start else found
+    if calibrated is None or predicts_worse(*data.losses(calibrated, start)):
+        gain = prediction_gain(data, start, after)
+    else:
+        gain = prediction_gain(data, calibrated, after)
+        gain = gain and replace(gain, over="calibrated")
+    return gain and replace(gain, gained=gain.gained and bool(found.effects))

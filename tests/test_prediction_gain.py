@@ -1,0 +1,91 @@
+"""What the search for effects gained over calibration alone: paired errors, both ways."""
+
+import numpy as np
+import pytest
+
+from diagnosis import Finding, Findings, Model
+from diagnosis.verdict.prediction_gain import gain_of_search, prediction_gain
+from diagnosis.verdict.validation_data import Losses
+
+START, BETTER = Model(), Model().plus({"delta_X_u": -1.0})
+WINDOWS = 40
+
+
+class Data:
+    """Data that decide, with errors by model: mean squares of ``sizes``, paired noise on top."""
+
+    def __init__(self, sizes, known=True, validate=(), windows=WINDOWS):
+        self.sizes, self.known, self.validate, self.where = sizes, known, validate, "validation runs"
+        self.windows = windows
+
+    def judges(self, found):
+        return self.known
+
+    def losses(self, *models):
+        common = np.random.default_rng(0).exponential(1.0, self.windows)
+        own = np.random.default_rng(1)
+        return [
+            Losses(np.ones(4), *(s * common + 0.05 * own.uniform(size=self.windows) for _ in "ph"))
+            for s in (self.sizes[id(m)] for m in models)
+        ]
+
+
+def found(effects):
+    """The end of a search."""
+    each = [Finding("X_u", {"delta_X_u": -1.0}, {}, 0.9, [], 1.0, 1.0, BETTER)] * effects
+    return Findings(each, model=BETTER)
+
+
+@pytest.mark.parametrize(
+    ("start", "calibrated", "learned", "effects", "gained", "over"),
+    [
+        (9.0, 4.0, 1.0, 1, True, "calibrated"),
+        (9.0, 4.0, 4.0, 1, False, "calibrated"),
+        (9.0, 1.0, 4.0, 1, False, "calibrated"),
+        (4.0, 9.0, 4.0, 0, False, "initial"),  # calibration that harms is not used
+        (4.0, 9.0, 1.0, 1, True, "initial"),
+        (9.0, 4.0, 1.0, 0, False, "calibrated"),  # without an effect the search gained nothing
+    ],
+)
+def test_the_search_gains_what_calibration_does_not(start, calibrated, learned, effects, gained, over):
+    calibration, end = Findings(model=BETTER), found(effects)
+    model = end.model if effects else START
+    sizes = {id(START): start, id(calibration): calibrated, id(end): learned, id(model): learned}
+    gain = gain_of_search(Data(sizes | {id(START): start}), START, calibration, end, model)
+    assert (gain.gained, gain.over, gain.windows) == (gained, over, WINDOWS)
+    for change in (gain.position, gain.heading):
+        assert change.difference == pytest.approx(change.before**2 - change.after**2)
+        assert change.standard_error > 0.0 or start == learned
+
+
+def test_the_standard_error_is_paired_and_covers_the_difference():
+    """Over repeated noise the difference scatters by as much as its standard error says."""
+    rng, sizes, found = np.random.default_rng(2), {id(START): 1.0, id(BETTER): 1.0}, []
+    for _ in range(300):
+        data = Data(sizes)
+        common = 100.0 * rng.exponential(1.0, WINDOWS)
+        data.losses = lambda *models, common=common: [
+            Losses(np.ones(4), *(common + rng.normal(0.0, 1.0, WINDOWS) for _ in "ph")) for _ in models
+        ]
+        gain = prediction_gain(data, START, BETTER)
+        found.append((gain.position.difference, gain.position.standard_error, gain.gained))
+    difference, error, gained = np.array(found).T
+    assert np.std(difference) == pytest.approx(np.mean(error), rel=0.15)
+    assert np.mean(gained) < 0.1
+
+
+def test_it_is_not_known_without_folds_or_windows():
+    sizes = {id(START): 1.0, id(BETTER): 1.0}
+    nothing = Findings()
+    assert prediction_gain(Data(sizes | {id(nothing): 1.0}, known=False), START, nothing) is None
+    assert prediction_gain(Data(sizes, windows=0), START, BETTER) is None
+
+
+def test_a_model_that_runs_away_gains_nothing():
+    data = Data({})
+    finite = Losses(np.ones(4), np.ones(9), np.ones(9))
+    away = Losses(np.ones(4), np.append(np.ones(8), np.inf), np.ones(9))
+    data.losses = lambda *_: [away, finite]
+    gain = prediction_gain(data, START, BETTER)
+    assert not gain.gained
+    assert gain.position.difference == 0.0

@@ -1,0 +1,90 @@
+"""Progress: the remaining time of a search is told once it has begun, and falls while a step goes on."""
+
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from diagnosis.execution.progress import progress
+from diagnosis.execution.remaining_time import USUAL, RemainingTime
+
+ROUND = ("every effect as a candidate", "the best candidates refined")
+SEARCH = [
+    "reading",
+    "smoothing a",
+    "predicting a",
+    "calibration of the coefficients",
+    ROUND[0],
+    f"effect 1: {ROUND[1]}",
+    f"effect 2: {ROUND[0]}",
+    f"effect 2: {ROUND[1]}",
+    "effect 1: its place searched again",
+    f"effect 3: {ROUND[0]}",
+    f"effect 3: {ROUND[1]}",
+    "waves",
+    "effects without which validation data are predicted better",
+    "fit to predictions",
+    "residual",
+    "what the search gained over calibration",
+    "predicting a",
+    "stability",
+    "report: figures",
+    "report: page",
+]
+
+
+class Clock:
+    def __init__(self):
+        self.time = 0.0
+
+    def __call__(self):
+        return self.time
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 20.0])
+def test_remaining_time_is_right_within_a_factor_of_two_on_any_machine(speed):
+    clock = Clock()
+    left = RemainingTime(clock)
+    took = [speed * next(usual for name, usual in USUAL.items() if name in what) for what in SEARCH]
+    for k, what in enumerate(SEARCH):
+        left.begin(what)
+        rest = sum(took[k:])
+        if k < SEARCH.index(ROUND[0]):
+            assert left.seconds is None
+            assert left.share is None
+        else:
+            assert 0.5 * rest < left.seconds < 2.0 * rest
+        clock.time += took[k]
+
+
+def test_the_bar_moves_while_a_step_goes_on():
+    clock = Clock()
+    left = RemainingTime(clock)
+    for what in SEARCH[:6]:
+        left.begin(what)
+        clock.time += 1.0
+    shares = []
+    for _ in range(100):
+        clock.time += 1.0
+        shares.append(left.share)
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < shares[-1] < 1.0
+
+
+def test_a_step_of_another_command_has_no_remaining_time():
+    left = RemainingTime(Clock())
+    for what in ("reading", "something of a user's method", "report: figures", "report: page"):
+        left.begin(what)
+        assert left.seconds is None
+
+
+def test_the_line_is_away_while_an_answer_is_printed():
+    text = StringIO()
+    with progress(Console(file=text, force_terminal=True, width=100)) as line:
+        line("every effect as a candidate")
+        with line.paused():
+            shown = len(text.getvalue())
+            text.write("the answer")
+        line("effect 1: the best candidates refined")
+    assert text.getvalue()[shown:].startswith("the answer")
+    assert "more" in text.getvalue()
