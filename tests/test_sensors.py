@@ -462,3 +462,13 @@ def test_the_sea_trial_closes_once_its_clock_is_repaired(trial):
     assert np.degrees(after.heading) < 1.0
     scale = next(f for f in found.findings if f.kind == "scale")
     assert scale.value == pytest.approx(0.98, abs=0.005)
+
+
+@pytest.mark.parametrize("gain", [0.8, 1.0, 1.6, 1.97, 3.5])
+def test_a_delay_whose_estimate_goes_too_far_is_found_nevertheless(gain):
+    """Whole steps would go to and fro about it: with a gain of 1.97 for two hundred rounds."""
+    delay, taken, last, share = 1.0, 0.0, 0.0, 1.0
+    for _ in range(8):
+        last, share = motion._step(gain * (delay - taken), last, share)
+        taken += last
+    assert taken == pytest.approx(delay, abs=0.03)

@@ -1,8 +1,9 @@
 """Clock and constant faults of the channels of motion, estimated together."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -49,8 +50,16 @@ class MotionFaults(NamedTuple):
     torn: bool = False
 
 
-def motion(run: Run, scale: Scale) -> Examined:
-    """Clock, scales, offsets, places and delays of velocity and yaw rate against the pose."""
+def motion(
+    run: Run, scale: Scale, before: Mapping[str, tuple[float, float]] = MappingProxyType({})
+) -> Examined:
+    """Clock, scales, offsets, places and delays of velocity and yaw rate against the pose.
+
+    Args:
+        run: as it was read.
+        scale: of the ship.
+        before: channel -> delay that was taken off it last [s], and its share of what was found.
+    """
     e = evidence(run)
     if e is None:
         return Examined(run)
@@ -62,13 +71,27 @@ def motion(run: Run, scale: Scale) -> Examined:
     findings = [*jumps, *_clock(found), *_constants(found, e)]
     late = [f for f in findings if f.kind == "delay"]
     if late:  # its column is a tangent: all else is estimated once it is gone
+        steps = {f.channel: _step(f.value, *before.get(f.channel, (0.0, 1.0))) for f in late}
+        late = [_moved(f, steps[f.channel][0]) for f in late]
         first = corrected(e, Correction({(f.channel, f.kind): f.value for f in late}))
-        rest = motion(first, scale)
+        rest = motion(first, scale, {**before, **steps})
         return replace(rest, findings=(*_added(late, rest.findings),))
     fixes = [f for f in findings if f.repaired]
     repaired = corrected(e, _correction(found, jumps, fixes)) if fixes else run
     notes = (*_leeway(e), *((TWO_CLOCKS,) if found.torn else ()))
     return Examined(repaired, tuple(findings), notes, _agreeing(found, e))
+
+
+def _step(delay: float, last: float, share: float) -> tuple[float, float]:
+    """How much of a delay is taken off [s], and which share: half where the last step went too far."""
+    share *= 0.5 if delay * last < 0.0 else 1.0
+    return share * delay, share
+
+
+def _moved(f: SensorFinding, value: float) -> SensorFinding:
+    """A finding about another value."""
+    low, high = (end + value - f.value for end in f.ci95)
+    return replace(f, value=value, ci95=(low, high))
 
 
 def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iterator[SensorFinding]:
