@@ -192,11 +192,7 @@ def common_layout(
     common: dict[str, Column] = {}
     for signal in dict.fromkeys(s for layout in layouts.values() for s in layout.columns):
         found = [layout.column(signal) for layout in layouts.values()]
-<<<<<<< HEAD
-        units = {column.unit for column in found if column.unit is not None}
-=======
         units = {column.unit for column in found if column.unit}
->>>>>>> cols
         if len(units) == 1:
             found = [column.model_copy(update={"unit": next(iter(units))}) for column in found]
         if all(column == found[0] for column in found):
