@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
     from pydantic import ValidationError
 
-# A value between quotes, which an apostrophe of a word is not; with a separator it may be a path.
-VALUE = re.compile(r"(?<!\w)'([^'/\\]*)'(?!\w)")
+# A value between quotes, which an apostrophe of a word is not.
+VALUE = re.compile(r"(?<!\w)'([^']*)'(?!\w)")
+PATH = re.compile(r"[/\\]")  # separators, with which a value may be a path
 Location = tuple[int | str, ...]  # the keys and indices that lead to a place in a file
 
 # Characters of what a message repeats of a file, and of what it says of it; chosen: a few lines in all.
@@ -27,7 +28,7 @@ def printable(text: str) -> str:
     Names in files and messages of FMUs may hold control characters, which would move the cursor or
     change colours, or be very long: these are shown as Python writes them, and cut.
     """
-    text = VALUE.sub(lambda value: f"'{name_of(value[1])}'", text)
+    text = VALUE.sub(lambda value: value[0] if PATH.search(value[1]) else f"'{name_of(value[1])}'", text)
     return _cut(_words_cut(_one_line(text), LONGEST_WORD), LONGEST_LINE)
 
 
