@@ -163,6 +163,9 @@ def test_command_writes_what_another_method_finds(name, file, tmp_path, capsys):
     assert found["effects"][0]["confidence"] is None
     assert found["effects"][0]["coefficients"]["loss_yaw"]["value"] == pytest.approx(0.3, rel=0.1)
     assert {p.name for p in out.iterdir()} == {
+        "comparison.json",
+        "calibrated.json",
+        "calibrated.ssv",
         "diagnosis.json",
         "model.ssv",
         "posterior.json",

@@ -1,5 +1,8 @@
 """Runs of which an analysis keeps what it needs: the log of a run without files is that of one with them."""
 
+import signal
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,7 @@ import cosim
 from cosim.dispatch import analyse_runs, measured_run
 from cosim.dispatch.job import Job, RunRow
 from cosim.results import MetricsError
+from cosim.system.instance_pool import InstancePool
 
 
 @pytest.fixture
@@ -87,6 +91,14 @@ def test_a_failed_run_has_its_message_and_its_log(short, plain_fmu):
 def refuse(run):
     run.demand()
     raise RuntimeError("nothing to see")
+
+
+def test_an_interrupt_after_the_last_step_is_one(plain_fmu):
+    init = "self.y = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))"
+    fmus = {"one": {"path": str(plain_fmu("One", init, "return True"))}}
+    scenario = cosim.load_scenario({"name": "one", "step": 0.1, "stop": 0.2, "fmus": fmus})
+    with closing(InstancePool()) as pool, pytest.raises(KeyboardInterrupt):
+        measured_run.run_in_memory(pool, scenario, keep=lambda _: signal.raise_signal(signal.SIGINT))
 
 
 def test_what_an_analysis_raises_arrives(short):

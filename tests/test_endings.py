@@ -98,7 +98,11 @@ def test_fmu_that_exits_with_0_is_no_success_of_a_campaign(runs, tmp_path):
 @linux_only
 def test_fmu_that_exits_with_0_is_no_success_of_a_replay(plain_fmu, tmp_path):
     t = np.arange(0.0, 20.0, 0.05)
-    columns = dict.fromkeys(("tau_X", "tau_Y", "tau_N"), 0.1) | {"x": np.sin(t), "y": t, "psi": 0.0}
+    columns = dict.fromkeys(("tau_X", "tau_Y", "tau_N"), 0.1) | {
+        "x": np.sin(t),
+        "y": t,
+        "psi": 0.1 * np.sin(t),
+    }
     pandas.DataFrame({"time": t} | columns).to_csv(tmp_path / "run.csv", index=False)
     names = [f"{stem}_{axis}" for stem in ("x", "y", "psi") for axis in ("hat", "t")]
     inputs = "".join(

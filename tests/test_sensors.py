@@ -453,7 +453,8 @@ def test_the_sea_trial_closes_once_its_clock_is_repaired(trial):
     zero = np.zeros((len(d), 3))
     measured = {"u": d.u.to_numpy(), "v": d.v.to_numpy(), "r": np.radians(d.r.to_numpy())}
     pose = np.column_stack([d.N, d.E, np.radians(d.psi)])
-    run = Run(trial, d.tvec.to_numpy(), pose, zero, measured=measured)
+    rounded = np.full_like(pose, 1e-3)
+    run = Run(trial, d.tvec.to_numpy(), pose, zero, measured=measured, resolution=rounded)
     found = examine(run, Scale(33.9 / 1.105))
     after = closure(found.run, 60.0, 20.0)
     assert closure(run, 60.0, 20.0).position > 8.0

@@ -75,7 +75,7 @@ def deaths_elsewhere(count: int, seed: int, work: Path, advance: Callable[[], No
     campaign = work / "mortal.campaign.json"
     campaign.write_text(json.dumps({"scenario": "mortal.json", "axes": axes}))
     t = np.arange(0.0, 12.0, 0.05)
-    columns = {"x": np.sin(t), "y": t, "psi": 0.0, "tau_X": 0.1, "tau_Y": 0.1, "tau_N": 0.0}
+    columns = {"x": np.sin(t), "y": t, "psi": 0.1 * np.sin(t), "tau_X": 0.1, "tau_Y": 0.1, "tau_N": 0.0}
     pandas.DataFrame({"time": t} | columns).to_csv(work / "run.csv", index=False)
     for k in range(count):
         way, out = rng.choice(ways), work / "dead"

@@ -83,6 +83,8 @@ def run_in_memory(
             master.close()
             if keep is not None and log is not None:
                 keep(log)
+    if interrupted():  # after the last step
+        raise KeyboardInterrupt
     columns = recorder.kept()
     return metrics_of(system, columns, trial_of(system, columns))
 

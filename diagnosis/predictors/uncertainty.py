@@ -76,8 +76,9 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     slope, turned = _slope(w, model), np.zeros((w.middle.size, 3, 3))
     turned[:, :2, 2] = (w.smooth @ w.motion[1])[:, [1, 0]] * [1.0, -1.0]
     variance = acceleration @ (mass**2).T + (FLOOR * s.scale.forces) ** 2
-    for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
-        variance += np.einsum("kij,kj->ki", by**2, of)
+    with np.errstate(over="ignore"):  # a force that no ship has is not known at all
+        for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
+            variance += np.einsum("kij,kj->ki", by**2, of)
     return np.sqrt(variance)
 
 

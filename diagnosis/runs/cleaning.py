@@ -32,6 +32,7 @@ MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spike
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
 PLACE, HEADING = slice(0, 2), slice(2, 3)  # channels of the pose, each of one receiver
+FARTHEST = 4e7  # m, round the earth, and rad: what is further is no pose
 FEWEST = 4  # samples, without which there is no third difference
 DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
 # Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
@@ -90,8 +91,15 @@ class Track:
 
     @cached_property
     def rounding(self) -> np.ndarray:
-        """(n, 3), standard deviation by rounding [m, m, rad]."""
-        return self.run.coarse / 12.0**0.5
+        """(n, 3), standard deviation by rounding [m, m, rad]; zero where there is no measurement."""
+        return np.where(self.fresh, self.run.coarse, 0.0) / 12.0**0.5
+
+    @cached_property
+    def usual_rounding(self) -> np.ndarray:
+        """(3,), the median of it over the measurements [m, m, rad]."""
+        return np.array(
+            [np.median(r[there]) for r, there in zip(self.rounding.T, self.fresh.T, strict=True)]
+        )
 
     @cached_property
     def silences(self) -> np.ndarray:
@@ -132,6 +140,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     if out:
         notes.append(f"{out} rows left out: time missing, repeated or backwards")
         run = run.rows(kept)
+    run = replace(
+        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
+    )
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
@@ -262,7 +273,7 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
     """
     values, coarse = run.pose[:, channels], run.coarse[:, channels]
     if channels == HEADING:
-        values = np.unwrap(np.nan_to_num(values), axis=0) + 0.0 * values  # NaN where it was
+        values = np.where(np.isfinite(values), np.unwrap(np.nan_to_num(values), axis=0), np.nan)
     there = np.isfinite(values).all(axis=1) & ~gone
     repeats = repeated(values, there)
     rows = np.flatnonzero(there & ~repeats)

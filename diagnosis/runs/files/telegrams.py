@@ -46,7 +46,7 @@ def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndar
     before, after = slope[pair - 1], slope[pair + 1]
     channel = np.abs(before - after).argmax(axis=1)[:, None]
     ahead = position[pair + 1] - position[pair] - after * (time[pair + 1] - time[pair])[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):  # of lines that meet at no angle
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of lines that meet at no angle
         kink = np.take_along_axis(ahead, channel, 1) / np.take_along_axis(before - after, channel, 1)
     nearer = kink[:, 0] < 0.5 * (time[pair + 1] - time[pair])
     on[np.where(nearer, pair + 1, pair)] = True

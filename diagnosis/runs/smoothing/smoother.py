@@ -19,6 +19,7 @@ from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
 from ..cleaning import BRIEF, CHANCE, HORIZON, LONG, WIDTH, Counts, Track, noise
+from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
@@ -220,12 +221,12 @@ def given_noise(track: Track) -> np.ndarray:
 def least_noise(track: Track) -> np.ndarray:
     """(3,), standard deviation by rounding of the pose, or the least that is believed [m, m, rad]."""
     least = np.multiply(LEAST_NOISE, (track.scale.length, track.scale.length, 1.0))
-    return np.maximum(least, np.median(track.rounding, axis=0))
+    return np.maximum(least, track.usual_rounding)
 
 
 def _share(track: Track, sigma: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """(n, 3), precision of rows by that of noise (3,): less where rounding grows with the value."""
-    more = track.rounding[rows] ** 2 - np.median(track.rounding, axis=0) ** 2
+    more = track.rounding[rows] ** 2 - track.usual_rounding**2
     return 1.0 / (1.0 + np.maximum(more, 0.0) / sigma**2)
 
 
@@ -360,7 +361,8 @@ def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
     time = track.run.time[rows] - track.run.time[0]
     cut = np.flatnonzero(breaks(rows, track))
     first, last = np.concatenate([[0], cut + 1]), np.concatenate([cut, [time.size - 1]])
-    enough = last - first + 1 >= FEWEST
+    of_channel = np.add.reduceat(track.fresh[rows], first, dtype=int).min(axis=1)
+    enough = (last - first + 1 >= FEWEST) & (of_channel >= OF_CHANNEL)
     if not enough.any():
         raise InputError(f"run '{track.run.name}': nowhere {FEWEST} samples without a long gap")
     return time[first[enough]], time[last[enough]]
