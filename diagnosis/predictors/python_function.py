@@ -70,6 +70,7 @@ class FunctionPredictor(BlackBox):
     def __init__(self, source: PythonFunction, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(source.name, runs, ship)
         self.source, self.inputs = source, frozenset(TAU)
+        self.files = [] if source.file is None else [("model", source.file)]
         if source.file is not None:
             self.sha256 = hashlib.sha256(source.file.read_bytes()).hexdigest()
 

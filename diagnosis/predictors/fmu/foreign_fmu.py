@@ -1,11 +1,13 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
 from weakref import finalize
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from fmus.frames import rotate_to_body
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
-from ...runs import OF_UNIT, QUANTITY, Run, Smoothed
+from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed, fingerprints
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
 from ..predictor import FOUND, MAP, UnmatchedError
@@ -32,6 +34,7 @@ from .variable_map import VariableMap, completed, propose, read_map, signal_line
 from .wrapper import Wrapped, write_wrapper
 
 SYSTEMS = (".ssp", ".json")
+LEARNED = "resources/learned_from.json"  # in an FMU: the runs of which it was learned
 
 
 class Fmu:
@@ -56,10 +59,13 @@ class Fmu:
         ship: Ship | None = None,
     ) -> None:
         self._given = self.path = Path(path).absolute()
+        self.inner: Sequence[tuple[str, Path]] = ()
         if self.path.suffix in SYSTEMS:
             self._made = Scratch()
             finalize(self, self._made.remove)
-            self.path = _as_one(self._given, self._made.path)
+            self.path, inner = _as_one(self._given, self._made.path)
+            # Of an archive the parts are unpacked for a while, and hashed with it.
+            self.inner = inner if self._given.suffix == ".json" else ()
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
         self.model = FmuModel(self.path)
@@ -74,6 +80,21 @@ class Fmu:
     def sha256(self) -> str:
         """Of the file."""
         return hashlib.sha256(self._given.read_bytes()).hexdigest()
+
+    @cached_property
+    def learned_from(self) -> tuple[Fingerprint, ...]:
+        """Runs of which it was learned, as far as it tells.
+
+        Raises:
+            InputError: it tells what is broken.
+        """
+        fmus = [self.path, *(path for _, path in self.inner if path.suffix == ".fmu")]
+        return tuple(f for path in dict.fromkeys(fmus) for f in _learned_from(path))
+
+    @property
+    def files(self) -> list[tuple[str, Path]]:
+        """What decides its predictions: each file, after what it is for."""
+        return [("model", self._given), *self.inner, *([("map", self.map)] if self.map else [])]
 
     @property
     def step(self) -> float | None:
@@ -131,6 +152,7 @@ class FmuPredictor(BlackBox):
 
     def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(fmu.name, runs, ship)
+        self.learned_from, self.files = fmu.learned_from, fmu.files
         measured = [w.run for w in runs]
         self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
         self.lines = signal_lines(self.map, commands_of(measured))
@@ -202,6 +224,10 @@ class FmuPredictor(BlackBox):
             return []
         wrapped = Wrapped(self.name, self.fmu.model, self.map, self.lines)
         told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
+        if of_both is not None:
+            known = (*self.learned_from, *(Fingerprint.of(w.smoothed) for w in runs))
+            with ZipFile(folder / FOUND, "a", ZIP_DEFLATED) as archive:
+                archive.writestr(ZipInfo(LEARNED), json.dumps([f.content() for f in known]))
         write_map(folder / MAP, (of_both or self.given).content())
         return [told]
 
@@ -223,10 +249,24 @@ def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
     return {name: float(x[k]) for name, x in values.items()}
 
 
-def _as_one(path: Path, folder: Path) -> Path:
-    """A system as one FMU, whose parameters are all that the system leaves open."""
-    made = folder / f"{path.stem}.fmu"
-    with closing(prepare(cosim.load_scenario(path))) as system:
+def _learned_from(path: Path) -> tuple[Fingerprint, ...]:
+    """Runs of which an FMU was learned, as far as it tells."""
+    with ZipFile(path) as archive:
+        if LEARNED not in archive.namelist():
+            return ()
+        try:
+            told = json.loads(archive.read(LEARNED))
+        except (ValueError, RecursionError):
+            told = [{}]
+    return fingerprints(told, path)
+
+
+def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
+    """A system as one FMU, whose parameters are all that the system leaves open, and what it is "
+    "made of."""
+    made, scenario = folder / f"{path.stem}.fmu", cosim.load_scenario(path)
+    with closing(prepare(scenario)) as system:
+        inner = [(f"FMU {name}", Path(model.path)) for name, model in system.models.items()]
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
         every = {
             f"{name}.{v.name}"
@@ -235,7 +275,11 @@ def _as_one(path: Path, folder: Path) -> Path:
             if v.causality == "parameter" and v.type == "Real"
         }
         export_fmu(system, made, expose=every - given)
-    return made
+    tables = [t.table for t in scenario.fmus.values()] + [r.path for r in scenario.recordings]
+    inner += [("table", scenario.folder / t) for t in tables if t is not None]
+    return made, inner + [
+        ("ship", scenario.folder / s) for s in [scenario.ship] if s and s.endswith(".toml")
+    ]
 
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:

@@ -20,6 +20,7 @@ from fmus.ship import Ship, ship
 from fmus.ship_description import Description
 from fmus.ships.naming import DEFAULT
 
+from ...execution.result_folder import sha256
 from ..columns.columns import (
     BESIDE,
     POSE,
@@ -65,6 +66,7 @@ class Run:
         ship: that was measured; None: the default ship.
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
         resolution: (n, 3), step to which the pose is rounded in the file [m, m, rad]; None: not at all.
+        sha256: of the file when it was read; empty where there is none.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Run:
     ship: Description | None = None
     trial: str | None = None
     resolution: np.ndarray | None = None
+    sha256: str = ""
 
     @property
     def coarse(self) -> np.ndarray:
@@ -139,9 +142,12 @@ def read(
     name = path.absolute().parent.name if is_log else path.stem
     of = of or ship()
     if path.suffix == ".mat" and fits_matlab(of):
-        return replace(_run(name, read_matlab(path, of), f"'{path}'", of), file=path)
+        return replace(
+            _run(name, read_matlab(path, of), f"'{path}'", of), file=path, sha256=sha256(path)
+        )
     table, layout = _tabular(path, layout, of, set(also))
-    run = replace(_of_table(name, table, layout, path, f"'{path}'", of), file=path)
+    run = _of_table(name, table, layout, path, f"'{path}'", of)
+    run = replace(run, file=path, sha256=sha256(path))
     others = {n: pd.to_numeric(table[n], errors="coerce") for n in also if n in table}
     run = replace(run, measured={**run.measured, **{n: np.asarray(c, float) for n, c in others.items()}})
     told = read_options(path.parent).trial if is_log else None
