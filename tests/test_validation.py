@@ -255,7 +255,7 @@ def test_only_windows_within_count(comparison, predictions):
     [
         ("", "cannot be read as criteria"),
         ("[" * 100_000, "nested too deeply"),
-        ("[]", "valid dictionary"),
+        ("[]", "should be an object"),
         ('{"criteria": []}', "criteria: List should have at least 1 item"),
         ('{"criterai": []}', r"criteri.*(did you mean 'criteria'|is missing)"),
         ({"quantity": "headin"}, r"'headin' cannot be judged; did you mean 'heading'"),
@@ -303,7 +303,7 @@ def test_a_record_of_both_verdicts_and_what_shows_a_change(comparison, tmp_path,
     out = tmp_path / "out"
     assert set(v.write(out, key)) == set(FILES) == {p.name for p in out.iterdir()}
     record, public = out / FILES[0], public_of(key, tmp_path / "public.pem")
-    usual = [str(record), "--key", public, "--allow-missing", "run"]  # which is a table in memory
+    usual = [str(record), "--key", public, "--allow-missing", "made"]  # which is a table in memory
     for path in (criteria, map_, *(out / name for name in FILES)):
         raw = path.read_bytes()
         # Of the record a byte that leaves it one.
@@ -333,7 +333,7 @@ def test_whose_signature_it_is(comparison, tmp_path, key):
     diagnosis.validate(comparison, criteria).write(record.parent, key)
     mine = public_of(key, tmp_path / "mine.pem")
     other = public_of(write_key(tmp_path / "key_2.pem"), tmp_path / "other.pem")
-    usual = [str(record), "--allow-missing", "run"]
+    usual = [str(record), "--allow-missing", "made"]
     assert verify_main([*usual, "--key", mine]) == 0
     assert verify_main([*usual, "--key", other]) == 1
     assert verify_main([*usual, "--key", str(criteria)]) == 2
@@ -357,7 +357,7 @@ def test_an_edited_verdict_without_its_signature_is_not_checked(comparison, tmp_
     content["judgements"][0]["outcome"], content["public_key"] = "met", None
     record.write_text(json.dumps(content))
     (record.parent / FILES[3]).unlink()
-    assert verify_main([str(record), "--allow-missing", "run"]) == 4
+    assert verify_main([str(record), "--allow-missing", "made"]) == 4
     assert verify_main([str(record), "--key", public_of(key, tmp_path / "mine.pem")]) == 1
     raw = record.read_text()
     record.write_text(raw.replace('"form"', '"public_key": null, "form"', 1))

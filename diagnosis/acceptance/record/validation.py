@@ -3,8 +3,8 @@
 ``validation.json`` has numbers in SI, but those of a criterion in its unit; one that is not finite, or
 not known, is null. E = S - D is the mean of predicted minus measured, of position the mean distance,
 with the mean by axes of the ship in E_axes; estimate, low and high are the share, or the RMS, with
-bounds at the criterion's confidence. Of standard uncertainties the combined ones, u_input and u_val, hold what is
-known. Times are those of the computer's clock, with their offset from UTC.
+bounds at the criterion's confidence. Of standard uncertainties the combined ones, u_input and u_val,
+hold what is known. Times are those of the computer's clock, with their offset from UTC.
 """
 
 import sys
