@@ -20,7 +20,7 @@ EXPANDED = 2.0  # standard uncertainties in the expanded one, about 95 % of a no
 # Of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half, as
 # noise may be stated too large (chosen).
 FAR_BELOW, CHANCE = 0.5, 1e-3
-LEARNED = "the model was learned from it"
+LEARNED, FEW = "the model was learned from it", "too few samples"
 
 
 class WindowCounts(NamedTuple):
@@ -97,7 +97,7 @@ def judge(
     c: Criterion,
     given: Sequence[str],
     predicted: Sequence[Predicted],
-    short: Mapping[str, str] | None = None,
+    short: Mapping[str, int] | None = None,
 ) -> Judgement:
     """Judge a criterion.
 
@@ -105,7 +105,7 @@ def judge(
         c: the criterion.
         given: names of all runs that were compared.
         predicted: those that have windows of the criterion's horizon.
-        short: name of another -> why it has none.
+        short: name of another -> windows that it would have, were no sample missing.
     """
     lacking = [name for name in c.runs or () if name not in given]
     chosen, counts = _counted(c, predicted, short or {})
@@ -187,16 +187,17 @@ def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Ou
 
 
 def _counted(
-    c: Criterion, predicted: Sequence[Predicted], short: Mapping[str, str]
+    c: Criterion, predicted: Sequence[Predicted], short: Mapping[str, int]
 ) -> tuple[list[tuple[Predicted, np.ndarray]], WindowCounts]:
     """The windows that count, of each run that has some, a mask (w,).
 
     Raises:
         InputError: ``within`` names what is no signal of a run.
     """
-    excluded: dict[str, int] = {}
-    left_out, chosen = dict(short), []
+    excluded = {FEW: sum(short.values())}
+    left_out, chosen = dict.fromkeys(short, f"no window of {c.horizon:g} s has enough samples"), []
     for p in predicted:
+        excluded[FEW] += p.predictions.possible - p.predictions.rows.size
         keep = np.ones(p.predictions.rows.size, bool)
         if why := _left_out(c, p, [q.name for q, _ in chosen]):
             excluded[why] = excluded.get(why, 0) + keep.size
@@ -214,7 +215,8 @@ def _counted(
             chosen.append((p, keep))
         else:
             left_out[p.name] = f"no window has {_limits(c)}"
-    offered = sum(p.predictions.rows.size for p in predicted)
+    offered = sum(p.predictions.possible for p in predicted) + sum(short.values())
+    excluded = {why: count for why, count in excluded.items() if count}
     windows = sum(int(rows.sum()) for _, rows in chosen)
     return chosen, WindowCounts(offered, windows, excluded, [p.name for p, _ in chosen], left_out)
 

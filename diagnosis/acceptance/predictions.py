@@ -27,6 +27,7 @@ class Predictions:
     Attributes:
         name: of the run.
         windows: of that length; of a predictor whose velocity cannot be set one, the whole run.
+        possible: windows that there would be, were no sample missing.
         rows: (w,), row of the last sample of each, near the horizon.
         measured: (w, 6), the sample of the pose there, and the smoothed velocity.
 
@@ -57,6 +58,8 @@ class Predictions:
         window = self.windows.sample_window[self._last]
         self._since = self.windows.since
         time = self.windows.start[window] + self._since[self._last]
+        whole, seconds = self.predictor.whole, possible(self.smoothed, horizon)
+        self.possible = self._last.size if whole else max(seconds, self._last.size)
         self.first = np.searchsorted(self.smoothed.time, self.windows.start[window] + begin - 1e-6)
         self.rows = np.searchsorted(self.smoothed.time, time - 1e-6)
         self.measured = np.hstack([self.windows.measured[self._last], self.smoothed.nu[self.rows]])
@@ -109,6 +112,11 @@ class Predictions:
         psi = pose[k, 2]
         u, v = rotate_to_body(psi, rate[:, 0], rate[:, 1])
         return np.column_stack([pose[k], u, v, rate[:, 2]])
+
+
+def possible(smoothed: Smoothed, horizon: float) -> int:
+    """Windows of a length [s] that there would be in a run, were no sample missing."""
+    return int((smoothed.time[-1] - smoothed.time[0] + smoothed.track.period) // horizon)
 
 
 def difference(motion: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from cosim import InputError
 from ...execution.result_folder import sha256 as sha256_of
 from ...predictors import Model, read_model
 from ...predictors.evaluation import Evaluation
+from ...report.content import COUNTS, part
 from ...runs import samples_sha256, side_cars
 from ...session import Comparison
 
@@ -124,10 +125,12 @@ def _ours(path: Path) -> bool:
     return any((PROJECT / name) in path.resolve().parents for name in PACKAGES)
 
 
-def samples(evaluations: Sequence[Evaluation]) -> list[dict[str, str]]:
-    """Of each run the hash of its samples as they were used: those of a table have no file."""
+def samples(evaluations: Sequence[Evaluation]) -> list[dict[str, Any]]:
+    """Of each run the hash of its samples as they were used, and their counts; a table has no file."""
     return [
         {"run": e.name, "file": str(e.weak_windows.run.file or ""), "sha256": samples_sha256(e.smoothed)}
+        | part(e.smoothed.counts, COUNTS)
+        | {"notes": [*e.smoothed.notes]}
         for e in evaluations
     ]
 

@@ -71,6 +71,11 @@ def _judged(r: Content) -> ReportSection:
     told = [f"{j.criterion}: {'; '.join(j.restrictions)}." for j in r.judgements if j.restrictions]
     told += [f"Runs that do not count: {'; '.join(left)}."] if left else []
     told += [f"The same motion, or nearly: {' and '.join(pair)}." for pair in r.same_runs]
+    told += [
+        f"{s.run}: {s.samples} samples, of which {s.used} are used, {s.frozen} frozen, {s.dropped} "
+        f"dropped, {s.spikes} spikes.{''.join(f' {note}.' for note in s.notes)}"
+        for s in r.samples
+    ]
     known = ", ".join(f.name for f in r.learned_from)
     told.append(
         f"The model was learned from: {known}."

@@ -27,7 +27,7 @@ from ...session import Comparison
 from ..budget import Budget, Learned, read_learned, sources_of
 from ..criterion import JUDGED, InputStd, ReadCriteria, now, read_criteria
 from ..judged_criterion import EXPANDED, Judgement, Predicted, judge
-from ..predictions import Predictions
+from ..predictions import Predictions, possible
 from ..validity import covered, window_means
 from .provenance import Files, code, files_of, parameters_of, parameters_sha256, samples
 from .record_figures import figures
@@ -169,7 +169,7 @@ class _JudgedRuns:
     Attributes:
         learned_from: runs of which the model was learned, as far as it is known.
         same: pairs of names of runs that are the same, or nearly.
-        short: horizon -> name of a run -> why it has no window of that length.
+        short: horizon -> name of a run without a window of that length -> windows that it might have.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ class _JudgedRuns:
             acting,
             notes,
         )
-        self.short: dict[float, dict[str, str]] = {}
+        self.short: dict[float, dict[str, int]] = {}
         prints = {e.name: Fingerprint.of(e.smoothed) for e in comparison.evaluations}
         told = [*comparison.predictor.model.learned_from, *(learned.learned_from if learned else ())]
         told += [
@@ -198,7 +198,7 @@ class _JudgedRuns:
             try:
                 p = Predictions(e, horizon)
             except InputError as error:
-                short[e.name] = f"it has no window of {horizon:g} s with enough samples"
+                short[e.name] = possible(e.smoothed, horizon)
                 self._notes.append(str(error))
                 continue
             found = sources_of(p, self._learned, self._acting)

@@ -1,13 +1,11 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
 from weakref import finalize
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from fmus.frames import rotate_to_body
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
-from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed, fingerprints
+from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
 from ..predictor import FOUND, MAP, UnmatchedError
@@ -29,12 +27,12 @@ from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
 from ..windows import FREE_STEP
 from .instances import Begun, simulate
+from .lineage import learned_from, parts_of, remember
 from .short_steps import ShortSteps
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
 from .wrapper import Wrapped, write_wrapper
 
 SYSTEMS = (".ssp", ".json")
-LEARNED = "resources/learned_from.json"  # in an FMU: the runs of which it was learned
 
 
 class Fmu:
@@ -89,7 +87,7 @@ class Fmu:
             InputError: it tells what is broken.
         """
         fmus = [self.path, *(path for _, path in self.inner if path.suffix == ".fmu")]
-        return tuple(f for path in dict.fromkeys(fmus) for f in _learned_from(path))
+        return learned_from(fmus)
 
     @property
     def files(self) -> list[tuple[str, Path]]:
@@ -225,9 +223,7 @@ class FmuPredictor(BlackBox):
         wrapped = Wrapped(self.name, self.fmu.model, self.map, self.lines)
         told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
         if of_both is not None:
-            known = (*self.learned_from, *(Fingerprint.of(w.smoothed) for w in runs))
-            with ZipFile(folder / FOUND, "a", ZIP_DEFLATED) as archive:
-                archive.writestr(ZipInfo(LEARNED), json.dumps([f.content() for f in known]))
+            remember(folder / FOUND, self.learned_from, runs)
         write_map(folder / MAP, (of_both or self.given).content())
         return [told]
 
@@ -249,24 +245,10 @@ def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
     return {name: float(x[k]) for name, x in values.items()}
 
 
-def _learned_from(path: Path) -> tuple[Fingerprint, ...]:
-    """Runs of which an FMU was learned, as far as it tells."""
-    with ZipFile(path) as archive:
-        if LEARNED not in archive.namelist():
-            return ()
-        try:
-            told = json.loads(archive.read(LEARNED))
-        except (ValueError, RecursionError):
-            told = [{}]
-    return fingerprints(told, path)
-
-
 def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
-    """A system as one FMU, whose parameters are all that the system leaves open, and what it is "
-    "made of."""
+    """A system as one FMU, whose parameters are all that the system leaves open, and its files."""
     made, scenario = folder / f"{path.stem}.fmu", cosim.load_scenario(path)
     with closing(prepare(scenario)) as system:
-        inner = [(f"FMU {name}", Path(model.path)) for name, model in system.models.items()]
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
         every = {
             f"{name}.{v.name}"
@@ -275,11 +257,7 @@ def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
             if v.causality == "parameter" and v.type == "Real"
         }
         export_fmu(system, made, expose=every - given)
-    tables = [t.table for t in scenario.fmus.values()] + [r.path for r in scenario.recordings]
-    inner += [("table", scenario.folder / t) for t in tables if t is not None]
-    return made, inner + [
-        ("ship", scenario.folder / s) for s in [scenario.ship] if s and s.endswith(".toml")
-    ]
+        return made, parts_of(scenario, system)
 
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:
