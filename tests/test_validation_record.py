@@ -13,16 +13,20 @@ from support.measured import jumps, sail
 
 import diagnosis
 from cosim import InputError
+from cosim.campaign import Posterior
 from diagnosis.acceptance import FILES, lines
-from diagnosis.acceptance.budget import _numerical, sources_of
+from diagnosis.acceptance.budget import Learned, _numerical, sources_of
 from diagnosis.acceptance.criterion import Criterion, InputStd, now
 from diagnosis.acceptance.judged_criterion import Predicted, judge
 from diagnosis.acceptance.predictions import Predictions
 from diagnosis.acceptance.record.provenance import files_of
 from diagnosis.predictors import Model, write_model
 from diagnosis.predictors.described_ship import DescribedShip
+from diagnosis.predictors.fmu.lineage import remember
 from diagnosis.runs import Fingerprint
+from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
 from diagnosis.verify import main as verify_main
+from fmus.build import build, native_targets
 
 pypdf = pytest.importorskip("pypdf")
 EASY = {"quantity": "position", "horizon": 4.0, "tolerance": 0.5, "unit": "m", "coverage": 0.5}
@@ -302,13 +306,74 @@ def test_the_pdf_is_fit_for_a_client(comparison, tmp_path):
     assert "the same motion as a" in shown
 
 
-def test_a_predictor_without_a_file_is_named_by_its_code(comparison, tmp_path):
-    """As a class of a user, whose module is hashed."""
+def test_a_predictor_of_a_user_is_named_by_its_code(comparison, tmp_path):
+    """Also one that derives from a class of this project, and would else pass for it."""
 
     class Mine(DescribedShip):
-        files = None
-        parametric = False
+        pass
 
-    mine = Mine(Model())
-    changed = replace(comparison, predictor=mine)
+    changed = replace(comparison, predictor=Mine(Model()))
     assert __file__ in [f["path"] for f in files_of(changed, {}) if f["role"] == "model"]
+    content = validated(changed, tmp_path, {}).content
+    assert (content.model, content.confinement) == ("Mine, a class of the user", "unconfined")
+
+
+def test_cuts_of_one_log_that_overlap_count_once(folder, tmp_path):
+    run = sail(64.0, h=0.1)[0]
+    for name, begin, end in (("first", 0.0, 40.0), ("last", 30.0, 64.0)):
+        write_run(tmp_path / f"{name}.csv", run.rows((run.time >= begin) & (run.time < end)))
+    c = diagnosis.compare([tmp_path / "first.csv", tmp_path / "last.csv"])
+    assert validated(c, tmp_path, {}).content.judgements[0].runs == ["first"]
+
+
+def test_a_side_car_that_changed_since_is_refused(folder, tmp_path):
+    data = tmp_path / "a.csv"
+    data.write_bytes((folder / "a.csv").read_bytes())
+    beside = tmp_path / "a.csv.json"
+    beside.write_text("{}")
+    c = diagnosis.compare(data)
+    assert [f["role"] for f in files_of(c, {})] == ["data", "layout of data"]
+    beside.write_text('{"trial": null}')
+    with pytest.raises(InputError, match=r"a\.csv\.json' has changed since"):
+        files_of(c, {})
+
+
+def test_windows_without_samples_are_counted(folder, tmp_path):
+    """Cells that somebody left empty leave a trace."""
+    table = pd.read_csv(folder / "b.csv")
+    table.loc[(table.time > 20.0) & (table.time < 23.9), ["x", "y", "psi"]] = np.nan
+    table.to_csv(tmp_path / "holes.csv", index=False)
+    v = validated(diagnosis.compare(tmp_path / "holes.csv"), tmp_path, {})
+    (j,) = v.content.judgements
+    assert (j.offered, j.windows, j.excluded) == (12, 11, {"too few samples": 1})
+    assert v.content.samples[0].dropped > 30
+
+
+def test_a_posterior_of_another_model_says_nothing():
+    p = Posterior(names=["vessel.X_u"], units=["N.s/m"], mean=[-1.0], covariance=[[0.01]])
+    learned = Learned(p, ForceDisturbance(np.ones(3), np.ones(3)), ())
+    assert learned.is_of(Model({"X_u": -1.0}))
+    assert not learned.is_of(Model())
+    assert not Learned(p.model_copy(update={"names": ["vessel.other"]}), learned.push, ()).is_of(Model())
+
+
+@pytest.mark.slow
+def test_the_inside_of_a_system_is_hashed(tmp_path, monkeypatch):
+    """An FMU within a scenario that is replaced, and a model that remembers its runs within one."""
+    monkeypatch.chdir(tmp_path)
+    build(["vessel"], tmp_path, native=native_targets())
+    (tmp_path / "vessel.fmu").rename("inner.fmu")
+    system = {"name": "system", "step": 0.05, "stop": 10.0, "fmus": {"ship": {"path": "inner.fmu"}}}
+    (tmp_path / "system.json").write_text(json.dumps(system))
+    run = sail(24.0, h=0.1)[0]
+    write_run(tmp_path / "run.csv", run)
+    c = diagnosis.compare("run.csv", model="system.json")
+    v = validated(c, tmp_path, {})
+    assert {f.role for f in v.content.files} == {"data", "model", "FMU ship"}
+    v.write("out")
+    usual = ["out/validation.json", "--allow-missing", "signature"]
+    assert verify_main(usual) == 0
+    remember(tmp_path / "inner.fmu", (), diagnosis.gather([run]))
+    assert verify_main(usual) == 1
+    again = diagnosis.Fmu("system.json")
+    assert [f.name for f in again.learned_from] == [run.name]

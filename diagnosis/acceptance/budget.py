@@ -23,6 +23,7 @@ from cosim import InputError
 from cosim.campaign import Posterior, read_posterior
 from fmus.frames import rotate_to_body
 
+from ..predictors import Model
 from ..predictors.shooting import Shooting
 from ..runs import Fingerprint, Smoothed, fingerprints
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
@@ -31,6 +32,7 @@ from .predictions import Predictions, difference, judged
 
 # Parameters of the effects current and earth_force.
 CURRENT, WIND = ("V_n", "V_e"), ("F_n", "F_e")
+SAME = 1e-6  # of a value or its standard deviation: rounding in files; chosen
 ROUNDING = 1e-9  # of the motion: a change that is none, but of the last digits of a log; chosen
 SLOWEST = 0.5  # order of convergence below which there is none; chosen, an explicit Euler method has 1
 # Quantity -> variance in each window (w,); None: not known.
@@ -51,6 +53,16 @@ class Learned(NamedTuple):
     push: ForceDisturbance
     files: tuple[Path, ...]
     learned_from: tuple[Fingerprint, ...] = ()
+
+    def is_of(self, model: Model) -> bool:
+        """Whether a model has the values that the posterior is about."""
+        if self.posterior is None:
+            return True
+        p, known = self.posterior, model.values
+        names = [name.partition(".")[2] for name in p.names]
+        values = np.array([model.value(n) if "@" in n or n in known else np.nan for n in names])
+        reach = SAME * np.maximum(p.std, np.abs(p.mean))
+        return bool(np.all(np.abs(values - p.mean) <= reach))
 
 
 def read_learned(folder: str | Path) -> Learned:

@@ -39,8 +39,8 @@ class Criterion(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Annotated[str, Field(min_length=1)] | None = Field(
-        None, description="in the record; else made of the rest"
+    name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = (
+        Field(None, description="in the record; else made of the rest")
     )
     quantity: Quantity = Field(description="distance, heading, or velocity of the body over ground")
     horizon: Positive = Field(description="time of prediction after which the error is judged [s]")

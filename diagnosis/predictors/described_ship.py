@@ -35,9 +35,10 @@ class DescribedShip:
         self.sha256 = "" if file is None else sha256(file)
 
     @property
-    def files(self) -> list[tuple[str, Path]]:
-        """What decides its predictions: each file, after what it is for."""
-        return [] if self.file is None else [("model", self.file)]
+    def files(self) -> list[tuple[str, Path, str]]:
+        """What decides its predictions: what each file is for, its path, its SHA-256 when it was "
+        "read."""
+        return [] if self.file is None else [("model", self.file, self.sha256)]
 
     def learning_from(self, runs: Sequence[WeakWindows]) -> "DescribedShip":
         """The same model, which remembers that it and what is made from it is learned from some runs."""

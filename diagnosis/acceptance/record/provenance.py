@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, distribution, version
@@ -13,16 +14,15 @@ from typing import Any
 from cosim import InputError
 
 from ...execution.result_folder import sha256 as sha256_of
-from ...predictors import Model, read_model
+from ...predictors import Model, Predictor, read_model
 from ...predictors.evaluation import Evaluation
 from ...report.content import COUNTS, part
-from ...runs import samples_sha256, side_cars
+from ...runs import samples_sha256
 from ...session import Comparison
 
 PROJECT = Path(__file__).parents[3]
 PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "cybership")
 LIBRARIES = ("numpy", "scipy", "pandas", "fmpy", "pydantic", "pythonfmu", "cryptography", "matplotlib")
-LOG_OPTIONS = "log.json"
 Files = Mapping[str, "Path | str | Sequence[Path | str] | None"]
 
 
@@ -75,35 +75,35 @@ def files_of(comparison: Comparison, further: Files) -> list[dict[str, str]]:
 def _data(evaluations: Sequence[Evaluation]) -> Iterator[dict[str, str]]:
     for e in evaluations:
         run = e.weak_windows.run
-        if (path := run.file) is not None:
-            yield entry("data", path, run.sha256)
-            options = path.with_name(LOG_OPTIONS)
-            beside = [options] if path.stem == options.stem and options.is_file() else []
-            for file in (*side_cars(path), *beside):
-                yield entry("layout of data", file)
+        for path, known in run.hashes.items():
+            yield entry("data" if path == run.file else "layout of data", path, known)
 
 
 def _model(comparison: Comparison) -> Iterator[dict[str, str]]:
     """The files of model, effects and ship, with modules of Python that lie with them."""
     predictor = comparison.predictor
     model = comparison.evaluations[0].model
-    given = getattr(predictor, "files", None)  # what a predictor of a user does not have
-    if given is None:
-        source = getsourcefile(type(predictor))
-        given = [] if source is None or _ours(Path(source)) else [("model", Path(source))]
-    hashed = getattr(predictor, "sha256", "")
-    files = [(role, Path(path)) for role, path in given]
-    files += [("effects", Path(path)) for path in model.ship.effects.files]
-    folders = {path.resolve().parent for _, path in files if path.suffix == ".py"}
+    files = [(role, Path(path), known) for role, path, known in getattr(predictor, "files", ())]
+    if foreign(predictor):
+        with suppress(TypeError, OSError):  # a class without a file, as of a notebook
+            files.append(("model", Path(getsourcefile(type(predictor)) or ""), ""))
+    files += [("effects", Path(path), "") for path in model.ship.effects.files]
+    folders = {path.resolve().parent for _, path, _ in files if path.suffix == ".py"}
     for module in [*sys.modules.values()]:
         path = Path(getattr(module, "__file__", None) or "")
         if path.suffix == ".py" and path.parent.resolve() in folders and not _ours(path):
-            files.append(("module", path))
+            files.append(("module", path, ""))
     seen: set[Path] = set()
-    for role, path in files:
-        if path.resolve() not in seen:
+    for role, path, known in files:
+        if path.is_file() and path.resolve() not in seen:
             seen.add(path.resolve())
-            yield entry(role, path, hashed if role == "model" else "")
+            yield entry(role, path, known)
+
+
+def foreign(predictor: Predictor) -> bool:
+    """Whether a predictor is a class that this project does not have."""
+    file = getattr(sys.modules.get(type(predictor).__module__), "__file__", None)
+    return file is None or not _ours(Path(file))
 
 
 def _is_read(comparison: Comparison, path: Path) -> bool:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from cosim import InputError
 
@@ -29,7 +30,7 @@ from ..criterion import JUDGED, InputStd, ReadCriteria, now, read_criteria
 from ..judged_criterion import EXPANDED, Judgement, Predicted, judge
 from ..predictions import Predictions, possible
 from ..validity import covered, window_means
-from .provenance import Files, code, files_of, parameters_of, parameters_sha256, samples
+from .provenance import Files, code, files_of, foreign, parameters_of, parameters_sha256, samples
 from .record_figures import figures
 from .record_files import FILES, write_record
 from .record_keys import FORM, REFERENCES, STANDING
@@ -41,6 +42,7 @@ JUDGEMENT = (
     "tolerance=criterion.tolerance offered=counts.offered excluded=counts.excluded "
     "windows=counts.judged independent"
 )
+STRETCH = 8  # samples; chosen: no noise repeats so many
 BUDGET = (
     "u_D=measurement initial_state parameters process_noise current wind u_input u_num=numerical u_val"
 )
@@ -119,6 +121,13 @@ def validate(
     every = {**(files or {}), "learned": () if known is None else known.files}
     hashed = files_of(comparison, every)  # before any work: a file that has changed since
     notes: list[str] = []
+    if known is not None and not known.is_of(
+        comparison.evaluations[0].learned or comparison.predictor.model
+    ):
+        known = known._replace(posterior=None)
+        notes.append(
+            f"'{learned}' is of a model with other values, so that its posterior says nothing here."
+        )
     runs = _JudgedRuns(comparison, known, read.content.input_std, notes)
     horizons = dict.fromkeys(c.horizon for c in read.content.criteria)
     predicted = {horizon: [*runs.predicted(horizon)] for horizon in horizons}
@@ -188,7 +197,10 @@ class _JudgedRuns:
             prints[e.name] for e in comparison.evaluations if e.learned is not None and not e.held_out
         ]
         self.learned_from = [*{f.sha256: f for f in told}.values()]
-        self.same = [{a, b} for a, b in combinations(prints, 2) if prints[a].alike(prints[b])]
+        rows = {e.name: _rows(e.weak_windows.run.pose) for e in comparison.evaluations}
+        self.same = [
+            {a, b} for a, b in combinations(prints, 2) if rows[a] & rows[b] or prints[a].alike(prints[b])
+        ]
         self._seen = {n for n, f in prints.items() if any(f.alike(g) for g in self.learned_from)}
 
     def predicted(self, horizon: float) -> Iterator[Predicted]:
@@ -207,9 +219,18 @@ class _JudgedRuns:
             yield Predicted(e.name, p, found, window_means(p), same, e.name in self._seen)
 
 
+def _rows(pose: np.ndarray) -> set[bytes]:
+    """Each stretch of so many poses (n, 3) that all differ: what two cuts of a log have in common."""
+    moving = np.append(False, (np.diff(pose, axis=0) != 0.0).any(axis=1) & np.isfinite(pose[1:, 0]))
+    known = sliding_window_view(moving, STRETCH).all(axis=1)
+    return {pose[k : k + STRETCH].tobytes() for k in np.flatnonzero(known)}
+
+
 def _model_name(comparison: Comparison) -> str:
     """The model's file, or what it is without one."""
     predictor = comparison.predictor
+    if foreign(predictor):
+        return f"{type(predictor).__name__}, a class of the user"
     if files := getattr(predictor, "files", None):
         return str(files[0][1])
     if not predictor.parametric:
@@ -222,7 +243,7 @@ def _model_name(comparison: Comparison) -> str:
 def _confinement(comparison: Comparison) -> str:
     """What keeps the model's code from the data."""
     predictor = comparison.predictor
-    if predictor.parametric:
+    if predictor.parametric and not foreign(predictor):
         return "none needed: the model is parameters of this program"
     return getattr(predictor, "confinement", "") or "unconfined"
 

@@ -18,6 +18,7 @@ from fmus.frames import rotate_to_body
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
+from ...execution.result_folder import sha256
 from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
@@ -150,7 +151,8 @@ class FmuPredictor(BlackBox):
 
     def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(fmu.name, runs, ship)
-        self.learned_from, self.files = fmu.learned_from, fmu.files
+        self.learned_from = fmu.learned_from
+        self.files = [(role, path, sha256(path)) for role, path in fmu.files]
         measured = [w.run for w in runs]
         self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
         self.lines = signal_lines(self.map, commands_of(measured))
