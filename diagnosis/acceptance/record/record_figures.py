@@ -25,7 +25,7 @@ def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) 
         c = j.criterion
         told = f"{c.title}: error E = S − D of each of the {j.errors.size} windows that count"
         yield Plot(_errors(j), f"{told}, the tolerance, and 2 u_val about zero.")
-        if c.horizon in drawn:
+        if c.horizon in drawn or not evaluations:
             continue
         drawn.add(c.horizon)
         for p, rows in j.windows[:TRACKS]:

@@ -55,11 +55,12 @@ class Validation:
     Attributes:
         content: of ``validation.json``, but for the reports and the key.
         judgements: with the errors of all windows.
+        evaluations: of the runs, for the figures of tracks; without them there are none.
     """
 
     content: Content
     judgements: Sequence[Judgement]
-    _evaluations: Sequence[Evaluation]
+    evaluations: Sequence[Evaluation] = ()
 
     def write(self, folder: str | Path, sign: str | Path | None = None) -> list[str]:
         """Write the record and its report into a folder, all files or none.
@@ -79,7 +80,7 @@ class Validation:
 
     def write_into(self, folder: Path, sign: str | Path | None) -> list[str]:
         """The same in a folder that is there, file by file."""
-        plots = [*figures(self.judgements, self._evaluations)]
+        plots = [*figures(self.judgements, self.evaluations)]
         return write_record(self.content, plots, folder, sign)
 
     def __str__(self) -> str:

@@ -29,7 +29,7 @@ class HashedFile(BaseModel):
     sha256: str
 
 
-class Samples(BaseModel):
+class RunSamples(BaseModel):
     """The samples of a run, and the file that they are from; empty: none."""
 
     run: str
@@ -50,7 +50,7 @@ class Record(BaseModel):
     code: CodeHash
     criteria: HashedFile
     files: list[HashedFile]
-    samples: list[Samples]
+    samples: list[RunSamples]
     reports: list[HashedFile]
     public_key: str | None
 
