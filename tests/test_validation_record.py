@@ -297,7 +297,7 @@ def test_the_pdf_is_fit_for_a_client(comparison, tmp_path):
         assert text in first
     for k, page in enumerate(pages, 1):
         assert f"page {k} of {len(pages)}" in page
-        assert "Validation record · CY-42" in page
+        assert "Validation record · document CY-42" in page
     every = " ".join(pages)
     assert "Figure 1. close enough: error E = S − D" in every
     assert "Figure 2. a: measured track" in every

@@ -52,7 +52,7 @@ def write_pdf(
         raise InputError(missing_extra(error)) from None
     pictures, pages = [_png(plot) for plot in figures], 0
     while True:  # the second time the number of pages is known
-        out, foot = BytesIO(), partial(_foot, f"{title} · {next(iter(head.values()))}", pages)
+        out, foot = BytesIO(), partial(_foot, f"{title} · {' '.join(next(iter(head.items())))}", pages)
         made = SimpleDocTemplate(
             out, pagesize=A4, title=title, leftMargin=MARGIN, rightMargin=MARGIN,
             topMargin=MARGIN, bottomMargin=MARGIN, invariant=1,
@@ -170,8 +170,9 @@ def _widths(rows: Sequence[Sequence[str]], width: float) -> list[float]:
         return stringWidth(text, BOLD, SIZE - 1.0) + PADDING
 
     columns = [*zip(*rows, strict=True)]
-    most = width / len(columns)
-    least = [max(min(across(w), most) for text in c for w in text.split() or [""]) for c in columns]
+    most = 1.5 * width / len(columns)  # a word that is longer, such as a hash, is broken
+    words = [max(min(across(w), most) for text in c for w in text.split() or [""]) for c in columns]
+    least = [w * min(1.0, width / sum(words)) for w in words]
     wish = [max(map(across, c)) - least_ for c, least_ in zip(columns, least, strict=True)]
     free, wishes = max(width - sum(least), 0.0), sum(wish) or 1.0
     return [a + free * b / wishes for a, b in zip(least, wish, strict=True)]

@@ -23,6 +23,7 @@ from ...session import Comparison
 PROJECT = Path(__file__).parents[3]
 PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "cybership")
 LIBRARIES = ("numpy", "scipy", "pandas", "fmpy", "pydantic", "pythonfmu", "cryptography", "matplotlib")
+SOURCES = (".py", ".c")  # of a clone and of a wheel alike; ships are hashed by their numbers
 Files = Mapping[str, "Path | str | Sequence[Path | str] | None"]
 
 
@@ -152,7 +153,7 @@ def code() -> dict[str, Any]:
     total = sha256()
     for name in PACKAGES:
         for path in sorted((PROJECT / name).rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts and path.suffix not in (".pyc", ".so"):
+            if path.suffix in SOURCES:
                 total.update(path.relative_to(PROJECT).as_posix().encode() + b"\0" + path.read_bytes())
     return {
         "version": version("cybership"),
