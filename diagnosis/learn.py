@@ -149,9 +149,10 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
             refused = UNSOUND
         else:
             try:
-                notes = predictor.write(new, diagnosis.learned.model, task.runs)
+                learned = diagnosis.learned.model
+                notes = predictor.write(new, learned, [*task.train, *task.validate])
                 if predictor.parametric:
-                    diagnosis.posterior.write(new / POSTERIOR)
+                    diagnosis.posterior.write(new / POSTERIOR, learned.learned_from)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         early = [name for name in EARLY if (options.out / name).exists()]

@@ -352,7 +352,10 @@ def begin(
         )
     first, last = len(train), len(runs) - len(held_out)
     parts = runs[:first], runs[first:last], runs[last:]
-    return Session(*parts, source.on(runs, advance), prior, chosen, harms, advance, seed)
+    predictor = source.on(runs, advance)
+    if isinstance(predictor, DescribedShip):
+        predictor = predictor.learning_from(runs[:last])
+    return Session(*parts, predictor, prior, chosen, harms, advance, seed)
 
 
 def diagnose(

@@ -31,7 +31,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.ops import wrap
 
-from ..runs import Run, Smoothed
+from ..runs import Fingerprint, Run, Smoothed
 from .described_ship import DescribedShip, windows_of
 from .prediction import WindowStarts, at_rest
 from .predictor import Predictor, PredictorDescription
@@ -61,6 +61,7 @@ class BlackBox(ABC):
 
     Attributes:
         kind, sha256, given_map: see :class:`.predictor.PredictorDescription`.
+        learned_from: runs of which it was learned, as far as it tells.
         starts: what a prediction can begin with, of :data:`MOTION`.
         inputs: the forces and commands that it takes.
         own_run_in: the run-in of every run [s]; None: none from rest, else the usual one.
@@ -68,6 +69,7 @@ class BlackBox(ABC):
 
     parametric = False
     kind, sha256 = "black box", ""
+    learned_from: tuple[Fingerprint, ...] = ()
 
     def __init__(self, name: str, runs: Sequence[WeakWindows], ship: Model) -> None:
         self.name, self.runs, self.ship = name, runs, ship
@@ -129,7 +131,8 @@ class BlackBox(ABC):
         """A model that moves as the black box does along its runs."""
         body = Model({**self.ship.vessel, **self._inertia()}, self.ship.thrusters, ship=self.ship.ship)
         given = {w.run.name: self._beyond_along(w, body) for w in self.runs}
-        return Model(body.vessel, body.thrusters, ship=body.ship, given=given)
+        known = self.learned_from
+        return Model(body.vessel, body.thrusters, ship=body.ship, given=given, learned_from=known)
 
     def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
         if not self.whole:

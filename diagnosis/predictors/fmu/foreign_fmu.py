@@ -18,7 +18,8 @@ from fmus.frames import rotate_to_body
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
-from ...runs import OF_UNIT, QUANTITY, Run, Smoothed
+from ...execution.result_folder import sha256
+from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
 from ..predictor import FOUND, MAP, UnmatchedError
@@ -27,6 +28,7 @@ from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
 from ..windows import FREE_STEP
 from .instances import Begun, simulate
+from .lineage import learned_from, parts_of, remember
 from .short_steps import ShortSteps
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
 from .wrapper import Wrapped, write_wrapper
@@ -56,10 +58,13 @@ class Fmu:
         ship: Ship | None = None,
     ) -> None:
         self._given = self.path = Path(path).absolute()
+        self.inner: Sequence[tuple[str, Path]] = ()
         if self.path.suffix in SYSTEMS:
             self._made = Scratch()
             finalize(self, self._made.remove)
-            self.path = _as_one(self._given, self._made.path)
+            self.path, inner = _as_one(self._given, self._made.path)
+            # Of an archive the parts are unpacked for a while, and hashed with it.
+            self.inner = inner if self._given.suffix == ".json" else ()
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
         self.model = FmuModel(self.path)
@@ -74,6 +79,21 @@ class Fmu:
     def sha256(self) -> str:
         """Of the file."""
         return hashlib.sha256(self._given.read_bytes()).hexdigest()
+
+    @cached_property
+    def learned_from(self) -> tuple[Fingerprint, ...]:
+        """Runs of which it was learned, as far as it tells.
+
+        Raises:
+            InputError: it tells what is broken.
+        """
+        fmus = [self.path, *(path for _, path in self.inner if path.suffix == ".fmu")]
+        return learned_from(fmus)
+
+    @property
+    def files(self) -> list[tuple[str, Path]]:
+        """What decides its predictions: each file, after what it is for."""
+        return [("model", self._given), *self.inner, *([("map", self.map)] if self.map else [])]
 
     @property
     def step(self) -> float | None:
@@ -131,6 +151,8 @@ class FmuPredictor(BlackBox):
 
     def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(fmu.name, runs, ship)
+        self.learned_from = fmu.learned_from
+        self.files = [(role, path, sha256(path)) for role, path in fmu.files]
         measured = [w.run for w in runs]
         self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
         self.lines = signal_lines(self.map, commands_of(measured))
@@ -202,6 +224,8 @@ class FmuPredictor(BlackBox):
             return []
         wrapped = Wrapped(self.name, self.fmu.model, self.map, self.lines)
         told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
+        if of_both is not None:
+            remember(folder / FOUND, self.learned_from, runs)
         write_map(folder / MAP, (of_both or self.given).content())
         return [told]
 
@@ -223,10 +247,10 @@ def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
     return {name: float(x[k]) for name, x in values.items()}
 
 
-def _as_one(path: Path, folder: Path) -> Path:
-    """A system as one FMU, whose parameters are all that the system leaves open."""
-    made = folder / f"{path.stem}.fmu"
-    with closing(prepare(cosim.load_scenario(path))) as system:
+def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
+    """A system as one FMU, whose parameters are all that the system leaves open, and its files."""
+    made, scenario = folder / f"{path.stem}.fmu", cosim.load_scenario(path)
+    with closing(prepare(scenario)) as system:
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
         every = {
             f"{name}.{v.name}"
@@ -235,7 +259,7 @@ def _as_one(path: Path, folder: Path) -> Path:
             if v.causality == "parameter" and v.type == "Real"
         }
         export_fmu(system, made, expose=every - given)
-    return made
+        return made, parts_of(scenario, system)
 
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:
