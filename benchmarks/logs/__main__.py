@@ -29,8 +29,8 @@ from .ways_to_log import POSE, WAYS
 def good_log(path: Path, part: Sequence[float] | None, ship: str | None, rate: float, seed: int) -> Good:
     """A good log at even times, pose and commands alone, without spikes and stretches without a pose.
 
-    Its pose is the smoothed motion and the residual of the nearest sample, so that times that were uneven are
-    no noise; where the log is quicker than the measurement was, a residual drawn at random.
+    Its pose is the smoothed motion and the residual of the nearest sample, so that times that were
+    uneven are no noise; where the log is quicker than the measurement was, a residual drawn at random.
 
     Args:
         path: of the measurement.

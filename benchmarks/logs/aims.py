@@ -14,7 +14,7 @@ SURE = 0.8  # confidence from which on a cause that is not there is wrong
 
 
 def line(o: Recorded, clean: Recorded | None) -> str:
-    """A row of the table that is printed; a noise of which the model says that it is not known: in ()."""
+    """A row of the table that is printed; a noise that is said to be unknown in parentheses."""
     pairs = zip(o.noise, o.rel_std, strict=True)
     ratio = " ".join(
         "-" if np.isnan(r) else f"{r:.2f}" if std <= WITHIN else f"({r:.2f})" for r, std in pairs

@@ -3,11 +3,12 @@
 With h the eigenvalues of the hat matrix of the spline, the information on the logarithms of the noise's
 variance and of the jerk's density is (restricted likelihood, without the parabolas that cost nothing)
 
-    1/2 [[sum (1 - h)^2, sum h (1 - h)], [sum h (1 - h), sum h^2]],    sum h (1 - h) = -d sum h / d log s:
+    1/2 [[sum (1 - h)^2, sum h (1 - h)], [sum h (1 - h), sum h^2]],
+    sum h (1 - h) = -d sum h / d log s:
 
 where samples are so rare that the spline goes through all of them, a residual is none of noise. A noise
-is constant; where residuals are larger in some parts of a run than in others by more than chance, they are
-of motions that the samples are too rare to follow, and the noise is as uncertain as they differ.
+is constant; where residuals are larger in some parts of a run than in others by more than chance, they
+are of motions that the samples are too rare to follow, and the noise is as uncertain as they differ.
 """
 
 import numpy as np
@@ -41,10 +42,10 @@ def noise_rel_std(p: Problem, smoothness: np.ndarray, weights: np.ndarray, fit: 
         of_noise = float(e.counts[POSE]) - followed - mixed
         of_jerk = followed - ORDER * p.spline.grid.start.size - mixed
         information = 0.5 * (of_noise - mixed**2 / of_jerk) if of_jerk > 0.0 else 0.0
-        if not information > 0.0:
-            continue
         free = np.bincount(part, (p.share[:, k] > 0.0) * weights[:, k] - leverage[:, k])
         counted = free > 1.0
+        if not (information > 0.0 and counted.any()):
+            continue
         ratio = np.bincount(part, off[:, k])[counted] / free[counted]
         by_part = float(np.average((ratio - 1.0) ** 2 - 2.0 / free[counted], weights=free[counted]))
         found[k] = 0.5 * np.sqrt(1.0 / information + max(by_part, 0.0))  # of sigma, not of its square

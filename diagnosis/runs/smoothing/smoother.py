@@ -39,6 +39,7 @@ LEAST_NOISE = 2e-5
 # Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
 # of channels against each other are wrong by less than four.
 MISSTATED = 2.0
+FILTERED = "; behind a filter samples scatter less than they are wrong"
 
 # Channel -> standard deviation of what it says over a sampling period, in SI.
 Agreeing = Mapping[str, float]
@@ -324,6 +325,8 @@ def _doubted(track: Track, found: Inliers, even: Problem) -> Iterator[str]:
             yield (
                 f"the noise of {POSE[k]} is given as {given[k]:.3g} {unit}, its samples scatter by "
                 f"{free.sigma[k]:.2g} {unit} ({odds} : 1): leave it out, and it is estimated"
+                + FILTERED
+                * (size < 1.0)
             )
 
 
