@@ -8,6 +8,8 @@ import pytest
 import diagnosis
 from diagnosis import Model, Run
 from diagnosis.assessment.gathering import gather
+from diagnosis.report.content import file_content
+from diagnosis.report.report_data import ReportData
 from diagnosis.runs import channels_of, prepare, table_of
 from diagnosis.search.findings import Finding
 from diagnosis.verdict.confidence import confidence_of, doubt_of_data
@@ -152,7 +154,8 @@ def test_a_noise_is_hardly_known_where_motions_are_quicker_than_samples():
 
 def test_files_hold_each_channel_by_its_name():
     run = sailed()
-    data = diagnosis.compare([table_of(run), table_of(sailed(1))]).content.data
+    compared = diagnosis.compare([table_of(run), table_of(sailed(1))])
+    data = file_content(ReportData.of(compared))["data"]
     keys = {"rate", "held", "noise", "noise_from", "correlation", "latency", "outliers", "used", "why"}
     assert set(data["channels"]) == {"x", "y", "psi", "r"}
     for channels in (data["channels"], *(of["channels"] for of in data["runs"])):

@@ -139,9 +139,9 @@ def _unit(name: str) -> str:
 def _of_differences(samples: int) -> float:
     """Relative standard deviation of a noise by the median of that many third differences.
 
-    The median deviation has 37 % of the information of a root mean square; differences overlap fourfold.
+    A median deviation has 37 % of the information of a root mean square; differences overlap fourfold.
     """
-    return float(np.sqrt(4.0 / (2.0 * 0.37 * samples)))
+    return float(np.sqrt(5.4 / samples))
 
 
 def _rate(time: np.ndarray) -> float:
