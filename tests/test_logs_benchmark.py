@@ -1,5 +1,8 @@
 """The benchmark of logs: ways to record one do what they say, and each aim is counted."""
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +10,7 @@ import pytest
 from benchmarks.logs.aims import aims
 from benchmarks.logs.recorded import Good, Recorded
 from benchmarks.logs.ways_to_log import WAYS
+from diagnosis.report.formatting import finite
 
 H = 0.1
 
@@ -44,6 +48,13 @@ def test_motions_above_half_of_a_rate_are_noise_to_its_samples():
     quick = 0.01 * np.sin(2.0 * np.pi * 2.0 * g.table["time"].to_numpy())
     moved = Good(g.table, g.motion + quick[:, None], g.sigma, None)
     assert moved.noise((2.0, 1.0, 8.0)) == pytest.approx([0.0071, 0.0071, 1e-3], rel=0.05)
+
+
+def test_results_are_read_back():
+    o = Recorded("a", noise=(1.0, np.nan, 2.0), found={"X_u": 0.9, "mass": None}, doubted=("x",))
+    again = Recorded.of(json.loads(json.dumps(finite(asdict(o)))))
+    assert finite(asdict(again)) == finite(asdict(o))
+    assert np.isnan(again.noise[1])
 
 
 def test_each_aim_is_counted():

@@ -19,6 +19,7 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from diagnosis.predictors import ship_with
+from diagnosis.report.formatting import finite
 from diagnosis.runs import prepare, read_frame, table_of
 
 from .aims import CLEAN, aims, line
@@ -61,6 +62,16 @@ def good_log(path: Path, part: Sequence[float] | None, ship: str | None, rate: f
     return Good(table, motion, by_pose.noise, ship)
 
 
+def _answers(file: Path | None, of: object, parser: argparse.ArgumentParser) -> dict[str, Recorded]:
+    """Way -> what an earlier call with the same arguments made of it, which goes on where that ended."""
+    if file is None or not file.is_file():
+        return {}
+    content = json.loads(file.read_text(encoding="utf-8"))
+    if content["of"] != of:
+        parser.error(f"'{file}' holds results of other arguments: {content['of']}; name another file")
+    return {way["way"]: Recorded.of(way) for way in content["ways"]}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.logs", description=__doc__)
@@ -75,19 +86,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--there", nargs="*", metavar="EFFECT", help="effects that there are, if known")
     parser.add_argument("--seed", type=int, default=0, help="of all that is random (0)")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
-    parser.add_argument("--out", type=Path, metavar="FILE.json", help="for the results")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.json", help="for the results; it goes on with those there"
+    )
     o = parser.parse_args(arguments)
     good = good_log(o.good, o.part, o.ship, o.rate, o.seed)
     test = o.test and good_log(o.test, o.test_part, o.ship, o.rate, o.seed)
-    found: list[Recorded] = []
+    asked_for = {n: v for n, v in vars(o).items() if n not in ("only", "workers", "out", "there")}
+    of = {n: v.name if isinstance(v, Path) else v for n, v in asked_for.items()}
+    before = _answers(o.out, finite(of), parser)
+    ways, found = o.only or [*WAYS], list[Recorded]()
     print("| way | noise found / there | cause | error / clean | s |\n|---|---|---|--:|--:|")
     with ProcessPoolExecutor(o.workers, get_context("spawn")) as pool:
-        tasks = [pool.submit(recorded, way, good, o.seed, o.learn, test) for way in o.only or WAYS]
-        for task in tasks:
-            found.append(task.result())
+        asked = [way for way in ways if way not in before]
+        tasks = {way: pool.submit(recorded, way, good, o.seed, o.learn, test) for way in asked}
+        for way in ways:
+            found.append(before[way] if way in before else tasks[way].result())
             print(line(found[-1], found[0] if found[0].way == CLEAN else None), flush=True)
             if o.out:
-                o.out.write_text(json.dumps([asdict(x) for x in found], indent=1) + "\n")
+                kept = before | {x.way: x for x in found}
+                content = {"of": of, "ways": [asdict(x) for x in kept.values()]}
+                o.out.write_text(json.dumps(finite(content), indent=1) + "\n", encoding="utf-8")
     print("\n| aim | number |\n|---|---|")
     for aim, number in aims(found, o.there):
         print(f"| {aim} | {number} |")

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -79,6 +80,14 @@ class Recorded:
     found: Mapping[str, float | None] = field(default_factory=dict)
     error: float = np.nan
     seconds: float = 0.0
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Recorded":
+        """What a file of results holds, in which a number that is not finite is null."""
+        known = {n: np.nan if v is None else v for n, v in content.items()}
+        for name in ("noise", "rel_std"):
+            known[name] = tuple(np.nan if v is None else v for v in content[name])
+        return cls(**known)
 
 
 def recorded(way: str, good: Good, seed: int, learn: bool, test: Good | None) -> Recorded:
