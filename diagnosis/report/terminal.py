@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from math import degrees
-from statistics import median
 
 from rich.console import RenderableType
 from rich.padding import Padding
@@ -10,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
-from ..runs import sensor_lines
+from ..runs import by_name, sensor_lines
 from ..session import CalibratedModel
 from .finding_text import SHOWN
 from .formatting import number, percent
@@ -132,21 +131,17 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
         table.add_row(Text(r.called(e)), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
     yield from _titled("Data", table)
     table = _table("channel", "rate", "held", "noise", "", "outliers", "used")
-    for name in dict.fromkeys(c.name for _, channels in r.channels for c in channels):
-        of = [(run, c) for run, channels in r.channels for c in channels if c.name == name]
-        every = [c for _, c in of]
-        rate, held, noise = (
-            median(x) for x in zip(*((c.rate, c.held, c.noise) for c in every), strict=True)
-        )
-        first = next((f": {run} {_number(c.outlier_times[0])} s" for run, c in of if c.outliers), "")
+    for c in by_name(c for _, channels in r.channels for c in channels):
+        runs = ((run, x) for run, channels in r.channels for x in channels if x.name == c.name)
+        first = next((f": {run} {_number(x.outlier_times[0])} s" for run, x in runs if x.outliers), "")
         table.add_row(
-            name,
-            f"{_number(rate)} Hz",
-            _percent(held),
-            f"{_number(noise, 2)} {every[0].unit}",
-            every[0].noise_from,
-            f"{sum(c.outliers for c in every)}{first}",
-            next((c.reason for c in every if c.reason), "yes"),
+            c.name,
+            f"{_number(c.rate)} Hz",
+            _percent(c.held),
+            f"{_number(c.noise, 2)} {c.unit}",
+            c.noise_from if c.known else "hardly known",
+            f"{c.outliers}{first}",
+            c.why or "yes",
         )
     if r.channels:
         yield from _titled("Channels, medians of all runs", table)

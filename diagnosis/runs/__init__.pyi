@@ -31,6 +31,7 @@ from .fingerprint import Fingerprint as Fingerprint
 from .fingerprint import fingerprints as fingerprints
 from .fingerprint import samples_sha256 as samples_sha256
 from .measured_channels import MeasuredChannel as MeasuredChannel
+from .measured_channels import by_name as by_name
 from .measured_channels import channels_of as channels_of
 from .prepared_run import PreparedRun as PreparedRun
 from .prepared_run import examine as examine

@@ -26,6 +26,7 @@ from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
 from .likelihood import adapt, criteria, likeliest, with_noise
+from .noise_uncertainty import noise_rel_std
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots
@@ -38,6 +39,7 @@ LEAST_NOISE = 2e-5
 # Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
 # of channels against each other are wrong by less than four.
 MISSTATED = 2.0
+FILTERED = "; behind a filter samples scatter less than they are wrong"
 
 # Channel -> standard deviation of what it says over a sampling period, in SI.
 Agreeing = Mapping[str, float]
@@ -83,6 +85,7 @@ class Smoothed:
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
         noise: (3,), standard deviation of the measurement [m, m, rad].
+        noise_rel_std: (3,), relative standard deviation of that; zero where it was given.
         jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
         late: whether the whole run agrees on that delay.
@@ -103,6 +106,7 @@ class Smoothed:
     eta_ddot_std: np.ndarray
     nu_std: np.ndarray
     noise: np.ndarray
+    noise_rel_std: np.ndarray
     jerk: np.ndarray
     delay: float
     late: bool
@@ -269,6 +273,8 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
+    estimated = np.isnan(given_noise(track))
+    uncertain = np.where(estimated, noise_rel_std(p, smoothness, weights, fit), 0.0)
     spikes = track.valid.copy()  # those of parts that agree with nothing
     spikes[rows] = False
     spikes[dense] = track.valid[dense] & (weights[:, 0] == 0.0)
@@ -288,6 +294,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         eta_ddot_std,
         _body_std(motion, eta_std, eta_dot_std),
         sigma,
+        uncertain,
         sigma**2 / (smoothness * grid.spacing**DEGREE),
         response.delay,
         response.sure,
@@ -318,6 +325,8 @@ def _doubted(track: Track, found: Inliers, even: Problem) -> Iterator[str]:
             yield (
                 f"the noise of {POSE[k]} is given as {given[k]:.3g} {unit}, its samples scatter by "
                 f"{free.sigma[k]:.2g} {unit} ({odds} : 1): leave it out, and it is estimated"
+                + FILTERED
+                * (size < 1.0)
             )
 
 
