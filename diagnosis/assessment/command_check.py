@@ -6,8 +6,9 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.thrust import full_thrust
-from ..runs import Run
+from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU
+from ..runs.columns.side_car import ColumnChange
 from .readings import inertial, needed
 from .settings import SETTINGS
 
@@ -51,6 +52,23 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
             "it seems to be in another unit there"
         )
     return None
+
+
+def without_force(run: Run, model: Model) -> str:
+    """A clause about commands of a run that give no force at all, as where a propeller cannot reverse."""
+    beyond = {}
+    if run.commands is not None:
+        limits = model.ship.layout_of(run.commands).limits(model.drive.params)
+        for name, c, (low, high) in zip(run.signals, run.commands.T, limits, strict=True):
+            if c.any() and ((c <= low) | (c >= high)).all():
+                beyond[name] = f"{name} is beyond its limits, {low:.4g} to {high:.4g}"
+    if not beyond:
+        return "its commands are zero throughout"
+    flipped = {name: ColumnChange(name, -1.0) for name in beyond}
+    clause = (
+        f"its commands give no force: {', '.join(beyond.values())}, in all rows; has it the wrong sign?"
+    )
+    return clause + line_beside(run.file, flipped)
 
 
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
