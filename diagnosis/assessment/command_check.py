@@ -55,7 +55,7 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
 
 
 def without_force(run: Run, model: Model) -> str:
-    """A clause about commands of a run that give no force at all, as where a propeller cannot reverse."""
+    """A clause about commands that give no force at all, as where a propeller cannot reverse."""
     beyond = {}
     if run.commands is not None:
         limits = model.ship.layout_of(run.commands).limits(model.drive.params)
@@ -102,11 +102,15 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
 def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     """A clause about a ship that goes on as before while all of its commands are zero."""
     s, tau = w.smoothed, w.run.tau_cmd
-    if not (np.abs(tau).max(axis=1) == 0.0).any():
+    given = np.abs(tau)
+    if w.run.commands is not None:  # what is beyond a limit is a command, though it gives no force
+        unit = model.ship.form_of(w.run.commands)
+        given = np.abs(w.run.commands[:, [unit[s] != "rad" for s in w.run.signals]])
+    if not (given.max(axis=1, initial=0.0) == 0.0).any():
         return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
-    idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
+    idle = (every.held @ given).max(axis=1, initial=0.0) == 0.0
     if idle.sum() < SETTINGS.long:
         return None
     still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))

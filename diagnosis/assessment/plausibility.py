@@ -1,9 +1,10 @@
 """Whether a run's file is read as it was meant, by the data themselves: units, signs, axes, columns.
 
-Each mistake that a file may have (an axis that points the other way, another unit, columns in each other's
-place, ...) is put right in turn, and the densities of the motion are compared (:mod:`.reading_odds`). A
-mistake is reported, with its odds, if it is likelier than the file as it was read by more than chance gives
-to one of all, and lawful effects, a constant offset of the heading or dead actuators, do not do as well.
+Each mistake that a file may have (an axis that points the other way, another unit, columns in each
+other's place, ...) is put right in turn, and the densities of the motion are compared
+(:mod:`.reading_odds`). A mistake is reported, with its odds, if it is likelier than the file as it was
+read by more than chance gives to one of all, and lawful effects, a constant offset of the heading or
+dead actuators, do not do as well.
 """
 
 from collections.abc import Mapping, Sequence
@@ -82,8 +83,9 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     k = int(np.argmax(idle))
     unit = "N.m" if k == 2 else "N"
     return (
-        f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no actuator pushes, and "
-        f"the ship can do {full[k]:.3g} {unit} at all: are columns swapped, or in other units or axes?"
+        f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no "
+        f"actuator pushes, and the ship can do {full[k]:.3g} {unit} at all: are columns swapped, or in "
+        "other units or axes?"
     )
 
 
@@ -107,7 +109,7 @@ def still_column(run: Run) -> str | None:
 
 
 class Mistake(NamedTuple):
-    """Readings that are far likelier than the file as it was read, the likeliest first, and by which odds."""
+    """Readings that are far likelier than the file as it was read, the likeliest first, and the odds."""
 
     readings: Sequence[Reading]
     log_odds: float

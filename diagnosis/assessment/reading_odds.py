@@ -48,7 +48,13 @@ class Explanation:
             self.priors.append((deviation, low, high))
 
     def density(self, e: np.ndarray, least: np.ndarray, windows: float) -> float:
-        """Logarithm of the density of a model error (K, 3) whose noise is at least (3,), of so many windows."""
+        """Logarithm of the density of a model error.
+
+        Args:
+            e: (K, 3), the model error.
+            least: (3,), its noise at the least.
+            windows: number of independent ones that it counts as.
+        """
         s, low, high = np.array(self.priors).T
         x, unit = np.array(self.columns) * s[:, None, None], np.eye(s.size)
         r = e

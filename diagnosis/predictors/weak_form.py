@@ -208,7 +208,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
-    """Force (K, 3) [N, N, N m] that a motion needs by a model's inertia and hull, of what else but its hull."""
+    """Force (K, 3) [N, N, N m] that a motion needs by a model's inertia and hull."""
     return _balance(w, model, thrust=False)
 
 

@@ -131,9 +131,27 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     for e in r.evaluations:
         table.add_row(Text(r.called(e)), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
     yield from _titled("Data", table)
+    yield from channel_table(r.channels)
+    notes = [f"{e.name}: {note}" for e in r.evaluations for note in e.smoothed.notes]
+    if notes:
+        yield from _lines("Found in the data", notes)
+    examined = [(e.name, e.smoothed.sensors) for e in r.evaluations]
+    faults = [f"{run}: {line}" for run, x in examined if x for line in sensor_lines(x.findings)]
+    if faults:
+        yield from _lines("What channels say of each other", faults)
+    kind, sentences = r.how_it_predicts
+    if kind:
+        yield from _lines(f"How the {kind} predicts", sentences)
+    yield from _lines("Where the model fails", r.comparison.before.sentences)
+
+
+def channel_table(
+    of_runs: Sequence[tuple[str, Sequence[MeasuredChannel]]],
+) -> Iterator[RenderableType]:
+    """A row for each channel of some runs, by their names; nothing where there is none."""
     table = _table("channel", "rate", "held", "noise", "", "outliers", "used")
-    for name in dict.fromkeys(c.name for _, channels in r.channels for c in channels):
-        of = [(run, c) for run, channels in r.channels for c in channels if c.name == name]
+    for name in dict.fromkeys(c.name for _, channels in of_runs for c in channels):
+        of = [(run, c) for run, channels in of_runs for c in channels if c.name == name]
         every = [c for _, c in of]
         rate, held, noise = (
             median(x) for x in zip(*((c.rate, c.held, c.noise) for c in every), strict=True)
@@ -148,19 +166,8 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
             f"{sum(c.outliers for c in every)}{first}",
             next((c.reason for c in every if c.reason), "yes"),
         )
-    if r.channels:
+    if of_runs:
         yield from _titled("Channels, medians of all runs", table)
-    notes = [f"{e.name}: {note}" for e in r.evaluations for note in e.smoothed.notes]
-    if notes:
-        yield from _lines("Found in the data", notes)
-    examined = [(e.name, e.smoothed.sensors) for e in r.evaluations]
-    faults = [f"{run}: {line}" for run, x in examined if x for line in sensor_lines(x.findings)]
-    if faults:
-        yield from _lines("What channels say of each other", faults)
-    kind, sentences = r.how_it_predicts
-    if kind:
-        yield from _lines(f"How the {kind} predicts", sentences)
-    yield from _lines("Where the model fails", r.comparison.before.sentences)
 
 
 def _effect(e: ReportedEffect) -> Iterator[str]:
