@@ -70,7 +70,7 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChan
     found = likeliest_mistake(w, model, seen is not None, given.mean)
     if found:
         return found.clause, found.readings[0].changes, None
-    return seen and (seen, {}, None)
+    return (seen, {}, None) if seen else None
 
 
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:

@@ -57,17 +57,17 @@ class Explanation:
         """
         s, low, high = np.array(self.priors).T
         x, unit = np.array(self.columns) * s[:, None, None], np.eye(s.size)
-        r = e
+        r, b, design = e, np.zeros(s.size), unit
         for _ in range(ROUNDS):
             noise = np.sqrt((r**2).mean(axis=0) + least**2)
             weight = np.sqrt(windows / len(e)) / noise
             A = np.column_stack([(x * weight).reshape(s.size, -1).T, (e * weight).ravel()])
-            R = np.linalg.qr(A, mode="r")
-            A, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
-            b = lsq_linear(A, y, (low / s, high / s), method="bvls").x
+            R = np.linalg.qr(A).R  # as good as the rows, and few
+            design, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
+            b = lsq_linear(design, y, (low / s, high / s), method="bvls").x
             r = e - np.tensordot(b, x, 1)
         noise = np.sqrt((r**2).mean(axis=0) + least**2)
-        known = np.linalg.slogdet(A.T @ A)[1]
+        known = np.linalg.slogdet(design.T @ design)[1]
         return float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
 
 

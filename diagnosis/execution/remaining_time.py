@@ -1,7 +1,8 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
 The number of effects is known only in the end: that of the rounds is the usual one, or the present one
-and half a round more. Where no effect was found, none is validated and fitted. How long a step takes is scaled by what the steps so far took.
+and half a round more. Where no effect was found, none is validated and
+fitted. How long a step takes is scaled by what the steps so far took.
 """
 
 import re

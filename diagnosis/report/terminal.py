@@ -1,6 +1,6 @@
 """Output of the commands on a terminal of 80 columns, or in a pipe."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from math import degrees
 from statistics import median
 
@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
-from ..runs import sensor_lines
+from ..runs import MeasuredChannel, sensor_lines
 from ..session import CalibratedModel
 from .finding_text import SHOWN
 from .formatting import number, percent
