@@ -63,7 +63,7 @@ TOLD = [
     ("tau_mN", column(**MILLI)),
     ("tau_kN", column(**KILO)),
     ("tau_N_Nmm", column(tau_N={"unit": "N.mm"})),
-    ("tau_percent", "times the 1.165 N that the thrusters give"),
+    ("tau_percent", "its commands are in percent of the full thrust"),
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
     ("psi_180", column(psi={"offset": 3.142})),
     ("const_tau", "none of its commands ever varies"),
@@ -189,7 +189,7 @@ def test_gains_are_one_and_follow_units_and_clock():
         (of_commands("", (10.0, 10.0, 0.1)), [0.1, 0.1, 10.0]),
         (Reading("", pace=0.5), [4.0, 4.0, 4.0]),
     ):
-        found = gains(reread(windows(), reading), Model())
+        found = gains(reread(windows(), reading, Model()), Model())
         assert found.value == pytest.approx(expected, rel=0.1)
         assert found.wrong.any()
 

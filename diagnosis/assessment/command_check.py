@@ -6,8 +6,9 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.thrust import full_thrust
-from ..runs import Run
+from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU
+from ..runs.columns.side_car import ColumnChange
 from .readings import inertial, needed
 from .settings import SETTINGS
 
@@ -53,6 +54,23 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
     return None
 
 
+def without_force(run: Run, model: Model) -> str:
+    """A clause about commands that give no force at all, as where a propeller cannot reverse."""
+    beyond = {}
+    if run.commands is not None:
+        limits = model.ship.layout_of(run.commands).limits(model.drive.params)
+        for name, c, (low, high) in zip(run.signals, run.commands.T, limits, strict=True):
+            if c.any() and ((c <= low) | (c >= high)).all():
+                beyond[name] = f"{name} is beyond its limits, {low:.4g} to {high:.4g}"
+    if not beyond:
+        return "its commands are zero throughout"
+    flipped = {name: ColumnChange(name, -1.0) for name in beyond}
+    clause = (
+        f"its commands give no force: {', '.join(beyond.values())}, in all rows; has it the wrong sign?"
+    )
+    return clause + line_beside(run.file, flipped)
+
+
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
@@ -84,11 +102,15 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
 def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     """A clause about a ship that goes on as before while all of its commands are zero."""
     s, tau = w.smoothed, w.run.tau_cmd
-    if not (np.abs(tau).max(axis=1) == 0.0).any():
+    given = np.abs(tau)
+    if w.run.commands is not None:  # what is beyond a limit is a command, though it gives no force
+        unit = model.ship.form_of(w.run.commands)
+        given = np.abs(w.run.commands[:, [unit[s] != "rad" for s in w.run.signals]])
+    if not (given.max(axis=1, initial=0.0) == 0.0).any():
         return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
-    idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
+    idle = (every.held @ given).max(axis=1, initial=0.0) == 0.0
     if idle.sum() < SETTINGS.long:
         return None
     still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))

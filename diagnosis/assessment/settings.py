@@ -26,7 +26,10 @@ class AssessmentSettings:
     # 1, least share of a command that follows from no other; chosen: a thruster aft that pushes sideways
     # and turns at once has none.
     own: float = 0.01
-    factor: float = 4.0  # 1, by which another reading explains a right file better, at most; chosen
+    windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
+    lost: float = 0.5  # 1, deviation of the share of a thruster's force that is lost; chosen
+    drift: float = 0.5  # 1, of the full thrust, that nothing but an actuator gives all the time; chosen
+    steady: float = 0.1  # 1, of the full thrust, deviation of a force that is steady; chosen
     unbalanced: float = 0.2  # 1, of what inertia and hull need. Derived: twice 10 % of a coefficient
     long: int = 20  # windows without a command after which the ship has forgotten its thrust; chosen
     neighbours: int = 5  # windows by which that of a model error is predicted; chosen

@@ -204,6 +204,16 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 
     An acceleration counts as a force by the inertia of the model that this one was made from.
     """
+    return _balance(w, model, thrust=True)
+
+
+def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
+    """Force (K, 3) [N, N, N m] that a motion needs by a model's inertia and hull."""
+    return _balance(w, model, thrust=False)
+
+
+def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
+    """The force that a motion needs, less that of the thrusters and what is given, if these count."""
     model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
@@ -214,6 +224,8 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     eta, nu = w.recall("motion", measured, lambda: _motion(w, model))
     change = w.recall("change", measured, lambda: w.slope @ nu)
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
+    if not thrust:
+        return (change - free) @ model.reference_mass.T
 
     def drives() -> np.ndarray:
         key = measured, water
