@@ -177,7 +177,11 @@ LAWS = {
     "rudder_in_race": RACE_RUDDER,
     "four_quadrant_propeller": {
         **{name: x for name, x in OPEN_WATER.items() if name != "astern"},
-        **{"wake_slope": -0.3, "pitch": 0.15, "A_5": -0.001, "A_8": 0.001, "B_5": 0.001},
+        "wake_slope": -0.3,
+        "pitch": 0.15,
+        "A_5": -0.001,
+        "A_8": 0.001,
+        "B_5": 0.001,
     },
     "four_quadrant_rudder": {**RACE_RUDDER, "race_astern": 0.1, "pressure_astern": -0.2},
     "azimuth_with_leg": LEG,
