@@ -199,7 +199,7 @@ def forces(
             if couple:
                 place = places[k] if len(given) == len(sides) else places[0]
                 couples.append(a.law.couple(within(a, commands[place], p), flow, p))
-    return Thrust(*map(tuple, (X, Y, xs, ys, gains)), couple=tuple(couples))
+    return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), tuple(gains), couple=tuple(couples))
 
 
 def power_of(ship: Description, settings: Sequence[Number] = ()) -> list[Number]:

@@ -304,6 +304,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
     """
     inertia, damping, start = described(ship)
     windy = ship.wind_measured
+    inputs: type[Any] = ForceInWind if windy else Force
     groups = vessel_effects(effects, type(damping), windy)
     unchanged, undisturbed = groups.change_forces(), groups.outside_forces()
     params = bundle(
@@ -328,7 +329,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
     def prepared_step(s: State, i: Fields, b: PreparedVessel, h: Number) -> tuple[State, Fields]:
         p = b.params
         tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
-        wind = ()
+        wind: tuple[Number, ...] = ()
         if windy:
             wind = air_velocity(finite(i.wind_speed, 0.0), finite(i.wind_direction, 0.0))
             b = blown(b, s, *wind)
@@ -371,7 +372,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
         description=f"Hull of {ship.title} in surge, sway and yaw",
         params=params,
         state=State,
-        inputs=ForceInWind if windy else Force,
+        inputs=inputs,
         outputs=outputs,
         init=init,
         step=step,

@@ -1,7 +1,7 @@
 """The public Python interface as a page: ``python tests/support/public_api.py > docs/public_api.md``.
 
-What other programs may rely on: each public name, and names, kinds and defaults of its arguments. Types are in
-docs/python.md; a default that is no plain value is shown as ``...``.
+It lists each public name, and names, kinds and defaults of its arguments, for other programs. Types are in
+docs/python.md; ``...`` is a default that is not a plain value.
 """
 
 import inspect
@@ -17,9 +17,9 @@ PACKAGES = ("cosim", "diagnosis", "fmus")
 PLAIN = (type(None), bool, int, float, str)
 HEAD = """# Public names
 
-What other programs may rely on: a test holds these names, their arguments and their order. What they do is in
-[the reference](python.md); how a name goes away, in [CONTRIBUTING](../CONTRIBUTING.md#a-name-that-goes-away). Defaults that are
-no plain values are shown as `...`. This page is what `python tests/support/public_api.py` prints.
+This page lists the names that other programs may use. A test checks that these names, their arguments and their order stay. Their documentation is
+[the reference](python.md); [CONTRIBUTING](../CONTRIBUTING.md#a-name-that-goes-away) describes how a name is removed. `...` is a default that is
+not a plain value. `python tests/support/public_api.py` prints this page.
 """
 
 

@@ -5,7 +5,9 @@ import re
 import pytest
 from support.project import ROOT
 
-PAGE = (ROOT / "docs" / "thesis.md").read_text(encoding="utf-8")
+PAGE = "".join(
+    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("thesis.md", "thesis_items.md")
+)
 # How many the thesis has, by chapter; those before chapter 2 are numbered without one.
 ITEMS = {
     "equation": {"2": 39, "3": 20, "4": 63, "5": 5, "6": 2, "7": 15, "A": 12},

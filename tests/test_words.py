@@ -1,0 +1,172 @@
+"""The prose of the pages: the field's words (docs/glossary.md), short sentences, correct spelling."""
+
+import re
+import subprocess
+import sys
+from functools import cache
+
+import pytest
+from markdown_it import MarkdownIt
+from support.project import ROOT
+
+LONGEST = 35  # words a sentence, code not counted; 25 are the aim (CONTRIBUTING.md, "Words")
+
+# Phrases that are private to this project, as regular expressions, with the field's.
+PRIVATE = {
+    r"(?:un|re)?told|tells?|telling": "report, state, give, discriminate",
+    r"believ(?:es?|ed|ing)|beliefs?": "prior, controller model, assume",
+    r"(?:holds?|held) (?:\S+ ){0,4}against": "compare with, validate against",
+    r"withdraw(?:n|als?|s|ing)?": "prune, reject",
+    r"unseen|(?:seen|not seen) (?:only now|before)": "validation data, test data",
+    r"unrecorded forces?": "disturbance, process noise",
+    r"alike": "similar, indistinguishable",
+    r"what (?:is|are|was|were) left|left over": "residual, remainder",
+    r"(?:takes?|took|taken|taking) (?:\w+ )?away": "explain, reduce, remove",
+    r"nothing else (?:does|takes)|by nothing else": "unique contribution",
+    r"(?:goes|go|going|went) with": "is fixed to, belongs to, depends on",
+    r"miss(?:es)? by": "prediction error",
+    r"(?:stands?|lies?|said) beside": "is next to, in addition to",
+    r"knows? better|nobody knows|knows? nothing": "is unknown",
+    r"sail(?:s|ed)?|in vain|fore(?:tells?|told)|come to rest|comes to rest": "name the fact",
+    r"(?<!marine )crafts?": "ship, vessel",
+    r"(?<!there )(?<!where )(?:is|are|was|were) no (?!(?:more|less|better|worse|\w+er)\b)\w+": "is not a",
+    r"\w+n't|(?:it|that|there|what|let)'s": "no contraction",
+    r"so that\b.*\bso that": "one 'so that' a sentence",
+}
+PHRASES = re.compile("|".join(rf"(?P<p{k}>\b(?:{p})\b)" for k, p in enumerate(PRIVATE)), re.IGNORECASE)
+RELATIVE = re.compile(r"(?:What|Whatever|Who|Whoever)\b[^?]*$")
+
+# A sentence that may break a rule: (page, words of it) -> the reason. At most 30.
+EXCEPTIONS: dict[tuple[str, str], str] = {}
+
+# Pages that are not rewritten yet, or are printed by commands whose texts are not.
+LATER = {
+    "benchmarks/README.md",
+    "docs/checks.md",
+    "docs/constants.md",
+    "docs/diagnosis.md",
+    "docs/effects.md",
+    "docs/foreign_models.md",
+    "docs/interface.md",
+    "docs/measurements.md",
+    "docs/sensors.md",
+    "docs/ship.md",
+    "docs/ships.md",
+    "docs/trials.md",
+    "docs/trust.md",
+    "docs/validation.md",
+}
+
+FOLDERS = ("*.md", "benchmarks/*.md", "studies/*.md", "docs/*.md", "docs/notebooks/*.md")
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path
+    for folder in FOLDERS
+    for path in sorted(ROOT.glob(folder))
+    if path.name != "CHANGELOG.md"  # its older entries are history
+}
+
+
+@cache
+def sentences(page):
+    """(line, kind of block, sentence) of each sentence, table cell and comment of a command of a page."""
+    text = re.sub(
+        r"\A---\n.*?\n---\n",
+        lambda m: "\n" * m[0].count("\n"),
+        PAGES[page].read_text("utf-8"),
+        flags=re.S,
+    )
+    tokens, found, line = MarkdownIt().enable("table").parse(text), [], 0
+    for before, token in zip([None, *tokens], tokens, strict=False):
+        line = token.map[0] + 1 if token.map else line
+        if token.type == "fence" and token.info == "sh":
+            found += [(line, "comment", c) for c in re.findall(r"(?:^|\s)# (.+)$", token.content, re.M)]
+        if token.type == "inline":
+            words = ("``" if c.type == "code_inline" else c.content or " " for c in token.children)
+            for sentence in re.split(r"(?<=[.!?])[*)]*\s+", "".join(words)):
+                found.append((line, before.type, sentence))
+    return found
+
+
+@cache
+def faults(page):
+    """One line for each rule that a sentence of a page breaks."""
+    found = []
+    for line, kind, sentence in sentences(page):
+        if any(page == p and part in sentence for p, part in EXCEPTIONS):
+            continue
+        wrong = [
+            f"'{m[0]}': {[*PRIVATE.values()][int(m.lastgroup[1:])]}" for m in PHRASES.finditer(sentence)
+        ]
+        count = sum(any(c.isalpha() for c in word) for word in sentence.split())
+        if count > LONGEST:
+            wrong.append(f"{count} words, at most {LONGEST}")
+        if kind == "paragraph_open" and RELATIVE.match(sentence):
+            wrong.append("begins with a relative clause")
+        found += [f"{page}:{line}: {w}; in: {sentence}" for w in wrong]
+    return found
+
+
+@pytest.mark.parametrize("page", sorted(PAGES.keys() - LATER))
+def test_a_page_is_in_the_words_of_the_field(page):
+    assert faults(page) == []
+
+
+@pytest.mark.parametrize("page", sorted(LATER))
+def test_a_page_that_waits_for_its_rewriting_still_needs_it(page):
+    assert faults(page), f"{page} passes: take it out of LATER"
+
+
+def test_exceptions_are_few_needed_and_have_reasons():
+    assert len(EXCEPTIONS) <= 30
+    for (page, part), reason in EXCEPTIONS.items():
+        assert reason
+        assert any(part in sentence for _, _, sentence in sentences(page)), part
+
+
+@pytest.mark.parametrize(
+    ("sentence", "wrong"),
+    [
+        ("The report tells the reason.", True),
+        ("The report states the reason.", False),
+        ("A model is held against a run.", True),
+        ("The held-out run decides nothing.", False),
+        ("An effect is no cause.", True),
+        ("There is no other cause, and it is no longer likely.", False),
+        ("It takes away 99 % of the error.", True),
+    ],
+)
+def test_a_private_phrase_is_detected_and_its_replacement_is_not(sentence, wrong):
+    assert bool(PHRASES.search(sentence)) == wrong
+
+
+def test_the_glossary_has_each_term_once_with_one_sentence():
+    rows = [
+        line.strip("|").split("|")
+        for line in PAGES["docs/glossary.md"].read_text("utf-8").splitlines()
+        if line[:2] == "| "
+    ]
+    rows = [[cell.strip() for cell in row] for row in rows if row[0].strip() != "term"]
+    assert len({row[0] for row in rows}) == len(rows) > 100
+    for term, symbol, unit, meaning, literature in rows:
+        assert re.fullmatch(r"[A-Z][^.]*(?:\.(?=\d|ssv|json)[^.]*)*\.", meaning), term
+        assert all((symbol, unit, literature)), term
+
+
+def test_spelling():
+    """Of all pages, messages, docstrings and names; the words that codespell ignores are in pyproject.toml."""
+    packages = (
+        "cosim",
+        "cybership",
+        "diagnosis",
+        "fmucheck",
+        "fmus",
+        "studies",
+        "thesis",
+        "ships",
+        "scenarios",
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "codespell_lib", *PAGES, "CHANGELOG.md", *packages],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("", "")
