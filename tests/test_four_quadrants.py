@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from support.ships import SHIPS, scaled
 
 from fmus.actuators.actuation import command_units, forces
+from fmus.actuators.four_quadrants import FourQuadrantPropeller, FourQuadrantRudder
 from fmus.actuators.law import Flow, Law
 from fmus.actuators.response import total
 from fmus.effects import Motion
@@ -269,7 +270,7 @@ def test_resistance_goes_from_ahead_to_astern_by_the_angle_of_drift():
 
 # Of propeller and rudder
 
-PROPELLER, RUDDER = (Law.known[a.law] for a in TANKER.actuators)
+PROPELLER, RUDDER = FourQuadrantPropeller, FourQuadrantRudder
 WITHOUT = {f"{k}_{j}": 0.0 for k in "AB" for j in range(1, 9)}
 
 
