@@ -309,7 +309,7 @@ def at_samples(smoothed: Smoothed) -> dict[str, np.ndarray]:
 def _beyond(w: WeakWindows, body: Model, motion: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
     """Force (n, 3) that a model of a ship lacks in a motion (n, 6)."""
     eta, nu = motion[:, :3], motion[:, 3:]
-    free = acceleration(body, w.run.time, eta, nu)
+    free = acceleration(body, w.smoothed, eta, nu)
     return (nu_dot - free) @ body.mass.T - thrust_along(w, body, inflow_along(w, body, eta, nu))
 
 

@@ -223,7 +223,7 @@ def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
     eta, nu = w.recall("motion", measured, lambda: _motion(w, model))
     change = w.recall("change", measured, lambda: w.slope @ nu)
-    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
+    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.smoothed, eta, nu))
     if not thrust:
         return (change - free) @ model.reference_mass.T
 
@@ -239,7 +239,7 @@ def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
 def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
     """Force (K, 3) [N, N, N m] of hull and thrusters over the windows, at the velocity nu (n, 3)."""
     model, (eta, _) = model.during(w.run.name), w.motion
-    hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
+    hull = w.smooth @ acceleration(model, w.smoothed, eta, nu) @ model.reference_mass.T
     driven = w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
     return hull + _acting(w, model, driven, eta, nu)
 
@@ -313,10 +313,14 @@ def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
     return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
 
 
-def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust, at its pose and velocity (n, 3)."""
-    s = vessel.State._make([*eta.T, *nu.T, time])
-    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), model.hull)
+def acceleration(model: Model, run: Smoothed, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust, at its pose and velocity (n, 3).
+
+    The wind is that of the run, where it was measured.
+    """
+    s = vessel.State._make([*eta.T, *nu.T, run.time])
+    body = model.hull if run.air is None else vessel.blown(model.hull, s, *run.air.T)
+    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), body)
     return np.column_stack(np.broadcast_arrays(*nu_dot))
 
 

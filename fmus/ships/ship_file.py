@@ -27,10 +27,10 @@ from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
-from .hull_errors import WIND_SETTINGS
 from .numbers_told import Finite, Given, Number, Prime, StrictTable, Term, valued
 from .ship_doubts import doubts, line_of
 from .ship_warning import ShipWarning
+from .wind import by_regression, described_numbers
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
@@ -59,6 +59,16 @@ class ActuatorTable(BaseModel):
     behind: str = ""
 
 
+class WindTable(BaseModel):
+    """What the wind acts on: areas and drag, or areas and superstructure for Fujiwara's regression."""
+
+    model_config = ConfigDict(extra="allow")
+
+    measured: Annotated[bool, Field(strict=True)] = Field(
+        False, description="whether the wind over time is an input of the vessel and of predictions"
+    )
+
+
 class PrimeTable(StrictTable):
     """What numbers in prime units are over."""
 
@@ -83,7 +93,7 @@ class ShipTable(StrictTable):
     allocates: bool = Field(True, description="false: the thrusters get commands instead of a force")
     inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
     prime: PrimeTable | None = None
-    wind: dict[str, Given] = Field({})
+    wind: WindTable | None = None
     hull: HullTable = HullTable()
     actuators: list[ActuatorTable] = Field([])
     effects: list[str] = Field(
@@ -218,10 +228,27 @@ def _description(table: ShipTable) -> Description:
         tuple(_function(name, given, prime) for name, given in table.hull.functions.items()),
         actuators,
         table.allocates,
-        _values("wind", table.wind, WIND_SETTINGS, prime),
+        () if table.wind is None else _wind(table.wind, prime),
         tuple(table.effects),
         tuple(table.aliases.items()),
+        table.wind is not None and table.wind.measured,
     )
+
+
+def _wind(table: WindTable, prime: Prime | None) -> tuple[Value, ...]:
+    """Numbers of what is above the water.
+
+    Raises:
+        DeclarationError: one is unknown, out of its range, or missing for the regression.
+    """
+    given = {name: _checked("wind", name, x) for name, x in (table.model_extra or {}).items()}
+    declared = described_numbers(given)
+    missing = [v.name for v in declared if v.name not in given and v.name != "air_density"]
+    if by_regression(given) and missing:
+        raise DeclarationError(f"wind: {missing[0]} is missing, which a superstructure needs as well")
+    if table.measured and not given:
+        raise DeclarationError("wind: frontal_area is missing, on which a measured wind acts")
+    return _values("wind", given, declared, prime)
 
 
 def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:

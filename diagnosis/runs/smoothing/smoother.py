@@ -9,6 +9,7 @@ deviations from its prediction by all others is a spike.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from fmus.scale import Scale
 from ..cleaning import BRIEF, CHANCE, HORIZON, LONG, WIDTH, Counts, Track, noise
 from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
+from ..measured_wind import air_along
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
@@ -123,6 +125,11 @@ class Smoothed:
     def scale(self) -> Scale:
         """Of the ship."""
         return self.track.scale
+
+    @cached_property
+    def air(self) -> np.ndarray | None:
+        """(n, 2), velocity of the air to north and east [m/s]; None: no wind was measured."""
+        return air_along(self.track.run, self.eta[:, 2], self.nu)
 
     @property
     def used(self) -> np.ndarray:
