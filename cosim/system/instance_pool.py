@@ -13,7 +13,7 @@ from pathlib import Path
 from ..errors import SimulationError
 from ..fmu.fmu_model import FmuModel
 from ..fmu.instance import Instance, OnMessage
-from ..fmu.isolated import TIMEOUT, IsolatedInstance
+from ..fmu.isolated import IsolatedInstance
 from ..fmu.local import LocalInstance
 from ..scenario.schema import FmuEntry, Scenario
 
@@ -65,7 +65,7 @@ class InstancePool:
             InputError: no binary for this platform, or instantiation refused.
         """
         if entry.isolate:
-            return IsolatedInstance(name, model, on_message, entry.timeout or TIMEOUT)
+            return IsolatedInstance(name, model, on_message, entry.timeout)
         waiting = self._waiting.pop((model.sha256, name), None)
         if waiting is not None:
             try:

@@ -38,7 +38,7 @@ from .predictor import Predictor, PredictorDescription
 from .ship_model import Model, SampledForce
 from .thrust import FORGOTTEN
 from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
-from .windows import Windows, first_row, free_runs, step_of
+from .windows import Windows, between_steps, first_row, free_runs, step_of
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
@@ -162,9 +162,10 @@ class BlackBox(ABC):
         row, h = first_row(smoothed, begin), step_of(smoothed)
         start = 0 if self.whole else row
         steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
-        first = round((smoothed.time[row] - smoothed.time[start]) / h)
+        since = smoothed.time[row] - smoothed.time[start]
+        first = int(np.ceil(since / h - 1e-6))
         motion = self.motion(smoothed, np.array([start]), h, steps)
-        pose = self._placed_at(motion, h, first, smoothed.eta[[row]])[first:, :, 0]
+        pose = self._placed_at(motion, h, np.array([since]), smoothed.eta[[row]])[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
 
     def description(self) -> PredictorDescription:
@@ -200,22 +201,25 @@ class BlackBox(ABC):
         """The predicted pose (steps + 1, 3, 1, w) in windows."""
         found, h = [], starts.h
         for smoothed, rows in starts.runs:
-            first = round(self.run_in(smoothed) / h)
-            onto = np.searchsorted(smoothed.time, smoothed.time[rows] + first * h - 1e-9)
+            time = smoothed.time
+            onto = np.searchsorted(time, time[rows] + self.run_in(smoothed) - 1e-9)
             motion = self.motion(smoothed, rows, h, starts.steps)
-            found.append(self._placed_at(motion, h, first, smoothed.eta[onto]))
+            since = time[onto] - time[rows]  # a sample, which need not be a step
+            found.append(self._placed_at(motion, h, since, smoothed.eta[onto]))
         return np.concatenate(found, axis=-1)[:, :, None]
 
-    def _placed_at(self, motion: np.ndarray, h: float, first: int, eta: np.ndarray) -> np.ndarray:
-        """Pose (steps + 1, 3, w) of a motion, at a step laid onto others (w, 3) if it cannot be set."""
-        return _laid(_pose(motion, h), first, eta.T) if self.placed else _pose(motion, h)
+    def _placed_at(
+        self, motion: np.ndarray, h: float, since: np.ndarray, eta: np.ndarray
+    ) -> np.ndarray:
+        """Pose (steps + 1, 3, w) of a motion, at times (w,) laid onto others (w, 3) if it cannot be set."""
+        return _laid(_pose(motion, h), since / h, eta.T) if self.placed else _pose(motion, h)
 
     def _whole_run(self, smoothed: Smoothed) -> np.ndarray:
         """Pose and velocity (n, 6) along a run from its start."""
         h = step_of(smoothed)
         steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
         motion = self.motion(smoothed, np.array([0]), h, steps)
-        pose = _laid(_pose(motion, h), 0, smoothed.eta[:1].T)[:, :, 0]
+        pose = _laid(_pose(motion, h), np.zeros(1), smoothed.eta[:1].T)[:, :, 0]
         nu = motion[:, 3:, 0]
         if np.isnan(nu).any():
             rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
@@ -321,8 +325,9 @@ def _pose(motion: np.ndarray, h: float) -> np.ndarray:
     return np.stack([sums(north), sums(east), psi], axis=1)
 
 
-def _laid(pose: np.ndarray, first: int, onto: np.ndarray) -> np.ndarray:
-    """Tracks (steps + 1, 3, w), moved and turned so that at a step they are where others (3, w) are."""
-    x, y, psi = (pose - pose[first]).transpose(1, 0, 2)
-    north, east = rotate_to_earth(onto[2] - pose[first, 2], x, y)
+def _laid(pose: np.ndarray, place: np.ndarray, onto: np.ndarray) -> np.ndarray:
+    """Tracks (steps + 1, 3, w), moved and turned onto poses (3, w) after some steps (w,), in parts, too."""
+    at = between_steps(pose[:, :, None], np.arange(place.size), place)[0].T
+    x, y, psi = (pose - at).transpose(1, 0, 2)
+    north, east = rotate_to_earth(onto[2] - at[2], x, y)
     return np.stack([onto[0] + north, onto[1] + east, onto[2] + psi], axis=1)

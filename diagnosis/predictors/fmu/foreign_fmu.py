@@ -1,16 +1,19 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from weakref import finalize
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 import cosim
 from cosim.export import export_fmu
+from cosim.fmu import MEANS, ConfinedFmu
 from cosim.fmu import FmuModel as FmuModel
 from cosim.system import prepare
 from cybership.scratch_folder import Scratch
@@ -19,13 +22,30 @@ from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
 from ...runs import OF_UNIT, QUANTITY, Run, Smoothed
-from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
+from ..black_box import (
+    MOTION,
+    POSE,
+    SMALL,
+    TAU,
+    VELOCITY,
+    BlackBox,
+    Signals,
+    at_samples,
+    commands_at,
+)
 from ..described_ship import nominal
-from ..predictor import FOUND, MAP, UnmatchedError
+from ..predictor import (
+    DEFAULT_EXECUTION,
+    FOUND,
+    MAP,
+    Execution,
+    PredictorDescription,
+    UnmatchedError,
+)
 from ..ship_model import Model
 from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
-from ..windows import FREE_STEP
+from ..windows import FREE_STEP, Windows, step_of
 from .instances import Begun, simulate
 from .short_steps import ShortSteps
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
@@ -42,6 +62,7 @@ class Fmu:
             connection feeds as its inputs, and variables called ``instance.variable``.
         map: which of its variables is which signal, a file; None: as names and units tell.
         ship: that it is a model of; None: that of the runs.
+        execution: how it is run.
 
     Raises:
         InputError: no such FMU, or none for co-simulation by FMI 2.0; a system that one FMU cannot hold.
@@ -54,7 +75,9 @@ class Fmu:
         path: str | Path,
         map: str | Path | None = None,  # noqa: A002 - as the option of the commands
         ship: Ship | None = None,
+        execution: Execution = DEFAULT_EXECUTION,
     ) -> None:
+        self.execution = execution
         self._given = self.path = Path(path).absolute()
         if self.path.suffix in SYSTEMS:
             self._made = Scratch()
@@ -77,15 +100,23 @@ class Fmu:
 
     @property
     def step(self) -> float | None:
-        """The step that it suggests [s]; None: it suggests none."""
+        """The step that is asked for, or that it suggests [s]; None: neither."""
         suggested = self.model.description.defaultExperiment
-        return float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
+        told = float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
+        return self.execution.step or told
 
     @property
-    def isolated(self) -> bool:
-        """Whether each instance needs a process of its own: where one process may hold only one."""
+    def fixed_step(self) -> float | None:
+        """The only step that it takes, or that is asked for [s]; None: it takes steps of any length."""
         told = self.model.description.coSimulation
-        return bool(told is not None and told.canBeInstantiatedOnlyOncePerProcess)
+        varies = told is not None and told.canHandleVariableCommunicationStepSize
+        return self.step if self.execution.step or not varies else None
+
+    @property
+    def needs_tool(self) -> bool:
+        """Whether it needs the tool that it was made with (``needsExecutionTool``)."""
+        told = self.model.description.coSimulation
+        return bool(told is not None and told.needsExecutionTool)
 
     def given(self, runs: Sequence[Run]) -> VariableMap:
         """The map of the file, else the one that names and units tell, for some runs."""
@@ -112,9 +143,20 @@ class Fmu:
         Raises:
             InputError: as :meth:`variables`; the FMU refuses to be set to a measured state, or fails.
         """
-        predictor = FmuPredictor(self, runs, self.start or nominal(runs))
-        advance(f"what {self.name} does in measured states")
-        assert predictor.model  # which takes a while
+        self.variables([w.run for w in runs])  # before a process is started
+        means = MEANS if self.execution.confined else ()
+        try:
+            confined = ConfinedFmu(self.model, means, self.execution.timeout)
+        except cosim.SimulationError as error:
+            raise cosim.InputError(str(error)) from None
+        try:
+            predictor = FmuPredictor(self, confined, runs, self.start or nominal(runs))
+            advance(f"what {self.name} does in measured states")
+            assert predictor.model  # which takes a while
+        except BaseException:
+            confined.close()
+            raise
+        finalize(predictor, confined.close)
         return predictor
 
 
@@ -125,13 +167,17 @@ class FmuPredictor(BlackBox):
         given: which of its variables is which signal, as it was told or proposed.
         map: the same with the units that the FMU declares.
         lines: see :func:`.variable_map.signal_lines`.
+        confinement: what confines its processes, in words; "unconfined" where nothing does.
     """
 
     kind = "FMU"
 
-    def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
+    def __init__(
+        self, fmu: Fmu, confined: ConfinedFmu, runs: Sequence[WeakWindows], ship: Model
+    ) -> None:
         super().__init__(fmu.name, runs, ship)
         measured = [w.run for w in runs]
+        self.confined, self.confinement = confined, confined.confinement
         self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
         self.lines = signal_lines(self.map, commands_of(measured))
         self.starts = frozenset(self.map.told("start")) & set(MOTION)
@@ -147,14 +193,53 @@ class FmuPredictor(BlackBox):
         return not set(POSE) <= self.map.told("outputs").keys() & self.starts
 
     @cached_property
+    def late(self) -> list[str]:
+        """The outputs that are zero until the first step, against their start values."""
+        w = self.runs[0]
+        sizes = dict(zip(MOTION, (w.scale.length, w.scale.length, 1.0, *w.scale.speeds), strict=True))
+        started = [s for s in MOTION if s in self.starts & self.map.told("outputs").keys()]
+        if not started:
+            return []
+        state = np.where(w.known[:, None], np.hstack([w.smoothed.eta, w.smoothed.nu]), 0.0)
+        size = np.array([sizes[s] for s in MOTION])
+        row = int(np.abs(state / size)[:, [MOTION.index(s) for s in started]].min(axis=1).argmax())
+        h = self.fmu.fixed_step or step_of(w.smoothed)
+        first = {s: x[0, 0] for s, x in self._told(w.smoothed, np.array([row]), h, 1).items()}
+        values = dict(zip(MOTION, state[row], strict=True))
+        return [s for s in started if first[s] == 0.0 and abs(values[s]) > SMALL * sizes[s]]
+
+    @cached_property
     def _along_runs(self) -> Model:
         inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
         time = self.runs[0].scale.time
-        h = min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
-        with closing(ShortSteps(self.fmu.model, inputs, outputs, h)) as self._steps:
+        h = self.fmu.fixed_step or min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
+        late = bool(self.late)
+        with closing(ShortSteps(self.confined, inputs, outputs, h, late)) as self._steps:
             return super()._along_runs
 
+    def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
+        found = super().windows(runs, length)
+        if found is None or not self.late:
+            return found
+        return found.after(self.fmu.fixed_step or 0.5 * step_of(runs[0]))
+
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
+        own = self.fmu.fixed_step or h
+        count = steps if own == h else int(np.ceil(steps * h / own - 1e-9))
+        motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
+        for signal, told in self._told(smoothed, rows, own, max(count, 3 if self.late else 1)).items():
+            x = np.unwrap(told, axis=0) if signal == "psi" else told
+            if self.late:
+                x[0] = 3.0 * (x[1] - x[2]) + x[3]
+            if own != h:
+                x = CubicSpline(own * np.arange(len(x)), x)(h * np.arange(steps + 1))
+            motion[:, MOTION.index(signal)] = x[: steps + 1]
+        return motion
+
+    def _told(
+        self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int
+    ) -> dict[str, np.ndarray]:
+        """Signal -> its values (steps + 1, w) [SI], in steps of h [s] from some rows on."""
         run, columns = smoothed.track.run, self.map.told("outputs")
         at, middle = self._variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
         given = [commands_at(run, time + middle) for time in smoothed.time[rows]]
@@ -162,15 +247,11 @@ class FmuPredictor(BlackBox):
             Begun(_row(at, row), self._variables("inputs", commands))
             for row, commands in zip(rows, given, strict=True)
         ]
-        names = [c.name for c in columns.values()]
         try:
-            told = simulate(self.fmu.path, self.fmu.isolated, begun, names, h, steps)
+            told = simulate(self.confined, begun, [c.name for c in columns.values()], h, steps)
         except cosim.InputError as error:
             raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {error}") from None
-        motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
-        for signal, values in self._outputs(told).items():
-            motion[:, MOTION.index(signal)] = values
-        return motion
+        return self._outputs(told)
 
     def accelerations(self, signals: Signals) -> np.ndarray:
         start, inputs = (self._variables(group, signals) for group in ("start", "inputs"))
@@ -192,6 +273,24 @@ class FmuPredictor(BlackBox):
     @property
     def _started_by(self) -> str:
         return f", by {', '.join(c.name for c in self.map.told('start').values())}"
+
+    def description(self) -> PredictorDescription:
+        return replace(super().description(), confinement=self.confinement)
+
+    def _sentences(self, wait: float) -> Iterator[str]:
+        yield from super()._sentences(wait)
+        if (step := self.fmu.fixed_step) is not None:
+            yield f"It takes steps of {step:.6g} s; between them its outputs are interpolated (cubic spline)."
+        if self.late:
+            yield (
+                f"Its outputs {', '.join(self.late)} are zero until the first step, against their start "
+                "values: the samples of each window's first step are left out."
+            )
+        if self.fmu.needs_tool:
+            yield "It needs the tool that it was made with (needsExecutionTool)."
+        if lines := [*self.confined.printed]:
+            yield f"It printed {len(lines)} different lines, the first: {lines[0]}"
+        yield f"Its processes: {self.confinement}."
 
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()

@@ -1,0 +1,128 @@
+"""An FMU whose instances run in confined processes: without the user's files, environment and arguments.
+
+Each instance has a process of its own that knows nothing of another one, and an empty folder. What
+confines it (:mod:`cosim.fmu.confinement`) is stated in words, "unconfined" where nothing does.
+"""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from cybership.scratch_folder import Scratch
+
+from ..errors import SimulationError
+from .confinement import MEANS
+from .fmu_model import FmuModel
+from .instance import OnMessage
+from .isolated import EXIT_TIMEOUT, START_TIMEOUT, IsolatedInstance
+from .worker_process import ForkedProcess, Printed
+
+NAME = "model"  # of every instance, as another one would say which it is
+# Variables of the environment that a process keeps; others may hold paths and secrets.
+KEPT = ("PATH", "LANG", "LC_ALL", "LC_CTYPE", "LD_LIBRARY_PATH", "TZ")
+
+
+class ConfinedFmu:
+    """An FMU, and the process that makes those of its instances.
+
+    Args:
+        model: the FMU.
+        means: what may confine it, of ``MEANS``; none: nothing does.
+        timeout: longest wall time of a call [s]; None: by what a step usually takes.
+
+    Attributes:
+        confinement: what is in force, in words.
+        printed: what instances have printed, each line once.
+
+    Raises:
+        InputError: the archive cannot be unpacked.
+        SimulationError: no process can be started.
+    """
+
+    def __init__(
+        self, model: FmuModel, means: Sequence[str] = MEANS, timeout: float | None = None
+    ) -> None:
+        self.model, self._timeout = model, timeout
+        self.printed: dict[str, None] = {}
+        self._owner = os.getpid()
+        self._scratch = Scratch()
+        archive = self._scratch.path / "model.fmu"
+        self._folders = self._scratch.path / "folders"
+        self._folders.mkdir()
+        shutil.copyfile(model.path, archive)
+        self._model = model.copied_to(archive)
+        try:
+            unpacked = self._model.unpack()
+            self._server, theirs = socket.socketpair()
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "cosim.fmu.fork_server"],
+                stdin=theirs,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                cwd=self._folder(),
+                env=_environment(),
+                start_new_session=True,
+            )
+            theirs.close()
+            assert self._process.stderr is not None
+            self._complaints = Printed(self._process.stderr, self._keep)
+            self._server.settimeout(START_TIMEOUT)
+            first = [list(means), str(archive), str(unpacked), str(self._folder())]
+            self._server.sendall(json.dumps(first).encode())
+            self.confinement = self._server.recv(4096).decode()
+        except OSError as error:
+            self.close()
+            raise SimulationError(f"{model.path.name}: no process for it: {error}") from None
+        if not self.confinement:
+            self.close()
+            why = "; ".join(self.printed)
+            raise SimulationError(f"{model.path.name}: the process for it has ended: {why}")
+
+    def instance(self, on_message: OnMessage = lambda *_: None) -> IsolatedInstance:
+        """A new instance, in a process that has run nothing of the FMU.
+
+        Args:
+            on_message: receives the messages that the FMU logs.
+
+        Raises:
+            SimulationError: its process cannot be started.
+        """
+        return IsolatedInstance(NAME, self._model, on_message, self._timeout, self._fork, self._keep)
+
+    def _fork(self) -> ForkedProcess:
+        return ForkedProcess(self._server, self._folder())
+
+    def _folder(self) -> Path:
+        return Path(tempfile.mkdtemp(dir=self._folders))
+
+    def _keep(self, line: str) -> None:
+        self.printed.setdefault(line)
+
+    def close(self) -> None:
+        """End all processes, and remove their folders."""
+        if os.getpid() != self._owner:  # a copy of the process that has begun them
+            return
+        with suppress(AttributeError):  # it has not begun
+            self._server.close()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(EXIT_TIMEOUT)
+            self._process.kill()
+            self._process.wait()
+            self._complaints.finish()
+        self._model.close()
+        self._scratch.remove()
+
+
+def _environment() -> dict[str, str]:
+    """The environment of a process that is to know nothing of this one."""
+    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
+    root = str(Path(__file__).resolve().parents[2])
+    single = {"OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}  # namespaces need one thread
+    return kept | single | {"PYTHONPATH": root}
