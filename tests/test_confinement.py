@@ -47,14 +47,14 @@ def stepped(confined, steps=1):
 
 @pytest.fixture
 def hidden(tmp_path, monkeypatch):
-    """A file: in the working directory, open, in the environment, and in that of another process."""
+    """A file: in the working directory, open, in the environment, and an argument of another process."""
     folder = tmp_path / "data"
     folder.mkdir()
     path = folder / "MARKED_NAME.csv"
     path.write_text("time,x,y,psi\n0,1,2,3\n")
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MEASURED", str(path))
-    other = subprocess.Popen(["sleep", "60"], env={"MEASURED": str(path)})
+    other = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)", str(path)])
     with path.open() as kept:
         os.set_inheritable(kept.fileno(), True)
         yield path
@@ -126,7 +126,9 @@ def test_a_crash_or_a_hang_is_one_message_and_leaves_no_process(tmp_path, habit,
         pid = confined._process.pid
     finally:
         confined.close()
-    listed = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
+    listed = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False
+    )
     assert listed.stdout.split() == []
 
 

@@ -1,5 +1,5 @@
-from .confinement import MEANS as MEANS
 from .confined import ConfinedFmu as ConfinedFmu
+from .confinement import MEANS as MEANS
 from .fmu_model import FmuModel as FmuModel
 from .fmu_model import FmuVariable as FmuVariable
 from .instance import Instance as Instance

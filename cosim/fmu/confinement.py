@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import platform
 import signal
 import site
 import sys
@@ -21,7 +22,7 @@ from typing import NamedTuple
 
 NAMESPACES, LANDLOCK = MEANS = ("namespaces", "landlock")
 # What programs need in order to run, and what libraries ask of the processor.
-SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/etc", "/sys/devices/system/cpu")
+SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc", "/sys/devices/system/cpu")
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
 ABOUT_COMPUTER = ("/proc/cpuinfo", "/proc/meminfo", "/proc/stat")
 PROCESSES, SHARED, TEMPORARY = "/proc", "/dev/shm", "/tmp"
@@ -34,7 +35,7 @@ RDONLY, NOSUID, NODEV, NOEXEC, REMOUNT, BIND, REC, PRIVATE = 1, 2, 4, 8, 0x20, 0
 DETACH, SET_PDEATHSIG, SET_SECUREBITS, SET_NO_NEW_PRIVS, NO_ROOT = 2, 1, 28, 38, 3
 CAPABILITIES = 0x20080522
 # Numbers of system calls without a function in the C library: of x86_64, and of newer ones anywhere.
-PIVOT_ROOT, CAPSET = {"x86_64": (155, 126)}.get(os.uname().machine, (41, 91)) if os.name == "posix" else (0, 0)
+PIVOT_ROOT, CAPSET = (155, 126) if platform.machine() == "x86_64" else (41, 91)
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
 
 # Rights of linux/landlock.h, by the version that introduced them.
@@ -209,6 +210,6 @@ def _done(result: int) -> int:
     return result
 
 
-def _mount(source: str | None, target: str, kind: str | None, flags: int, data: str | None = None) -> None:
-    source_, target_, kind_, data_ = (None if x is None else x.encode() for x in (source, target, kind, data))
-    _done(_libc().mount(source_, target_, kind_, ctypes.c_ulong(flags), data_))
+def _mount(source: str | None, target: str, kind: str | None, flags: int, data: str = "") -> None:
+    texts = [None if x is None else x.encode() for x in (source, target, kind, data or None)]
+    _done(_libc().mount(*texts[:3], ctypes.c_ulong(flags), texts[3]))

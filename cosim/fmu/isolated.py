@@ -10,11 +10,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
 from ..errors import InputError, SimulationError
+from ..process.call_watch import TIMEOUT, TIMES_USUAL
 from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
 from .component import WARNING
 from .fmu_model import FmuModel, FmuVariable, Value
@@ -22,11 +23,8 @@ from .instance import Access, OnMessage
 from .memory import DoubleMemory, Port
 from .worker_process import Printed, StartedProcess, WorkerProcess
 
-# Longest wall time of one call where none is given: so many seconds, or so many times what a step has
-# taken on average. Chosen: a garbage collector or a busy computer stops a program for less.
-TIMEOUT, TIMES_USUAL = 30.0, 100.0
-# The same of instantiation, for which a process is started [s]; chosen: loading a large tool may take
-# tens of seconds.
+# Longest wall time of instantiation where none is given, for which a process is started [s]; chosen:
+# loading a large tool may take tens of seconds.
 START_TIMEOUT = 60.0
 # Wall time that an idle process may take to exit [s]; chosen: far beyond the clean-up of any library.
 EXIT_TIMEOUT = 5.0
@@ -226,6 +224,24 @@ class IsolatedInstance:
 
         return Access(put, get, step, begin)
 
+    def short_run(
+        self, start: Mapping[str, Value], inputs: Sequence[float], steps: int, h: float
+    ) -> list[list[float]]:
+        """A whole run of a few steps, from its set-up to its termination, as one request.
+
+        Args:
+            start: start value -> number.
+            inputs: of the variables that are bound, which stay the same.
+            steps, h: how many steps, and of what length [s].
+
+        Returns:
+            The outputs that are bound, at the start and after each step.
+
+        Raises:
+            SimulationError: the FMU refuses or fails.
+        """
+        return self._call("a short run", "short_run", dict(start), [*inputs], steps, h)
+
     def reset(self) -> None:
         """Return to the state after instantiation, for another run (fmi2Reset).
 
@@ -259,7 +275,8 @@ class IsolatedInstance:
 
 
 def _to_standard_error(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 def _part(ports: Sequence[Port], memory: DoubleMemory) -> memoryview:

@@ -12,6 +12,7 @@ import json
 import os
 import signal
 import sys
+from array import array
 from pathlib import Path
 
 from ..errors import InputError, SimulationError
@@ -35,6 +36,7 @@ class Worker:
             "get_value": self._get_value,
             "free": self._free,
             "reset": self._reset,
+            "short_run": self._short_run,
         }
 
     def serve(self) -> None:
@@ -90,6 +92,25 @@ class Worker:
         elif actions & GET:
             self._access.get()
         return bytes(self._outputs)
+
+    def _short_run(
+        self, start: dict[str, Value], inputs: list[float], steps: int, h: float
+    ) -> list[list[float]]:
+        """A whole run with inputs that stay the same: the outputs at its start and after each step."""
+        self._instance.set_up(steps * h)
+        for name, value in start.items():
+            self._set_value(name, value)
+        self._instance.enter_initialization()
+        self._inputs[:] = array("d", inputs).tobytes()
+        self._access.put()
+        self._instance.exit_initialization()
+        self._access.get()
+        told = [self._outputs.cast("d").tolist()]
+        for k in range(steps):
+            self._access.step(k * h)
+            told.append(self._outputs.cast("d").tolist())
+        self._instance.terminate()
+        return told
 
     def _reset(self) -> None:
         self._instance.reset(self._log)

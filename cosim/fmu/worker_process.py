@@ -59,7 +59,9 @@ class StartedProcess:
             stderr=subprocess.PIPE,
             start_new_session=True,
         )
-        assert self._process.stdin and self._process.stdout and self._process.stderr
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        assert self._process.stderr is not None
         self.writer, self.reader = self._process.stdin, self._process.stdout
         self.printed = self._process.stderr
 

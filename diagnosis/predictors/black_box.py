@@ -208,10 +208,8 @@ class BlackBox(ABC):
             found.append(self._placed_at(motion, h, since, smoothed.eta[onto]))
         return np.concatenate(found, axis=-1)[:, :, None]
 
-    def _placed_at(
-        self, motion: np.ndarray, h: float, since: np.ndarray, eta: np.ndarray
-    ) -> np.ndarray:
-        """Pose (steps + 1, 3, w) of a motion, at times (w,) laid onto others (w, 3) if it cannot be set."""
+    def _placed_at(self, motion: np.ndarray, h: float, since: np.ndarray, eta: np.ndarray) -> np.ndarray:
+        """Pose (steps + 1, 3, w), laid onto others (w, 3) at times (w,) [s] if it cannot be set."""
         return _laid(_pose(motion, h), since / h, eta.T) if self.placed else _pose(motion, h)
 
     def _whole_run(self, smoothed: Smoothed) -> np.ndarray:
@@ -326,7 +324,7 @@ def _pose(motion: np.ndarray, h: float) -> np.ndarray:
 
 
 def _laid(pose: np.ndarray, place: np.ndarray, onto: np.ndarray) -> np.ndarray:
-    """Tracks (steps + 1, 3, w), moved and turned onto poses (3, w) after some steps (w,), in parts, too."""
+    """Tracks (steps + 1, 3, w), moved and turned onto poses (3, w) after steps (w,), or parts."""
     at = between_steps(pose[:, :, None], np.arange(place.size), place)[0].T
     x, y, psi = (pose - at).transpose(1, 0, 2)
     north, east = rotate_to_earth(onto[2] - at[2], x, y)

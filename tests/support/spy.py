@@ -88,7 +88,9 @@ def build_spy(folder, target, name="spy"):
         name: of the FMU.
     """
     before = BEFORE.replace("TARGET", str(target))
-    return build_lag(folder, name, "if (!m->steps) m->y = spy(); m->steps++; return 0;", ANY_STEP, before)
+    return build_lag(
+        folder, name, "if (!m->steps) m->y = spy(); m->steps++; return 0;", ANY_STEP, before
+    )
 
 
 def found(value):

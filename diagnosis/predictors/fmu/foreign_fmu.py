@@ -47,11 +47,10 @@ from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
 from ..windows import FREE_STEP, Windows, step_of
 from .instances import Begun, simulate
+from .ship_of_fmu import SYSTEMS
 from .short_steps import ShortSteps
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
 from .wrapper import Wrapped, write_wrapper
-
-SYSTEMS = (".ssp", ".json")
 
 
 class Fmu:
@@ -236,9 +235,7 @@ class FmuPredictor(BlackBox):
             motion[:, MOTION.index(signal)] = x[: steps + 1]
         return motion
 
-    def _told(
-        self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int
-    ) -> dict[str, np.ndarray]:
+    def _told(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> dict[str, np.ndarray]:
         """Signal -> its values (steps + 1, w) [SI], in steps of h [s] from some rows on."""
         run, columns = smoothed.track.run, self.map.told("outputs")
         at, middle = self._variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
@@ -280,7 +277,7 @@ class FmuPredictor(BlackBox):
     def _sentences(self, wait: float) -> Iterator[str]:
         yield from super()._sentences(wait)
         if (step := self.fmu.fixed_step) is not None:
-            yield f"It takes steps of {step:.6g} s; between them its outputs are interpolated (cubic spline)."
+            yield f"It takes steps of {step:.6g} s, with a cubic spline through its outputs."
         if self.late:
             yield (
                 f"Its outputs {', '.join(self.late)} are zero until the first step, against their start "

@@ -29,7 +29,9 @@ class Instance:
         h: length of a step [s].
     """
 
-    def __init__(self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], h: float) -> None:
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], h: float
+    ) -> None:
         self._variables, self._instance, self._h = fmu.model.variables, fmu.instance(), h
         names, count = [*inputs, *outputs], len(inputs)
         self._memory, self._count, self.outputs = DoubleMemory(len(names)), count, tuple(outputs)
@@ -67,8 +69,16 @@ class Instance:
         self._access.step(k * self._h)
         return self._told(k + 1)
 
+    def short_run(self, start: Mapping[str, float], inputs: Sequence[float], steps: int) -> np.ndarray:
+        """Outputs (steps + 1, m) of a whole run with inputs that stay the same."""
+        told = self._instance.short_run(start, inputs, steps, self._h)
+        return np.array([self._finite(np.array(row), k) for k, row in enumerate(told)])
+
     def _told(self, k: int) -> np.ndarray:
         told = np.array(self._memory.values[self._count : self._count + len(self.outputs)])
+        return self._finite(told, k)
+
+    def _finite(self, told: np.ndarray, k: int) -> np.ndarray:
         if not np.isfinite(told).all():
             name = self.outputs[int(np.flatnonzero(~np.isfinite(told))[0])]
             raise SimulationError(f"{name} is not finite at t = {k * self._h:.6g} s after its start")
