@@ -38,7 +38,7 @@ from .predictor import Predictor, PredictorDescription
 from .ship_model import Model, SampledForce
 from .thrust import FORGOTTEN
 from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
-from .windows import Windows, between_steps, first_row, free_runs, step_of
+from .windows import Windows, between_steps, first_row, first_time, free_runs, step_of
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
@@ -135,7 +135,7 @@ class BlackBox(ABC):
         if not self.whole:
             return windows_of(runs, length)
         (smoothed,) = runs
-        seconds = float(smoothed.time[-1] - smoothed.time[0]) + 0.75 * smoothed.track.period
+        seconds = smoothed.time[-1] - first_time(smoothed) + 0.75 * smoothed.track.period
         try:
             return Windows(runs, seconds).after(self.run_in(smoothed))
         except InputError as error:
