@@ -14,7 +14,7 @@ from support.spy import build_spy, found
 
 from cosim import SimulationError
 from cosim.fmu import ConfinedFmu, DoubleMemory, FmuModel, Port
-from cosim.fmu.worker_process import LONGEST_PRINTED, MOST_PRINTED, cleaned
+from cosim.fmu.isolation.worker_process import LONGEST_PRINTED, MOST_PRINTED, cleaned
 
 pytestmark = needs_compiler
 MEANS = [("namespaces", "landlock"), ("landlock",), ("namespaces",)]

@@ -170,14 +170,14 @@ def steps_of(fmu, tmp_path, **options):
     asked = set()
     from diagnosis.predictors.fmu import instances
 
-    class Counted(instances.Instance):
+    class Counted(instances.FmuRun):
         def __init__(self, fmu, inputs, outputs, h):
             asked.add(h)
             super().__init__(fmu, inputs, outputs, h)
 
     patch = pytest.MonkeyPatch()
-    patch.setattr("diagnosis.predictors.fmu.instances.Instance", Counted)
-    patch.setattr("diagnosis.predictors.fmu.short_steps.Instance", Counted)
+    patch.setattr("diagnosis.predictors.fmu.instances.FmuRun", Counted)
+    patch.setattr("diagnosis.predictors.fmu.short_steps.FmuRun", Counted)
     try:
         model = Fmu(fmu, execution=Execution(**options))
         return asked, diagnosis.evaluate(loaded(turned(0.1, 60.0)), model)
@@ -235,15 +235,15 @@ def test_outputs_that_are_zero_until_the_first_step_are_told_and_left_out(made, 
     """As of an FMU that computes its outputs in its steps only; the right model is not condemned."""
     from diagnosis.predictors.fmu import instances
 
-    whole, short = instances.Instance.initialise, instances.Instance.short_run
-    monkeypatch.setattr(instances.Instance, "initialise", lambda *a: 0.0 * whole(*a))
+    whole, short = instances.FmuRun.initialise, instances.FmuRun.short_run
+    monkeypatch.setattr(instances.FmuRun, "initialise", lambda *a: 0.0 * whole(*a))
 
     def late(*arguments):
         told = short(*arguments)
         told[0] = 0.0
         return told
 
-    monkeypatch.setattr(instances.Instance, "short_run", late)
+    monkeypatch.setattr(instances.FmuRun, "short_run", late)
     run = turned(0.1, 60.0, offset=200.0)
     found = diagnosis.evaluate(loaded(run), made)
     (e,) = found.evaluations
@@ -259,7 +259,7 @@ def test_outputs_that_are_zero_until_the_first_step_are_told_and_left_out(made, 
 
 
 def test_a_hang_is_one_line_that_names_the_run(made, tmp_path):
-    with pytest.raises(InputError, match="failed on run 'turned': .* took longer than 1e-06 s"):
+    with pytest.raises(InputError, match=r"failed on run 'turned': .* took longer than 1e-06 s"):
         steps_of(made, tmp_path, timeout=1e-6)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from ..errors import SimulationError
 from ..fmu.fmu_model import FmuModel
 from ..fmu.instance import Instance, OnMessage
-from ..fmu.isolated import IsolatedInstance
+from ..fmu.isolation.isolated import IsolatedInstance
 from ..fmu.local import LocalInstance
 from ..process.run_state import STATE
 from ..scenario.schema import FmuEntry, Scenario

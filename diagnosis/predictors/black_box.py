@@ -19,7 +19,7 @@ forces are its own; else that of the ship.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -289,8 +289,20 @@ def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarr
 
 
 def commanded(run: Run) -> dict[str, np.ndarray]:
-    """Force or command -> its values (n,) in a run [SI]."""
-    return dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    """Force or command -> its values (n,) in a run [SI], forces in the plane also as size and angle."""
+    found = dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    for name, (ahead, aside) in planes(found).items():
+        found[f"{name}.force"] = np.hypot(found[ahead], found[aside])
+        found[f"{name}.angle"] = np.arctan2(found[aside], found[ahead])
+    return found
+
+
+def planes(signals: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Name of a force in the plane -> its components ahead and to starboard, among some signals."""
+    known = [*signals]
+    pairs = {"tau": (TAU[0], TAU[1])}
+    pairs |= {n[:-2]: (n, f"{n[:-2]}.Y") for n in known if n.endswith(".X")}
+    return {name: pair for name, pair in pairs.items() if {*pair} <= {*known}}
 
 
 def commands_at(run: Run, time: np.ndarray) -> dict[str, np.ndarray]:

@@ -18,12 +18,11 @@ class Begun(NamedTuple):
     inputs: Mapping[str, np.ndarray]
 
 
-class Instance:
-    """An FMU that has been initialised; the first input acts on it already.
+class FmuRun:
+    """A run of an FMU in a process of its own; the first input acts when it is initialised.
 
     Args:
         fmu: of which it is one.
-        start: start value -> number.
         inputs: names of inputs.
         outputs: names of outputs.
         h: length of a step [s].
@@ -124,10 +123,10 @@ def _together(
     fmu: ConfinedFmu, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
 ) -> np.ndarray:
     """Outputs (steps + 1, w, m) of predictions side by side."""
-    told, running = np.empty((steps + 1, len(begun), len(outputs))), list[Instance]()
+    told, running = np.empty((steps + 1, len(begun), len(outputs))), list[FmuRun]()
     try:
         for one in begun:
-            running.append(Instance(fmu, tuple(one.inputs), outputs, h))
+            running.append(FmuRun(fmu, tuple(one.inputs), outputs, h))
         inputs = [np.column_stack([*one.inputs.values()]).tolist() for one in begun]
         for w, (one, each) in enumerate(zip(running, begun, strict=True)):
             told[0, w] = one.initialise(each.start, inputs[w][0], steps * h)

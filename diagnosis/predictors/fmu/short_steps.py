@@ -12,7 +12,7 @@ import numpy as np
 from cosim import InputError, SimulationError
 from cosim.fmu import ConfinedFmu
 
-from .instances import Instance
+from .instances import FmuRun
 
 STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
 
@@ -35,7 +35,7 @@ class ShortSteps:
         self._fmu, self.h, self._late = fmu, h, late
         self._inputs, self._outputs = tuple(inputs), tuple(dict.fromkeys(outputs))
         self._resets: bool | None = None
-        self._instance: Instance | None = None
+        self._instance: FmuRun | None = None
 
     def run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
         """Each output (STEPS + 1,) from a start on; from the first step on where outputs are late.
@@ -79,7 +79,7 @@ class ShortSteps:
             self._instance.restart()
         else:
             self.close()
-            self._instance = Instance(self._fmu, self._inputs, self._outputs, self.h)
+            self._instance = FmuRun(self._fmu, self._inputs, self._outputs, self.h)
         given, steps = [inputs[name] for name in self._inputs], STEPS + self._late
         told = self._instance.short_run(start, given, steps)
         return dict(zip(self._outputs, told[int(self._late) :].T, strict=True))

@@ -28,11 +28,14 @@ KILLED = -9
 
 
 class WorkerProcess(Protocol):
-    """A process that :func:`cosim.fmu.worker.serve` runs in."""
+    """A process that :func:`cosim.fmu.isolation.worker.serve` runs in: its pipes, and its end."""
 
-    reader: IO[bytes]
-    writer: IO[bytes]
-    printed: IO[bytes]
+    @property
+    def reader(self) -> IO[bytes]: ...
+    @property
+    def writer(self) -> IO[bytes]: ...
+    @property
+    def printed(self) -> IO[bytes]: ...
 
     def wait(self, timeout: float) -> int:
         """Exit code, negative for a signal.
@@ -53,7 +56,7 @@ class StartedProcess:
     def __init__(self) -> None:
         # A session of its own: Ctrl-C reaches the master only, and children end with their parent.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "cosim.fmu.worker"],
+            [sys.executable, "-m", "cosim.fmu.isolation.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

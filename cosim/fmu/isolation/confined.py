@@ -1,7 +1,7 @@
 """An FMU whose instances run in confined processes: without the user's files, environment and arguments.
 
 Each instance has a process of its own that knows nothing of another one, and an empty folder. What
-confines it (:mod:`cosim.fmu.confinement`) is stated in words, "unconfined" where nothing does.
+confines it (:mod:`cosim.fmu.isolation.confinement`) is stated in words, "unconfined" where nothing does.
 """
 
 import json
@@ -17,10 +17,10 @@ from pathlib import Path
 
 from cybership.scratch_folder import Scratch
 
-from ..errors import SimulationError
+from ...errors import SimulationError
+from ..fmu_model import FmuModel
+from ..instance import OnMessage
 from .confinement import MEANS
-from .fmu_model import FmuModel
-from .instance import OnMessage
 from .isolated import EXIT_TIMEOUT, START_TIMEOUT, IsolatedInstance
 from .worker_process import ForkedProcess, Printed
 
@@ -62,8 +62,8 @@ class ConfinedFmu:
             unpacked = self._model.unpack()
             self._server, theirs = socket.socketpair()
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "cosim.fmu.fork_server"],
-                stdin=theirs,
+                [sys.executable, "-m", "cosim.fmu.isolation.fork_server"],
+                stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
                 cwd=self._folder(),
@@ -123,6 +123,6 @@ class ConfinedFmu:
 def _environment() -> dict[str, str]:
     """The environment of a process that is to know nothing of this one."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
-    root = str(Path(__file__).resolve().parents[2])
+    root = str(Path(__file__).resolve().parents[3])
     single = {"OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}  # namespaces need one thread
     return kept | single | {"PYTHONPATH": root}

@@ -1,4 +1,4 @@
-"""The process that forks the processes of one confined FMU: ``python -m cosim.fmu.fork_server``.
+"""What forks the processes of one confined FMU: ``python -m cosim.fmu.isolation.fork_server``.
 
 It has read the FMU and imported what its copies need, and never runs anything of the FMU itself, so
 that a copy knows nothing of another one. A copy is three processes: one that the master can end, in new
@@ -15,10 +15,10 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from ..process.spawned import end_with_parent
+from ...process.spawned import end_with_parent
+from ..fmu_model import FmuModel
 from . import confinement
 from .confinement import Confinement
-from .fmu_model import FmuModel
 from .worker import serve
 
 MESSAGE = 2**16  # most bytes of a request; chosen: far above a few paths

@@ -14,13 +14,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
-from ..errors import InputError, SimulationError
-from ..process.call_watch import TIMEOUT, TIMES_USUAL
+from ...errors import InputError, SimulationError
+from ...process.call_watch import TIMEOUT, TIMES_USUAL
+from ..component import WARNING
+from ..fmu_model import FmuModel, FmuVariable, Value
+from ..instance import Access, OnMessage
+from ..memory import DoubleMemory, Port
 from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
-from .component import WARNING
-from .fmu_model import FmuModel, FmuVariable, Value
-from .instance import Access, OnMessage
-from .memory import DoubleMemory, Port
 from .worker_process import Printed, StartedProcess, WorkerProcess
 
 # Longest wall time of instantiation where none is given, for which a process is started [s]; chosen:

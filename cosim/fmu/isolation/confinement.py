@@ -89,7 +89,7 @@ def available(means: Sequence[str], trial: Callable[[Confinement], str]) -> Conf
 
 def needed_folders() -> list[str]:
     """What a process of Python needs to read: the system, Python, its packages, and this one."""
-    own = Path(__file__).resolve().parents[1]
+    own = Path(__file__).resolve().parents[2]
     python = [sys.prefix, sys.base_prefix, sysconfig.get_path("stdlib"), *site.getsitepackages()]
     places = [*SYSTEM, *python, str(own), str(own.with_name("cybership"))]
     return [p for p in dict.fromkeys(places) if os.path.isdir(p) and p != "/"]

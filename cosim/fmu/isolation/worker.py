@@ -1,6 +1,6 @@
-"""The process of one isolated FMU: ``python -m cosim.fmu.worker``, started by the master only.
+"""The process of one isolated FMU: ``python -m cosim.fmu.isolation.worker``, started by the master only.
 
-A confined one is forked instead, see :mod:`cosim.fmu.fork_server`.
+A confined one is forked instead, see :mod:`cosim.fmu.isolation.fork_server`.
 
 It carries out the frames on its standard input with the same code that runs an FMU inside the master,
 and ends when the master does, also when that is killed.
@@ -15,12 +15,12 @@ import sys
 from array import array
 from pathlib import Path
 
-from ..errors import InputError, SimulationError
-from ..process.spawned import end_with_parent
+from ...errors import InputError, SimulationError
+from ...process.spawned import end_with_parent
+from ..fmu_model import FmuModel, Value
+from ..local import LocalInstance
+from ..memory import DoubleMemory, Port
 from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
-from .fmu_model import FmuModel, Value
-from .local import LocalInstance
-from .memory import DoubleMemory, Port
 
 
 class Worker:
@@ -105,10 +105,10 @@ class Worker:
         self._access.put()
         self._instance.exit_initialization()
         self._access.get()
-        told = [self._outputs.cast("d").tolist()]
+        told = [[*self._outputs.cast("d")]]
         for k in range(steps):
             self._access.step(k * h)
-            told.append(self._outputs.cast("d").tolist())
+            told.append([*self._outputs.cast("d")])
         self._instance.terminate()
         return told
 
