@@ -6,6 +6,8 @@ from contextlib import closing
 from pathlib import Path
 from weakref import finalize
 
+from typing_extensions import deprecated
+
 import cosim
 from cosim.export import export_fmu
 from cosim.fmu import MEANS, ConfinedFmu
@@ -79,6 +81,12 @@ class Fmu:
         suggested = self.model.description.defaultExperiment
         told = float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
         return self.execution.step or told
+
+    @property
+    @deprecated("Each instance has a process of its own.")
+    def isolated(self) -> bool:
+        """Whether each instance has a process of its own."""
+        return True
 
     @property
     def fixed_step(self) -> float | None:
