@@ -18,6 +18,7 @@ from cosim.fmu.isolation.worker_process import LONGEST_PRINTED, MOST_PRINTED, cl
 
 pytestmark = needs_compiler
 MEANS = [("namespaces", "landlock"), ("landlock",), ("namespaces",)]
+EACH = [MEANS[0], *(pytest.param(m, marks=pytest.mark.slow) for m in MEANS[1:])]
 
 
 def opened(fmu, **options):
@@ -62,7 +63,7 @@ def hidden(tmp_path, monkeypatch):
     other.wait()
 
 
-@pytest.mark.parametrize("means", MEANS)
+@pytest.mark.parametrize("means", EACH)
 def test_an_fmu_finds_no_file_of_the_user(tmp_path, hidden, means):
     """By name, in its environment, arguments, descriptors, folder and memory, or in another process."""
     fmu = build_spy(tmp_path, hidden)
@@ -71,10 +72,12 @@ def test_an_fmu_finds_no_file_of_the_user(tmp_path, hidden, means):
         if confined.confinement.startswith("unconfined"):
             pytest.skip(confined.confinement)
         assert found(stepped(confined)[0]) == []
+        assert not _notifies() or str(hidden) in confined.outside
     finally:
         confined.close()
 
 
+@pytest.mark.slow
 def test_the_spy_finds_the_file_where_nothing_confines_it(tmp_path, hidden):
     """So the test above can fail; and what is not confined is called so."""
     confined = opened(build_spy(tmp_path, hidden), means=())
@@ -85,6 +88,25 @@ def test_the_spy_finds_the_file_where_nothing_confines_it(tmp_path, hidden):
         assert not {"environment", "arguments", "descriptors", "own memory"} & {*seen}
     finally:
         confined.close()
+
+
+def test_files_that_it_opens_are_named(tmp_path, hidden):
+    """Where the kernel says it; a system's library is none of them."""
+    for target, named in ((hidden, True), ("/etc/hostname", False)):
+        habit = f'FILE *f = fopen("{target}", "r"); if (f) fclose(f);'
+        confined = opened(build_lag(tmp_path, habit=habit))
+        try:
+            stepped(confined)
+            if sys.platform == "linux" and _notifies():
+                assert (str(target) in confined.outside) == named
+                assert len(confined.outside) == named
+        finally:
+            confined.close()
+
+
+def _notifies():
+    """Whether the kernel has notifications of system calls (since 5.5)."""
+    return tuple(map(int, re.findall(r"\d+", os.uname().release)[:2])) >= (5, 5)
 
 
 def test_numbers_are_those_of_the_same_process(tmp_path):

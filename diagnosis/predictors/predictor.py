@@ -47,6 +47,7 @@ class PredictorDescription:
         sentences: the same for a reader.
         confinement: what confines the processes that it runs in, in words, "unconfined" where nothing
             does; empty where it is not a program of its own.
+        outside: files beyond its own and those of the system that it has opened or tried to.
     """
 
     kind: str
@@ -57,6 +58,7 @@ class PredictorDescription:
     run_in: Mapping[str, float]
     sentences: Sequence[str]
     confinement: str = ""
+    outside: Sequence[str] = ()
 
 
 class Execution(NamedTuple):

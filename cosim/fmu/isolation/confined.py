@@ -15,15 +15,18 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from cybership.message_text import printable
 from cybership.scratch_folder import Scratch
 
 from ...errors import SimulationError
 from ..fmu_model import FmuModel
 from ..instance import OnMessage
-from .confinement import MEANS
+from .confinement import MEANS, needed_folders
 from .isolated import EXIT_TIMEOUT, START_TIMEOUT, IsolatedInstance
+from .opened_files import OpenedFiles
 from .worker_process import ForkedProcess, Printed
 
+MOST_OPENED = 20  # files that are named; chosen: more say no more
 NAME = "model"  # of every instance, as another one would say which it is
 # Variables of the environment that a process keeps; others may hold paths and secrets.
 KEPT = ("PATH", "LANG", "LC_ALL", "LC_CTYPE", "LD_LIBRARY_PATH", "TZ")
@@ -40,6 +43,8 @@ class ConfinedFmu:
     Attributes:
         confinement: what is in force, in words.
         printed: what instances have printed, each line once.
+        outside: files beyond programs and libraries that instances have opened or tried to, each once;
+            empty where the system cannot say.
 
     Raises:
         InputError: the archive cannot be unpacked.
@@ -51,6 +56,7 @@ class ConfinedFmu:
     ) -> None:
         self.model, self._timeout = model, timeout
         self.printed: dict[str, None] = {}
+        self.outside: dict[str, None] = {}
         self._owner = os.getpid()
         self._scratch = Scratch()
         archive = self._scratch.path / "model.fmu"
@@ -60,6 +66,7 @@ class ConfinedFmu:
         self._model = model.copied_to(archive)
         try:
             unpacked = self._model.unpack()
+            self._readable = [*needed_folders(), str(unpacked)]
             self._server, theirs = socket.socketpair()
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "cosim.fmu.isolation.fork_server"],
@@ -97,7 +104,14 @@ class ConfinedFmu:
         return IsolatedInstance(NAME, self._model, on_message, self._timeout, self._fork, self._keep)
 
     def _fork(self) -> ForkedProcess:
-        return ForkedProcess(self._server, self._folder())
+        folder = self._folder()
+        process = ForkedProcess(self._server, folder)
+        OpenedFiles(process.opened, [*self._readable, str(folder)], self._note)
+        return process
+
+    def _note(self, path: str) -> None:
+        if len(self.outside) < MOST_OPENED:
+            self.outside.setdefault(printable(path))
 
     def _folder(self) -> Path:
         return Path(tempfile.mkdtemp(dir=self._folders))

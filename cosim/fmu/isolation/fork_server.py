@@ -17,12 +17,20 @@ from pathlib import Path
 
 from ...process.spawned import end_with_parent
 from ..fmu_model import FmuModel
-from . import confinement
-from .confinement import Confinement
+from .confinement import (
+    Confinement,
+    available,
+    die_with_parent,
+    enter_root,
+    needed_folders,
+    restrict,
+    unshare,
+)
+from .opened_files import install
 from .worker import serve
 
 MESSAGE = 2**16  # most bytes of a request; chosen: far above a few paths
-PIPES = 4  # requests, answers, what is printed, how it ended
+PIPES = 5  # requests, answers, what is printed, how it ended, and a socket for its opened files
 
 
 class _ForkServer:
@@ -46,10 +54,10 @@ class _ForkServer:
             if not (child := os.fork()):
                 self._found, why = found, ""
                 try:
-                    root = confinement.unshare(self._readable, folder)
+                    root = unshare(self._readable, folder)
                     if not (first := os.fork()):
-                        confinement.enter_root(root)
-                        confinement.restrict(found, self._readable, [folder])
+                        enter_root(root)
+                        restrict(found, self._readable, [folder])
                         os._exit(0)
                     why = "" if os.waitpid(first, 0)[1] == 0 else "no own tree of files"
                 except OSError as error:
@@ -61,7 +69,7 @@ class _ForkServer:
             with os.fdopen(reader, "rb") as pipe:
                 return pipe.read().decode()
 
-        self._found = confinement.available(means, trial)
+        self._found = available(means, trial)
         self._master.sendall(self._found.text.encode())
         signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nothing of copies that have ended is kept
         while True:
@@ -77,29 +85,29 @@ class _ForkServer:
     def _copy(self, folder: str, pipes: list[int]) -> None:
         """The first process of a copy: it waits for the second one, and is what the master ends."""
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        confinement.die_with_parent()
+        die_with_parent()
         os.setsid()
         self._master.close()
         os.dup2(pipes[2], 2)
         root, own = "", not self._found.namespaces and sys.platform == "linux"
         try:
             if own:
-                root = confinement.unshare(self._readable, folder)
+                root = unshare(self._readable, folder)
             if child := os.fork():
                 for pipe in (*pipes, 2):  # the end of the FMU is the end of these
                     os.close(pipe)
                 os.waitpid(child, 0)
                 os._exit(0)
-            confinement.die_with_parent()
+            die_with_parent()
             if own:
-                confinement.enter_root(root)
+                enter_root(root)
         except OSError as error:
             os.write(2, f"it cannot be confined: {error}\n".encode())
             os._exit(1)
         second = os.fork()
         if not second:
             self._run(folder, pipes)
-        for pipe in (*pipes[:3], 2):
+        for pipe in (*pipes[:3], pipes[4], 2):
             os.close(pipe)
         while True:  # orphans in new namespaces are children of this process, too
             pid, status = os.wait()
@@ -109,17 +117,20 @@ class _ForkServer:
 
     def _run(self, folder: str, pipes: list[int]) -> None:
         """The process that runs the FMU."""
-        confinement.die_with_parent()
+        die_with_parent()
         code = 1
         try:
             os.chdir(folder)
             os.environ.update(dict.fromkeys(("HOME", "TMPDIR", "TMP", "TEMP"), folder))
             os.dup2(pipes[0], 0)
             os.dup2(pipes[1], 1)
-            for pipe in pipes:
+            opened = socket.socket(fileno=pipes[4])
+            for pipe in pipes[:4]:
                 os.close(pipe)
             if sys.platform == "linux":
-                confinement.restrict(self._found, self._readable, [folder])
+                restrict(self._found, self._readable, [folder])
+                with opened, suppress(OSError):  # an old kernel
+                    install(opened)
             serve(self._model)
             code = 0
         except OSError as error:
@@ -137,7 +148,7 @@ def main() -> None:
     os.dup2(os.open(os.devnull, os.O_RDWR), 0)
     means, archive, unpacked, folder = json.loads(master.recv(MESSAGE))
     model = FmuModel(Path(archive), Path(unpacked))
-    readable = [*confinement.needed_folders(), unpacked]
+    readable = [*needed_folders(), unpacked]
     _ForkServer(master, model, readable).serve(means, folder)
 
 

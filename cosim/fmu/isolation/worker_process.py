@@ -85,16 +85,21 @@ class ForkedProcess:
     Args:
         server: connection to it.
         folder: the only one that the process may write to.
+
+    Attributes:
+        opened: connection over which it says what it opens.
     """
 
     def __init__(self, server: socket.socket, folder: Path) -> None:
         pairs = [os.pipe() for _ in range(4)]
         (requests, mine), *others = pairs
+        self.opened, notices = socket.socketpair()
         theirs = [requests, *(writer for _, writer in others)]
         try:
-            socket.send_fds(server, [json.dumps(str(folder)).encode()], theirs)
+            socket.send_fds(server, [json.dumps(str(folder)).encode()], [*theirs, notices.fileno()])
             answer = server.recv(32)
         finally:
+            notices.close()
             for pipe in theirs:
                 os.close(pipe)
         self.writer = os.fdopen(mine, "wb")

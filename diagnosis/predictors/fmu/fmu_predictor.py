@@ -177,7 +177,8 @@ class FmuPredictor(BlackBox):
         return f", by {', '.join(c.name for c in self.map.told('start').values())}"
 
     def description(self) -> PredictorDescription:
-        return replace(super().description(), confinement=self.confinement)
+        outside = tuple(self.confined.outside)
+        return replace(super().description(), confinement=self.confinement, outside=outside)
 
     def _sentences(self, wait: float) -> Iterator[str]:
         yield from super()._sentences(wait)
@@ -193,6 +194,9 @@ class FmuPredictor(BlackBox):
         if lines := [*self.confined.printed]:
             yield f"It printed {len(lines)} different lines, the first: {lines[0]}"
         yield f"Its processes: {self.confinement}."
+        if outside := [*self.confined.outside]:
+            named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
+            yield f"It opened, or tried to open, {len(outside)} files that are not its own: {named}."
 
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()

@@ -61,9 +61,8 @@ CORES = {
     "y": {"length": "y"},
     "": {"angle": "psi"},
 }
-# Vector of Fossen's notation -> its signals in three and in six degrees of freedom.
+# Vector of Fossen's notation -> its signals in six degrees of freedom.
 VECTORS = {"eta": ("x", "y", "psi"), "nu": ("u", "v", "r"), "tau": ("tau_X", "tau_Y", "tau_N")}
-PLACES = {"1": 0, "2": 1, "6": 2}
 VECTOR = re.compile(r"(eta|nu|tau)_?\[?([1-6])\]?", re.IGNORECASE)
 # Largest of an angle [rad] and of a rate of turn [rad/s] that are in radians; chosen: a turn with some
 # to spare, and a rate that no ship has.
@@ -121,8 +120,8 @@ def _by_name(name: str, known: Mapping[str, str]) -> Meant:
     if signal:
         return Meant(signal, flip)
     if vector := VECTOR.fullmatch(name):
-        names, place = VECTORS[vector[1].lower()], PLACES.get(vector[2])
-        return Meant(names[place]) if place is not None and names[place] in known else NONE
+        signal = dict(zip("126", VECTORS[vector[1].lower()], strict=True)).get(vector[2], "")
+        return Meant(signal) if signal in known else NONE
     words = words_of(name)
     framed = ["pos"] if {"ned", "enu"} & {*words} and {"x", "y", "n", "e"} & {*words} else []
     signal = _by_words([w for w in words if w not in NOTHING] + framed)
