@@ -21,12 +21,13 @@ from cybership.scratch_folder import Scratch
 from ...errors import SimulationError
 from ..fmu_model import FmuModel
 from ..instance import OnMessage
-from .confinement import MEANS, needed_folders
+from .confinement import MEANS, available, needed_folders
 from .isolated import EXIT_TIMEOUT, START_TIMEOUT, IsolatedInstance
 from .opened_files import OpenedFiles
-from .worker_process import ForkedProcess, Printed
+from .worker_process import ForkedProcess, Printed, StartedProcess
 
 MOST_OPENED = 20  # files that are named; chosen: more say no more
+FORKS = hasattr(os, "fork")
 NAME = "model"  # of every instance, as another one would say which it is
 # Variables of the environment that a process keeps; others may hold paths and secrets.
 KEPT = ("PATH", "LANG", "LC_ALL", "LC_CTYPE", "LD_LIBRARY_PATH", "TZ")
@@ -59,15 +60,30 @@ class ConfinedFmu:
         self.outside: dict[str, None] = {}
         self._owner = os.getpid()
         self._scratch = Scratch()
-        archive = self._scratch.path / "model.fmu"
+        self._archive = self._scratch.path / model.path.name
         self._folders = self._scratch.path / "folders"
         self._folders.mkdir()
-        shutil.copyfile(model.path, archive)
-        self._model = model.copied_to(archive)
+        shutil.copyfile(model.path, self._archive)
+        self._model = model.copied_to(self._archive)
         try:
-            unpacked = self._model.unpack()
-            self._readable = [*needed_folders(), str(unpacked)]
-            self._server, theirs = socket.socketpair()
+            self._unpacked = str(self._model.unpack())
+            self._readable = [*needed_folders(), self._unpacked]
+            self.confinement = self._begun(means) if FORKS else available((), lambda _: "").text
+        except OSError as error:
+            self.close()
+            raise SimulationError(f"{model.path.name}: no process for it: {error}") from None
+        except BaseException:
+            self.close()
+            raise
+        if not self.confinement:
+            self.close()
+            why = "; ".join(self.printed)
+            raise SimulationError(f"{model.path.name}: the process for it has ended: {why}")
+
+    def _begun(self, means: Sequence[str]) -> str:
+        """Start what forks the processes; returns what confines them."""
+        self._server, theirs = socket.socketpair()
+        with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "cosim.fmu.isolation.fork_server"],
                 stdin=theirs.fileno(),
@@ -77,20 +93,16 @@ class ConfinedFmu:
                 env=_environment(),
                 start_new_session=True,
             )
-            theirs.close()
-            assert self._process.stderr is not None
-            self._complaints = Printed(self._process.stderr, self._keep)
-            self._server.settimeout(START_TIMEOUT)
-            first = [list(means), str(archive), str(unpacked), str(self._folder())]
-            self._server.sendall(json.dumps(first).encode())
-            self.confinement = self._server.recv(4096).decode()
-        except OSError as error:
-            self.close()
-            raise SimulationError(f"{model.path.name}: no process for it: {error}") from None
-        if not self.confinement:
-            self.close()
-            why = "; ".join(self.printed)
-            raise SimulationError(f"{model.path.name}: the process for it has ended: {why}")
+        assert self._process.stderr is not None
+        self._complaints = Printed(self._process.stderr, self._keep)
+        self._server.settimeout(START_TIMEOUT)
+        first = [list(means), str(self._archive), self._unpacked, str(self._folder())]
+        self._server.sendall(json.dumps(first).encode())
+        return self._server.recv(4096).decode()
+
+    def told(self, error: Exception) -> str:
+        """What an error says, with the file of the FMU in place of its copy."""
+        return str(error).replace(str(self._archive), str(self.model.path))
 
     def instance(self, on_message: OnMessage = lambda *_: None) -> IsolatedInstance:
         """A new instance, in a process that has run nothing of the FMU.
@@ -103,10 +115,12 @@ class ConfinedFmu:
         """
         return IsolatedInstance(NAME, self._model, on_message, self._timeout, self._fork, self._keep)
 
-    def _fork(self) -> ForkedProcess:
+    def _fork(self) -> ForkedProcess | StartedProcess:
         folder = self._folder()
+        if not FORKS:
+            return StartedProcess(folder, _environment())
         process = ForkedProcess(self._server, folder)
-        OpenedFiles(process.opened, [*self._readable, str(folder)], self._note)
+        OpenedFiles(process.opened, [*self._readable, str(self._folders)], self._note)
         return process
 
     def _note(self, path: str) -> None:

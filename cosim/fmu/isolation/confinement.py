@@ -96,8 +96,9 @@ def needed_folders() -> list[str]:
 
 
 def die_with_parent() -> None:
-    """Have this process killed when the one that has forked it ends."""
-    _libc().prctl(SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    """Have this process killed when the one that has forked it ends (on Linux)."""
+    if sys.platform == "linux":
+        _libc().prctl(SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 
 def unshare(readable: Sequence[str], folder: str) -> str:

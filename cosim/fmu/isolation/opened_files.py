@@ -27,7 +27,13 @@ RECEIVE, ANSWER = 0xC0502100, 0xC0182101
 NOTICE, REPLY = struct.Struct("=QIIiIQ6Q"), struct.Struct("=QqiI")
 LOAD, JUMP_IF_EQUAL, RETURN = 0x20, 0x15, 0x06  # instructions of the filter
 LONGEST = 4096  # bytes of a path
-USUAL = ("/dev", "/sys", "/run", "/proc")  # what libraries look at, and what is not the user's
+USUAL = (
+    "/dev",
+    "/sys",
+    "/run",
+    "/proc",
+    "/var/lib/libuuid",
+)  # what libraries look at, and what is not the user's
 
 
 def install(to: socket.socket) -> None:
@@ -96,10 +102,14 @@ class OpenedFiles:
                 fcntl.ioctl(listener, ANSWER, REPLY.pack(identity, 0, 0, CONTINUE))
 
     def _look(self, path: str) -> None:
-        full = posixpath.normpath(path) if path.startswith("/") else ""
+        full = posixpath.normpath(path) if path.startswith("/") else "/"
         of_process = full.startswith("/proc/") and full.split("/")[2].isdigit()
-        if full not in ("", "/", "/tmp") and (of_process or not f"{full}/".startswith(self._allowed)):
+        if of_process or not (f"{full}/".startswith(self._allowed) or self._leads(full)):
             self._found(full)
+
+    def _leads(self, folder: str) -> bool:
+        """Whether something that may be opened is below a folder."""
+        return any(allowed.startswith(f"{folder.rstrip('/')}/") for allowed in self._allowed)
 
 
 def _ended(listener: int) -> bool:

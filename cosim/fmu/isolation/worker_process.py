@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Protocol
@@ -51,9 +51,14 @@ class WorkerProcess(Protocol):
 
 
 class StartedProcess:
-    """A process that is started for one FMU and may do what the user may."""
+    """A process that is started for one FMU and may do what the user may.
 
-    def __init__(self) -> None:
+    Args:
+        folder: its working directory; None: that of this process.
+        environment: None: that of this process.
+    """
+
+    def __init__(self, folder: Path | None = None, environment: Mapping[str, str] | None = None) -> None:
         # A session of its own: Ctrl-C reaches the master only, and children end with their parent.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "cosim.fmu.isolation.worker"],
@@ -61,6 +66,8 @@ class StartedProcess:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,
+            cwd=folder,
+            env=environment,
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

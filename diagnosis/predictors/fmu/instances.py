@@ -114,8 +114,8 @@ def simulate(
     try:
         groups = [begun[k : k + TOGETHER] for k in range(0, len(begun), TOGETHER)]
         told = np.concatenate([_together(fmu, group, names, h, steps) for group in groups], axis=1)
-    except SimulationError as error:
-        raise InputError(str(error)) from None
+    except (InputError, SimulationError) as error:
+        raise InputError(fmu.told(error)) from None
     return {name: told[:, :, k] for k, name in enumerate(names)}
 
 

@@ -47,11 +47,10 @@ class ShortSteps:
             if self._resets is None:
                 self._resets = self._tried(start, inputs)
             return self._run(start, inputs)
-        except SimulationError as error:
+        except (InputError, SimulationError) as error:
             self.close()
-            raise InputError(
-                f"'{self._fmu.model.path.name}' cannot be set to a measured state: {error}"
-            ) from None
+            told, name = self._fmu.told(error), self._fmu.model.path.name
+            raise InputError(f"'{name}' cannot be set to a measured state: {told}") from None
 
     def derivatives(self, x: np.ndarray) -> tuple[float, float]:
         """First and second derivative at the start of an output (STEPS + 1,), of a polynomial."""
