@@ -13,7 +13,16 @@ from cosim import InputError
 from . import session
 from .assessment.gathering import gather
 from .execution.progress import Advance, silent
-from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
+from .predictors import (
+    Model,
+    ModelSource,
+    WeakWindows,
+    nominal,
+    open_model,
+    ship_of_model,
+    ship_with,
+    write_model,
+)
 from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
@@ -83,11 +92,19 @@ def load(
     return gather(found, advance, anyway, model, horizon)
 
 
-def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any]) -> Model:
+def _model_of(
+    model: Model | None,
+    name: str | Path | None,
+    runs: Sequence[Any],
+    file: str | Path | None = None,
+) -> Model:
     """The initial model: a given one, or the nominal one of a ship, by default that of the runs.
 
+    Where these name none, it is the one that a model file is of.
+
     Raises:
-        InputError: no such ship, model and ship are given, or the runs are of several ships.
+        InputError: no such ship, model and ship are given, or the runs are of several ships; an FMU
+            whose ship nobody names.
     """
     if model is not None and name is not None:
         raise InputError("a model has its ship: give model or ship, not both")
@@ -99,7 +116,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
     if name is None:
         files = [getattr(run, "folder", run) for run in runs]  # of a result of a simulation
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
-        name = told[0] if told else None
+        name = told[0] if told else ship_of_model(file)
     return Model(ship=ship_with((), name))
 
 
@@ -110,7 +127,8 @@ def _opened(
     runs: Sequence[Any],
 ) -> tuple[Model | ModelSource, Model]:
     """The initial model, read if it is a file, and the model of the ship by which runs are read."""
-    of = _model_of(model if isinstance(model, Model) else None, ship, runs)
+    file = model if isinstance(model, (str, Path)) else None
+    of = _model_of(model if isinstance(model, Model) else None, ship, runs, file)
     if isinstance(model, (str, Path)):
         model = open_model(model, map, of.ship)
         of = model.start or of

@@ -20,9 +20,10 @@ from cosim.command import FAILED, run_command
 from .commands.command_line import (
     Done,
     command_of,
+    execution_of,
+    fmu_options,
     import_later_parts,
     inputs_of,
-    map_option,
     out_options,
     parser,
     prior,
@@ -70,13 +71,13 @@ def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
     """The runs and the model, read and checked."""
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .predictors import DescribedShip, ship_with
+    from .predictors import DescribedShip, ship_of_model, ship_with
     from .search import shares
 
     by = method(options.method)  # before any work: an unknown name, or a library that is missing
     criterion(options.pruning)
-    craft = ship_with(options.effects, options.ship)
-    model = initial_model(options.model, options.map, craft)
+    craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
+    model = initial_model(options.model, options.map, craft, execution_of(options))
     start = model.start
     if options.fit and not model.parametric:
         raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
@@ -254,7 +255,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"
     )
-    map_option(made)
+    fmu_options(made)
     out_options(made, Path("results", "diagnosis"))
     return made
 

@@ -233,12 +233,15 @@ def step_of(smoothed: Smoothed) -> float:
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
-    """The windows of a length [s] of a run that have their first sample and at least half of all."""
+    """The windows of a length [s] of a run that have their first sample and at least half of all.
+
+    They follow each other from the first sample that is used.
+    """
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
-    since = smoothed.time - smoothed.time[0] + 0.25 * period
+    since = smoothed.time - first_time(smoothed) + 0.25 * period
     number = np.floor(since / length).astype(int)
     complete = int((since[-1] + period) // length)
-    measured = np.flatnonzero(~track.between & (number < complete))
+    measured = np.flatnonzero(~track.between & (number >= 0) & (number < complete))
     _, at = np.unique(number[measured], return_index=True)
     first = measured[at]  # the first sample of each window that has any
     prompt = since[first] - length * number[first] < period
@@ -247,6 +250,11 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     first = first[prompt & used[first] & np.isin(number[first], full)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
+
+
+def first_time(smoothed: Smoothed) -> float:
+    """Time of the first sample that is used, which an outlier is not [s]; else that of the first row."""
+    return float(smoothed.time[smoothed.used.argmax()])
 
 
 def first_row(smoothed: Smoothed, begin: float) -> int:

@@ -38,6 +38,10 @@ NAME = r"^[a-z][a-z0-9_]*$"
 VARIABLE = r"^[A-Za-z][A-Za-z0-9_]*$"
 REQUIRED = ("m", "I_z")  # of the inertia; what else is not named is zero
 
+# Of a force that is given, over the cube of the length [N/m3]; chosen: a tenth of the weight of so much
+# water, which no thruster reaches.
+LARGEST_GIVEN = 1e3
+
 
 class HullTable(StrictTable):
     """What the water does to the hull."""
@@ -95,7 +99,9 @@ class ShipTable(StrictTable):
     prime: PrimeTable | None = None
     wind: WindTable | None = None
     hull: HullTable = HullTable()
-    actuators: list[ActuatorTable] = Field([])
+    actuators: list[ActuatorTable] = Field(
+        [], description="empty: two forces as they are commanded, a quarter of the length fore and aft"
+    )
     effects: list[str] = Field(
         [],
         description="effects of its actuators, in their order; all that each may have where it is empty",
@@ -209,7 +215,9 @@ def _description(table: ShipTable) -> Description:
     prime, L = None, table.length
     if table.prime is not None:
         prime = Prime(L, 0.5 * table.prime.water_density * L * L * table.prime.draft)
-    actuators = tuple(_actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators)
+    actuators = tuple(
+        _actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators or _given_forces(L)
+    )
     _once([a.name for a in actuators], "actuators")
     _belong_together(actuators, table.allocates)
     if any(a.number("abreast") for a in actuators) and not table.effects:
@@ -249,6 +257,15 @@ def _wind(table: WindTable, prime: Prime | None) -> tuple[Value, ...]:
     if table.measured and not given:
         raise DeclarationError("wind: frontal_area is missing, on which a measured wind acts")
     return _values("wind", given, declared, prime)
+
+
+def _given_forces(L: float) -> list[ActuatorTable]:
+    """What pushes a ship without actuators: two forces as they are commanded, which make any moment."""
+    largest = LARGEST_GIVEN * L**3
+    force = {"law": "given_force", "F_X": largest, "F_Y": largest}
+    places = {"fore": 0.25 * L, "aft": -0.25 * L}
+    named = ({"name": name, "title": f"force {name}", "x": x} for name, x in places.items())
+    return [ActuatorTable.model_validate(force | of) for of in named]
 
 
 def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:
