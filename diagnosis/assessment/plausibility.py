@@ -32,6 +32,7 @@ from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU
 from ..runs.columns.side_car import ColumnChange
 from ..runs.columns.unit_check import GO_ON
+from ..runs.files.resolution import FUZZ
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import ThrustGains, gains
 from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
@@ -153,7 +154,7 @@ def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     commands = w.held @ commanded_force(w, model)
     commands = commands - commands.mean(axis=0)
     size = (commands**2).sum(axis=0)
-    heard = size > SETTINGS.rounding * size.max()
+    heard = size > FUZZ * size.max()
     if not heard.any():
         return None
 

@@ -9,9 +9,13 @@ import time
 from collections.abc import Callable
 
 # s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count.
-ROUND = {"every effect as a candidate": 0.8, "candidates refined": 1.0}
-AGAIN = {"its place searched again": 3.0}
-LAST = {
+USUAL = {
+    "reading": 0.2,
+    "smoothing": 1.7,
+    "calibration of the coefficients": 2.5,
+    "every effect as a candidate": 0.8,
+    "candidates refined": 1.0,
+    "its place searched again": 3.0,
     "waves": 1.2,
     "validation data are predicted better": 4.0,
     "fit to predictions": 4.5,
@@ -22,12 +26,10 @@ LAST = {
     "report: figures": 1.5,
     "report: page": 0.5,
 }
-FIRST = {"reading": 0.2, "smoothing": 1.7, "calibration of the coefficients": 2.5}
-USUAL = {**FIRST, **ROUND, **AGAIN, **LAST}
+_, _, _, SCORED, REFINED, AGAIN, *LAST = USUAL
+ROUND = SCORED, REFINED
 ROUNDS = 3.0  # usual number, the last of which finds nothing; chosen
-LATE = (
-    0.3  # share of its time that a step is taken to go on for where it takes longer than usual; chosen
-)
+LATE = 0.3  # share of its time that a step which takes longer than usual is taken to go on; chosen
 
 
 class RemainingTime:
@@ -75,23 +77,22 @@ class RemainingTime:
             self._took += now - self._begun
             self._usual += USUAL[self._step]
         self._step, self._begun = next((name for name in USUAL if name in what), ""), now
-        if self._step in ROUND or self._step in AGAIN:
-            self._again = self._again + 1 if self._step in AGAIN else 0
+        if self._step in (*ROUND, AGAIN):
+            self._again = self._again + 1 if self._step == AGAIN else 0
             number = re.match(r"effect (\d+)", what)
             self._round = max(self._round, int(number[1]) if number else 1)
             self._left = self._following()
         elif self._step in LAST and self._round:
-            names = [*LAST]
-            self._left = {name: LAST[name] for name in names[names.index(self._step) + 1 :]}
+            self._left = {name: USUAL[name] for name in LAST[LAST.index(self._step) + 1 :]}
 
     def _following(self) -> dict[str, float]:
         """The time of each kind of step that usually follows the present one of a round."""
         rounds = max(ROUNDS, self._round + 0.5)
-        left = {name: (rounds - self._round) * usual for name, usual in ROUND.items()}
+        left = {name: (rounds - self._round) * USUAL[name] for name in ROUND}
         # A place is searched again twice for each effect but one, and goes on where it went on long.
         again = rounds * (rounds - 1.0) - self._round * (self._round - 1.0)
         if self._again:
             again = max(2.0 - self._again, 0.5 * self._again)
-        if self._step == next(iter(ROUND)):
-            left["candidates refined"] += ROUND["candidates refined"]
-        return left | {name: again * usual for name, usual in AGAIN.items()} | LAST
+        if self._step == SCORED:
+            left[REFINED] += USUAL[REFINED]
+        return left | {AGAIN: again * USUAL[AGAIN]} | {name: USUAL[name] for name in LAST}
