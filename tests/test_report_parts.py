@@ -319,7 +319,7 @@ def test_errors_grow_by_their_quartiles_in_millimetres_and_degrees():
     for panel, scale in ((position, 10.0), (heading, 1.0)):
         drawn = marks(panel)
         middle = drawn["before"].x
-        assert middle.size == tracks.PARTS
+        assert middle.size == 2 * tracks.INSTANTS
         assert middle[0] == pytest.approx(0.125)
         assert drawn["before"].y == pytest.approx(scale * middle, abs=0.13 * scale)
         assert drawn["after"].y == pytest.approx(0.5 * drawn["before"].y)

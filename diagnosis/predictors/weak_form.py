@@ -30,7 +30,7 @@ from .thrust import Response, inflow, thrust
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
-BLOCKS = 64
+BLOCKS = 64  # 1; chosen: Gram matrices of more take memory, and no fold needs them
 SMALL = 1e-3  # of its usual size: step of a finite difference where nothing is linear; chosen
 # Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.

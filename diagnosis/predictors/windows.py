@@ -20,11 +20,11 @@ from ..runs.cleaning import BRIEF
 from .prediction import WindowStarts, by_clock, predict
 from .ship_model import Model
 from .thrust import LONGEST_STEP
-from .weak_form import HORIZON
+from .weak_form import BLOCK, BLOCKS, HORIZON
 
 # Of a run that is predicted as a whole, times the scale of the ship.
 FREE_STEP = BRIEF  # the mean of the commands acts in it
-LONGEST_FREE = 600.0  # s; chosen, takes some seconds
+LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 
 
 @dataclass(frozen=True, eq=False)
