@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from cosim import InputError
 
@@ -272,30 +272,30 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    parts = _loaded(runs, validate, held_out, prior, model, ship)
-    found = session.diagnose(*parts.first, prior, parts.model, advance, seed, by, parts.decide, pruning)
+    choices = {"seed": seed, "by": by, "pruning": pruning}
+    task = _begun(runs, validate, held_out, prior, model, ship, advance, **choices)
+    found = task.diagnose()
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
 
 
-class _Loaded(NamedTuple):
-    """What a function of :mod:`.session` is given: train and test runs, runs that decide, a model."""
-
-    first: tuple[Sequence[WeakWindows], Sequence[WeakWindows]]
-    decide: Sequence[WeakWindows]
-    model: Model | ModelSource
-
-
-def _loaded(
-    runs: Any, validate: Any, held_out: Any, prior: Prior, model: Any, ship: str | Path | None
-) -> _Loaded:
-    """Runs and model, read where they are not; arguments as of :func:`diagnose`."""
+def _begun(
+    runs: Any,
+    validate: Any,
+    held_out: Any,
+    prior: Prior,
+    model: Any,
+    ship: str | Path | None,
+    advance: Advance,
+    **options: Any,
+) -> session.Session:
+    """A session of runs and a model, read where they are not; arguments as of :func:`diagnose`."""
     parts = [_listed(runs), _listed(validate), _listed(held_out)]
     model, of = _opened(model, None, ship, [r for p in parts for r in p])
     shares(of.ship, prior)  # before any work
     train, decide, test = (
         p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
     )
-    return _Loaded((train, test), decide, model)
+    return session.begin(train, test, prior, model, advance, validate=decide, **options)
 
 
 def calibrate(
@@ -318,9 +318,7 @@ def calibrate(
     Raises:
         InputError: too little data, a prior that is negative or not finite, or no coefficient to fit.
     """
-    parts = _loaded(runs, validate, held_out, prior, model, ship)
-    task = session.begin(*parts.first, prior, parts.model, advance, validate=parts.decide)
-    found = task.calibrate()
+    found = _begun(runs, validate, held_out, prior, model, ship, advance).calibrate()
     if found is None:
         raise InputError("there is no coefficient to calibrate, or the runs do not determine them")
     return found

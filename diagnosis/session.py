@@ -358,21 +358,6 @@ def begin(
     return Session(*parts, predictor, prior, chosen, harms, advance, seed)
 
 
-def diagnose(
-    train: Sequence[WeakWindows],
-    held_out: Sequence[WeakWindows] = (),
-    prior: Prior = None,
-    model: Model | ModelSource | str | Path | None = None,
-    advance: Advance = silent,
-    seed: int = 0,
-    by: str | Method = DEFAULT,
-    validate: Sequence[WeakWindows] = (),
-    pruning: str = USUAL,
-) -> Diagnosis:
-    """Learn what a model lacks; arguments as of :func:`diagnosis.diagnose`, of runs that are loaded."""
-    return begin(train, held_out, prior, model, advance, seed, by, validate, pruning).diagnose()
-
-
 def _predicted(
     verdict: DecidedFindings,
     predictor: Predictor,

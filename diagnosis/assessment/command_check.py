@@ -6,9 +6,11 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.thrust import full_thrust
+from ..predictors.weak_form import BLOCK
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU
 from ..runs.columns.side_car import ColumnChange
+from ..runs.files.resolution import FUZZ
 from .readings import inertial, needed
 from .settings import SETTINGS
 
@@ -75,7 +77,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
-    varies = np.ptp(tau, axis=0) > SETTINGS.rounding * largest
+    varies = np.ptp(tau, axis=0) > FUZZ * largest
     if not varies.any():
         return "none of its commands ever varies, which tells nothing of what the ship does with them"
     z = needed(w, model)
@@ -84,7 +86,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
         follows = (z[:, k] * given > 0.0).mean() >= SETTINGS.negligible
         opposed = not follows and size[k] > SETTINGS.least_gain * abs(given)
-        if opposed and abs(given) > SETTINGS.rounding * largest:
+        if opposed and abs(given) > FUZZ * largest:
             return (
                 f"{name} is {given:.3g} {unit} in all rows, and the motion needs {z[:, k].mean():.3g} "
                 f"{unit} all the time: another column is meant, or it was not logged"
@@ -109,7 +111,7 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
     idle = (every.held @ given).max(axis=1) == 0.0
-    if idle.sum() < SETTINGS.long:
+    if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
     still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))
     if (still < SETTINGS.explained * size).any():

@@ -37,15 +37,12 @@ from .prediction import WindowStarts, at_rest
 from .predictor import Predictor, PredictorDescription
 from .ship_model import Model, SampledForce
 from .thrust import FORGOTTEN
-from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
+from .weak_form import SMALL, WeakWindows, acceleration, inflow_along, thrust_along
 from .windows import Windows, between_steps, first_row, first_time, free_runs, step_of
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
 TAU = ("tau_X", "tau_Y", "tau_N")
-# Of the ship's speeds the step of slopes; of the ship's answer to a force one that is none, and its
-# inverse too much. Chosen, as a black box solves its equations to some digits only.
-SMALL = 1e-3
 
 # Name of a pose, velocity, force or command -> values (n,) [SI].
 Signals = Mapping[str, np.ndarray]

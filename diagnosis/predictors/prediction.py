@@ -22,7 +22,9 @@ from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
 
 HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
-UNSURE = 3.0  # standard deviations of a speed within which it may be none
+# Standard deviations beyond which a speed is none of rest, a gain is wrong, and a nominal coefficient is
+# no explanation alone (contract).
+FAR_OFF = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,7 @@ def at_rest(smoothed: Smoothed) -> bool:
     """Whether a ship hardly moves at the start of a run, for its noise and its usual speeds."""
     first = np.isfinite(smoothed.nu[:, 0]).argmax()
     usual = np.sqrt(np.nanmean(smoothed.nu**2, axis=0))
-    still = np.maximum(idle(smoothed.scale), UNSURE * smoothed.nu_std[first])
+    still = np.maximum(idle(smoothed.scale), FAR_OFF * smoothed.nu_std[first])
     still = np.maximum(still, HARDLY * usual)
     return bool((np.abs(smoothed.nu[first]) < still).all())
 

@@ -30,7 +30,8 @@ from .thrust import Response, inflow, thrust
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
-BLOCKS = 64
+BLOCKS = 64  # 1; chosen: Gram matrices of more take memory, and no fold needs them
+SMALL = 1e-3  # of its usual size: step of a finite difference where nothing is linear; chosen
 # Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.
 ROOM = 4e7
@@ -185,11 +186,7 @@ def _span(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of the time from a row to the next: the kernel's area, its part of the next row, and its length.
 
-    Args:
-        t: (n,), times of the rows [s].
-        middle: (m,), of windows [s].
-        half: their half width [s].
-        row: (m,), a row of each; before the first and after the last there is no time.
+    Of rows (m,) of windows with middles (m,), times t (n,) [s]; outside of these there is no time.
     """
     a, b = t[np.maximum(row, 0)], t[np.minimum(row + 1, t.size - 1)]
     low, high = (np.clip((x - middle) / half, -1.0, 1.0) for x in (a, b))

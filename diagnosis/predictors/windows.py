@@ -16,14 +16,15 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
+from ..runs.cleaning import BRIEF
 from .prediction import WindowStarts, by_clock, predict
 from .ship_model import Model
 from .thrust import LONGEST_STEP
-from .weak_form import HORIZON
+from .weak_form import BLOCK, BLOCKS, HORIZON
 
-# Times the scale of the ship.
-FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
-LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
+# Of a run that is predicted as a whole, times the scale of the ship.
+FREE_STEP = BRIEF  # the mean of the commands acts in it
+LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,15 +292,11 @@ def free_runs(
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Predicted pose at the samples, by cubic interpolation between steps.
+    """Pose (p, samples, 3) of p models at samples, by cubic interpolation between steps.
 
     Args:
-        predicted: (steps + 1, 3, p, w), pose [m, m, rad] of p models in w windows at each step.
-        column: (samples,), the window of each sample.
-        place: (samples,), number of steps from the window's start to it, a fraction included.
-
-    Returns:
-        (p, samples, 3) [m, m, rad].
+        predicted: (steps + 1, 3, p, w), in w windows at each step.
+        column, place: (samples,), the window of each sample, and steps from its start to it.
     """
     first = np.clip(np.floor(place + 1e-6).astype(int) - 1, 0, max(len(predicted) - 4, 0))
     nodes = range(min(4, len(predicted)))
