@@ -24,7 +24,18 @@ from ..execution.result_folder import clean, default_folder, keep_inputs, sha256
 from ..search import Prior
 
 # Options that name files which decide a result.
-INPUTS = ("train", "validate", "test", "runs", "run", "model", "map", "effects", "criteria")
+INPUTS = (
+    "train",
+    "validate",
+    "test",
+    "runs",
+    "run",
+    "model",
+    "map",
+    "parameters",
+    "effects",
+    "criteria",
+)
 RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 
 
