@@ -51,9 +51,7 @@ def parameters(options: argparse.Namespace, advance: Advance) -> Done:
     shown: list[RenderableType]
     try:
         if options.runs:
-            residuals = task.residuals("train")
-            assert residuals is not None
-            found = sensitivities(residuals, advance)
+            found = sensitivities(task.residuals()["train"], advance)
             chosen = [s.parameter for s in found.each if s.known]
             shown = [*_told(found)]
         else:

@@ -76,9 +76,7 @@ class SystemCalibration:
 
 
 def calibrate(
-    train: WindowResiduals,
-    validate: WindowResiduals | None,
-    test: WindowResiduals | None,
+    parts: Mapping[str, WindowResiduals],
     forces_on: Sequence[str],
     names: Sequence[str],
     units: Sequence[str],
@@ -88,8 +86,8 @@ def calibrate(
     """Fit parameters to runs, find what is missing in addition, and judge.
 
     Args:
-        train: residuals of the runs to learn from.
-        validate, test: those of runs that decide, and of runs that only judge.
+        parts: residuals of the runs to learn from, ``train``, and as far as there are any, of those that
+            decide, ``validate``, and of those that only judge, ``test``.
         forces_on: inputs on which a force may act in addition.
         names, units: of the measured outputs.
         usual: of each of these inputs a usual size.
@@ -98,7 +96,7 @@ def calibrate(
     Raises:
         InputError: the FMU fails at its start values.
     """
-    start = Setting((0.0,) * len(train.parameters))
+    train, start = parts["train"], Setting((0.0,) * len(parts["train"].parameters))
     advance("predictions with the start values")
     train.whiten_about(start)
     before = fit(train, start, (), range(len(start.z)))
@@ -129,7 +127,7 @@ def calibrate(
     rest, grown = left(best), temper(best)
     covariance = best.covariance * grown
     moved = _moved(train, best, grown)
-    rejected = _rejected(validate, best, start)
+    rejected = _rejected(parts.get("validate"), best, start)
     verdict = verdict_of(accepted, moved, best, rest, bool(rejected))
     advance("intervals")
     ends = intervals(train, best, grown)
@@ -140,9 +138,8 @@ def calibrate(
     ]
     learned = best.setting if kept else start
     errors: dict[str, dict[str, tuple[float, float]]] = {}
-    for part in (train, validate, test):
-        if part is not None:
-            errors |= _errors(part, start, learned, names)
+    for part in parts.values():
+        errors |= _errors(part, start, learned, names)
     every = [*(p.name for p in train.parameters), *(f.id for f in best.setting.forces)]
     return SystemCalibration(
         verdict,

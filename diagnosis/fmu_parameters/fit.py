@@ -117,18 +117,9 @@ def fit(
         # A start on a bound would end there.
         inside = np.where(np.isfinite(high - low), high - low, 1.0) * 1e-6
         x = np.clip(x, low + inside, high - inside)
-        solved = least_squares(
-            residuals,
-            x,
-            slopes,
-            (low, high),
-            "trf",
-            ftol=1e-6,
-            xtol=1e-5,
-            gtol=None,
-            max_nfev=MOST_STEPS,
-        )
-        x = solved.x
+        jacobian: Any = slopes  # the stubs of scipy know no function here
+        ends = {"ftol": 1e-6, "xtol": 1e-5, "max_nfev": MOST_STEPS}
+        x = least_squares(residuals, x, jacobian, (low, high), "trf", **ends).x
     s = setting(x)
     if "x" in last and np.array_equal(np.asarray(last["x"]), x):
         J, faults = np.asarray(last["J"]), last["faults"]

@@ -118,7 +118,7 @@ def _promising(
     """The forces that promise most by slopes, all parameters free, and to each those like it.
 
     Returns:
-        Gain in cost, force, and unit of its coefficient, of each; id -> ids of those with the same slopes.
+        Gain in cost, force, and unit of its coefficient, of each; id -> ids of those like it.
     """
     J, e = _with_prior(at), np.concatenate([at.residuals, at.setting.z])
     Q = np.linalg.qr(J)[0] if J.shape[1] else np.zeros((len(e), 0))

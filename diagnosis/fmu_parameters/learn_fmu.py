@@ -1,7 +1,7 @@
 """``learn`` with an FMU whose own parameters are calibrated."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..execution.progress import Advance
@@ -34,14 +34,11 @@ def learn_system(
     runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
     task = system_task(options.model, options.map, runs, options.parameters, options.horizon)
     try:
-        parts = [task.residuals(use) for use in runs]
-        train = parts[0]
-        assert train is not None  # the command line asks for one
+        parts = task.residuals()
+        train = parts["train"]
         if options.parameters is None:
-            _only_known(task, train, parts, advance)
-        result = calibrate(
-            train, parts[1], parts[2], task.forces_on, task.names, task.units, task.usual, advance
-        )
+            _only_known(task, parts, advance)
+        result = calibrate(parts, task.forces_on, task.names, task.units, task.usual, advance)
         use = {r.name: u for u, every in task.runs.items() for r in every}
         content = task.map.model_dump(exclude_none=True)
         units = dict(zip(task.names, task.units, strict=True))
@@ -55,7 +52,7 @@ def written(
     report: CalibrationReport,
     out: Path,
     origin: dict[str, str],
-    parts: list[WindowResiduals | None],
+    parts: Mapping[str, WindowResiduals],
     names: Sequence[str],
     advance: Advance,
 ) -> CalibrationReport:
@@ -66,21 +63,19 @@ def written(
     return report
 
 
-def _only_known(
-    task: SystemTask, train: WindowResiduals, parts: list[WindowResiduals | None], advance: Advance
-) -> None:
+def _only_known(task: SystemTask, parts: Mapping[str, WindowResiduals], advance: Advance) -> None:
     """Leave to be calibrated what the runs can tell, within the range in which the FMU works.
 
     Raises:
         InputError: they can tell nothing.
     """
-    found = sensitivities(train, advance)
+    found = sensitivities(parts["train"], advance)
     refuse_unknown(found)
     task.notes += [s.fault for s in found.each if s.fault]
     if untold := [s.parameter.name for s in found.each if not s.known]:
         task.notes.append(f"The runs do not determine {', '.join(untold)}: kept at the start value.")
     task.parameters = [s.parameter for s in found.each if s.known]
-    for part in filter(None, parts):
+    for part in parts.values():
         part.choose(task.parameters)
 
 
@@ -91,12 +86,9 @@ def learn_ship(
     runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
     task = ship_task(options, runs, advance)
     try:
-        parts = [task.residuals(use) for use in runs]
-        train = parts[0]
-        assert train is not None
-        result = calibrate(
-            train, parts[1], parts[2], task.forces_on, task.names, task.units, task.usual, advance
-        )
+        parts = task.residuals()
+        train = parts["train"]
+        result = calibrate(parts, task.forces_on, task.names, task.units, task.usual, advance)
         use = {w.run.name: u for u, every in task.runs.items() for w in every}
         content, units = task.predictor.given.content(), dict(zip(task.names, task.units, strict=True))
         model, notes = task.fmu.model, task.notes

@@ -22,7 +22,6 @@ from cosim.fmu import DoubleMemory, FmuModel, LocalInstance, Port
 from cosim.interrupts import ignore_interrupts
 from cosim.process import end_with_parent, without_program
 
-from ..execution.parallel import forks
 from .additional_force import AdditionalForce
 
 PROCESSES = 2  # chosen: as everywhere in the diagnosis
@@ -205,8 +204,10 @@ class Processes:
     def _begun(self) -> ProcessPoolExecutor:
         if self._pool is None:
             make = partial(Playback, self.path, self.inputs, self.outputs, self.courses)
-            context = get_context("fork" if forks() else "spawn")
-            self._pool = ProcessPoolExecutor(PROCESSES, context, _begin, (make, os.getpid()))
+            # An FMU does not outlive a fork, nor do the files and threads of this process.
+            self._pool = ProcessPoolExecutor(
+                PROCESSES, get_context("spawn"), _begin, (make, os.getpid())
+            )
         return self._pool
 
     def run(self, requests: Sequence[Request]) -> list[Predicted]:

@@ -57,8 +57,9 @@ class WindowResiduals:
     """The residuals of an FMU in the windows of some runs.
 
     Args:
-        processes: that run the FMU, along the courses of the windows in their order.
+        processes: that run the FMU.
         windows: of the runs.
+        first: number of the course of the first window; the others follow.
         noise: (m,), of each output.
         parameters: that are calibrated.
         lines: (2, m), gain and offset that make of an output what is measured; None: it is that.
@@ -69,12 +70,13 @@ class WindowResiduals:
         self,
         processes: Processes,
         windows: Sequence[Window],
+        first: int,
         noise: np.ndarray,
         parameters: Sequence[CalibratedParameter],
         lines: np.ndarray | None = None,
         angles: Sequence[int] = (),
     ) -> None:
-        self.processes, self.windows = processes, windows
+        self.processes, self.windows, self._first = processes, windows, first
         self.noise, self.parameters, self._angles = noise, parameters, [*angles]
         m = noise.size
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
@@ -108,7 +110,7 @@ class WindowResiduals:
     ) -> list[list[Predicted]]:
         """Of each setting the prediction in each window."""
         which = range(len(self.windows)) if windows is None else windows
-        requests = [Request(k, self.values(s), s.forces) for s in settings for k in which]
+        requests = [Request(self._first + k, self.values(s), s.forces) for s in settings for k in which]
         found = self.processes.run(requests)
         return [found[j : j + len(which)] for j in range(0, len(found), len(which))]
 
@@ -159,7 +161,7 @@ class WindowResiduals:
             InputError: the FMU fails there.
         """
         values, requests = self.values(setting), []
-        for k, w in enumerate(self.windows):
+        for k, w in enumerate(self.windows, self._first):
             requests.append(Request(k, values, setting.forces))
             for name, std in w.start_std.items():
                 moved = {name: w.course.start[name] + START_STEP * std}
@@ -217,17 +219,15 @@ class WindowResiduals:
             down, up = min(STEP, max(z - low, 0.0)), min(STEP, max(high - z, 0.0))
             yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
         for k, (f, size) in enumerate(zip(setting.forces, sizes, strict=True)):
-            moved = [
-                Setting(
-                    setting.z,
-                    tuple(
-                        replaced(g, g.coefficient + sign * STEP * size) if j == k else g
-                        for j, g in enumerate(setting.forces)
-                    ),
-                )
-                for sign in (-1.0, 1.0)
-            ]
-            yield f.id, *moved, STEP, STEP
+            low, high = (self._forced(setting, k, sign * STEP * size) for sign in (-1.0, 1.0))
+            yield f.id, low, high, STEP, STEP
+
+    @staticmethod
+    def _forced(setting: Setting, k: int, change: float) -> Setting:
+        """A setting with another coefficient of a force."""
+        forces = list(setting.forces)
+        forces[k] = replaced(forces[k], forces[k].coefficient + change)
+        return Setting(setting.z, tuple(forces))
 
     @staticmethod
     def at(setting: Setting, k: int, z: float) -> Setting:

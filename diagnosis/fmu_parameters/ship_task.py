@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from .measured_system import FEWEST, Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 from .playback import Course
 from .residuals import WindowResiduals
-from .system_task import processes_of
+from .system_task import numbered, processes_of
 
 MOST_SAMPLES = (
     60  # of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion
@@ -82,27 +83,26 @@ class ShipTask:
         told = self.predictor.map.told("outputs")
         return [told[s].name for s in MOTION if s in told]
 
-    def residuals(self, use: str) -> WindowResiduals | None:
-        """The residuals of the runs of a use; None: there is none.
+    def residuals(self) -> dict[str, WindowResiduals]:
+        """Use -> the residuals of its runs, of those that there are.
 
         Raises:
             InputError: no window has enough samples.
         """
-        runs = self.runs.get(use) or []
-        if not runs:
-            return None
-        windows = [w for run in runs for w in self._windows(run)]
-        if not windows:
-            raise InputError(f"no window of {', '.join(w.run.name for w in runs)} has enough samples")
+        windows = {use: [x for w in runs for x in self._windows(w)] for use, runs in self.runs.items()}
+        if not windows["train"]:
+            names = ", ".join(w.run.name for w in self.runs["train"])
+            raise InputError(f"no window of {names} has enough samples")
         driven = [c.name for c in self.predictor.map.told("inputs").values()]
-        processes = processes_of(
-            self.fmu.model, windows, driven, self.forces_on, self.parameters, self.outputs
-        )
+        processes = processes_of(self, [*chain(*windows.values())], self.fmu.model, driven)
         self._open.enter_context(processes)
         lines = [self.predictor.lines["outputs"][s] for s in POSE]
         gains = np.array([[line.gain for line in lines], [line.offset for line in lines]])
         noise = np.median([w.smoothed.noise for w in self.runs["train"]], axis=0)
-        return WindowResiduals(processes, windows, noise, self.parameters, gains, [2])
+        return {
+            use: WindowResiduals(processes, own, first, noise, self.parameters, gains, [2])
+            for use, own, first in numbered(windows)
+        }
 
     def _windows(self, w: WeakWindows) -> list[Window]:
         """Those of a run: of the ship's length from smoothed states, or the whole run."""

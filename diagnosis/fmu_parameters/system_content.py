@@ -302,11 +302,11 @@ def _table(header: Sequence[str], rows: Iterator[Sequence[str]]) -> Table:
 
 
 def plots_of(
-    parts: Sequence[WindowResiduals | None], r: SystemCalibration, names: Sequence[str]
+    parts: Mapping[str, WindowResiduals], r: SystemCalibration, names: Sequence[str]
 ) -> list[Plot]:
     """Measured and predicted outputs of each run."""
     found = []
-    for part in filter(None, parts):
+    for part in parts.values():
         start = Setting((0.0,) * len(part.parameters))
         before, after = part.raw([start, r.fit.setting if r.changed else start])
         for run in dict.fromkeys(w.run for w in part.windows):

@@ -1,9 +1,12 @@
 """What the commands ask of an FMU and measured runs: read, checked, and ready to be predicted."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -11,14 +14,14 @@ from cosim import InputError
 from cosim.fmu import FmuModel
 from cybership.message_text import quoted
 
-from ..predictors.black_box import MOTION
+from ..predictors.black_box import MOTION, POSE
+from ..runs import stated_layout
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 from .playback import Course, Processes
 from .residuals import WindowResiduals
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
-POSE = ("x", "y", "psi")
 # Outputs that are no measured ones, of which an additional force may be a function; chosen: the more
 # are tried, the more alike they are.
 MOST_OUTPUTS = 6
@@ -31,8 +34,6 @@ def is_system(runs: Sequence[Path], map: Path | None) -> bool:  # noqa: A002
         InputError: map or run cannot be read.
     """
     if map is not None:
-        import json
-
         try:
             content = json.loads(map.read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:
@@ -42,8 +43,6 @@ def is_system(runs: Sequence[Path], map: Path | None) -> bool:  # noqa: A002
     first = runs[0]
     if first.is_dir() or not first.exists():
         return False
-    from ..runs import stated_layout
-
     layout = stated_layout(first)
     stated = set(layout.columns) if layout else set()
     return not set(POSE) <= {*columns_of(first), *stated}
@@ -109,60 +108,76 @@ class SystemTask:
                 found[c.name] = float(np.sqrt(np.nanmean(x**2))) or 1.0
         return found
 
-    def residuals(self, use: str) -> WindowResiduals | None:
-        """The residuals of the runs of a use; None: there is none.
+    def residuals(self) -> dict[str, WindowResiduals]:
+        """Use -> the residuals of its runs, of those that there are.
 
         Raises:
             InputError: a run is too short, or has no samples of a column.
         """
-        runs = self.runs.get(use) or []
-        if not runs:
-            return None
         noise = noises(self.runs["train"], self.map)
         length = self.window or self.map.window
-        windows = [w for r in runs for w in windows_of(r, self.map, self.model, noise, length)]
+        windows = {
+            use: [w for r in runs for w in windows_of(r, self.map, self.model, noise, length)]
+            for use, runs in self.runs.items()
+        }
         driven = [c.name for c in self.map.inputs.values()]
-        processes = processes_of(
-            self.model, windows, driven, self.forces_on, self.parameters, self.outputs
-        )
+        processes = processes_of(self, [*chain(*windows.values())], self.model, driven)
         self._open.enter_context(processes)
-        return WindowResiduals(processes, windows, noise, self.parameters)
+        return {
+            use: WindowResiduals(processes, own, first, noise, self.parameters)
+            for use, own, first in numbered(windows)
+        }
 
     def close(self) -> None:
         """End the processes in which the FMU runs."""
         self._open.close()
 
 
+class _Task(Protocol):
+    """What is common to the tasks of systems and ships."""
+
+    parameters: list[CalibratedParameter]
+
+    @property
+    def forces_on(self) -> list[str]: ...
+    @property
+    def outputs(self) -> list[str]: ...
+
+
 def processes_of(
-    model: FmuModel,
-    windows: Sequence[Window],
-    driven: Sequence[str],
-    forces_on: Sequence[str],
-    parameters: Sequence[CalibratedParameter],
-    outputs: Sequence[str],
+    task: _Task, windows: Sequence[Window], model: FmuModel, driven: Sequence[str]
 ) -> Processes:
     """Processes that run an FMU along windows.
 
     Inputs that nothing drives but a force keep their start value, as do parameters that are inputs.
 
     Args:
-        model: the FMU.
+        task: of a system or a ship.
         windows: whose courses have the inputs in ``driven``.
-        driven, forces_on: inputs that the runs drive, and those on which a force may act.
-        parameters: that are calibrated.
-        outputs: variables that are read.
+        model: the FMU.
+        driven: inputs that the runs drive.
     """
     every = model.variables
-    set_once = [p.name for p in parameters if every[p.name].causality == "input"]
-    extra = [n for n in dict.fromkeys([*forces_on, *set_once]) if n not in driven]
+    set_once = [p.name for p in task.parameters if every[p.name].causality == "input"]
+    extra = [n for n in dict.fromkeys([*task.forces_on, *set_once]) if n not in driven]
     starts = np.array([float(every[n].start or 0.0) for n in extra])
 
     def whole(course: Course) -> Course:
         still = np.broadcast_to(starts, (len(course.inputs), starts.size))
         return course._replace(inputs=np.column_stack([course.inputs, still]))
 
-    courses = [whole(w.course) for w in windows]
-    return Processes(model.path, [*driven, *extra], outputs, courses)
+    return Processes(model.path, [*driven, *extra], task.outputs, [whole(w.course) for w in windows])
+
+
+def numbered(
+    windows: Mapping[str, Sequence[Window]],
+) -> Iterator[tuple[str, Sequence[Window], int]]:
+    """Use, its windows, and the number of the first among all; only of uses that have any."""
+    first = 0
+    for use, own in windows.items():
+        if own:
+            yield use, own, first
+        first += len(own)
 
 
 def system_task(
