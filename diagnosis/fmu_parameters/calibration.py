@@ -8,8 +8,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from ..execution.progress import Advance, silent
+from .additional_force import AdditionalForce
 from .fit import Fit, fit, fitted, intervals
-from .force_search import Accepted, candidates, search
+from .force_search import Accepted, search
 from .parameter_file import CalibratedParameter
 from .remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
 from .residuals import Setting, WindowResiduals, rms_of
@@ -77,7 +78,7 @@ class SystemCalibration:
 
 def calibrate(
     parts: Mapping[str, WindowResiduals],
-    forces_on: Sequence[str],
+    possible: Sequence[AdditionalForce],
     names: Sequence[str],
     units: Sequence[str],
     usual: Mapping[str, float],
@@ -88,9 +89,9 @@ def calibrate(
     Args:
         parts: residuals of the runs to learn from, ``train``, and as far as there are any, of those that
             decide, ``validate``, and of those that only judge, ``test``.
-        forces_on: inputs on which a force may act in addition.
+        possible: forces that may act in addition.
         names, units: of the measured outputs.
-        usual: of each of these inputs a usual size.
+        usual: of each input on which such a force acts a usual size.
         advance: receives the name of each step.
 
     Raises:
@@ -109,13 +110,11 @@ def calibrate(
         return remainder(train, f.residuals, first_white, f.slopes.shape[1], names, units)
 
     best, accepted = alone, []
-    outputs = [*train.processes.outputs]
-    possible = candidates(forces_on, outputs, names) if forces_on else []
 
     def temper(f: Fit) -> float:
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
-    while possible and len(accepted) < MOST_FORCES and left(best).significant:
+    while possible and len(accepted) < MOST_FORCES and (left(best).significant or _far(best)):
         found = search(train, best, possible, dict(usual), temper, advance)
         if found is None:
             break
@@ -184,8 +183,8 @@ def verdict_of(
     """The verdict, by the rule of ships with parameters in place of coefficients.
 
     A force with a probability of 0.8 or more is found, with less than that its set is ambiguous; else
-    parameters that are off explain the runs if none is further than three prior standard deviations
-    from its mean and nothing significant is left. Which of them is off must be known.
+    parameters that are off explain the runs if nothing significant is left. Which of them is off must be
+    known. Beyond three prior standard deviations a force was looked for, and explained less.
     """
     if rejected:
         return "unexplained"
@@ -195,9 +194,12 @@ def verdict_of(
         return "unexplained"
     if not moved.any:
         return "none"
-    if np.abs(best.setting.z).max() > MOST_MOVED:
-        return "unexplained"
     return "parameters" if any(moved.each) else "ambiguous"
+
+
+def _far(best: Fit) -> bool:
+    """Whether a parameter is further from its prior mean than that allows."""
+    return bool(np.abs(best.setting.z).max() > MOST_MOVED)
 
 
 def rest_is_large(rest: SystemRemainder) -> bool:

@@ -38,7 +38,7 @@ def learn_system(
         train = parts["train"]
         if options.parameters is None:
             _only_known(task, parts, advance)
-        result = calibrate(parts, task.forces_on, task.names, task.units, task.usual, advance)
+        result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
         use = {r.name: u for u, every in task.runs.items() for r in every}
         content = task.map.model_dump(exclude_none=True)
         units = dict(zip(task.names, task.units, strict=True))
@@ -88,7 +88,7 @@ def learn_ship(
     try:
         parts = task.residuals()
         train = parts["train"]
-        result = calibrate(parts, task.forces_on, task.names, task.units, task.usual, advance)
+        result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
         use = {w.run.name: u for u, every in task.runs.items() for w in every}
         content, units = task.predictor.given.content(), dict(zip(task.names, task.units, strict=True))
         model, notes = task.fmu.model, task.notes

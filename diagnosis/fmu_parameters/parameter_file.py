@@ -9,6 +9,7 @@
 """
 
 import json
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -69,6 +70,7 @@ KINDS = (
     Kind("inductance", (1, 2, -2, -2, 0, 0, 0), 0.3, True),
     Kind("capacitance", (-1, -2, 4, 2, 0, 0, 0), 0.3, True),
 )
+QUADRATIC = Kind("quadratic damping", (), 0.5, False)
 OTHER = Kind("other", (), 0.3, False)
 
 
@@ -253,6 +255,9 @@ def _with_prior(v: FmuVariable) -> CalibratedParameter:
 def kind_of(unit: Unit | None) -> Kind:
     """The kind of a quantity by its unit; :data:`OTHER` where that says nothing."""
     exponents = None if unit is None else unit.exponents or _BY_NAME.get(unit.name)
+    # N.s2/m has the dimension of a mass.
+    if unit is not None and re.match(r"N\.(m\.)?s2", unit.name):
+        return QUADRATIC
     return next((k for k in KINDS if k.exponents == exponents), OTHER)
 
 

@@ -10,7 +10,8 @@ from .measured_system import Window
 from .residuals import WindowResiduals
 
 CHANCE = 0.01  # contract: by more than chance
-OF_FIRST, OF_SPREAD = 0.05, 0.02  # contract: what matters, of the first error and of what is measured
+# Contract: what matters, of the first error and of what makes the motion: here the motion itself.
+OF_FIRST, OF_SPREAD = 0.05, 0.02
 BINS = (4, 16, 64)  # samples whose mean is compared with that of white noise; chosen
 BLOCKS = 8  # of a run, by which the correlation of residuals is judged; chosen
 
@@ -85,7 +86,7 @@ def remainder(
         own, before = _of_output(r, white, k), _of_output(r, first, k)
         known = [np.isfinite(w.measured[:, k]) for w in r.windows]
         left, at_first = _beyond(own, known), _beyond(before, known)
-        spread = np.nanstd(np.concatenate([w.measured[:, k] for w in r.windows])) / r.noise[k]
+        spread = _spread(r, k) / r.noise[k]
         least = max(OF_SPREAD * spread, OF_FIRST * at_first if white is not first else 0.0)
         share = min(1.0, (left / at_first) ** 2) if at_first > 0.0 else 0.0
         p = _chance(own, known, fitted / len(names))
@@ -97,6 +98,21 @@ def _of_output(r: WindowResiduals, white: np.ndarray, k: int) -> list[np.ndarray
     return [
         white[rows].reshape(w.measured.shape)[:, k] for w, rows in zip(r.windows, r.rows, strict=True)
     ]
+
+
+def _spread(r: WindowResiduals, k: int) -> float:
+    """Standard deviation of a measured output about a straight line in each window.
+
+    A straight line is what a window begins with, such as the velocity of a ship.
+    """
+    every = []
+    for w in r.windows:
+        known = np.isfinite(w.measured[:, k])
+        y, t = w.measured[known, k], w.time[known]
+        y = np.unwrap(y) if k in r.angles else y
+        X = np.vander(t, 2)
+        every.append(y - X @ np.linalg.lstsq(X, y, rcond=None)[0])
+    return float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
 
 
 def _means(parts: Sequence[np.ndarray], known: Sequence[np.ndarray], size: int) -> np.ndarray:

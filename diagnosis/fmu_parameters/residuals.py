@@ -77,7 +77,7 @@ class WindowResiduals:
         angles: Sequence[int] = (),
     ) -> None:
         self.processes, self.windows, self._first = processes, windows, first
-        self.noise, self.parameters, self._angles = noise, parameters, [*angles]
+        self.noise, self.parameters, self.angles = noise, parameters, [*angles]
         m = noise.size
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
         self._known: dict[Setting, np.ndarray] = {}
@@ -129,11 +129,11 @@ class WindowResiduals:
         at = w.course.h * np.arange(len(p.outputs))
         with np.errstate(invalid="ignore", over="ignore"):
             outputs = self._gain * p.outputs[:, : self.noise.size] + self._offset
-            for k in self._angles:
+            for k in self.angles:
                 outputs[:, k] = np.unwrap(outputs[:, k])
             predicted = np.column_stack([np.interp(w.time, at, y) for y in outputs.T])
             off = w.measured - (predicted if w.onto is None else laid(predicted, w.onto))
-            off[:, self._angles] = wrap(off[:, self._angles])
+            off[:, self.angles] = wrap(off[:, self.angles])
             off /= self.noise
             off[~(np.abs(off) < LARGEST)] = np.nan
         off[~np.isfinite(w.measured)] = 0.0

@@ -13,10 +13,12 @@ from cosim import InputError
 
 from ..execution.progress import Advance
 from ..predictors import Fmu, WeakWindows
-from ..predictors.black_box import MOTION, POSE, TAU, Signals, at_samples, commands_at
+from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
 from ..predictors.fmu.foreign_fmu import FmuPredictor
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed
+from .additional_force import AdditionalForce
+from .force_search import candidates
 from .measured_system import FEWEST, Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 from .playback import Course
@@ -82,6 +84,12 @@ class ShipTask:
         """Variables of the pose, then of the velocity as far as the map has it."""
         told = self.predictor.map.told("outputs")
         return [told[s].name for s in MOTION if s in told]
+
+    @property
+    def possible(self) -> list[AdditionalForce]:
+        """Forces that may act in addition: constant, or a function of one velocity."""
+        told = self.predictor.map.told("outputs")
+        return candidates(self.forces_on, [told[s].name for s in VELOCITY if s in told], ())
 
     def residuals(self) -> dict[str, WindowResiduals]:
         """Use -> the residuals of its runs, of those that there are.

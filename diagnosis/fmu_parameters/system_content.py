@@ -17,7 +17,7 @@ from cosim.fmu import FmuModel
 from ..report.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
 from ..report.document import Document, Plot, ReportSection, numbers, write_document, write_json
 from ..report.document import Table as PageTable
-from .calibration import CalibratedValue, SystemCalibration
+from .calibration import MOST_MOVED, CalibratedValue, SystemCalibration
 from .force_search import Accepted
 from .residuals import Setting, WindowResiduals
 
@@ -78,6 +78,10 @@ class CalibrationReport:
         off = [v.parameter.name for v in r.values if v.moved]
         if r.verdict in ("found", "ambiguous") and off and r.forces:
             text += f" Parameters are off as well: {', '.join(off)}."
+        if far := [v.parameter.name for v in r.values if abs(v.z) > MOST_MOVED and v.moved]:
+            text += (
+                f" Beyond three prior standard deviations: {', '.join(far)}; check the value or prior."
+            )
         if r.rejected:
             text += f" The fitted values are rejected: {r.rejected}."
         return text
@@ -104,7 +108,7 @@ class CalibrationReport:
             "suspect_coefficients": [
                 {"name": v.parameter.name, "z": v.z, "value": v.value}
                 for v in r.values
-                if abs(v.z) > 3.0
+                if abs(v.z) > MOST_MOVED
             ],
             "ranking": [],
             "data": {"samples": self.samples, "used": self.samples},

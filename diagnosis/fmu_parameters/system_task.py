@@ -16,6 +16,8 @@ from cybership.message_text import quoted
 
 from ..predictors.black_box import MOTION, POSE
 from ..runs import stated_layout
+from .additional_force import AdditionalForce
+from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 from .playback import Course, Processes
@@ -107,6 +109,11 @@ class SystemTask:
                 x = np.concatenate([c.factor * r.columns[column] + c.offset for r in self.runs["train"]])
                 found[c.name] = float(np.sqrt(np.nanmean(x**2))) or 1.0
         return found
+
+    @property
+    def possible(self) -> list[AdditionalForce]:
+        """Forces that may act in addition."""
+        return candidates(self.forces_on, self.outputs, self.names)
 
     def residuals(self) -> dict[str, WindowResiduals]:
         """Use -> the residuals of its runs, of those that there are.
