@@ -152,6 +152,21 @@ class ShipTask:
         known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
         return {name: (x - line.offset) / line.gain for x, line, name in known}
 
+    def state_at(self, time: float) -> dict[str, float]:
+        """Start values and inputs of the FMU in the smoothed state of the first run at a time [s].
+
+        Raises:
+            InputError: there is none then.
+        """
+        s = self.runs["train"][0].smoothed
+        known = np.flatnonzero(np.isfinite(s.nu).all(axis=1))
+        row = known[np.argmin(np.abs(s.time[known] - time))]
+        if abs(float(s.time[row]) - time) > s.track.period:
+            raise InputError(f"run '{s.track.run.name}' has no state at {time:g} s")
+        at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
+        both = {**self._of_variables("start", at), **self._of_variables("inputs", at)}
+        return {n: float(x[0]) for n, x in both.items()}
+
     def close(self) -> None:
         """End the processes in which the FMU runs."""
         self._open.close()

@@ -30,24 +30,24 @@ MOST_OUTPUTS = 6
 
 
 def is_system(runs: Sequence[Path], map: Path | None) -> bool:  # noqa: A002
-    """Whether runs are of a system that is not a ship, as the map or the columns say.
+    """Whether runs are of a system that is not a ship: the map or the columns have no pose.
 
     Raises:
         InputError: map or run cannot be read.
     """
-    if map is not None:
-        try:
-            content = json.loads(map.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError) as error:
-            raise InputError(f"'{map}' cannot be read as a map: {error}") from None
-        outputs = content.get("outputs") if isinstance(content, dict) else None
-        return isinstance(outputs, dict) and not set(outputs) <= set(MOTION)
     first = runs[0]
-    if first.is_dir() or not first.exists():
+    if first.is_file():
+        layout = stated_layout(first)
+        if not set(POSE) <= {*columns_of(first), *(layout.columns if layout else ())}:
+            return True
+    if map is None:
         return False
-    layout = stated_layout(first)
-    stated = set(layout.columns) if layout else set()
-    return not set(POSE) <= {*columns_of(first), *stated}
+    try:
+        content = json.loads(map.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"'{map}' cannot be read as a map: {error}") from None
+    outputs = content.get("outputs") if isinstance(content, dict) else None
+    return isinstance(outputs, dict) and not set(outputs) <= set(MOTION)
 
 
 @dataclass
