@@ -7,7 +7,7 @@ import numpy as np
 
 from ..execution.progress import Advance
 from .additional_force import SHAPES, AdditionalForce
-from .fit import Fit, added, fit
+from .parameter_fit import ParameterFit, added, fit
 from .residuals import Setting, WindowResiduals, replaced
 
 TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
@@ -58,12 +58,12 @@ def candidates(
 
 def search(
     r: WindowResiduals,
-    at: Fit,
+    at: ParameterFit,
     possible: Sequence[AdditionalForce],
     usual: dict[str, float],
-    temper_of: Callable[[Fit], float],
+    temper_of: Callable[[ParameterFit], float],
     advance: Advance,
-) -> tuple[Fit, Accepted] | None:
+) -> tuple[ParameterFit, Accepted] | None:
     """The force that explains most beyond the parameters, if it is more than chance.
 
     Every candidate is as probable as any other, and all together as none (Schwarz, 1978, for the
@@ -85,7 +85,7 @@ def search(
         return None
     kept, same = _promising(at, scaled)
     charge = float(np.log(r.samples) + 2.0 * np.log(len(scaled)))
-    fits: list[tuple[float, Fit, AdditionalForce]] = []
+    fits: list[tuple[float, ParameterFit, AdditionalForce]] = []
     for gain, force, size in kept:
         if gain < charge / 4.0:  # a fit gains hardly more than its slopes promise
             continue
@@ -113,7 +113,7 @@ def search(
 
 
 def _promising(
-    at: Fit, scaled: Sequence[tuple[AdditionalForce, float, np.ndarray]]
+    at: ParameterFit, scaled: Sequence[tuple[AdditionalForce, float, np.ndarray]]
 ) -> tuple[list[tuple[float, AdditionalForce, float]], dict[str, list[str]]]:
     """The forces that promise most by slopes, all parameters free, and to each those like it.
 
@@ -141,13 +141,13 @@ def _promising(
     return [entry[:3] for entry in kept], same
 
 
-def _with_prior(at: Fit) -> np.ndarray:
+def _with_prior(at: ParameterFit) -> np.ndarray:
     p = len(at.setting.z)
     return np.concatenate([at.slopes, np.eye(p, at.slopes.shape[1])])
 
 
 def _scaled(
-    r: WindowResiduals, at: Fit, forces: Sequence[AdditionalForce], usual: dict[str, float]
+    r: WindowResiduals, at: ParameterFit, forces: Sequence[AdditionalForce], usual: dict[str, float]
 ) -> list[tuple[AdditionalForce, float, np.ndarray]]:
     """Each force with a unit of its coefficient, and the slope (n,) of the residuals by that unit.
 

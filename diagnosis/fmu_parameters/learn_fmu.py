@@ -7,10 +7,10 @@ from pathlib import Path
 from ..execution.progress import Advance
 from ..execution.result_folder import together
 from ..predictors import WRITTEN
-from .calibration import calibrate
 from .residuals import WindowResiduals
 from .sensitivity import refuse_unknown, sensitivities
 from .ship_task import ship_task
+from .system_calibration import calibrate
 from .system_content import CalibrationReport, plots_of
 from .system_task import SystemTask, system_task
 

@@ -21,7 +21,7 @@ from ..runs import QUANTITY
 from .system_map import SystemMap, column_of_start
 
 SMALL = 1e-3  # of a value, or of one unit where that is less, the step of a difference; chosen
-STEP = 1e-2  # s, of the short steps where the FMU suggests none; chosen
+STEP = 1e-3  # s, of the short steps where the FMU suggests none; chosen
 
 
 class LinearState(NamedTuple):

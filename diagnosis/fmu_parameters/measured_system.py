@@ -13,7 +13,7 @@ from cybership.message_text import quoted
 
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.tables import column_names, numbers, table_of_file
-from .playback import Course
+from .playback import InputCourse
 from .system_map import TIME, SystemMap, column_of_start
 
 LOGS = ("log.csv", "log.parquet")
@@ -58,7 +58,7 @@ class Window:
 
     run: str
     begin: float
-    course: Course
+    course: InputCourse
     time: np.ndarray
     measured: np.ndarray
     start_std: Mapping[str, float]
@@ -229,26 +229,27 @@ def _window(
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has no {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])
-    return Window(run.name, begin, Course(h, start, inputs), t[counts], measured[counts], std)
+    return Window(run.name, begin, InputCourse(h, start, inputs), t[counts], measured[counts], std)
 
 
 def _at_start(t: np.ndarray, y: np.ndarray, noise: float, rate: bool) -> tuple[float, float]:
     """A signal, or its derivative, at its first time, and the standard deviation of that.
 
-    By a parabola through the first samples: the widest that the noise explains.
+    By a parabola through the first samples: the widest whose value lies in the intervals of all narrower
+    ones (O. V. Lepski, 1991, Theory of Probability and its Applications 35, 454-466).
     """
     known = np.isfinite(y)
     t, y = t[known], y[known]
-    chosen: tuple[float, float] = (float(y[0]), noise) if y.size and not rate else (0.0, np.inf)
+    low, high, chosen = -np.inf, np.inf, (0.0, np.inf)
     for width in WIDTHS:
         if width > y.size:
             break
         X = np.vander(t[:width] - t[0], 3, increasing=True)
-        c, *_ = np.linalg.lstsq(X, y[:width], rcond=None)
-        size = float(np.sqrt(np.mean((y[:width] - X @ c) ** 2) * width / (width - 3)))
-        # Two standard deviations above the noise: then the parabola does not follow the signal.
-        if width > WIDTHS[0] and size > noise * (1.0 + 2.0 / np.sqrt(2.0 * (width - 3))):
+        c = np.linalg.lstsq(X, y[:width], rcond=None)[0]
+        value = float(c[int(rate)])
+        std = float(noise * np.sqrt(np.linalg.inv(X.T @ X)[int(rate), int(rate)]))
+        if not low <= value <= high:
             break
-        S = np.linalg.inv(X.T @ X) * max(noise, size) ** 2
-        chosen = float(c[int(rate)]), float(np.sqrt(S[int(rate), int(rate)]))
+        chosen = value, std
+        low, high = max(low, value - 2.0 * std), min(high, value + 2.0 * std)
     return chosen

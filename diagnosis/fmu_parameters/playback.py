@@ -28,7 +28,7 @@ PROCESSES = 2  # chosen: as everywhere in the diagnosis
 LONGEST = 120.0  # s that one prediction may take; chosen: a window is some thousand steps
 
 
-class Course(NamedTuple):
+class InputCourse(NamedTuple):
     """What an FMU gets in one prediction.
 
     Attributes:
@@ -43,7 +43,7 @@ class Course(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Request:
+class PlaybackRequest:
     """One prediction.
 
     Attributes:
@@ -58,7 +58,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Predicted:
+class PlayedBack:
     """A prediction.
 
     Attributes:
@@ -83,7 +83,7 @@ class Playback:
     path: Path
     inputs: Sequence[str]
     outputs: Sequence[str]
-    courses: Sequence[Course]
+    courses: Sequence[InputCourse]
     _instance: LocalInstance | None = None
     _h: float = 0.0  # of its steps
 
@@ -96,7 +96,7 @@ class Playback:
         # To save the state before each step, for one that is discarded, takes a multiple of the time.
         self._redoes = False
 
-    def run(self, request: Request) -> Predicted:
+    def run(self, request: PlaybackRequest) -> PlayedBack:
         """One prediction."""
         try:
             if self._resets is None:
@@ -107,12 +107,12 @@ class Playback:
             if not self._redoes:
                 self._redoes = True
                 return self.run(request)
-            return Predicted(self._nothing(request), str(error))
+            return PlayedBack(self._nothing(request), str(error))
 
-    def _nothing(self, request: Request) -> np.ndarray:
+    def _nothing(self, request: PlaybackRequest) -> np.ndarray:
         return np.full((len(self.courses[request.course].inputs) + 1, len(self.outputs)), np.nan)
 
-    def _returns_by_reset(self, request: Request) -> bool:
+    def _returns_by_reset(self, request: PlaybackRequest) -> bool:
         """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
         new = self._run(request)
         with suppress(SimulationError):
@@ -137,7 +137,7 @@ class Playback:
         if instance is not None:
             instance.free()
 
-    def _run(self, request: Request) -> Predicted:
+    def _run(self, request: PlaybackRequest) -> PlayedBack:
         course = self.courses[request.course]
         h, n, steps = course.h, len(self.inputs), len(course.inputs)
         instance, values = self._ready(h), self._memory.values
@@ -169,9 +169,9 @@ class Playback:
             if not np.isfinite(outputs[k + 1]).all():
                 name = self.outputs[int(np.flatnonzero(~np.isfinite(outputs[k + 1]))[0])]
                 self.close()  # a reset may not cure it
-                return Predicted(outputs, f"{name} is not finite at t = {(k + 1) * h:.6g} s")
+                return PlayedBack(outputs, f"{name} is not finite at t = {(k + 1) * h:.6g} s")
         instance.terminate()
-        return Predicted(outputs)
+        return PlayedBack(outputs)
 
 
 _playback: Playback  # of a worker process
@@ -184,7 +184,7 @@ def _begin(make: partial[Playback], parent: int) -> None:
     _playback = make()
 
 
-def _run(request: Request) -> Predicted:
+def _run(request: PlaybackRequest) -> PlayedBack:
     return _playback.run(request)
 
 
@@ -196,7 +196,7 @@ class Processes:
     """
 
     def __init__(
-        self, path: Path, inputs: Sequence[str], outputs: Sequence[str], courses: Sequence[Course]
+        self, path: Path, inputs: Sequence[str], outputs: Sequence[str], courses: Sequence[InputCourse]
     ) -> None:
         self.path, self.inputs, self.outputs, self.courses = path, inputs, outputs, courses
         self._pool: ProcessPoolExecutor | None = None
@@ -210,13 +210,13 @@ class Processes:
             )
         return self._pool
 
-    def run(self, requests: Sequence[Request]) -> list[Predicted]:
+    def run(self, requests: Sequence[PlaybackRequest]) -> list[PlayedBack]:
         """Some predictions, in their order."""
         with without_program():
             return [*self._all(requests)]
 
-    def _all(self, requests: Sequence[Request]) -> Iterator[Predicted]:
-        waiting: list[Future[Predicted]] = []
+    def _all(self, requests: Sequence[PlaybackRequest]) -> Iterator[PlayedBack]:
+        waiting: list[Future[PlayedBack]] = []
         with suppress(BrokenProcessPool):
             waiting = [self._begun().submit(_run, request) for request in requests]
         for k, request in enumerate(requests):
@@ -230,7 +230,7 @@ class Processes:
                 with suppress(BrokenProcessPool):
                     waiting += [self._begun().submit(_run, r) for r in requests[k + 1 :]]
 
-    def _alone(self, request: Request, error: Exception) -> Predicted:
+    def _alone(self, request: PlaybackRequest, error: Exception) -> PlayedBack:
         """One prediction after a process has ended; the same again is its own fault."""
         late = isinstance(error, futures.TimeoutError)
         if not late:
@@ -241,7 +241,7 @@ class Processes:
                 self.close()
         rows = len(self.courses[request.course].inputs) + 1
         fault = f"it takes longer than {LONGEST:g} s" if late else "it ends the process that runs it"
-        return Predicted(np.full((rows, len(self.outputs)), np.nan), fault)
+        return PlayedBack(np.full((rows, len(self.outputs)), np.nan), fault)
 
     def close(self) -> None:
         """End the processes."""

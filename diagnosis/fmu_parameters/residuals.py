@@ -18,7 +18,7 @@ from fmus.ops import wrap
 from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
-from .playback import Predicted, Processes, Request
+from .playback import PlaybackRequest, PlayedBack, Processes
 
 STEP = 0.02  # of a central difference, in prior standard deviations; chosen: solvers keep some digits
 REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit
@@ -107,10 +107,12 @@ class WindowResiduals:
 
     def predict(
         self, settings: Sequence[Setting], windows: Sequence[int] | None = None
-    ) -> list[list[Predicted]]:
+    ) -> list[list[PlayedBack]]:
         """Of each setting the prediction in each window."""
         which = range(len(self.windows)) if windows is None else windows
-        requests = [Request(self._first + k, self.values(s), s.forces) for s in settings for k in which]
+        requests = [
+            PlaybackRequest(self._first + k, self.values(s), s.forces) for s in settings for k in which
+        ]
         found = self.processes.run(requests)
         return [found[j : j + len(which)] for j in range(0, len(found), len(which))]
 
@@ -125,7 +127,7 @@ class WindowResiduals:
             del self._known[next(iter(self._known))]
         return found
 
-    def _off(self, w: Window, p: Predicted) -> np.ndarray:
+    def _off(self, w: Window, p: PlayedBack) -> np.ndarray:
         at = w.course.h * np.arange(len(p.outputs))
         with np.errstate(invalid="ignore", over="ignore"):
             outputs = self._gain * p.outputs[:, : self.noise.size] + self._offset
@@ -162,10 +164,10 @@ class WindowResiduals:
         """
         values, requests = self.values(setting), []
         for k, w in enumerate(self.windows, self._first):
-            requests.append(Request(k, values, setting.forces))
+            requests.append(PlaybackRequest(k, values, setting.forces))
             for name, std in w.start_std.items():
                 moved = {name: w.course.start[name] + START_STEP * std}
-                requests.append(Request(k, {**values, **moved}, setting.forces))
+                requests.append(PlaybackRequest(k, {**values, **moved}, setting.forces))
         found = iter(self.processes.run(requests))
         self._whitening = []
         for w in self.windows:

@@ -8,9 +8,9 @@ import numpy as np
 from cosim import InputError
 
 from ..execution.progress import Advance
-from .calibration import together
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
+from .system_calibration import together
 
 # Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
 # it. Chosen: a tenth less is hardly news.

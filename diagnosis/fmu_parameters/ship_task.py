@@ -21,7 +21,7 @@ from .additional_force import AdditionalForce
 from .force_search import candidates
 from .measured_system import FEWEST, Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
-from .playback import Course
+from .playback import InputCourse
 from .residuals import WindowResiduals
 from .system_task import numbered, processes_of
 
@@ -142,7 +142,7 @@ class ShipTask:
             for signal, c in p.map.told("start").items()
             if signal in sure and not p.whole
         }
-        course = Course(h, start, np.column_stack([*inputs.values()]))
+        course = InputCourse(h, start, np.column_stack([*inputs.values()]))
         onto = s.eta[rows[0]] if p.placed else None
         return Window(run.name, float(begin), course, since[rows], s.track.pose[rows], std, onto)
 

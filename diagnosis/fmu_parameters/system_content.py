@@ -17,9 +17,9 @@ from cosim.fmu import FmuModel
 from ..report.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
 from ..report.document import Document, Plot, ReportSection, numbers, write_document, write_json
 from ..report.document import Table as PageTable
-from .calibration import MOST_MOVED, CalibratedValue, SystemCalibration
 from .force_search import Accepted
 from .residuals import Setting, WindowResiduals
+from .system_calibration import MOST_MOVED, CalibratedValue, SystemCalibration
 
 Z95 = float(norm.ppf(0.975))
 SENTENCES = {

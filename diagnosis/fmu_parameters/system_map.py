@@ -41,7 +41,7 @@ TIME = "time"
 Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
 
-class Channel(BaseModel):
+class MappedVariable(BaseModel):
     """A column in terms of a variable: variable = factor * column + offset."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -51,7 +51,7 @@ class Channel(BaseModel):
     offset: FiniteFloat = Field(default=0.0, description="what is added, in the variable's unit")
 
 
-class MeasuredOutput(Channel):
+class MeasuredOutput(MappedVariable):
     """An output that is compared with a column."""
 
     noise: Positive | None = Field(
@@ -59,7 +59,7 @@ class MeasuredOutput(Channel):
     )
 
 
-class DrivenInput(Channel):
+class DrivenInput(MappedVariable):
     """An input that a column drives."""
 
     linear: bool = Field(
@@ -74,7 +74,7 @@ class SystemMap(BaseModel):
 
     inputs: dict[str, DrivenInput] = Field(default_factory=dict)
     outputs: dict[str, MeasuredOutput] = Field(min_length=1)
-    start: dict[str, Channel] = Field(
+    start: dict[str, MappedVariable] = Field(
         default_factory=dict, description="start values, by measured outputs or their derivatives"
     )
     beside: list[str] | None = Field(
@@ -94,7 +94,7 @@ class SystemMap(BaseModel):
     @property
     def variables(self) -> set[str]:
         """All variables that are in use."""
-        groups: tuple[Mapping[str, Channel], ...] = (self.inputs, self.outputs, self.start)
+        groups: tuple[Mapping[str, MappedVariable], ...] = (self.inputs, self.outputs, self.start)
         return {c.name for group in groups for c in group.values()}
 
 
@@ -151,7 +151,7 @@ def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
         "start": (real(model.can_be_set), "value that can be set before a simulation"),
     }
     for group, (possible, role) in roles.items():
-        channels: Mapping[str, Channel] = getattr(found, group)
+        channels: Mapping[str, MappedVariable] = getattr(found, group)
         for column, channel in channels.items():
             place = f"{where}: {group}.{column}"
             if channel.name not in possible:

@@ -20,7 +20,7 @@ from .additional_force import AdditionalForce
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters
-from .playback import Course, Processes
+from .playback import InputCourse, Processes
 from .residuals import WindowResiduals
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
@@ -169,7 +169,7 @@ def processes_of(
     extra = [n for n in dict.fromkeys([*task.forces_on, *set_once]) if n not in driven]
     starts = np.array([float(every[n].start or 0.0) for n in extra])
 
-    def whole(course: Course) -> Course:
+    def whole(course: InputCourse) -> InputCourse:
         still = np.broadcast_to(starts, (len(course.inputs), starts.size))
         return course._replace(inputs=np.column_stack([course.inputs, still]))
 

@@ -20,7 +20,7 @@ NOT_NORMAL = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ParameterFit:
     """The end of a fit.
 
     Attributes:
@@ -79,7 +79,7 @@ def fit(
     begin: Setting,
     sizes: Sequence[float] = (),
     held: Sequence[int] = (),
-) -> Fit:
+) -> ParameterFit:
     """Fit parameters and coefficients.
 
     Args:
@@ -127,10 +127,10 @@ def fit(
         J, faults = r.slopes(s, sizes)
     (white,) = r.whitened([s])
     names = tuple(str(f) for f in faults) if isinstance(faults, list) else ()
-    return Fit(s, tuple(size.tolist()), white, J, bool(held) and len(held) == p, names)
+    return ParameterFit(s, tuple(size.tolist()), white, J, bool(held) and len(held) == p, names)
 
 
-def fitted(r: WindowResiduals, begin: Setting, sizes: Sequence[float] = ()) -> Fit:
+def fitted(r: WindowResiduals, begin: Setting, sizes: Sequence[float] = ()) -> ParameterFit:
     """A fit, with the slopes by start values about its end."""
     first = fit(r, begin, sizes)
     if not any(w.start_std for w in r.windows):
@@ -139,7 +139,7 @@ def fitted(r: WindowResiduals, begin: Setting, sizes: Sequence[float] = ()) -> F
     return fit(r, first.setting, sizes)
 
 
-def intervals(r: WindowResiduals, f: Fit, inflation: float) -> list[tuple[float, float]]:
+def intervals(r: WindowResiduals, f: ParameterFit, inflation: float) -> list[tuple[float, float]]:
     """95 % interval of each parameter's value; by profile where the posterior is not normal.
 
     Args:
@@ -160,7 +160,7 @@ def intervals(r: WindowResiduals, f: Fit, inflation: float) -> list[tuple[float,
 
 
 def _reach(
-    r: WindowResiduals, f: Fit, k: int, sign: float, reach: float, std: float, inflation: float
+    r: WindowResiduals, f: ParameterFit, k: int, sign: float, reach: float, std: float, inflation: float
 ) -> float:
     """How far a parameter's interval reaches to one side, in z."""
     if reach <= 0.0 or not np.isfinite(reach):
@@ -192,7 +192,7 @@ def _reach(
     return float(min(0.5 * (near + far), abs((high if sign > 0 else low) - f.setting.z[k])))
 
 
-def _profile(r: WindowResiduals, f: Fit, k: int, change: float) -> float:
+def _profile(r: WindowResiduals, f: ParameterFit, k: int, change: float) -> float:
     """By how much the cost grows where a parameter is moved and all else fitted anew."""
     begin = r.at(f.setting, k, f.setting.z[k] + change)
     low, high = r.parameters[k].bounds
@@ -204,6 +204,6 @@ def _profile(r: WindowResiduals, f: Fit, k: int, change: float) -> float:
     return fit(r, begin, f.sizes, [k]).cost - f.cost
 
 
-def added(f: Fit, force: AdditionalForce, size: float) -> tuple[Setting, tuple[float, ...]]:
+def added(f: ParameterFit, force: AdditionalForce, size: float) -> tuple[Setting, tuple[float, ...]]:
     """Where to begin with one more force, as yet zero, and the units of all."""
     return Setting(f.setting.z, (*f.setting.forces, replaced(force, 0.0))), (*f.sizes, size)

@@ -9,10 +9,10 @@ from scipy.stats import chi2, norm
 
 from ..execution.progress import Advance, silent
 from .additional_force import AdditionalForce
-from .fit import Fit, fit, fitted, intervals
 from .force_search import Accepted, search
 from .parameter_file import CalibratedParameter
-from .remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
+from .parameter_fit import ParameterFit, fit, fitted, intervals
+from .system_remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
 from .residuals import Setting, WindowResiduals, rms_of
 
 FOUND, EVEN_ODDS = 0.8, 0.5  # contract
@@ -65,7 +65,7 @@ class SystemCalibration:
     first: SystemRemainder
     rejected: str
     together: Sequence[Sequence[str]]
-    fit: Fit
+    fit: ParameterFit
     covariance: np.ndarray
     errors: Mapping[str, Mapping[str, tuple[float, float]]]
     faults: Sequence[str]
@@ -106,12 +106,12 @@ def calibrate(
     (first_white,) = train.whitened([start])
     first = remainder(train, first_white, first_white, 0, names, units)
 
-    def left(f: Fit) -> SystemRemainder:
+    def left(f: ParameterFit) -> SystemRemainder:
         return remainder(train, f.residuals, first_white, f.slopes.shape[1], names, units)
 
     best, accepted = alone, []
 
-    def temper(f: Fit) -> float:
+    def temper(f: ParameterFit) -> float:
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
     while possible and len(accepted) < MOST_FORCES and (left(best).significant or _far(best)):
@@ -163,7 +163,7 @@ class Moved:
     each: Sequence[bool]
 
 
-def _moved(r: WindowResiduals, best: Fit, grown: float) -> Moved:
+def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
     """Which parameters the runs show to be off, forces fitted anew where they are not."""
     p = len(best.setting.z)
     held = Setting((0.0,) * p, best.setting.forces)
@@ -178,7 +178,7 @@ def _moved(r: WindowResiduals, best: Fit, grown: float) -> Moved:
 
 
 def verdict_of(
-    forces: Sequence[Accepted], moved: Moved, best: Fit, rest: SystemRemainder, rejected: bool
+    forces: Sequence[Accepted], moved: Moved, best: ParameterFit, rest: SystemRemainder, rejected: bool
 ) -> Verdict:
     """The verdict, by the rule of ships with parameters in place of coefficients.
 
@@ -197,7 +197,7 @@ def verdict_of(
     return "parameters" if any(moved.each) else "ambiguous"
 
 
-def _far(best: Fit) -> bool:
+def _far(best: ParameterFit) -> bool:
     """Whether a parameter is further from its prior mean than that allows."""
     return bool(np.abs(best.setting.z).max() > MOST_MOVED)
 
@@ -207,7 +207,7 @@ def rest_is_large(rest: SystemRemainder) -> bool:
     return any(o.share > EVEN_ODDS and o.matters for o in rest.outputs)
 
 
-def _rejected(validate: WindowResiduals | None, best: Fit, start: Setting) -> str:
+def _rejected(validate: WindowResiduals | None, best: ParameterFit, start: Setting) -> str:
     """Why validation runs reject what was learned; empty: they do not."""
     if validate is None:
         return ""
