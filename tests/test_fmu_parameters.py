@@ -14,6 +14,7 @@ from cosim import InputError, Unit
 from cosim.fmu import FmuModel
 from diagnosis import learn, linearise, parameters
 from diagnosis.fmu_parameters.additional_force import AdditionalForce
+from diagnosis.fmu_parameters.fmu_playback import InputCourse, Playback, PlaybackRequest, Processes
 from diagnosis.fmu_parameters.force_search import candidates
 from diagnosis.fmu_parameters.measured_system import MeasuredRun, noise_of, noises, windows_of
 from diagnosis.fmu_parameters.parameter_file import (
@@ -23,7 +24,6 @@ from diagnosis.fmu_parameters.parameter_file import (
     proposed,
     read_parameters,
 )
-from diagnosis.fmu_parameters.playback import InputCourse, Playback, PlaybackRequest, Processes
 from diagnosis.fmu_parameters.residuals import Whitening, laid
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 
@@ -215,11 +215,12 @@ def test_linear_model_of_the_oscillator_is_its_equation(fmu, work, seen):
     found = json.loads((work / "linear/linear.json").read_text())
     assert np.allclose(found["A"], [[0.0, 1.0], [-10.0, -0.5]], atol=5e-3)
     assert np.allclose(found["B"], [[0.0], [0.5]], atol=1e-3)
-    assert np.allclose(found["C"], [[1.0, 0.0], [0.0, 1.0], [-10.0, -0.5]], atol=1e-6)
-    assert np.allclose(found["D"], [[0.0], [0.0], [0.5]], atol=1e-6)
+    seen_by = [[1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [-10.0, -0.5]]
+    assert np.allclose(found["C"], seen_by, atol=1e-6)
+    assert np.allclose(found["D"], [[0.0], [0.0], [0.0], [0.5]], atol=1e-6)
     assert found["x_dot"] == pytest.approx([-0.1, (1.0 - 4.0 + 0.1) / 2.0], abs=1e-3)
     assert [s["name"] for s in found["states"]] == ["x0", "v0"]
-    assert [o["unit"] for o in found["outputs"]] == ["m", "m/s", "m/s2"]
+    assert [o["unit"] for o in found["outputs"]] == ["m", "m/s", "m/s", "m/s2"]
     mat = loadmat(work / "linear/linear.mat")
     assert np.array_equal(mat["A"], found["A"])
     assert [str(x[0]) for x in mat["states"].ravel()] == ["x0", "v0"]
@@ -278,7 +279,9 @@ def test_parameters_that_runs_determine(fmu, work, capsys):
 @pytest.mark.slow
 def test_values_known_only_together_are_said(work, capsys):
     """Only the product of spring constant and another value acts."""
-    fmu = build_oscillator(work, "product", habit="p[F] += p[C] * p[X] - p[C] * p[UNUSED] * p[X];")
+    fmu = build_oscillator(
+        work, "product", habit="p[V_f] += p[V_c] * p[V_x] - p[V_c] * p[V_unused] * p[V_x];"
+    )
     run = measured(fmu, work, "run", {})
     assert parameters.main([str(fmu), "--map", written(work / "map.json", MAP), "--runs", run]) == 0
     assert "known only together: c, unused" in " ".join(capsys.readouterr().out.split())
@@ -359,7 +362,7 @@ def test_windows_from_measured_states_agree_with_whole_runs(fmu, work):
 
 @pytest.mark.slow
 def test_range_in_which_the_fmu_fails_is_said_and_the_rest_goes_on(work, capsys):
-    habit = "if (p[C] > 40.0) return 3; if (p[D] > 3.0) p[X] = NAN;"
+    habit = "if (p[V_c] > 40.0) return 3; if (p[V_d] > 3.0) p[V_x] = NAN;"
     fmu = build_oscillator(work, "fragile", habit=habit)
     run = measured(fmu, work, "run", {"c": 12.0})
     given = written(work / "map.json", MAP)

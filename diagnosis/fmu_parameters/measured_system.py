@@ -13,7 +13,7 @@ from cybership.message_text import quoted
 
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.tables import column_names, numbers, table_of_file
-from .playback import InputCourse
+from .fmu_playback import InputCourse
 from .system_map import TIME, SystemMap, column_of_start
 
 LOGS = ("log.csv", "log.parquet")

@@ -16,9 +16,9 @@ from fmus.frames import rotate_to_earth
 from fmus.ops import wrap
 
 from .additional_force import AdditionalForce
+from .fmu_playback import PlaybackRequest, PlayedBack, Processes
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
-from .playback import PlaybackRequest, PlayedBack, Processes
 
 STEP = 0.02  # of a central difference, in prior standard deviations; chosen: solvers keep some digits
 REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit

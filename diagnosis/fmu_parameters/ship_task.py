@@ -18,10 +18,10 @@ from ..predictors.fmu.foreign_fmu import FmuPredictor
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed
 from .additional_force import AdditionalForce
+from .fmu_playback import InputCourse
 from .force_search import candidates
 from .measured_system import FEWEST, Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
-from .playback import InputCourse
 from .residuals import WindowResiduals
 from .system_task import numbered, processes_of
 

@@ -12,8 +12,8 @@ from .additional_force import AdditionalForce
 from .force_search import Accepted, search
 from .parameter_file import CalibratedParameter
 from .parameter_fit import ParameterFit, fit, fitted, intervals
-from .system_remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
 from .residuals import Setting, WindowResiduals, rms_of
+from .system_remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
 
 FOUND, EVEN_ODDS = 0.8, 0.5  # contract
 MOST_MOVED = 3.0  # prior standard deviations; contract

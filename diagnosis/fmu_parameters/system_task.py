@@ -17,10 +17,10 @@ from cybership.message_text import quoted
 from ..predictors.black_box import MOTION, POSE
 from ..runs import stated_layout
 from .additional_force import AdditionalForce
+from .fmu_playback import InputCourse, Processes
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters
-from .playback import InputCourse, Processes
 from .residuals import WindowResiduals
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
