@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -65,7 +66,7 @@ def measured(path: Path, s: ForeignSystem, kind: str, seed: int) -> pd.DataFrame
     return pd.DataFrame({"time": s.step * np.arange(SAMPLES), **inputs, s.output: noisy})
 
 
-def one(path: Path, s: ForeignSystem, kind: str, seed: int, folder: Path) -> dict[str, object]:
+def one(path: Path, s: ForeignSystem, kind: str, seed: int, folder: Path) -> dict[str, Any]:
     """What ``learn`` says of one hidden cause."""
     runs = []
     for k in range(3):
@@ -164,7 +165,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(summary(results))
 
 
-def summary(results: Sequence[dict[str, object]]) -> str:
+def summary(results: Sequence[dict[str, Any]]) -> str:
     """All cases in a sentence."""
 
     def total(key: str) -> int:
@@ -173,8 +174,8 @@ def summary(results: Sequence[dict[str, object]]) -> str:
     seconds = [float(r["seconds"]) for r in results]
     return (
         f"{total('right')} of {len(results)} right; {total('inside')} of {total('intervals')} intervals "
-        f"hold the truth; {total('false cause')} false causes at 0.9 or more; {total('worse')} test runs "
-        f"predicted worse; {np.median(seconds):.0f} s a case, {max(seconds):.0f} s at most"
+        f"hold the truth; {total('false cause')} false causes at 0.9 or more; {total('worse')} test "
+        f"runs predicted worse; {np.median(seconds):.0f} s a case, {max(seconds):.0f} s at most"
     )
 
 

@@ -11,7 +11,8 @@ from .parameter_fit import ParameterFit, added, fit
 from .residuals import Setting, WindowResiduals, replaced
 
 TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
-# Correlation of what two forces change beyond parameters, from which on no such run tells them apart.
+# Correlation of two signals that are one, and of what two forces change beyond parameters, which no such
+# run discriminates.
 SAME = 0.999  # chosen
 PROBABLE = 0.05  # of a candidate that belongs to the set of those that cannot be told apart; chosen
 ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
@@ -79,7 +80,7 @@ def search(
     """
     advance("which additional force explains the residual")
     present = {f.id for f in at.setting.forces}
-    tried = [f for f in possible if f.id not in present]
+    tried = [f for f in _distinct(r, at, possible) if f.id not in present]
     scaled = _scaled(r, at, tried, usual)
     if not scaled:
         return None
@@ -144,6 +145,23 @@ def _promising(
 def _with_prior(at: ParameterFit) -> np.ndarray:
     p = len(at.setting.z)
     return np.concatenate([at.slopes, np.eye(p, at.slopes.shape[1])])
+
+
+def _distinct(
+    r: WindowResiduals, at: ParameterFit, possible: Sequence[AdditionalForce]
+) -> list[AdditionalForce]:
+    """The forces without those of a signal that is another one by another name."""
+    outputs = [p.outputs for p in r.predict([at.setting])[0]]
+    signals: dict[tuple[str, bool], np.ndarray] = {("", False): np.zeros(0)}
+    wanted = {(f.output, f.rate) for f in possible if f.output}
+    for name, rate in sorted(wanted, key=lambda key: (key[1], r.processes.outputs.index(key[0]))):
+        k = r.processes.outputs.index(name)
+        parts = [np.gradient(y[:, k]) if rate else y[:, k] for y in outputs]
+        y = np.concatenate([part - part.mean() for part in parts])
+        size = float(np.linalg.norm(y))
+        if size > 0.0 and all(abs(float(y @ x)) < SAME * size for x in signals.values() if x.size):
+            signals[name, rate] = y / size
+    return [f for f in possible if (f.output, f.rate) in signals]
 
 
 def _scaled(
