@@ -48,6 +48,7 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.tex",
 )
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
+FMUS = (".fmu", ".ssp", ".json")
 UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
 
 
@@ -57,7 +58,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def learn(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
-    """Run the command with parsed options: the three answers, each when its files are there."""
+    """Run the command with parsed options: the three answers, each when its files are there.
+
+    Where the parameters of an FMU are calibrated, there is one answer.
+    """
+    if _calibrates_fmu(options):
+        yield _learned_of_fmu(options, advance)
+        return
     task = _begun(options, advance)
     yield _compared(task, options)
     calibrated = _calibrated(task, options)
@@ -65,6 +72,28 @@ def learn(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         yield calibrated
     if not options.quick:
         yield _diagnosed(task, options, advance)
+
+
+def _calibrates_fmu(options: argparse.Namespace) -> bool:
+    """Whether parameters of an FMU are calibrated: they are named, or the FMU is not of a ship."""
+    model = options.model
+    if options.parameters is not None and (model is None or model.suffix not in FMUS):
+        raise InputError("--parameters are those of an FMU: --model NAME.fmu is missing")
+    if model is None or model.suffix not in FMUS:
+        return False
+    from .fmu_parameters.system_task import is_system
+
+    return options.parameters is not None or is_system(options.train, options.map)
+
+
+def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
+    """The one answer where the parameters of an FMU are calibrated."""
+    from .fmu_parameters.learn_fmu import learn_ship, learn_system
+    from .fmu_parameters.system_task import is_system
+
+    origin = {name: str(value) for name, value in _origin(options).items()}
+    work = learn_system if is_system(options.train, options.map) else learn_ship
+    return Done(0, work(options, advance, origin).shown(str(options.out)))
 
 
 def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
@@ -195,6 +224,7 @@ def _parser() -> argparse.ArgumentParser:
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
         "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
+        "           %(prog)s run1.csv --model vendor.fmu --parameters parameters.json\n"
         "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
         "            130 interrupted (the files of answers that were shown are kept)",
     )
@@ -251,6 +281,13 @@ def _parser() -> argparse.ArgumentParser:
         default=PAIRED,
         help=f"criterion by which effects are rejected: {', '.join(CRITERIA)}, or a FILE.py of your own "
         f"({PAIRED})",
+    )
+    made.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE.json",
+        help="parameters of an FMU given by --model to calibrate; cybership parameters proposes the "
+        "file (none for a ship, else those that the runs determine)",
     )
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"

@@ -27,7 +27,18 @@ if TYPE_CHECKING:
     from ..predictors import Execution
 
 # Options that name files which decide a result.
-INPUTS = ("train", "validate", "test", "runs", "run", "model", "map", "effects", "criteria")
+INPUTS = (
+    "train",
+    "validate",
+    "test",
+    "runs",
+    "run",
+    "model",
+    "map",
+    "parameters",
+    "effects",
+    "criteria",
+)
 RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 
 
