@@ -1,6 +1,7 @@
 """The benchmark of logs: ways to record one do what they say, and each aim is counted."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -56,7 +57,7 @@ def test_results_are_read_back():
 
 
 def test_each_aim_is_counted():
-    known = {"noise": (1.0, 1.5, np.nan), "rel_std": (0.1, 0.1, 0.0)}
+    known: dict[str, Any] = {"noise": (1.0, 1.5, np.nan), "rel_std": (0.1, 0.1, 0.0)}
     found = [
         Recorded("clean", verdict="found", found={"X_u": 0.95}, error=1.0, **known),
         Recorded(

@@ -88,7 +88,7 @@ class Recorded:
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Recorded":
         """The same, of such a file."""
-        known = {n: np.nan if v is None else v for n, v in content.items()}
+        known: dict[str, Any] = {n: np.nan if v is None else v for n, v in content.items()}
         for name in ("noise", "rel_std"):
             known[name] = tuple(np.nan if v is None else v for v in content[name])
         return cls(**known)
