@@ -10,7 +10,6 @@ import argparse
 import json
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -19,7 +18,6 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from diagnosis.predictors import ship_with
-from diagnosis.report.formatting import finite
 from diagnosis.runs import prepare, read_frame, table_of
 
 from .aims import CLEAN, aims, line
@@ -94,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     test = o.test and good_log(o.test, o.test_part, o.ship, o.rate, o.seed)
     asked_for = {n: v for n, v in vars(o).items() if n not in ("only", "workers", "out", "there")}
     of = {n: v.name if isinstance(v, Path) else v for n, v in asked_for.items()}
-    before = _answers(o.out, finite(of), parser)
+    before = _answers(o.out, of, parser)
     ways, found = o.only or [*WAYS], list[Recorded]()
     print("| way | noise found / there | cause | error / clean | s |\n|---|---|---|--:|--:|")
     with ProcessPoolExecutor(o.workers, get_context("spawn")) as pool:
@@ -105,8 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(line(found[-1], found[0] if found[0].way == CLEAN else None), flush=True)
             if o.out:
                 kept = before | {x.way: x for x in found}
-                content = {"of": of, "ways": [asdict(x) for x in kept.values()]}
-                o.out.write_text(json.dumps(finite(content), indent=1) + "\n", encoding="utf-8")
+                content = {"of": of, "ways": [x.content() for x in kept.values()]}
+                o.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print("\n| aim | number |\n|---|---|")
     for aim, number in aims(found, o.there):
         print(f"| {aim} | {number} |")

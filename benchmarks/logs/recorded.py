@@ -5,7 +5,7 @@ import os
 import time
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -81,10 +81,14 @@ class Recorded:
     error: float = np.nan
     seconds: float = 0.0
 
+    def content(self) -> dict[str, Any]:
+        """What a file of results holds, in which a number that is not finite is null."""
+        return json.loads(json.dumps(asdict(self)), parse_constant=lambda _: None)
+
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Recorded":
-        """What a file of results holds, in which a number that is not finite is null."""
-        known = {n: np.nan if v is None else v for n, v in content.items()}
+        """The same, of such a file."""
+        known: dict[str, Any] = {n: np.nan if v is None else v for n, v in content.items()}
         for name in ("noise", "rel_std"):
             known[name] = tuple(np.nan if v is None else v for v in content[name])
         return cls(**known)

@@ -8,7 +8,7 @@ deviations from its prediction by all others is a spike.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -87,13 +87,13 @@ class Smoothed:
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
         noise: (3,), standard deviation of the measurement [m, m, rad].
-        noise_rel_std: (3,), relative standard deviation of that; zero where it was given.
         jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
         late: whether the whole run agrees on that delay.
         pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
         doubted: lines on noise that was given and contradicts the samples.
         sensors: what the run's channels say of each other; None where nobody asked.
+        noise_rel_std: (3,), relative standard deviation of the noise; zero where it was given.
     """
 
     track: Track
@@ -108,13 +108,13 @@ class Smoothed:
     eta_ddot_std: np.ndarray
     nu_std: np.ndarray
     noise: np.ndarray
-    noise_rel_std: np.ndarray
     jerk: np.ndarray
     delay: float
     late: bool
     pose_only: PoseOnly
     doubted: tuple[str, ...] = ()
     sensors: Examined | None = None
+    noise_rel_std: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def time(self) -> np.ndarray:
@@ -301,12 +301,12 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         eta_ddot_std,
         _body_std(motion, eta_std, eta_dot_std),
         sigma,
-        uncertain,
         sigma**2 / (smoothness * grid.spacing**DEGREE),
         response.delay,
         response.sure,
         pose_only,
         tuple(_doubted(track, alone, even)),
+        noise_rel_std=uncertain,
     )
 
 
