@@ -431,8 +431,8 @@ def test_tests_of_one_log_are_left_out_together():
     names += ["turn_14-Oct_14_08_51", "turn_14-Oct_14_17_39"]
     runs = [SimpleNamespace(run=SimpleNamespace(name=name)) for name in names]
     first, second = ([w.run.name for w in fold] for fold in low_speed_tanker.dealt(runs, 2))
-    assert first == [*names[:2], names[3]]
-    assert second == [names[2], names[4]]
+    assert sorted(first) == [*names[:2], names[3]]
+    assert sorted(second) == [names[2], names[4]]
 
 
 @needs_esso
