@@ -105,12 +105,13 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     given = np.abs(tau)
     if w.run.commands is not None:  # what is beyond a limit is a command, though it gives no force
         unit = model.ship.form_of(w.run.commands)
-        given = np.abs(w.run.commands[:, [unit[s] != "rad" for s in w.run.signals]])
-    if not (given.max(axis=1, initial=0.0) == 0.0).any():
+        thrusts = [k for k, name in enumerate(w.run.signals) if unit[name] != "rad"]
+        given = np.abs(w.run.commands[:, thrusts or slice(None)])
+    if not (given.sum(axis=1) == 0.0).any():
         return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
-    idle = (every.held @ given).max(axis=1, initial=0.0) == 0.0
+    idle = (every.held @ given).sum(axis=1) == 0.0
     if idle.sum() < SETTINGS.long:
         return None
     still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))
