@@ -67,7 +67,7 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChan
     seen = beyond or (
         f"its accelerations follow {', '.join(wrong)}" if wrong else pushed_aside(w, model)
     )
-    found = likeliest_mistake(w, model, seen is not None, given.mean)
+    found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean)
     if found:
         clause = f"{beyond}; {found.clause}" if beyond else found.clause
         return clause, found.readings[0].changes, None
@@ -131,7 +131,7 @@ def likeliest_mistake(
     Args:
         w: windows of the run.
         model: of its ship.
-        doubted: whether something else says that the file is wrong, so that it is only asked in what.
+        doubted: whether commands or accelerations show that the file is wrong.
         factor: by which a column without a unit may be off; None: by none.
     """
     odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
