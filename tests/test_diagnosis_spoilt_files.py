@@ -63,7 +63,7 @@ TOLD = [
     ("tau_mN", column(**MILLI)),
     ("tau_kN", column(**KILO)),
     ("tau_N_Nmm", column(tau_N={"unit": "N.mm"})),
-    ("tau_percent", "its commands are in percent of the full thrust"),
+    ("tau_percent", "times the 1.165 N that the thrusters give"),
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
     ("psi_180", column(psi={"offset": 3.142})),
     ("const_tau", "none of its commands ever varies"),

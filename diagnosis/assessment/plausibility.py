@@ -8,7 +8,7 @@ dead actuators, do not do as well.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, compress
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import gains
 from .reading_odds import ReadingOdds, most_thrust
-from .readings import AS_READ, Reading, other_factors, readings
+from .readings import AS_READ, Reading, other_factors, readings, reread
 from .settings import SETTINGS
 
 # rad; a heading that is off by any of them is an effect of the library, and no mistake where it explains
@@ -67,9 +67,10 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChan
     seen = beyond or (
         f"its accelerations follow {', '.join(wrong)}" if wrong else pushed_aside(w, model)
     )
-    found = likeliest_mistake(w, model, seen is not None, given.mean)
+    found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean)
     if found:
-        return found.clause, found.readings[0].changes, None
+        clause = f"{beyond}; {found.clause}" if beyond else found.clause
+        return clause, found.readings[0].changes, None
     return (seen, {}, None) if seen else None
 
 
@@ -130,12 +131,17 @@ def likeliest_mistake(
     Args:
         w: windows of the run.
         model: of its ship.
-        doubted: whether something else says that the file is wrong, so that it is only asked in what.
+        doubted: whether commands or accelerations show that the file is wrong.
         factor: by which a column without a unit may be off; None: by none.
     """
     odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
     named = len(possible)
     possible += [] if factor is None else other_factors(w.run, factor)
+    if beyond_thrusters(w.run, model):
+        sound = [not beyond_thrusters(reread(w, r, model).run, model) for r in possible]
+        named, possible = sum(sound[:named]), [*compress(possible, sound)]
+        if not possible:
+            return None
     needed = np.log((1 if doubted else len(possible)) / SETTINGS.chance)
     found = np.array([odds.log_density(reading) for reading in possible])
     as_read = odds.log_density(AS_READ)
@@ -143,10 +149,12 @@ def likeliest_mistake(
         return None
     best = possible[int(np.argmax(found))]
     lawful = [Reading("", turn=turn) for turn in TURNS]
-    if best.commands is not None:  # actuators that are dead show nothing of any command
+    if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
+        lawful = []
+    elif best.commands is not None:  # actuators that are dead show nothing of any command
         same = (best.commands == np.eye(len(best.commands))).all(axis=1)
         lawful.append(Reading("", commands=np.diag(same.astype(float))))
-    better = found.max() - max(as_read, *map(odds.log_density, lawful))
+    better = found.max() - max([as_read, *map(odds.log_density, lawful)])
     if better < needed:
         return None
     near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))

@@ -25,7 +25,6 @@ from scipy.optimize import lsq_linear
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OVERLAP
-from ..search.prior import MEASURED, NominalPrior
 from .readings import Reading, inertial, needed, reread
 from .settings import SETTINGS
 
@@ -105,7 +104,7 @@ class ReadingOdds:
             why.may(-part, SETTINGS.lost, 0.0, 1.0)
         for axis in axes:
             why.may((a - z) * axis, 1.0, -1.0)
-        return why.density(e, MEASURED * np.sqrt((a**2).mean(axis=0)), self.windows) + (
+        return why.density(e, SETTINGS.inexact * np.sqrt((a**2).mean(axis=0)), self.windows) + (
             self.windows * reading.density
         )
 
@@ -137,10 +136,6 @@ class ReadingOdds:
         return found if len(found) > 1 else []
 
     @cached_property
-    def _prior(self) -> NominalPrior:
-        return NominalPrior.of(self.model)
-
-    @cached_property
     def _gain(self) -> float:
         """Relative deviation of the thrusters' forces."""
         known = self.model.ship.coefficients.items()
@@ -149,9 +144,10 @@ class ReadingOdds:
     @cached_property
     def _inertia(self) -> np.ndarray:
         """(3,), relative deviation of the inertia of each axis."""
-        own = self.model.mass.diagonal()
-        hull = [(n, s) for n, s in self._prior.std.items() if self.model.owner(n) == "vessel"]
-        changes = [self.model.plus({n: s}).mass.diagonal() - own for n, s in hull]
+        own, model = self.model.mass.diagonal(), self.model
+        known = [(n, k) for n, k in model.ship.coefficients.items() if model.owner(n) == "vessel"]
+        others = [model.plus({n: k.deviation(model.value(n))}) for n, k in known]
+        changes = [other.mass.diagonal() - own for other in others]
         return np.sqrt(np.square(changes).sum(axis=0)) / own
 
 

@@ -23,6 +23,7 @@ class AssessmentSettings:
     # gives a tenth, or none, is a matter of the diagnosis.
     least_gain: float = 0.1
     windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
+    inexact: float = 0.1  # 1, of the inertial force, that a model lacks at the least; chosen
     lost: float = 0.5  # 1, deviation of the share of a thruster's force that is lost; chosen
     drift: float = 0.5  # 1, of the full thrust, that nothing but an actuator gives all the time; chosen
     steady: float = 0.1  # 1, of the full thrust, deviation of a force that is steady; chosen
