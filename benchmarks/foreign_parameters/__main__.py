@@ -20,8 +20,6 @@ from fmpy.fmi2 import FMU2Slave
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis import learn
-
 from .foreign_systems import CASES, OTHERS, ForeignSystem, built
 
 SAMPLES, NOISE, FACTOR = 600, 0.01, 1.25
