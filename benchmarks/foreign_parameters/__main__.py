@@ -7,6 +7,8 @@ FMPy, not with this project's master. ``--fmus`` names a folder with FMUs of oth
 
 import argparse
 import json
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
