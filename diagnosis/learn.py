@@ -88,7 +88,7 @@ def _calibrates_fmu(options: argparse.Namespace) -> bool:
 
 def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
     """The one answer where the parameters of an FMU are calibrated."""
-    from .fmu_parameters.learn_fmu import learn_ship, learn_system
+    from .fmu_parameters.output.learn_fmu import learn_ship, learn_system
     from .fmu_parameters.system_task import is_system
 
     origin = {name: str(value) for name, value in _origin(options).items()}

@@ -7,6 +7,8 @@ FMPy, not with this project's master. ``--fmus`` names a folder with FMUs of oth
 
 import argparse
 import json
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -19,8 +21,6 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 from rich.console import Console
 from rich.table import Table
-
-from diagnosis import learn
 
 from .foreign_systems import CASES, OTHERS, ForeignSystem, built
 
@@ -86,17 +86,9 @@ def one(path: Path, s: ForeignSystem, kind: str, seed: int, folder: Path) -> dic
     options = {"model": path, "map": folder / "map.json", "parameters": folder / "parameters.json"}
     named = [str(x) for name, value in options.items() for x in (f"--{name}", value)]
     began = time.perf_counter()
-    code = learn.main(
-        [
-            *map(str, runs[:2]),
-            "--test",
-            str(runs[2]),
-            *named,
-            "--out",
-            str(folder / "out"),
-            "--overwrite",
-        ]
-    )
+    named += ["--out", str(folder / "out"), "--overwrite"]
+    command = [sys.executable, "-m", "diagnosis.learn", *map(str, runs[:2]), "--test", str(runs[2])]
+    code = subprocess.run([*command, *named], stdout=subprocess.DEVNULL).returncode
     seconds = time.perf_counter() - began
     if code != 0:
         return {"verdict": f"exit code {code}", "right": False, "seconds": seconds}

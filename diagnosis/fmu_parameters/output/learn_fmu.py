@@ -4,15 +4,16 @@ import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..execution.progress import Advance
-from ..execution.result_folder import together
-from ..predictors import WRITTEN
-from .residuals import WindowResiduals
-from .sensitivity import refuse_unknown, sensitivities
-from .ship_task import ship_task
-from .system_calibration import calibrate
-from .system_content import CalibrationReport, plots_of
-from .system_task import SystemTask, system_task
+from ...execution.progress import Advance
+from ...execution.result_folder import together
+from ...predictors import WRITTEN
+from ..residuals import WindowResiduals
+from ..sensitivity import refuse_unknown, sensitivities
+from ..ship_task import ship_task
+from ..system_calibration import calibrate
+from ..system_task import SystemTask, system_task
+from .system_content import CalibrationReport
+from .system_plots import plots_of
 
 FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
 OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.csv", "coefficients.tex")
