@@ -263,15 +263,11 @@ def test_a_hang_is_one_line_that_names_the_run(made, tmp_path):
         steps_of(made, tmp_path, timeout=1e-6)
 
 
-def test_the_length_of_the_ship_is_asked_for(made, tmp_path, capsys, monkeypatch):
+def test_the_length_of_the_ship_is_stated(made, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run, _ = sail(20.0)
     table = np.column_stack([run.time, run.pose, run.tau_cmd])
     header = "time,x,y,psi,tau_X,tau_Y,tau_N"
     np.savetxt("run.csv", table, delimiter=",", header=header, comments="")
-    assert diagnosis.compare.main(["run.csv", "--model", str(made), "--out", "out"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "does not say which ship it is of" in line
-    assert "--ship" in line
-    with pytest.raises(InputError, match="--ship"):
-        diagnosis.compare("run.csv", model=made)
+    assert diagnosis.compare.main(["run.csv", "--model", str(made), "--out", "out"]) == 0
+    assert "a ship of 1.105 m" in " ".join(capsys.readouterr().out.split())

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.io import savemat
 
 from cosim import InputError
-from cosim.fmu import FmuModel
+from cosim.fmu import ConfinedFmu, FmuModel
 from cybership.message_text import quoted
 
 from ..predictors.black_box import MOTION, TAU
@@ -166,7 +166,7 @@ def linearised(
     suggested = model.description.defaultExperiment
     h = float(suggested.stepSize) if suggested is not None and suggested.stepSize else STEP
     seen = [*outputs, *(s.seen for s in states)]
-    with closing(ShortSteps(model, inputs, seen, h)) as steps:
+    with closing(ConfinedFmu(model)) as fmu, closing(ShortSteps(fmu, inputs, seen, h, False)) as steps:
 
         def answer(start: Mapping[str, float], driven: Mapping[str, float]) -> np.ndarray:
             found = steps.run(start, driven)

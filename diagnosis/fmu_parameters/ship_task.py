@@ -14,7 +14,7 @@ from cosim import InputError
 from ..execution.progress import Advance
 from ..predictors import Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
-from ..predictors.fmu.foreign_fmu import FmuPredictor
+from ..predictors.fmu.fmu_predictor import FmuPredictor
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed
 from .additional_force import AdditionalForce
@@ -186,7 +186,7 @@ def ship_task(
         InputError: one of them is not as it should be.
     """
     from ..assessment.gathering import gather
-    from ..predictors import nominal, ship_with
+    from ..predictors import ship_with
 
     craft = ship_with(options.effects, options.ship)
     path = getattr(options, "model", None) or options.fmu
@@ -195,7 +195,7 @@ def ship_task(
     gathered = gather(every, advance, options.anyway, fmu.start, options.horizon)
     ends = np.cumsum([0, *(len(each) for each in paths.values())])
     runs = {use: gathered[a:b] for use, a, b in zip(paths, ends[:-1], ends[1:], strict=True)}
-    predictor = FmuPredictor(fmu, gathered, fmu.start or nominal(gathered))
+    predictor = fmu.begun_on(gathered)
     told = predictor.map
     if not set(POSE) <= told.told("outputs").keys():
         raise InputError(f"'{fmu.name}' needs outputs for x, y and psi to calibrate its parameters")

@@ -188,6 +188,11 @@ class FmuPredictor(BlackBox):
 
     def _sentences(self, wait: float) -> Iterator[str]:
         yield from super()._sentences(wait)
+        description = self.ship.ship.description
+        yield (
+            f"Windows, filters and effects are those of a ship of {description.length:.4g} m "
+            f"({description.title}); --ship NAME|FILE.toml selects another."
+        )
         if (step := self.fmu.fixed_step) is not None:
             yield f"It takes steps of {step:.6g} s, with a cubic spline through its outputs."
         if self.late:

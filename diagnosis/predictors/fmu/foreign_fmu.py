@@ -141,11 +141,22 @@ class Fmu:
             raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
         return found
 
-    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> "FmuPredictor":
+    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> FmuPredictor:
         """The predictor of some runs, see :meth:`..predictor.ModelSource.on`.
 
         Raises:
             InputError: as :meth:`variables`; the FMU refuses to be set to a measured state, or fails.
+        """
+        predictor = self.begun_on(runs)
+        advance(f"what {self.name} does in measured states")
+        assert predictor.model  # which takes a while
+        return predictor
+
+    def begun_on(self, runs: Sequence[WeakWindows]) -> FmuPredictor:
+        """The predictor of some runs, of which nothing is computed yet.
+
+        Raises:
+            InputError: as :meth:`variables`; there is no process for it.
         """
         measured = [w.run for w in runs]
         maps = self.given(measured), self.variables(measured)  # before a process is started
@@ -154,16 +165,10 @@ class Fmu:
             confined = ConfinedFmu(self.model, means, self.execution.timeout)
         except cosim.SimulationError as error:
             raise cosim.InputError(str(error)) from None
-        try:
-            steps = self.step, self.fixed_step, self.needs_tool
-            files = [(role, path, sha256(path)) for role, path in self.files]
-            use = FmuUse(self.name, self.sha256, confined, *steps, *maps, self.learned_from, files)
-            predictor = FmuPredictor(use, runs, self.start or nominal(runs))
-            advance(f"what {self.name} does in measured states")
-            assert predictor.model  # which takes a while
-        except BaseException:
-            confined.close()
-            raise
+        steps = self.step, self.fixed_step, self.needs_tool
+        files = [(role, path, sha256(path)) for role, path in self.files]
+        use = FmuUse(self.name, self.sha256, confined, *steps, *maps, self.learned_from, files)
+        predictor = FmuPredictor(use, runs, self.start or nominal(runs))
         finalize(predictor, confined.close)
         return predictor
 

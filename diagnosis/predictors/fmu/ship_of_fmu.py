@@ -12,23 +12,14 @@ FMUS = (".fmu", *SYSTEMS)
 
 
 def ship_of_model(path: str | Path | None) -> str | None:
-    """The ship that a model file is of; None: it is no FMU, and the default one is meant.
+    """The ship that a model file is of; None: it does not say it, or is no FMU.
 
     Args:
         path: what ``--model`` names.
-
-    Raises:
-        InputError: an FMU or a system that does not say it. Windows, filters and effects go by the
-            length of the ship, so that none is assumed.
     """
     if path is None or Path(path).suffix not in FMUS:
         return None
-    if (found := _told(Path(path).absolute())) is None:
-        raise cosim.InputError(
-            f"'{Path(path).name}' does not say which ship it is of, whose length sets the windows: "
-            "--ship NAME|FILE.toml is missing (a file with title, length, beam, mass, moment of inertia)"
-        )
-    return found
+    return _told(Path(path).absolute())
 
 
 def _told(path: Path) -> str | None:
