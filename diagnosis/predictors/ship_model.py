@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
 from fmus.vessel.vessel import PreparedVessel
 
-from ..runs import Fingerprint
+if TYPE_CHECKING:  # at run time it takes a while to import
+    from ..runs import Fingerprint
 
 Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
@@ -107,7 +108,7 @@ class Model:
     origin: "Model | None" = None
     runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     given: Mapping[str, SampledForce] = field(default_factory=dict)
-    learned_from: tuple[Fingerprint, ...] = ()
+    learned_from: "tuple[Fingerprint, ...]" = ()
 
     def __repr__(self) -> str:
         parts = (*self.ship.parameters, "measurement")

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import fftconvolve
 
 from cosim import InputError
 
-from .smoothing.smoother import Smoothed
+if TYPE_CHECKING:  # at run time it takes a while to import
+    from .smoothing.smoother import Smoothed
 
 POINTS = 512  # of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
 PIECES, SHIFTS = 4, 8  # of the shorter run; within a step of the course; chosen
@@ -48,7 +48,7 @@ class Fingerprint:
     certain: np.ndarray
 
     @classmethod
-    def of(cls, smoothed: Smoothed) -> "Fingerprint":
+    def of(cls, smoothed: "Smoothed") -> "Fingerprint":
         """That of a run."""
         run, known = smoothed.track.run, np.isfinite(smoothed.nu[:, 0])
         time, nu = run.time[known], smoothed.nu[known]
@@ -120,6 +120,8 @@ def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
 
 def _correlation(piece: np.ndarray, course: np.ndarray, certain: np.ndarray) -> float:
     """The largest correlation of a piece (m, 3) with parts of a course (n, 3); NaN where it is still."""
+    from scipy.signal import fftconvolve  # only now: it takes a while to import
+
     m = len(piece)
     off = piece - piece.mean(axis=0)
     power = np.mean(off**2, axis=0)
@@ -136,7 +138,7 @@ def _correlation(piece: np.ndarray, course: np.ndarray, certain: np.ndarray) -> 
     return float(total.max() / moving.sum())
 
 
-def samples_sha256(smoothed: Smoothed) -> str:
+def samples_sha256(smoothed: "Smoothed") -> str:
     """Hash of the samples of a run: time, pose and commands, as they were read."""
     run = smoothed.track.run
     columns = np.column_stack([run.time, run.pose, run.tau_cmd, *run.commanded.values()])
