@@ -1,12 +1,22 @@
 """Waves: found where there are some, and not where commands are quicker than what noise lets one follow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.cases import in_part
 from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model
-from diagnosis.search.nonlinear.waves import BAND, PEAK, find_waves, followed, inside, peak
+from diagnosis.search.nonlinear.waves import (
+    BAND,
+    PEAK,
+    command_interval,
+    find_waves,
+    followed,
+    inside,
+    peak,
+)
 
 MASS = Model().reference_mass
 
@@ -26,6 +36,33 @@ def test_a_run_of_few_segments_does_not_make_sure():
     found = find_waves([run], Model(), np.random.default_rng(0))
     assert found is not None
     assert found.confidence < 0.9
+
+
+def held(run, seconds):
+    """The run with commands that were recorded once in some seconds, and held."""
+    count = round(seconds / 0.02)
+    return replace(run, tau_cmd=run.tau_cmd[np.arange(run.time.size) // count * count])
+
+
+@pytest.mark.parametrize(("seconds", "sure"), [(0.3, True), (1.0, False)])
+def test_of_commands_that_were_recorded_rarely_waves_are_not_sure(seconds, sure):
+    """The waves have a period of 1.6 s; a force by commands in between may look the same."""
+    run = sail(240.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0]
+    found = find_waves([smoothed(held(run, seconds))], Model(), np.random.default_rng(0))
+    assert found is not None
+    assert (found.confidence > 0.8) == sure
+    assert found.confidence > 0.4
+
+
+def test_the_interval_of_commands_is_that_of_a_recorder_and_not_of_steps():
+    run = sail(150.0)[0]
+    assert command_interval(run) == 0.0
+    assert command_interval(held(run, 1.0)) == pytest.approx(1.0)
+    rng = np.random.default_rng(0)
+    steps = np.searchsorted(np.cumsum(rng.uniform(1.0, 20.0, 40)), run.time)
+    at_times = replace(run, tau_cmd=rng.normal(size=(41, 3))[steps])
+    assert command_interval(at_times) == 0.0
+    assert command_interval(replace(run, tau_cmd=np.ones_like(run.tau_cmd))) == 0.0
 
 
 CALM = [(quick, noise, seed) for quick in (0.0, 0.3) for noise in (1.0, 4.0, 10.0) for seed in (1, 2)]

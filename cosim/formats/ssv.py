@@ -16,6 +16,7 @@ from .namespaces import SSC, SSV
 
 # Types of annotations that hold values of this project; the standard leaves annotations to the tools.
 BESIDE, RUN, LEARNED = "cybership.beside", "cybership.run", "cybership.learned_from"
+CONTENT = "Content"  # element of an annotation that holds text
 Values = Mapping[str, Mapping[str, "Parameter"]]  # model name -> parameter -> value
 
 
@@ -123,7 +124,7 @@ def read_parameters(path: Path) -> ParameterSet:
     runs = {s.get("name", ""): _values(s, path) for s in sets}
     if "" in runs:
         raise InputError(f"'{path}' has values of a run without a name")
-    learned = [_told(e.text, path) for e in root.iterfind(f"{own}[@type='{LEARNED}']")]
+    learned = [_told(e.text, path) for e in root.iterfind(f"{own}[@type='{LEARNED}']/{CONTENT}")]
     return ParameterSet(values, units, beside, root.get("name", ""), runs, learned)
 
 
@@ -200,7 +201,8 @@ def write_parameters(path: Path, content: ParameterSet) -> None:
             within = SubElement(own, f"{{{SSV}}}ParameterSet", version="1.0", name=run)
             _write_entries(within, _named(values))
         for told in content.learned_from:
-            SubElement(annotations, f"{{{SSC}}}Annotation", type=LEARNED).text = json.dumps(told)
+            within = SubElement(annotations, f"{{{SSC}}}Annotation", type=LEARNED)
+            SubElement(within, CONTENT).text = json.dumps(told)  # the standard wants an element
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')

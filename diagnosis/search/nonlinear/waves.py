@@ -18,7 +18,7 @@ from ...execution.parallel import for_each
 from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
-from ...runs import Smoothed, SmoothMotion, without_commands
+from ...runs import Run, Smoothed, SmoothMotion, without_commands
 from ...runs.cleaning import BRIEF
 from ..map_regression import REPLICATES
 
@@ -40,7 +40,8 @@ class Waves:
         force: standard deviation of the horizontal force around the peak [N].
         share: of the model error's power, on the axis where they stand out most.
         confidence: share of bootstrap replicates in which they stand out; at most (n + 1) / (n + 2) of n
-            segments (rule of succession): what was seen in few of them may be by chance.
+            segments (rule of succession): what was seen in few may be by chance; at most one half
+            where commands were recorded less than twice in a period: forces in between look the same.
     """
 
     peak: float
@@ -89,12 +90,26 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     at = float(frequency[found.row])
     near = np.abs(frequency - at) < at / 2.0
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
+    rare = any(2.0 * at * command_interval(s.track.run) > 1.0 for s in runs)
     return Waves(
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        min(float(np.mean(heights >= least)), (count + 1) / (count + 2)),
+        min(float(np.mean(heights >= least)), (count + 1) / (count + 2), 0.5 if rare else 1.0),
     )
+
+
+def command_interval(run: Run) -> float:
+    """Interval at which the commands of a run were recorded [s].
+
+    It is zero where most samples have commands of their own, or commands change at no regular times.
+    """
+    given = run.tau_cmd if run.commands is None else run.commands
+    between = np.diff(run.time[1:][(np.diff(given, axis=0) != 0.0).any(axis=1)])
+    sample = float(np.median(np.diff(run.time)))
+    if not between.size or (usual := float(np.median(between))) < 1.5 * sample:
+        return 0.0
+    return usual if np.mean(np.abs(between - usual) < sample) > 0.5 else 0.0
 
 
 def _signals(
