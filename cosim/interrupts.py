@@ -166,8 +166,8 @@ def ignore_interrupts() -> None:
 class Held:
     """Interrupts that arrive inside wait, but where :meth:`allow` lets them act.
 
-    At the end a waiting one acts, unless :meth:`finish` was called: then it came too late, and the
-    enclosing ``Held``, if there is one, holds from there on. In another thread than the main one, which
+    At the end a waiting one acts, unless :meth:`finish` was called: then it came too late, or waits in
+    the enclosing ``Held``, which holds from there on. In another thread than the main one, which
     signals do not interrupt, nothing happens.
     """
 
@@ -198,6 +198,7 @@ class Held:
         self.hold()
         Held._innermost = self._outer
         if self._finished and self._outer:
+            self._outer._waiting += self._waiting
             self._outer.hold()
             return
         _install(self._before)

@@ -65,6 +65,17 @@ def test_an_interrupt_after_the_end_of_the_inner_comes_too_late():
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_an_interrupt_while_the_files_of_an_answer_move_ends_the_command_behind_it():
+    """It was lost: the inner work had ended, and the outer knew nothing of it."""
+    with Held() as outer:
+        outer.allow()
+        with Held() as inner:
+            interrupt()
+            inner.finish()
+        with pytest.raises(KeyboardInterrupt):
+            outer.allow()
+
+
 LOST = """
 import signal, sys
 from contextlib import suppress
