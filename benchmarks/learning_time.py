@@ -4,16 +4,20 @@ Each state learns in a process of its own, one after the other, from the same fi
 of 240 s at 50 Hz with a hidden drag, or those that are named. With ``--ship`` the present state learns
 from three runs of CyberShip Enterprise 1 and from three of that ship, each of 180 s at 10 Hz (times the
 scale of the ship) with a hidden drag. Times are of the processor, the last one is that of the wall.
+With ``--answers`` each state learns from one run of the Otter, or of that ship, of ten minutes at 10 Hz:
+the table has the time of the processor until each answer is there, imports included, and the remaining
+time that was stated over the true one.
 """
 
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tarfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,19 +29,24 @@ COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 PARTS = {
     "reading": "reading, smoothing",
     "smoothing": "reading, smoothing",
+    "calibration of": "calibration",
     "every": "search",
     "effect": "search",
     "waves": "waves",
-    "what unseen": "unseen data",
+    "effects without": "validation",
     "fit to": "fit to predictions",
+    "what the search": "gain over calibration",
     "predicting": "errors of predictions",
-    "what is": "what is left",
+    "residual": "residual",
     "stability": "stability check",
     "dissipation": "stability check",
     "closed loop": "stability check",
     "coming to rest": "stability check",
     "report": "report",
 }
+
+ANSWERS = ["compare", "compare, wall", *(f"until answer {k}" for k in (1, 2, 3))]
+REMAINING = ["first remaining time", "least", "most"]  # over the true one
 
 
 def seconds() -> float:
@@ -48,7 +57,7 @@ def seconds() -> float:
 def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
     """Seconds of each part of one ``learn`` from runs of a ship, and of the whole."""
     begun, wall, found = seconds(), time.perf_counter(), {}
-    part, since = "import", 0.0
+    part, since, stated = "import", 0.0, []
 
     def close() -> None:
         nonlocal since
@@ -59,16 +68,46 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
     def advance(step: str) -> None:
         nonlocal part
         close()
-        part = next((p for words, p in PARTS.items() if step.startswith(words)), part)
+        part = next(
+            (p for words, p in PARTS.items() if re.sub(r"^effect \d+: ", "", step).startswith(words)),
+            part,
+        )
+        if remaining is not None:
+            remaining.begin(step)
+            if remaining.seconds is not None:
+                stated.append((since, remaining.seconds))
 
     from diagnosis import learn as command
+
+    try:
+        from diagnosis.execution.remaining_time import RemainingTime
+    except ImportError:  # an earlier state
+        remaining = None
+    else:
+        remaining = RemainingTime(seconds)
 
     with TemporaryDirectory() as folder:
         of = ["--ship", ship] if ship else []
         options = command._parser().parse_args([*runs, *of, "--out", folder])
-        command.learn(options, advance)
+        answers = command.learn(options, advance)
+        for k, _ in enumerate(answers if isinstance(answers, Iterator) else [answers]):
+            found[f"until answer {k + 1}"] = seconds()
     close()
+    ratios = [left / (since - at) for at, left in stated if since - at > 1.0]
+    if ratios:
+        found |= {"first remaining time": ratios[0], "least": min(ratios), "most": max(ratios)}
     return found | {"all": seconds() - begun, "wall": time.perf_counter() - wall}
+
+
+def compare(runs: Sequence[str], ship: str | None) -> dict[str, float]:
+    """Seconds of one ``compare``, and of it by the wall."""
+    wall = time.perf_counter()
+    from diagnosis import compare as command
+
+    with TemporaryDirectory() as folder:
+        of = ["--ship", ship] if ship else []
+        command.compare(command._parser().parse_args([*runs, *of, "--out", folder]), lambda step: None)
+    return {"compare": seconds(), "compare, wall": time.perf_counter() - wall}
 
 
 def simulated(folder: Path, thinned: bool = False) -> list[str]:
@@ -97,17 +136,20 @@ def simulated(folder: Path, thinned: bool = False) -> list[str]:
     return files[:3]
 
 
-def described(folder: Path, name: str) -> list[str]:
-    """Files of three runs of a described ship with more drag than its model."""
+def described(folder: Path, name: str, count: int = 3, minutes: float = 0.0) -> list[str]:
+    """Files of runs of a described ship with more drag than its model; of so many minutes at 10 Hz."""
     import numpy as np
 
     from diagnosis.predictors import ship_with
 
-    from .ship_effects import causes, sail
+    from .ship_effects import PERIOD, causes, sail
 
     ship, files = ship_with((), name), []
-    for k in range(3):
-        run = sail(ship, causes(ship)["drag"], np.random.default_rng(k), None, SECONDS)
+    scale = ship.scale.time if minutes else 1.0
+    seconds, period = (60.0 * minutes / scale or SECONDS), (0.1 / scale if minutes else PERIOD)
+    for k in range(count):
+        rng = np.random.default_rng(k)
+        run = sail(ship, causes(ship)["drag"], rng, None, seconds=seconds, period=period)
         files.append(str(folder / f"described{k}.csv"))
         run.to_csv(files[-1], index=False)
     return files
@@ -116,18 +158,26 @@ def described(folder: Path, name: str) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.learning_time", description=__doc__)
     parser.add_argument("runs", nargs="*", help="measured runs (three simulated ones)")
-    chosen = parser.add_mutually_exclusive_group()
-    chosen.add_argument("--before", metavar="COMMIT", help="an earlier state to compare with")
-    chosen.add_argument("--ship", metavar="NAME|FILE", help="a described ship to compare with")
-    parser.add_argument("--once", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--before", metavar="COMMIT", help="an earlier state to compare with")
+    parser.add_argument("--ship", metavar="NAME|FILE", help="a described ship to compare with")
+    parser.add_argument("--answers", action="store_true", help="the time until each answer is there")
+    parser.add_argument("--once", choices=["learn", "compare"], help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.once:
-        print(json.dumps(learn(options.runs, options.ship)))
+        work = learn if options.once == "learn" else compare
+        print(json.dumps(work(options.runs, options.ship)))
         return
     here = HERE.parents[1]
     with TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        if options.ship:
+        if options.answers:
+            ship = options.ship or "otter"
+            runs = options.runs or described(folder, ship, 1, 10.0)
+            found = {
+                name: in_tree(tree, runs, ship) | in_tree(tree, runs, ship, "compare")
+                for name, tree in states(options.before, folder, here).items()
+            }
+        elif options.ship:
             ship = str(Path(options.ship).absolute()) if Path(options.ship).is_file() else options.ship
             found = {
                 "CyberShip Enterprise 1": in_tree(here, simulated(folder, thinned=True)),
@@ -135,28 +185,35 @@ def main() -> None:
             }
         else:
             runs = [str(Path(r).absolute()) for r in options.runs] or simulated(folder)
-            trees = {"now": here}
-            if options.before:
-                archive = ["git", "archive", options.before]
-                content = subprocess.run(archive, capture_output=True, check=True)
-                tree = folder / "before"
-                with tarfile.open(fileobj=BytesIO(content.stdout)) as packed:
-                    packed.extractall(tree, filter="data")
-                trees = {"before": tree} | trees
+            trees = states(options.before, folder, here)
             found = {name: in_tree(tree, runs) for name, tree in trees.items()}
     print("| s |", " | ".join(found), "|")
     print("|---|", "|".join(["--:"] * len(found)), "|")
-    for part in dict.fromkeys(["import", *PARTS.values(), "all", "wall"]):
+    parts = ["import", *PARTS.values(), "all", "wall"]
+    for part in [*ANSWERS, *REMAINING] if options.answers else dict.fromkeys(parts):
         print("|", part, "|", " | ".join(f"{each.get(part, 0.0):.1f}" for each in found.values()), "|")
     if len(found) > 1:
-        first, second = (each["all"] for each in found.values())
-        print(f"\nRatio of the processor time: {second / first:.2f}")
+        whole = "compare" if options.answers else "all"
+        first, second = (each[whole] for each in found.values())
+        print(f"\nRatio of the processor time of {whole}: {second / first:.2f}")
 
 
-def in_tree(tree: Path, runs: Sequence[str], ship: str | None = None) -> dict[str, float]:
-    """What a state of the project takes to learn from runs of a ship."""
+def states(before: str | None, folder: Path, here: Path) -> dict[str, Path]:
+    """The present state, and before it an earlier one if there is one: name -> its tree."""
+    if not before:
+        return {"now": here}
+    content = subprocess.run(["git", "archive", before], capture_output=True, check=True, cwd=here)
+    with tarfile.open(fileobj=BytesIO(content.stdout)) as packed:
+        packed.extractall(folder / "before", filter="data")
+    return {"before": folder / "before", "now": here}
+
+
+def in_tree(
+    tree: Path, runs: Sequence[str], ship: str | None = None, command: str = "learn"
+) -> dict[str, float]:
+    """What a state of the project takes to learn from runs of a ship, or to compare."""
     done = subprocess.run(
-        [sys.executable, str(HERE), "--once", *runs, *(["--ship", ship] if ship else [])],
+        [sys.executable, str(HERE), "--once", command, *runs, *(["--ship", ship] if ship else [])],
         env=os.environ | {"PYTHONPATH": str(tree)},
         cwd=tree,
         stdout=subprocess.PIPE,

@@ -99,6 +99,7 @@ def sail(
     wrong: int | None,
     orders: Iterator[tuple[float, ...]] | None = None,
     seconds: float = SECONDS,
+    period: float = PERIOD,
 ) -> pd.DataFrame:
     """A run of the real ship, as a sensor of its size measures it.
 
@@ -108,17 +109,17 @@ def sail(
         rng: of commands and noise.
         wrong: seed of what is wrong with the coefficients; None: nothing is.
         orders: a command for each step (those of :func:`commands`).
-        seconds: at the size of CyberShip Enterprise 1.
+        seconds, period: length and time from a sample to the next at the size of CyberShip Enterprise 1.
     """
     off = None if wrong is None else np.random.default_rng(wrong)
     b = ship.vessel.prepared(parameters(ship.vessel, {"x_0": 0.0, "y_0": 0.0, **cause.vessel}, off))
     drive = ship.thrusters.prepared(parameters(ship.thrusters, cause.thrusters, off))
     layout, scale = ship.layout, ship.scale
-    h = STEP * scale.time
+    h = period / EVERY * scale.time
     s, past = ship.vessel.init(Force(), b.params), at_rest(drive.effects)
     orders = orders or commands(ship, rng)
     rows = []
-    for k in range(round(seconds / STEP)):
+    for k in range(round(seconds * EVERY / period)):
         now = next(orders)
         if k % EVERY == 0:
             pose = np.array([s.x, s.y, s.psi]) + noise(ship) * rng.standard_normal(3)

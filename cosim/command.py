@@ -30,6 +30,7 @@ __all__ = [
     "complain",
     "folder_name",
     "missing_extra",
+    "positive",
     "printable",
     "program",
     "run_command",
@@ -90,6 +91,19 @@ def whole_number(least: int) -> Callable[[str], int]:
         return int(text)
 
     return of
+
+
+def positive(text: str) -> float:
+    """Type of an option that takes a positive number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(
+            f"needs a positive number, not '{text}' (what a command works on comes before it)"
+        )
+    return value
 
 
 def folder_name(text: str) -> Path:

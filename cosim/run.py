@@ -20,6 +20,7 @@ from .command import (
     command_parser,
     complain,
     folder_name,
+    positive,
     printable,
     run_command,
     whole_number,
@@ -49,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not options.quiet:
             console.print(printable(text), markup=False)
 
+    STATE.timeout = options.timeout
     try:
         scenario = _scenario(options)
         if options.ensemble is not None or options.posterior is not None:
@@ -195,18 +197,6 @@ def _report(result: Result, quiet: bool) -> None:
         output.print(kind, soft_wrap=True)
 
 
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(
-            f"needs a positive number, not '{text}' (a scenario comes before it)"
-        )
-    return value
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "cosim.run",
@@ -228,8 +218,8 @@ def _parser() -> argparse.ArgumentParser:
         help="JSON file, or the name of a shipped one; or an SSP archive, an OSP directory or its "
         "OspSystemStructure.xml",
     )
-    parser.add_argument("--stop", type=_positive, metavar="SECONDS", help="another end")
-    parser.add_argument("--step", type=_positive, metavar="SECONDS", help="another base step")
+    parser.add_argument("--stop", type=positive, metavar="SECONDS", help="another end")
+    parser.add_argument("--step", type=positive, metavar="SECONDS", help="another base step")
     parser.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
@@ -291,6 +281,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.json",
         help="mean and covariance of parameters, from python -m diagnosis.learn",
     )
+    parser.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help="longest time of a call to an FMU (100 times that of its usual step, 30 s at the least)",
+    )
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--verbose", action="store_true", help="also which step loop ran, and why")
     parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
@@ -303,7 +299,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--realtime",
         nargs="?",
-        type=_positive,
+        type=positive,
         const=1.0,
         metavar="FACTOR",
         help="keep to the wall clock, FACTOR times as fast (1)",

@@ -38,6 +38,8 @@ SUBCOMMANDS = {
     "criteria": Subcommand("diagnosis.criteria", "a first file of criteria for compare --criteria"),
     "verify": Subcommand("diagnosis.verify", "check a validation record that compare has made"),
     "learn": Subcommand("diagnosis.learn", "which physical effect does the model lack?"),
+    "parameters": Subcommand("diagnosis.parameters", "which parameters of an FMU can runs determine?"),
+    "linearise": Subcommand("diagnosis.linearise", "A, B, C, D of an FMU in a state"),
     "campaign": Subcommand("cosim.campaign", "many runs: grids and samples, one table, differences"),
     "build": Subcommand("fmus.build", "build the FMUs, or one from a component file of your own"),
     "check": Subcommand("fmus.check", "hold FMUs against the FMI 2.0 standard"),

@@ -18,9 +18,10 @@ from cosim.command import printable, run_command
 from .commands.command_line import (
     Done,
     command_of,
+    execution_of,
+    fmu_options,
     import_later_parts,
     inputs_of,
-    map_option,
     out_options,
     parser,
     run,
@@ -42,7 +43,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     from .acceptance import lines, read_criteria, validate
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .predictors import MAP, ship_with
+    from .predictors import MAP, ship_of_model, ship_with
     from .report import ReportData, file_content, show_comparison, write_report
     from .report.document import write_json
 
@@ -50,7 +51,8 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
         raise InputError("--sign and --learned are of a record: --criteria FILE.json is missing")
     criteria = None if options.criteria is None else read_criteria(options.criteria)
     with together(options.out, (*FILES, MAP, *RECORD)) as new:
-        model = initial_model(options.model, options.map, ship_with(options.effects, options.ship))
+        craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
+        model = initial_model(options.model, options.map, craft, execution_of(options))
         paths, start = options.runs, model.start
         runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session
@@ -87,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written, but map.json where "
         "an FMU's names do not tell enough)",
     )
-    map_option(made)
+    fmu_options(made)
     made.add_argument(
         "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"
     )

@@ -6,14 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from cosim import InputError
 
 from . import session
 from .assessment.gathering import gather
 from .execution.progress import Advance, silent
-from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
+from .predictors import (
+    Model,
+    ModelSource,
+    WeakWindows,
+    nominal,
+    open_model,
+    ship_of_model,
+    ship_with,
+    write_model,
+)
 from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
@@ -83,11 +92,19 @@ def load(
     return gather(found, advance, anyway, model, horizon)
 
 
-def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any]) -> Model:
+def _model_of(
+    model: Model | None,
+    name: str | Path | None,
+    runs: Sequence[Any],
+    file: str | Path | None = None,
+) -> Model:
     """The initial model: a given one, or the nominal one of a ship, by default that of the runs.
 
+    Where these name none, it is the one that a model file is of.
+
     Raises:
-        InputError: no such ship, model and ship are given, or the runs are of several ships.
+        InputError: no such ship, model and ship are given, or the runs are of several ships; an FMU
+            whose ship nobody names.
     """
     if model is not None and name is not None:
         raise InputError("a model has its ship: give model or ship, not both")
@@ -99,7 +116,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
     if name is None:
         files = [getattr(run, "folder", run) for run in runs]  # of a result of a simulation
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
-        name = told[0] if told else None
+        name = told[0] if told else ship_of_model(file)
     return Model(ship=ship_with((), name))
 
 
@@ -110,7 +127,8 @@ def _opened(
     runs: Sequence[Any],
 ) -> tuple[Model | ModelSource, Model]:
     """The initial model, read if it is a file, and the model of the ship by which runs are read."""
-    of = _model_of(model if isinstance(model, Model) else None, ship, runs)
+    file = model if isinstance(model, (str, Path)) else None
+    of = _model_of(model if isinstance(model, Model) else None, ship, runs, file)
     if isinstance(model, (str, Path)):
         model = open_model(model, map, of.ship)
         of = model.start or of
@@ -254,30 +272,30 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    parts = _loaded(runs, validate, held_out, prior, model, ship)
-    found = session.diagnose(*parts.first, prior, parts.model, advance, seed, by, parts.decide, pruning)
+    choices = {"seed": seed, "by": by, "pruning": pruning}
+    task = _begun(runs, validate, held_out, prior, model, ship, advance, **choices)
+    found = task.diagnose()
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
 
 
-class _Loaded(NamedTuple):
-    """What a function of :mod:`.session` is given: train and test runs, runs that decide, a model."""
-
-    first: tuple[Sequence[WeakWindows], Sequence[WeakWindows]]
-    decide: Sequence[WeakWindows]
-    model: Model | ModelSource
-
-
-def _loaded(
-    runs: Any, validate: Any, held_out: Any, prior: Prior, model: Any, ship: str | Path | None
-) -> _Loaded:
-    """Runs and model, read where they are not; arguments as of :func:`diagnose`."""
+def _begun(
+    runs: Any,
+    validate: Any,
+    held_out: Any,
+    prior: Prior,
+    model: Any,
+    ship: str | Path | None,
+    advance: Advance,
+    **options: Any,
+) -> session.Session:
+    """A session of runs and a model, read where they are not; arguments as of :func:`diagnose`."""
     parts = [_listed(runs), _listed(validate), _listed(held_out)]
     model, of = _opened(model, None, ship, [r for p in parts for r in p])
     shares(of.ship, prior)  # before any work
     train, decide, test = (
         p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
     )
-    return _Loaded((train, test), decide, model)
+    return session.begin(train, test, prior, model, advance, validate=decide, **options)
 
 
 def calibrate(
@@ -300,9 +318,7 @@ def calibrate(
     Raises:
         InputError: too little data, a prior that is negative or not finite, or no coefficient to fit.
     """
-    parts = _loaded(runs, validate, held_out, prior, model, ship)
-    task = session.begin(*parts.first, prior, parts.model, advance, validate=parts.decide)
-    found = task.calibrate()
+    found = _begun(runs, validate, held_out, prior, model, ship, advance).calibrate()
     if found is None:
         raise InputError("there is no coefficient to calibrate, or the runs do not determine them")
     return found

@@ -20,9 +20,10 @@ from cosim.command import FAILED, run_command
 from .commands.command_line import (
     Done,
     command_of,
+    execution_of,
+    fmu_options,
     import_later_parts,
     inputs_of,
-    map_option,
     out_options,
     parser,
     prior,
@@ -47,6 +48,7 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.tex",
 )
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
+FMUS = (".fmu", ".ssp", ".json")
 UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
 
 
@@ -56,7 +58,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def learn(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
-    """Run the command with parsed options: the three answers, each when its files are there."""
+    """Run the command with parsed options: the three answers, each when its files are there.
+
+    Where the parameters of an FMU are calibrated, there is one answer.
+    """
+    if _calibrates_fmu(options):
+        yield _learned_of_fmu(options, advance)
+        return
     task = _begun(options, advance)
     yield _compared(task, options)
     calibrated = _calibrated(task, options)
@@ -66,17 +74,39 @@ def learn(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         yield _diagnosed(task, options, advance)
 
 
+def _calibrates_fmu(options: argparse.Namespace) -> bool:
+    """Whether parameters of an FMU are calibrated: they are named, or the FMU is not of a ship."""
+    model = options.model
+    if options.parameters is not None and (model is None or model.suffix not in FMUS):
+        raise InputError("--parameters are those of an FMU: --model NAME.fmu is missing")
+    if model is None or model.suffix not in FMUS:
+        return False
+    from .fmu_parameters.system_task import is_system
+
+    return options.parameters is not None or is_system(options.train, options.map)
+
+
+def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
+    """The one answer where the parameters of an FMU are calibrated."""
+    from .fmu_parameters.output.learn_fmu import learn_ship, learn_system
+    from .fmu_parameters.system_task import is_system
+
+    origin = {name: str(value) for name, value in _origin(options).items()}
+    work = learn_system if is_system(options.train, options.map) else learn_ship
+    return Done(0, work(options, advance, origin).shown(str(options.out)))
+
+
 def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
     """The runs and the model, read and checked."""
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .predictors import DescribedShip, ship_with
+    from .predictors import DescribedShip, ship_of_model, ship_with
     from .search import shares
 
     by = method(options.method)  # before any work: an unknown name, or a library that is missing
     criterion(options.pruning)
-    craft = ship_with(options.effects, options.ship)
-    model = initial_model(options.model, options.map, craft)
+    craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
+    model = initial_model(options.model, options.map, craft, execution_of(options))
     start = model.start
     if options.fit and not model.parametric:
         raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
@@ -149,9 +179,10 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
             refused = UNSOUND
         else:
             try:
-                notes = predictor.write(new, diagnosis.learned.model, task.runs)
+                learned = diagnosis.learned.model
+                notes = predictor.write(new, learned, [*task.train, *task.validate])
                 if predictor.parametric:
-                    diagnosis.posterior.write(new / POSTERIOR)
+                    diagnosis.posterior.write(new / POSTERIOR, learned.learned_from)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         early = [name for name in EARLY if (options.out / name).exists()]
@@ -193,6 +224,7 @@ def _parser() -> argparse.ArgumentParser:
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
         "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
+        "           %(prog)s run1.csv --model vendor.fmu --parameters parameters.json\n"
         "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
         "            130 interrupted (the files of answers that were shown are kept)",
     )
@@ -251,9 +283,16 @@ def _parser() -> argparse.ArgumentParser:
         f"({PAIRED})",
     )
     made.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE.json",
+        help="parameters of an FMU given by --model to calibrate; cybership parameters proposes the "
+        "file (none for a ship, else those that the runs determine)",
+    )
+    made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"
     )
-    map_option(made)
+    fmu_options(made)
     out_options(made, Path("results", "diagnosis"))
     return made
 

@@ -123,8 +123,11 @@ def _own_entries(others: Mapping[Path, Mapping[str, "Column"]]) -> Iterator[str]
 def _tabulated(
     paths: Iterable[Path], runs: Mapping[Path, "Run"], craft: "Ship", anyway: bool, advance: Advance
 ) -> list[RenderableType]:
-    """A row for each measurement, and why those that cannot be used as they are cannot."""
-    table, refused = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), []
+    """A row for each measurement, one for each channel, and why some measurements cannot be used."""
+    from .report.terminal import channel_table
+    from .runs import channels_of
+
+    table, refused, channels = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), [], []
     for k, name in enumerate(("file", "time", "every", *HEADS)):
         table.add_column(name, justify="right" if k else "left", overflow="fold")
     for path in paths:
@@ -133,10 +136,11 @@ def _tabulated(
             if path in runs:
                 s = _smoothed(runs[path], craft, anyway, advance)
                 cells = [f"{_seconds(s):.4g} s", f"{s.track.period:.3g} s", *map(str, s.counts)]
+                channels.append((s.track.run.name, [*channels_of(s)]))
         except InputError as error:
             refused.append(f"not usable as it is: {error}")
         table.add_row(Text(printable(path.name)), *cells)
-    return [table, *map(printable, refused)]
+    return [table, *channel_table(channels), *map(printable, refused)]
 
 
 def _refuse_there(options: argparse.Namespace, target: Path) -> None:

@@ -352,22 +352,10 @@ def begin(
         )
     first, last = len(train), len(runs) - len(held_out)
     parts = runs[:first], runs[first:last], runs[last:]
-    return Session(*parts, source.on(runs, advance), prior, chosen, harms, advance, seed)
-
-
-def diagnose(
-    train: Sequence[WeakWindows],
-    held_out: Sequence[WeakWindows] = (),
-    prior: Prior = None,
-    model: Model | ModelSource | str | Path | None = None,
-    advance: Advance = silent,
-    seed: int = 0,
-    by: str | Method = DEFAULT,
-    validate: Sequence[WeakWindows] = (),
-    pruning: str = USUAL,
-) -> Diagnosis:
-    """Learn what a model lacks; arguments as of :func:`diagnosis.diagnose`, of runs that are loaded."""
-    return begin(train, held_out, prior, model, advance, seed, by, validate, pruning).diagnose()
+    predictor = source.on(runs, advance)
+    if isinstance(predictor, DescribedShip):
+        predictor = predictor.learning_from(runs[:last])
+    return Session(*parts, predictor, prior, chosen, harms, advance, seed)
 
 
 def _predicted(

@@ -7,7 +7,8 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, printable, run_command
 
-TOLD = {True: "holds    ", False: "DIFFERS  ", None: "unknown  "}
+SHOWN = {True: "holds      ", False: "DIFFERS    ", None: "NOT CHECKED"}
+DIFFERS, UNCHECKED = 1, 4
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -16,30 +17,55 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from .acceptance import verify_record  # only now: it takes a second to import
 
     try:
-        checks = verify_record(options.record, options.key)
+        checks = verify_record(options.record, options.key, options.allow_missing)
     except InputError as error:
         complain(error)
         return BAD_INPUT
     output = Output(highlight=False, markup=False, soft_wrap=True)
     for check in checks:
-        output.print(f"{TOLD[check.holds]}{printable(check.line)}")
-    return int(any(check.holds is False for check in checks))
+        allowed = " (allowed)" if check.allowed else ""
+        output.print(f"{SHOWN[check.holds]}  {printable(check.line)}{allowed}")
+    unchecked = sum(c.holds is None and not c.allowed for c in checks)
+    if any(check.holds is False for check in checks):
+        code, verdict = DIFFERS, "The record does not hold."
+    elif unchecked:
+        code, verdict = (
+            UNCHECKED,
+            f"The record could not be checked: {unchecked} of {len(checks)} points are open.",
+        )
+    else:
+        rest = sum(check.allowed for check in checks)
+        code, verdict = (
+            0,
+            "The record holds" + (f", but for {rest} points that are allowed." if rest else "."),
+        )
+    output.print(verdict)
+    return code
 
 
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.verify",
-        "Check a validation record: its signature, and whether data, model, criteria and "
+        "Check a validation record: its signature, and whether data, model, criteria, code and "
         "report are those that it names.",
         "example:  %(prog)s results/comparison/validation.json --key public.pem\n"
-        "exit codes: 0 all that can be checked holds, 1 something differs, 2 bad input",
+        "exit codes: 0 the record holds, 1 something differs, 4 something could not be checked,\n"
+        "            2 bad input",
     )
     made.add_argument("record", type=Path, metavar="RECORD", help="validation.json")
     made.add_argument(
         "--key",
         type=Path,
         metavar="FILE.pem",
-        help="public key (Ed25519) of who must have signed (the one that the record names)",
+        help="public key (Ed25519) of who must have signed (that of the record, of nobody known)",
+    )
+    made.add_argument(
+        "--allow-missing",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="accept that this cannot be checked: signature, key, code, or a file by its name, its path "
+        "or what it is for, such as data; may be repeated",
     )
     return made
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from .declare import Component, Fields, Variable, bundle, flatten, group_of, packer, variables, width
 from .frames import rotate_to_body, rotate_to_earth
 from .hull import Triple, accelerated, inertia_force
-from .ops import Number, fmax, where, wrap
+from .ops import Number, atan2, fmax, sqrt, where, wrap
 from .ship import Ship
 from .signals import Force, VelocityInCurrent
 from .vessel.vessel import State, disturbed
@@ -126,6 +126,7 @@ def addition(
         for axis, name in enumerate(FORCE):
             if name in signals and not {name, ACCELERATION[axis]} & beside.keys():
                 signals[name] = signals[name] + more[axis]
+        signals |= _polar(signals, given)
         extra = dict(zip((*FORCE, *ACCELERATION), (*more, *faster), strict=True))
         values = [(signals[n] - x.offset) / x.gain for n, x in given.items()]
         values += [(extra[n] - x.offset) / x.gain for n, x in beside.items()]
@@ -145,6 +146,17 @@ def addition(
         step=step,
         hold_nonfinite=False,
     )
+
+
+def _polar(signals: Mapping[str, Number], given: Mapping[str, Line]) -> dict[str, Number]:
+    """Size and angle from ahead to starboard of the forces that are given so, by their components."""
+    found = {}
+    for name in (n.removesuffix("_force") for n in given if n.endswith("_force")):
+        if f"{name}_X" in signals and f"{name}_Y" in signals:
+            ahead, aside = signals[f"{name}_X"], signals[f"{name}_Y"]
+            found[f"{name}_force"] = sqrt(ahead * ahead + aside * aside)
+            found[f"{name}_angle"] = atan2(aside, ahead)
+    return found
 
 
 def _params(component: Component, values: Mapping[str, float]) -> Fields:

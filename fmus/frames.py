@@ -18,3 +18,8 @@ def rotate_to_earth(psi: Series, x: Series, y: Series) -> tuple[Series, Series]:
     c = cos(psi)
     s = sin(psi)
     return c * x - s * y, s * x + c * y
+
+
+def air_velocity(speed: Series, direction: Series) -> tuple[Series, Series]:
+    """Velocity of the air to north and east [m/s], of a wind of a speed [m/s] from a direction [rad]."""
+    return -speed * cos(direction), -speed * sin(direction)

@@ -6,6 +6,7 @@ A function gets u, v and r through the water [m/s, m/s, rad/s] and then its para
 """
 
 from collections.abc import Callable
+from math import pi
 from typing import Annotated, NamedTuple
 
 from .declare import POSITIVE, DeclarationError
@@ -124,6 +125,63 @@ def resistance(
     """Resistance that grows with the angle of drift, 1/2 rho (C + C_b |atan2(v, u)|) A |u| u."""
     coefficient = drag_ahead + drag_in_drift * abs(atan2(v, u))
     return -0.5 * drag_density * drag_area * coefficient * abs(u) * u, 0.0 * v, 0.0 * v
+
+
+def swept(v: Number, turn: Number) -> tuple[Number, Number]:
+    """Integrals of |s| s and of xi |s| s over -1/2 ... 1/2, s = v + turn xi; in closed form [m2/s2].
+
+    Where s keeps its sign, s |s| is a parabola; elsewhere the place where it is zero divides the hull.
+    """
+    b, size, end = 0.5 * turn, abs(v), 0.5 * abs(turn)
+    over = fmax(end, SMALL)
+    whole = size >= end
+    Y = where(whole, abs(v) * v + v * b * b / fmax(size, SMALL) / 3.0, v * (end + v * v / (3.0 * over)))
+    part = end * end / 8.0 + v * v * (0.25 - v * v / (24.0 * over * over))
+    return Y, where(whole, size * b / 3.0, where(turn < 0.0, -part, part))
+
+
+@hull_function(
+    Change("resistance", ("X_0F_prime",), "resistance ahead"),
+    Change("resistance_astern", ("X_0A_prime",), "resistance astern"),
+    Change("resistance_in_drift", ("X_vr_prime",), "surge force by drift and yaw"),
+    Change("sway_by_drift", ("Y_v_prime",), "sway force by drift"),
+    Change("yaw_by_drift", ("N_v_prime",), "yaw moment by drift"),
+    Change("sway_by_yaw", ("Y_r_prime",), "sway force by the yaw rate"),
+    Change("yaw_by_yaw", ("N_r_prime",), "yaw moment by the yaw rate"),
+    Change("cross_flow_drag", ("C_D",), "drag of the cross-flow"),
+    Change("cross_flow_yaw", ("C_rY", "C_rN"), "cross-flow by the yaw rate"),
+)
+def low_speed(
+    u: Number,
+    v: Number,
+    r: Number,
+    low_speed_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1000.0,
+    low_speed_length: Annotated[float, "m", "length L between perpendiculars", POSITIVE] = 1.0,
+    low_speed_draft: Annotated[float, "m", "draft d", POSITIVE] = 0.1,
+    X_0F_prime: Annotated[float, "1", "surge force ahead, negative"] = -0.02,
+    X_0A_prime: Annotated[float, "1", "the same coefficient astern"] = -0.02,
+    X_vr_prime: Annotated[float, "1", "surge force, v r L"] = 0.0,
+    Y_v_prime: Annotated[float, "1", "sway force, v |u|"] = 0.0,
+    Y_r_prime: Annotated[float, "1", "sway force, r L u"] = 0.0,
+    N_v_prime: Annotated[float, "1", "yaw moment, v u"] = 0.0,
+    N_r_prime: Annotated[float, "1", "yaw moment, r L |u|"] = 0.0,
+    C_D: Annotated[float, "1", "drag coefficient of the cross-flow"] = 1.0,
+    C_rY: Annotated[float, "1", "factor of the yaw rate in the cross-flow's sway force"] = 1.0,
+    C_rN: Annotated[float, "1", "factor of the yaw rate in the cross-flow's yaw moment"] = 1.0,
+) -> tuple[Number, Number, Number]:
+    """Hull at low speed and on the spot (Yoshimura 1988; Miyauchi et al. 2022), in prime units.
+
+    X = [X_0F + (X_0A - X_0F) |beta| / pi] u U + X_vr v r L, beta = atan2(v, u). Across, products of
+    speeds, and the cross-flow, in which the yaw rate counts C_rY and C_rN times. Nothing is divided by
+    the speed.
+    """
+    turn = low_speed_length * r
+    resistance = X_0F_prime + (X_0A_prime - X_0F_prime) * abs(atan2(v, u)) / pi
+    X = resistance * u * sqrt(u * u + v * v) + X_vr_prime * v * turn
+    Y = Y_v_prime * v * abs(u) + Y_r_prime * turn * u - C_D * swept(v, C_rY * turn)[0]
+    N = N_v_prime * v * u + N_r_prime * turn * abs(u) - C_D * swept(v, C_rN * turn)[1]
+    force = 0.5 * low_speed_density * low_speed_length * low_speed_draft
+    return force * X, force * Y, force * low_speed_length * N
 
 
 @hull_function(

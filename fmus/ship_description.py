@@ -86,11 +86,12 @@ class Description(NamedTuple):
         functions: damping that is no product of speeds.
         actuators: what drives it, in the order of its commands.
         allocates: whether its thrusters get a force to give; else commands of each actuator.
-        wind: areas above the water, parameters of :mod:`fmus.effects.wind`; empty: not known.
+        wind: what is above the water, numbers of :mod:`fmus.ships.wind`; empty: not known.
         effects: effects of its actuators, ``KIND ACTUATOR`` or ``KIND``, in the order in which they act;
             empty: all that each actuator may have, see :mod:`fmus.actuators.failings`.
         aliases: (name, alias) of variables of its actuators; a name also stands for the beginning of
             longer ones, and ``each_`` before that of a command means it where each unit has its own.
+        wind_measured: whether the wind over time is an input of the vessel, and of predictions.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Description(NamedTuple):
     wind: tuple[Value, ...] = ()
     effects: tuple[str, ...] = ()
     aliases: tuple[tuple[str, str], ...] = ()
+    wind_measured: bool = False
 
     @property
     def scale(self) -> Scale:

@@ -23,6 +23,18 @@ class Force(NamedTuple):
     tau_N: Annotated[float, "N.m", "yaw moment, bow to starboard"] = 0.0
 
 
+class ForceInWind(NamedTuple):
+    """The same, and the true wind: its speed, and from where it blows; NaN: not known."""
+
+    tau_X: Annotated[float, "N", "surge force, forward"] = 0.0
+    tau_Y: Annotated[float, "N", "sway force, to starboard"] = 0.0
+    tau_N: Annotated[float, "N.m", "yaw moment, bow to starboard"] = 0.0
+    wind_speed: Annotated[float, "m/s", "optional: speed of the true wind"] = 0.0
+    wind_direction: Annotated[
+        float, "rad", "optional: where the true wind blows from, from north towards east"
+    ] = 0.0
+
+
 Surge = Annotated[float, "m/s", "surge velocity, forward"]
 Sway = Annotated[float, "m/s", "sway velocity, to starboard"]
 YawRate = Annotated[float, "rad/s", "yaw rate, bow to starboard"]

@@ -1,15 +1,15 @@
 """The report of a study: Markdown with tables and figures, and all numbers as JSON beside it."""
 
-import json
 import math
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cosim import atomic_write
+from cosim import InputError, atomic_write
+from diagnosis.report import as_json, finite
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,21 +48,6 @@ def cell(value: Any) -> str:
     return str(value).replace("|", "\\|")
 
 
-def _jsonable(value: Any) -> Any:
-    """Named tuples as objects, arrays as lists, NaN and infinity as null."""
-    if hasattr(value, "_asdict"):
-        value = value._asdict()
-    elif hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(k): _jsonable(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_jsonable(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
 class Verdict(NamedTuple):
     """What the thesis says, what comes out here, and the numbers or the reason."""
 
@@ -81,7 +66,10 @@ class Report:
     """
 
     def __init__(self, folder: Path, title: str, seeds: Sequence[int] = ()) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
         self.folder = folder
         self._pieces = [f"# {title}"]
         self._results: dict[str, Any] = {"title": title, "seeds": list(seeds), "machine": machine()}
@@ -130,11 +118,11 @@ class Report:
 
     def result(self, name: str, value: Any) -> None:
         """Numbers for ``results.json``: nested mappings, sequences, named tuples, arrays."""
-        self._results[name] = _jsonable(value)
+        self._results[name] = finite(value)
 
     def write(self) -> Path:
         """Write ``results.json``, then ``report.md``; returns the latter's path."""
-        text = json.dumps(self._results, indent=2, ensure_ascii=False, allow_nan=False)
+        text = as_json(self._results)
         for name, content in ((RESULTS, text), (REPORT, "\n\n".join(self._pieces))):
             with atomic_write(self.folder / name) as scratch:
                 scratch.write_text(content + "\n", encoding="utf-8")

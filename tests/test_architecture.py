@@ -46,13 +46,16 @@ DIAGNOSIS_LAYERS = (
     ("session",),
     ("report",),
     ("acceptance",),
+    ("fmu_parameters",),
     ("commands",),
     ("interactive",),
     (
         "compare",
         "criteria",
         "learn",
+        "linearise",
         "measure_trial",
+        "parameters",
         "propose_columns",
         "repair",
         "verify",
@@ -352,8 +355,13 @@ def test_other_packages_use_public_names_of_cosim(package, allowed):
     assert list(foreign_uses(package, "cosim", allowed)) == []
 
 
-# Time and calibration of single parts of the diagnosis.
-MEASURE_PARTS = ("benchmarks.calibration", "benchmarks.fit_drivers", "benchmarks.learning_time")
+# Time, calibration and constants of single parts of the diagnosis.
+MEASURE_PARTS = (
+    "benchmarks.calibration",
+    "benchmarks.fit_drivers",
+    "benchmarks.learning_time",
+    "benchmarks.sensitivity.on_evidence",
+)
 
 
 @pytest.mark.parametrize("package", ["studies", "thesis", "benchmarks"])

@@ -26,7 +26,7 @@ from fmus.ship import ship
 from fmus.signals import Estimate, Target, VelocityInCurrent
 
 HARD = 0.6
-FROUDE = {"kvlcc2": 0.14, "gunnerus": 0.25, "commanded": 0.2}
+FROUDE = {"kvlcc2": 0.14, "gunnerus": 0.25, "commanded": 0.2, "esso_osaka": 0.1}
 
 
 def speed(name, d=None):
@@ -53,6 +53,7 @@ def twin(*parts):
 def test_shafts_drive_and_angles_steer_to_starboard():
     found = {name: roles(SHIPS[name]) for name in COMMANDED_SHIPS}
     assert found["kvlcc2"] == ((1.0, 0.0), (0.0, 1.0))
+    assert found["esso_osaka"] == ((1.0, 0.0), (0.0, 1.0))
     assert found["gunnerus"] == ((0.0, 1.0), (-1.0, 0.0))
     assert found["commanded"] == ((1.0, 0.0, 0.0, 1.0), (0.0, 1.0, -1.0, 0.0))
 

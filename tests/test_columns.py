@@ -164,6 +164,8 @@ def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     ]
     assert [row[:2] for row in rows] == [["a.csv", "99.9"], ["b.csv", "119.9"], ["c.csv", "139.9"]]
     assert [int(row[5]) for row in rows] == [1000, 1200, 1400]
+    channels = done.stdout[done.stdout.index("Channels") :]
+    assert all(f"\n  {name} " in channels for name in ("x", "y", "psi"))
     for name in "abc":
         assert read(tmp_path / f"{name}.csv", of=TANKER).signals == ("propeller.n", "rudder.delta")
     again = command(propose_columns.main, *files, "--ship", "kvlcc2", "--write", "--anyway")

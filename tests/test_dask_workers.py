@@ -3,6 +3,7 @@
 import importlib
 import time
 from collections import deque
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -42,6 +43,7 @@ def workers(client):
     made = object.__new__(dask_workers.DaskWorkers)
     made._client, made._files = client, SimpleNamespace(resettable=())
     made._running, made._walls, made._sent = {}, deque(maxlen=20), set()
+    made._cluster, made._notes = None, Path("none")
     return made
 
 

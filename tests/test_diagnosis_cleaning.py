@@ -158,7 +158,7 @@ def twice(run):
         (lambda r: changed(r, slice(0, N), (5.0, 2.0, 1.0)), "does not move: its pose is frozen"),
         (lambda r: changed(r, slice(0, N), np.nan), "does not move: its pose is frozen or missing"),
         (lambda r: replace(r, pose=np.random.default_rng(0).normal(1.0, 1e-3, (N, 3))), "noise around a place"),
-        (lambda r: replace(r, pose=1e3 * r.pose * [1, 1, 1e-3]), "is its position in mm?"),
+        (lambda r: replace(r, pose=1e3 * r.pose * [1, 1, 1e-3]), "is its position in mm or cm or in?"),
         (lambda r: replace(r, pose=r.pose * [1, 1, np.degrees(1.0)]), "is its heading in deg?"),
     ],
 )  # fmt: skip

@@ -285,7 +285,7 @@ def test_a_log_is_the_run_of_its_measurement(runs, tmp_path):
     for name in "ab":
         log, table = (diagnosis.read(path) for path in (tmp_path / name, runs / f"{name}.csv"))
         for field in fields(diagnosis.Run):
-            if field.name in ("called", "file"):  # which only messages show
+            if field.name in ("called", "file", "hashes"):  # of the file
                 continue
             if field.name == "ship":
                 assert log.ship == table.ship is not None
@@ -388,7 +388,7 @@ UGLY = {
     "a missing file": (["aa.csv"], "did you mean 'a.csv'?"),
     "a folder without a log": (["."], "log.csv is missing"),
     "a missing column": (["column.csv"], "no column 'psi'; did you mean 'psii'?"),
-    "another unit": (["unit.csv"], "is its position in mm?"),
+    "another unit": (["unit.csv"], "is its position in mm or cm or in?"),
     "nothing but NaN": (["nan.csv"], "does not move"),
     "an empty file": (["empty.csv"], "cannot be read"),
     "only a header": (["header.csv"], "too short"),
@@ -465,7 +465,7 @@ def written(monkeypatch, tmp_path):
     given = SimpleNamespace(
         sound=True,
         learned=SimpleNamespace(model=diagnosis.Model().plus({"delta_X_u": -1.0})),
-        posterior=SimpleNamespace(write=lambda path: path.write_text("{}")),
+        posterior=SimpleNamespace(write=lambda path, *_: path.write_text("{}")),
         comparison=SimpleNamespace(
             evaluations=[], omega_std=[], predictor=DescribedShip(diagnosis.Model())
         ),
@@ -496,7 +496,12 @@ def written(monkeypatch, tmp_path):
         monkeypatch.setattr(f"diagnosis.report.{name}", stub)
     monkeypatch.setattr("diagnosis.assessment.gathering.gather", lambda paths, *_: list(paths))
     task = SimpleNamespace(
-        compare=lambda: given.comparison, calibrate=lambda: None, diagnose=lambda: given, runs=[]
+        compare=lambda: given.comparison,
+        calibrate=lambda: None,
+        diagnose=lambda: given,
+        runs=[],
+        train=[],
+        validate=[],
     )
     monkeypatch.setattr(session, "begin", lambda *_, **__: task)
     monkeypatch.setattr(session, "evaluate", lambda *_, **__: given.comparison)

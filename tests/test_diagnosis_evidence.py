@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from diagnosis.assessment import remainder_text
+from diagnosis.assessment import remainder
 from diagnosis.assessment.recurrence import Recurrence
 from diagnosis.assessment.remainder import AxisRemainder
 from diagnosis.predictors import Model
@@ -189,13 +189,13 @@ def repeats(best=None, lasts=10.0, in_part=False):
 def test_what_a_remainder_repeats_with_suggests_its_cause(how, scale, comes, cause):
     axes = {"X": LEFT, "Y": NOTHING, "N": replace(LEFT, share=1.0)}
     place = SimpleNamespace(axis="N", phrase="in the north")
-    text = remainder_text.remainder_sentence(axes, [how] * 3, [place], False, Scale(scale))
+    text = remainder.remainder_sentence(axes, [how] * 3, [place], False, Scale(scale))
     assert text.startswith("Surge: 0.5 N (uncertainty 0.1, 20 % of the first error) and Yaw: 0.5 N m (uncertainty 0.1)")  # fmt: skip
     assert "not explained, most in the north. It " in text
     assert "Sway" not in text
     assert comes in text
     assert cause in text
-    apart = remainder_text.remainder_sentence(axes, [how, how, repeats("time")], [], True, Scale(scale))
+    apart = remainder.remainder_sentence(axes, [how, how, repeats("time")], [], True, Scale(scale))
     assert ("and Yaw" in apart) == (how.best == "time")
     assert ", most" not in apart
     assert apart.endswith("which no model can foretell.")
@@ -203,8 +203,8 @@ def test_what_a_remainder_repeats_with_suggests_its_cause(how, scale, comes, cau
 
 def test_little_and_nothing_are_left():
     axes = dict.fromkeys("XYN", NOTHING)
-    said = [remainder_text.remainder_sentence(a, None, [], False) for a in (axes, axes | {"N": SLIGHT})]
-    assert said == [remainder_text.NOTHING_LEFT, remainder_text.LITTLE_LEFT]
+    said = [remainder.remainder_sentence(a, None, [], False) for a in (axes, axes | {"N": SLIGHT})]
+    assert said == [remainder.NOTHING_LEFT, remainder.LITTLE_LEFT]
     assert [a.beyond_chance for a in (NOTHING, SLIGHT, replace(LEFT, p_value=0.01 / 6.0))] == [False, True, False]  # fmt: skip
 
 

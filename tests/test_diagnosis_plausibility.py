@@ -11,9 +11,21 @@ from support.cases import in_part
 from support.command import command
 from support.measured import DATA, needs_data, sail, smoothed
 
+import diagnosis
+from benchmarks.ship_effects import causes
+from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model, Run, compare, read, weak_windows
+from diagnosis.assessment.command_check import without_force
 from diagnosis.assessment.gains import ThrustGains, _own, gains
-from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
+from diagnosis.assessment.plausibility import (
+    likeliest_mistake,
+    pushed_aside,
+    refuse_implausible,
+    same_columns,
+)
+from diagnosis.assessment.readings import of_pose, reread
+from diagnosis.predictors import ship_with
+from diagnosis.runs.columns.side_car import ColumnChange
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 
@@ -76,6 +88,68 @@ def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_p
     assert mistake in text
     assert f"put {json.dumps({'columns': line})} into" in text
     assert "\n" not in text
+
+
+@cache
+def otter():
+    """A run of a ship with two fixed propellers, which cannot push sideways."""
+    ship = ship_with((), "otter")
+    return sail_of(ship, causes(ship)["none"], np.random.default_rng(0), None, seconds=120.0)
+
+
+def doubt(table):
+    """What is said of a run of that ship."""
+    with pytest.raises(InputError) as error:
+        diagnosis.load(table, ship="otter")
+    return str(error.value)
+
+
+OF_ACTUATORS = [
+    (["port.n", "starboard.n"], ["starboard.n", "port.n"], 1.0, "port.n and starboard.n are swapped"),
+    (["port.n"], ["port.n"], -1.0, "port.n has the wrong sign"),
+    (["x", "y"], ["y", "x"], 1.0, "x and y are swapped"),
+    (["psi"], ["psi"], -1.0, "heading is mirrored"),
+    (["x", "y"], ["x", "y"], 1.0 / 0.3048, "position is in ft"),
+    (["port.n", "starboard.n"], ["port.n", "starboard.n"], 60.0, "port.n and starboard.n are in rpm"),
+]
+
+
+@pytest.mark.parametrize(
+    ("columns", "read_from", "factor", "mistake"), in_part(OF_ACTUATORS, keep=OF_ACTUATORS[:1])
+)
+def test_mistakes_of_a_described_ship_are_told_with_odds(columns, read_from, factor, mistake):
+    table = otter().copy()
+    table[columns] = factor * otter()[read_from].to_numpy()
+    said = doubt(table)
+    assert mistake in said
+    assert "(odds " in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cause", ["none", "loss", "drag", "wind", "current", "lag"])
+def test_hidden_cause_of_a_described_ship_is_no_mistake(cause):
+    """With every coefficient 10 % wrong."""
+    ship = ship_with((), "otter")
+    table = sail_of(ship, causes(ship)[cause], np.random.default_rng(1), 1, seconds=120.0)
+    assert len(diagnosis.load(table, ship="otter")) == 1
+
+
+def test_a_force_where_no_actuator_pushes_is_a_question():
+    (w,) = diagnosis.load(otter(), ship="otter")
+    model = Model(ship=ship_with((), "otter"))
+    assert pushed_aside(w, model) is None
+    said = pushed_aside(reread(w, of_pose("", (100.0, 100.0, 1.0)), model), model)
+    assert said is not None
+    assert " sideways, where no actuator pushes, and the ship can do 239 N at all" in said
+
+
+def test_a_propeller_that_cannot_reverse_gives_no_force():
+    tanker = ship_with((), "kvlcc2")
+    commands = np.column_stack([np.full(9, -5.0), np.linspace(-0.3, 0.3, 9)])
+    force = tanker.commanded_force(commands)
+    run = Run("a", np.arange(9.0), np.zeros((9, 3)), force, commands, signals=tuple(tanker.commands))
+    said = without_force(run, Model(ship=tanker))
+    assert "propeller.n is beyond its limits, 0 to 20, in all rows" in said
 
 
 @pytest.mark.parametrize(
@@ -165,8 +239,15 @@ def test_late_clock_is_no_mistake():
     )
 
 
-def test_ship_of_another_size_is_no_mistake():
-    """By Froude's law 270 times as long; even with the model of the small ship."""
+def of_units(found):
+    """Whether nothing but units seems to be wrong."""
+    return all(
+        c == ColumnChange(s, factor=c.factor) for r in found.readings for s, c in r.changes.items()
+    )
+
+
+def test_ship_of_another_size_is_a_unit_alone():
+    """By Froude's law 270 times as long, with the model of the small ship: at the most units are doubted."""
     scale, run = 270.0, base()
     large = replace(
         run,
@@ -174,7 +255,8 @@ def test_ship_of_another_size_is_no_mistake():
         pose=run.pose * [scale, scale, 1.0],
         tau_cmd=run.tau_cmd * [scale**3, scale**3, scale**4],
     )
-    assert likeliest_mistake(weak_windows(smoothed(large)), Model()) is None
+    found = likeliest_mistake(weak_windows(smoothed(large)), Model())
+    assert found is None or of_units(found)
 
 
 @pytest.mark.parametrize(
@@ -216,11 +298,12 @@ def test_real_run_is_no_mistake(name):
 
 @pytest.mark.slow
 @needs_data
-def test_tanker_with_a_rudder_is_no_mistake():
-    """KVLCC2, its rudder read as a command of yaw, with the model of quite another ship."""
+def test_tanker_with_a_rudder_is_a_unit_alone():
+    """KVLCC2, its rudder read as a command of yaw, with the model of quite another ship: so at the most."""
     data = pd.read_csv(DATA / "kvlcc2_hsva" / "z_05_01.csv")
     pose = np.column_stack([data.x, data.y, np.radians(data.psi_deg)])
     for sign in (1.0, -1.0):
         rudder = np.column_stack([0.0 * data.t, 0.0 * data.t, sign * data.rudder_deg])
         w = weak_windows(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
-        assert likeliest_mistake(w, Model()) is None
+        found = likeliest_mistake(w, Model())
+        assert found is None or of_units(found)

@@ -86,7 +86,7 @@ def test_a_force_that_changes_sign_from_span_to_span_lasts_too():
 
 
 @pytest.mark.parametrize(
-    ("before", "command"), [(0.02 / SETTINGS.share_of_first, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
+    ("before", "command"), [(0.02 / SETTINGS.negligible, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
 )
 def test_what_is_little_beside_the_first_error_or_the_command_does_not_matter(before, command):
     after = noise()

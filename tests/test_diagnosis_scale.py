@@ -21,6 +21,7 @@ from fmus.effects import STANDARD
 from fmus.scale import REFERENCE, REFERENCE_LENGTH, Scale
 from fmus.ship import ship
 from fmus.ships.ship_file import read_ship, shipped_ships
+from fmus.ships.wind import described_numbers
 
 SIZES = [Scale(length / REFERENCE_LENGTH) for length in (7.0, 320.0)]
 HIDDEN = {"ship": {"V_n": 0.05, "V_e": -0.03}, "thrusters": {"lag": 0.6}}
@@ -31,8 +32,7 @@ def grown(d, scale):
     units = {n: v.unit for n, v in ship(STANDARD, d).parameters["vessel"].items()}
     always = {"x": "m", "y": "m", "abreast": "m", "lag": "s"}
 
-    everything = ship(STANDARD, d).effects.values()
-    wind = {p.name: p.unit for e in everything if e.id == "wind" for p in e.parameters}
+    wind = {v.name: v.unit for v in described_numbers([v.name for v in d.wind])}
 
     def given(values, units):
         return tuple(v._replace(value=scale.factor(units[v.name]) * v.value) for v in values)

@@ -189,7 +189,7 @@ def test_gains_are_one_and_follow_units_and_clock():
         (of_commands("", (10.0, 10.0, 0.1)), [0.1, 0.1, 10.0]),
         (Reading("", pace=0.5), [4.0, 4.0, 4.0]),
     ):
-        found = gains(reread(windows(), reading), Model())
+        found = gains(reread(windows(), reading, Model()), Model())
         assert found.value == pytest.approx(expected, rel=0.1)
         assert found.wrong.any()
 

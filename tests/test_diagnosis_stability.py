@@ -1,6 +1,7 @@
 """The check of a learned model: mass, dissipation, and the closed loop on the reference paths."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -60,8 +61,9 @@ def test_for_linear_damping_it_is_the_smallest_eigenvalue(changes):
 def test_it_is_the_rate_at_which_the_ship_loses_its_energy(u, v, r, cubic, mixed):
     nu = np.array([[u, v, r]]) + 0.01
     model = Model({"delta_X_uuu": cubic, "delta_N_uv": mixed, "curve_X_u_7": 0.1})
-    nu_dot = acceleration(model, np.zeros(1), np.zeros((1, 3)), nu)  # Coriolis forces included
-    rest = acceleration(model, np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
+    calm = SimpleNamespace(time=np.zeros(1), air=None)
+    nu_dot = acceleration(model, calm, np.zeros((1, 3)), nu)  # Coriolis forces included
+    rest = acceleration(model, calm, np.zeros((1, 3)), np.zeros((1, 3)))
     power = (nu @ mass(model) @ (nu_dot - rest).T)[0, 0]
     energy = 0.5 * (nu @ mass(model) @ nu.T)[0, 0]
     expected = -2.0 * dissipation(model, nu, mass(model))[0] * energy

@@ -13,11 +13,10 @@ from diagnosis import Model, Run, omega, weak_windows
 from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
-from diagnosis.predictors.correlation import correlated_windows
 from diagnosis.predictors.evaluation import evaluate_run
 from diagnosis.predictors.parameter_set import ship_with
 from diagnosis.predictors.ship_model import of_one_run
-from diagnosis.predictors.uncertainty import omega_std
+from diagnosis.predictors.uncertainty import correlated_windows, omega_std
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title

@@ -339,3 +339,20 @@ def test_the_namespaces_are_those_of_the_standard():
         "ssv": "SystemStructureParameterValues",
         "osp": "OSPAnnotations",
     }
+
+
+def test_another_ship_is_exported(tmp_path, capsys):
+    """The FMUs with a bare name are those of --ship; one that there is not is refused."""
+    content = {
+        "name": "ship", "step": 0.1, "stop": 1.0,
+        "fmus": {"thrusters": {"path": "thrusters.fmu"}, "vessel": {"path": "vessel.fmu"}},
+        "connections": [["thrusters.tau_act_*", "vessel.tau_*"]],
+    }  # fmt: skip
+    path = tmp_path / "ship.json"
+    path.write_text(json.dumps(content))
+    assert export([str(path), "--ship", "otter", "--osp", str(tmp_path / "osp")]) == 0
+    starts = FmuModel(tmp_path / "osp" / "vessel.fmu").variables
+    assert float(starts["m"].start) == 80.0
+    assert export([str(path), "--ship", "ottr", "--osp", str(tmp_path / "other")]) == 2
+    assert "otter" in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()

@@ -16,7 +16,7 @@ from support.project import ROOT
 from test_run import start
 
 import cosim
-from cosim.fmu.isolated import _reason
+from cosim.fmu.isolation.isolated import _reason
 
 # A watching thread that dies would be told as a warning only.
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")

@@ -7,7 +7,10 @@ import pytest
 
 from diagnosis import Model, Run
 from diagnosis.assessment.gathering import gather
-from diagnosis.runs import channels_of, prepare
+from diagnosis.interactive import compare, load
+from diagnosis.report.content import file_content
+from diagnosis.report.report_data import ReportData
+from diagnosis.runs import channels_of, prepare, table_of
 from diagnosis.search.findings import Finding
 from diagnosis.verdict.confidence import confidence_of, doubt_of_data
 
@@ -42,7 +45,7 @@ def test_each_channel_has_its_own_rate_and_noise():
     assert [found[n].noise for n in ("x", "y", "psi")] == pytest.approx(NOISE, rel=0.3)
     assert found["r"].noise == pytest.approx(1e-3, rel=0.2)
     assert {c.noise_from for c in found.values()} == {"estimated"}
-    assert {c.reason for c in found.values()} == {""}
+    assert {c.why for c in found.values()} == {""}
     assert [found[n].unit for n in ("x", "psi", "r")] == ["m", "rad", "rad/s"]
 
 
@@ -87,3 +90,74 @@ def test_of_rare_samples_nothing_is_sure(every, sure):
     seen = confidence_of(f, Model(), (), doubt_of_data([windows]))
     assert seen.own == (0.99 if sure else 0.5)
     assert ("too rare" in seen.doubt) != sure
+
+
+def held(run, times=2):
+    """The same run in a file that is as many times quicker, its rows held."""
+    rows = np.repeat(np.arange(run.time.size), times)
+    later = np.tile(np.arange(times), run.time.size) / times * H
+    return replace(run.rows(rows), time=run.time[rows] + later, measured={})
+
+
+def test_held_rows_add_no_information():
+    run = replace(sailed(), measured={})
+    whole, slow = prepare(held(run)).smoothed, prepare(run).smoothed
+    assert whole.noise == pytest.approx(slow.noise, rel=1e-6)
+    assert whole.noise_rel_std == pytest.approx(slow.noise_rel_std, rel=0.01)
+    assert whole.counts.used == slow.counts.used
+    off = whole.eta[::2] - slow.eta
+    assert np.nanmax(np.abs(off) / slow.eta_std) < 0.01
+
+
+def test_start_of_time_and_scale_of_the_place_do_not_matter():
+    run = replace(sailed(), measured={})
+    first = prepare(run).smoothed
+    later = prepare(replace(run, time=run.time + 2.0**17)).smoothed
+    assert later.noise == pytest.approx(first.noise, rel=1e-4)
+    assert later.eta == pytest.approx(first.eta, abs=1e-4 * NOISE.min(), nan_ok=True)
+    larger = prepare(replace(run, pose=run.pose * [2.0, 2.0, 1.0])).smoothed
+    assert larger.noise == pytest.approx(first.noise * [2.0, 2.0, 1.0], rel=1e-3)
+    assert larger.noise_rel_std == pytest.approx(first.noise_rel_std, rel=0.02)
+
+
+def test_added_noise_is_found_beside_that_which_is_there():
+    run, more = replace(sailed(), measured={}), 0.02
+    rng = np.random.default_rng(3)
+    rows = np.arange(run.time.size) // 2 * 2
+    pose = run.pose + more * rng.standard_normal(run.pose.shape) * [1.0, 1.0, 0.0]
+    s = prepare(replace(run, pose=pose[rows])).smoothed
+    assert s.noise[:2] == pytest.approx(np.hypot(NOISE[:2], more), rel=0.1)
+    assert s.noise[2] == pytest.approx(NOISE[2], rel=0.1)
+    assert s.spikes.sum() == 0
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_the_noise_is_as_far_off_as_it_is_said_to_be(every):
+    rows = np.arange(0, round(SECONDS / H), every)
+    off = []
+    for seed in range(3):
+        s = prepare(replace(sailed(seed).rows(rows), measured={})).smoothed
+        off.append(np.log(s.noise / NOISE) / s.noise_rel_std)
+    assert 0.3 < np.sqrt(np.mean(np.square(off))) < 2.0
+
+
+def test_a_noise_is_hardly_known_where_motions_are_quicker_than_samples():
+    run, rng = sailed(), np.random.default_rng(4)
+    jerks = 0.2 * rng.standard_normal(run.time.size) * (np.sin(0.1 * run.time) > 0.0)
+    quick = np.convolve(jerks, np.sin(np.arange(20) * 0.3), "same")
+    pose = run.pose + np.outer(quick, [1.0, 1.0, 0.0])
+    rows = np.arange(0, run.time.size, 5)
+    found = table(replace(run, pose=pose, measured={}).rows(rows))
+    assert not found["x"].known
+    assert found["psi"].known
+
+
+def test_files_hold_each_channel_by_its_name():
+    run = sailed()
+    compared = compare(load([table_of(run), table_of(sailed(1))], anyway=True))  # forces of no ship
+    data = file_content(ReportData.of(compared))["data"]
+    keys = {"rate", "held", "noise", "noise_from", "correlation", "latency", "outliers", "used", "why"}
+    assert set(data["channels"]) == {"x", "y", "psi", "r"}
+    for channels in (data["channels"], *(of["channels"] for of in data["runs"])):
+        assert all(keys <= set(c) for c in channels.values())
+    assert data["channels"]["r"]["used"] is True

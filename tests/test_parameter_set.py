@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from test_run import SSV, command, parameter, scenario  # noqa: F401 - a fixture
 import cosim
 from cosim import InputError, Parameter, ParameterSet, read_parameters, write_parameters
 from diagnosis.predictors import Model, read_model, write_model
+from diagnosis.runs import Fingerprint
 from fmus.build import build
 from fmus.build.start_values_file import read_starts
 
@@ -49,7 +51,13 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path_factory, vessel, clock):
     assert (found.thrusters, found.clock) == ({"lag": 0.1 + 0.2}, clock)
 
 
-@pytest.mark.parametrize("model", [Model(), LEARNED, Model(measurement={"clock_offset": -0.1})])
+RUN = Fingerprint("a", 64 * "0", 0.1, np.eye(3), np.ones(3))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [Model(), LEARNED, Model(measurement={"clock_offset": -0.1}), replace(LEARNED, learned_from=(RUN,))],
+)
 def test_the_file_is_valid_by_the_schema_of_the_standard(model, tmp_path):
     write_model(tmp_path / "model.ssv", model)
     found = read_ssv(str(tmp_path / "model.ssv"))  # checks against the schema

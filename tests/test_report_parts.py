@@ -227,7 +227,7 @@ def test_ranking_is_from_the_best_down_with_what_ties_hollow():
     assert far.x.spaced(1e-3) / 1e-3 == pytest.approx(far.x.spaced(2e-3) / 2e-3, rel=1e-4), "linear"
     assert far.x.spaced(1e6) - far.x.spaced(1e5) == pytest.approx(np.log(10.0)), "logarithmic"
     (many,) = figures.ranking([ranked(f"c{k}", float(k), 1.0) for k in range(40)]).panels
-    assert len(many.y.names) == figures.MAX_RANKED
+    assert len(many.y.names) == 2 * figures.LENGTH
     unpaired = [ranked(n, np.nan, np.nan, score=x) for n, x in (("a", 2.0), ("b", 3.5))]
     assert [m.x[0] for m in figures.ranking(unpaired).panels[0].marks if m.dots] == [0.0, 1.5]
 
@@ -319,7 +319,7 @@ def test_errors_grow_by_their_quartiles_in_millimetres_and_degrees():
     for panel, scale in ((position, 10.0), (heading, 1.0)):
         drawn = marks(panel)
         middle = drawn["before"].x
-        assert middle.size == tracks.PARTS
+        assert middle.size == 2 * tracks.INSTANTS
         assert middle[0] == pytest.approx(0.125)
         assert drawn["before"].y == pytest.approx(scale * middle, abs=0.13 * scale)
         assert drawn["after"].y == pytest.approx(0.5 * drawn["before"].y)

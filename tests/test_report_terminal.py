@@ -59,8 +59,8 @@ FAULT = SensorFinding("r", "scale", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "r reads to
 RATE = SensorFinding("time", "clock_rate", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "its clock is fast")
 OURS = SimpleNamespace(parametric=True, description=lambda: None)
 CHANNELS = [
-    ("a", [MeasuredChannel("x", 20.0, 0.0, 0.002, "m", "given", 0.0, 0.0, 2, (1.5, 3.0))]),
-    ("b", [MeasuredChannel("x", 10.0, 0.5, 0.004, "m", "given", 0.0, 0.0, 1, (7.0,))]),
+    ("a", [MeasuredChannel("x", 20.0, 0.0, 0.002, 0.0, "m", "given", 0.0, 0.0, 2, (1.5, 3.0))]),
+    ("b", [MeasuredChannel("x", 10.0, 0.5, 0.004, 0.0, "m", "given", 0.0, 0.0, 1, (7.0,))]),
 ]
 DERIVED = {"channels": CHANNELS, "trials": [None, TRIAL], "measured": [{}, {"port.thrust": (12.0, 3.0)}]}
 

@@ -9,8 +9,10 @@ import pytest
 from support.project import ROOT
 
 from benchmarks.constants import PACKAGE, constants, deciding
+from benchmarks.sensitivity import on_evidence
 from benchmarks.sensitivity.__main__ import COLUMNS, Task, markdown, summary
 from benchmarks.sensitivity.changed_constant import DOUBLE, HALF, change, names_of, places
+from diagnosis.verdict import confidence
 
 
 def values(text, name, factor):
@@ -109,3 +111,13 @@ def test_the_summary_counts_what_is_not_as_usual():
     }
     assert counts.loc["m:B", [("verdicts", 0.5), ("errors", 0.5)]].tolist() == [1, 1]
     assert "| m:A | 0 | 0 | 0 | 1 | 2 | 2 |" in markdown(counts, 2)
+
+
+def test_constants_of_the_verdict_are_tried_on_saved_evidence(tmp_path):
+    (tmp_path / "results.csv").write_text("effect,evidence\na,1 0 0; 0.5 0 0\nb,\nc,1 0.3 0\n")
+    found = on_evidence.read(tmp_path / "results.csv")
+    assert [on_evidence.outcome(e) for e in found] == ["found", "ambiguous", "ambiguous"]
+    before = confidence.SURE
+    changed = {name: counts for name, *counts in on_evidence.changes(found)}
+    assert changed == {"SURE": [1, 1], "PER_DOUBT": [1, 1], "FOUND": [0, 0], "EVEN_ODDS": [0, 3]}
+    assert before == confidence.SURE, "as it was"

@@ -98,7 +98,34 @@ def gunnerus():
     }
 
 
-@pytest.mark.parametrize("source", [otter, cybership2, kvlcc2, gunnerus], ids=lambda f: f.__name__)
+def esso_osaka():
+    """Prime units over L = 3 m and rho L^2 d / 2; Fujii's formula, heights and quotients of its rudder."""
+    length, mass, ratio = 3.0, 0.5 * 998.0 * 3.0**2 * 0.20114, 1.539
+    m, x_g = 0.27078 * mass, 0.03119 * length
+    I_z = m * ((0.25 * length) ** 2 + x_g**2)
+    return {
+        "m": m,
+        "x_g": x_g,
+        "I_z": I_z,
+        "X_udot": -0.0467 * mass,
+        "Y_vdot": -0.2579 * mass,
+        "N_rdot": I_z - (0.0286 * mass * length**2 + m * x_g**2),
+        "N_uv": (0.2579 - 0.0467) * mass,
+        "propeller.x": -0.517 * length,
+        "propeller.pitch": 0.7151 * 0.084,
+        "rudder.x": -0.5 * length,
+        "rudder.span": sqrt(0.01063 * ratio),
+        "rudder.lift": 6.13 * ratio / (2.25 + ratio),
+        "rudder.race": 0.288 / 1.42,
+        "rudder.hull_force_place": -0.45 * length,
+        "rudder.inflow_lever": -1.08 * length,
+    }
+
+
+SOURCES = [otter, cybership2, kvlcc2, gunnerus, esso_osaka]
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda f: f.__name__)
 def test_numbers_of_a_file_are_those_of_its_source(source):
     """To the digits that a file has; those of a model ship's thruster speed are guessed to three."""
     given = numbers(source.__name__)

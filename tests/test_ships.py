@@ -175,6 +175,15 @@ LAWS = {
     "given_force": {"F_X": 3.0, "F_Y": 2.0},
     "propeller_behind_hull": {**OPEN_WATER, "C_2_plus": 1.6, "C_2_minus": 1.1},
     "rudder_in_race": RACE_RUDDER,
+    "four_quadrant_propeller": {
+        **{name: x for name, x in OPEN_WATER.items() if name != "astern"},
+        "wake_slope": -0.3,
+        "pitch": 0.15,
+        "A_5": -0.001,
+        "A_8": 0.001,
+        "B_5": 0.001,
+    },
+    "four_quadrant_rudder": {**RACE_RUDDER, "race_astern": 0.1, "pressure_astern": -0.2},
     "azimuth_with_leg": LEG,
     "force_table_ahead": TABLE,
     "force_table_aside": TABLE,
@@ -185,7 +194,8 @@ every_law = pytest.mark.parametrize("name", LAWS)
 
 
 def test_every_law_is_tested():
-    sailed = {a.law for a in (*EVERY_LAW.actuators, *COMMANDED.actuators)}
+    ships = EVERY_LAW, COMMANDED, SHIPS["esso_osaka"]
+    sailed = {a.law for d in ships for a in d.actuators}
     ours = {name for name, law in Law.known.items() if law.__module__.startswith("fmus.actuators.")}
     assert set(LAWS) == ours == sailed
 

@@ -16,7 +16,8 @@ from diagnosis.predictors import ship_with
 from diagnosis.predictors.windows import free_runs
 from diagnosis.runs import Run, examine
 from diagnosis.search import DEFAULT
-from studies import research_vessel, ship_folds, tanker
+from fmus.ship import ship
+from studies import low_speed_tanker, research_vessel, ship_folds, tanker
 from studies.research_vessel import MANOEUVRES, closure, cut, steady
 from studies.study_report import Report
 
@@ -417,3 +418,40 @@ def test_command_asks_for_its_folds(module, arguments, folds, quick, monkeypatch
     with pytest.raises(SystemExit):
         module.main()
     assert "--seeds" in capsys.readouterr().err, "nothing is random, so that there are no seeds"
+
+
+ESSO = DATA / "esso_osaka"
+needs_esso = pytest.mark.skipif(
+    not ESSO.is_dir(), reason=f"no measured runs: no tests of the Esso Osaka in {ESSO}"
+)
+
+
+def test_tests_of_one_log_are_left_out_together():
+    names = ["random_06-Aug_16_24_25_1", "random_06-Aug_16_24_25_4", "random_31-Jul_12_29_58"]
+    names += ["turn_14-Oct_14_08_51", "turn_14-Oct_14_17_39"]
+    runs = [SimpleNamespace(run=SimpleNamespace(name=name)) for name in names]
+    first, second = ([w.run.name for w in fold] for fold in low_speed_tanker.dealt(runs, 2))
+    assert sorted(first) == [*names[:2], names[3]]
+    assert sorted(second) == [names[2], names[4]]
+
+
+@needs_esso
+@pytest.mark.slow
+def test_the_description_of_the_esso_osaka_predicts_a_zig_zag_and_needs_the_wind():
+    """Over 20 s it stays within a third of a length; in calm air it is worse."""
+    model = Model(ship=ship_with((), "esso_osaka"))
+    files = [
+        ESSO / f"{name}.csv" for name in ("zigzag_31-Jul-2020_13_57_45", "random_31-Jul-2020_14_52_18")
+    ]
+    runs = [ship_folds.read(f, low_speed_tanker.COLUMNS, model) for f in files]
+    data = diagnosis.gather(runs, model=model, anyway=True)
+    for w in data:
+        (position, heading), _ = low_speed_tanker.errors(w, model)
+        assert position < 1.0
+        assert heading < 10.0
+    calm = Model(ship=ship(description=model.ship.description._replace(wind_measured=False)))
+    (with_wind, _), _ = low_speed_tanker.errors(data[1], model)
+    (without, _), _ = low_speed_tanker.errors(data[1], calm)
+    assert with_wind < without
+    with pytest.raises(InputError, match="no tests KIND_DATE_TIME"):
+        low_speed_tanker.study(TANKER, ESSO, 0, True)

@@ -25,11 +25,9 @@ from diagnosis.acceptance.budget import (
 )
 from diagnosis.acceptance.criterion import Criterion
 from diagnosis.acceptance.judged_criterion import Predicted, decide, judge
-from diagnosis.acceptance.pdf import laid_out
 from diagnosis.acceptance.predictions import Predictions, difference, judged
 from diagnosis.acceptance.statistics import independent, root_mean_square, share
 from diagnosis.acceptance.validity import window_means
-from diagnosis.report.document import ReportSection, Table
 from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
 from diagnosis.verify import main as verify_main
 
@@ -171,7 +169,7 @@ def test_rms_bounds_hold_their_probability():
 
 
 def test_uncertainties_combine_by_their_squares():
-    b = Budget(3.0, 4.0, None, 12.0, None)
+    b = Budget(3.0, 4.0, None, 12.0, 0.0, 0.0, None)
     assert combined(3.0, None, 4.0) == 5.0
     assert b.u_input == pytest.approx(np.sqrt(160.0))
     assert b.u_val == pytest.approx(13.0)
@@ -180,7 +178,7 @@ def test_uncertainties_combine_by_their_squares():
 
 def test_a_budget_is_over_the_windows_that_count():
     one = {"u": np.array([1.0, 9.0, 100.0])}
-    s = Sources(one, one, None, None, one, {})
+    s = Sources(one, one, None, None, None, None, one, {})
     found = budget("u", [s], [np.array([True, True, False])])
     assert found.measurement == pytest.approx(np.sqrt(5.0))
     assert found.parameters is None
@@ -257,7 +255,7 @@ def test_only_windows_within_count(comparison, predictions):
     [
         ("", "cannot be read as criteria"),
         ("[" * 100_000, "nested too deeply"),
-        ("[]", "valid dictionary"),
+        ("[]", "should be an object"),
         ('{"criteria": []}', "criteria: List should have at least 1 item"),
         ('{"criterai": []}', r"criteri.*(did you mean 'criteria'|is missing)"),
         ({"quantity": "headin"}, r"'headin' cannot be judged; did you mean 'heading'"),
@@ -267,6 +265,12 @@ def test_only_windows_within_count(comparison, predictions):
         ({"horizon": 1e400}, r"criteria\[0\].horizon"),
         ({"statistic": "rms", "coverage": 0.5}, "coverage is of the statistic 'share'"),
         ({"within": {"u": [2, 1]}}, "within.u: 2 is not below 1"),
+        ({"tolerance": True}, r"criteria\[0\].tolerance: Input should be a valid number"),
+        ({"tolerance": "1"}, r"criteria\[0\].tolerance: Input should be a valid number"),
+        ({"training_runs": 1}, r"criteria\[0\].training_runs: Input should be a valid boolean"),
+        ('{"purpose": "a", "purpose": "b", "criteria": []}', "key 'purpose' stands twice"),
+        ('{"particulars": {"klient": "a"}, "criteria": []}', "particulars.klient.*did you mean 'client'"),
+        ('{"input_std": {"current": -1.0}, "criteria": []}', "input_std.current"),
     ],
 )  # fmt: skip
 def test_what_are_no_criteria(tmp_path, text, message):
@@ -291,52 +295,78 @@ def test_a_record_of_both_verdicts_and_what_shows_a_change(comparison, tmp_path,
     """Written, checked, and with a byte changed in each file that it names."""
     easy, hard = {"tolerance": 0.5, "coverage": 0.5, "horizon": 4.0}, {"tolerance": 1e-4, "horizon": 4.0}
     criteria = write_criteria(tmp_path / "criteria.json", easy, hard, purpose="a test")
-    model = tmp_path / "model.ssv"
-    model.write_text("a model")
-    v = diagnosis.validate(comparison, criteria, files={"model": model})
+    map_ = tmp_path / "notes.txt"
+    map_.write_text("a file")
+    v = diagnosis.validate(comparison, criteria, files={"notes": map_})
     assert [j.outcome for j in v.content.judgements] == ["met", "cannot be judged"]
     assert "within the validation uncertainty" in v.content.judgements[1].reason
     out = tmp_path / "out"
     assert set(v.write(out, key)) == set(FILES) == {p.name for p in out.iterdir()}
-    record = out / FILES[0]
-    assert all(c.holds for c in diagnosis.verify_record(record))
-    assert (out / FILES[2]).read_bytes().startswith(b"%PDF")
-    for path in (criteria, model, *(out / name for name in FILES)):
+    record, public = out / FILES[0], public_of(key, tmp_path / "public.pem")
+    usual = [str(record), "--key", public, "--allow-missing", "made"]  # which is a table in memory
+    for path in (criteria, map_, *(out / name for name in FILES)):
         raw = path.read_bytes()
         # Of the record a byte that leaves it one.
         at = raw.index(b'"purpose": "a t') + 12 if path == record else len(raw) // 2
         path.write_bytes(raw[:at] + bytes([raw[at] ^ 1]) + raw[at + 1 :])
-        assert verify_main([str(record)]) == 1, path
+        assert verify_main(usual) == 1, path
         path.write_bytes(raw)
-    assert verify_main([str(record)]) == 0
-    model.unlink()
-    assert verify_main([str(record)]) == 0
-    assert "model.ssv: not found here" in capsys.readouterr().out
+    assert verify_main(usual) == 0
+    map_.unlink()
+    assert verify_main(usual) == 4
+    assert "NOT CHECKED  notes: " in capsys.readouterr().out
+    assert verify_main([*usual, "--allow-missing", "notes.txt"]) == 0
+    assert "notes.txt: not found here (allowed)" in capsys.readouterr().out
+    assert verify_main([*usual, "--allow-missing", "notes.pdf"]) == 2
+
+
+def public_of(key, path):
+    from diagnosis.acceptance.record.signature import public_key
+
+    path.write_text(public_key(key))
+    return str(path)
 
 
 def test_whose_signature_it_is(comparison, tmp_path, key):
-    from diagnosis.acceptance.signature import public_key
-
     criteria = write_criteria(tmp_path / "criteria.json", {"horizon": 4.0})
     record = tmp_path / "out" / FILES[0]
     diagnosis.validate(comparison, criteria).write(record.parent, key)
-    mine, other = tmp_path / "mine.pem", tmp_path / "other.pem"
-    mine.write_text(public_key(key))
-    other.write_text(public_key(write_key(tmp_path / "key_2.pem")))
-    assert verify_main([str(record), "--key", str(mine)]) == 0
-    assert verify_main([str(record), "--key", str(other)]) == 1
-    assert verify_main([str(record), "--key", str(criteria)]) == 2
+    mine = public_of(key, tmp_path / "mine.pem")
+    other = public_of(write_key(tmp_path / "key_2.pem"), tmp_path / "other.pem")
+    usual = [str(record), "--allow-missing", "made"]
+    assert verify_main([*usual, "--key", mine]) == 0
+    assert verify_main([*usual, "--key", other]) == 1
+    assert verify_main([*usual, "--key", str(criteria)]) == 2
     assert verify_main([str(criteria)]) == 2
     assert verify_main([str(tmp_path / "no.json")]) == 2
+    assert verify_main(usual) == 4, "of a key that the record names nobody knows whose it is"
+    assert verify_main([*usual, "--allow-missing", "key"]) == 0
+    (record.parent / FILES[3]).unlink()
+    assert verify_main([*usual, "--allow-missing", "signature", "--allow-missing", "key"]) == 1
     diagnosis.validate(comparison, criteria).write(record.parent)
-    assert not (record.parent / FILES[3]).exists()  # of the record before
-    assert verify_main([str(record)]) == 0
-    assert verify_main([str(record), "--key", str(mine)]) == 1
+    assert verify_main([*usual, "--key", mine]) == 1
+    assert verify_main(usual) == 4
+    assert verify_main([*usual, "--allow-missing", "signature"]) == 0
+
+
+def test_an_edited_verdict_without_its_signature_is_not_checked(comparison, tmp_path, key):
+    criteria = write_criteria(tmp_path / "criteria.json", {"horizon": 4.0, "tolerance": 1e-4})
+    record = tmp_path / "out" / FILES[0]
+    diagnosis.validate(comparison, criteria).write(record.parent, key)
+    content = json.loads(record.read_text())
+    content["judgements"][0]["outcome"], content["public_key"] = "met", None
+    record.write_text(json.dumps(content))
+    (record.parent / FILES[3]).unlink()
+    assert verify_main([str(record), "--allow-missing", "made"]) == 4
+    assert verify_main([str(record), "--key", public_of(key, tmp_path / "mine.pem")]) == 1
+    raw = record.read_text()
+    record.write_text(raw.replace('"form"', '"public_key": null, "form"', 1))
+    assert verify_main([str(record)]) == 2, "a key twice"
 
 
 @pytest.mark.parametrize("kind", ["nothing", "no key", "public key"])
 def test_what_cannot_sign_leaves_nothing(comparison, tmp_path, key, kind):
-    from diagnosis.acceptance.signature import public_key
+    from diagnosis.acceptance.record.signature import public_key
 
     contents = {"no key": "no key", "public key": public_key(key)}
     path = tmp_path / "bad.pem"
@@ -349,7 +379,7 @@ def test_what_cannot_sign_leaves_nothing(comparison, tmp_path, key, kind):
 
 
 def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
-    from diagnosis.acceptance.signature import sign
+    from diagnosis.acceptance.record.signature import sign
 
     monkeypatch.setitem(__import__("sys").modules, "cryptography", None)
     with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[diagnosis\]'"):
@@ -359,14 +389,6 @@ def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
 def test_a_signature_is_of_criteria(tmp_path, capsys):
     assert compare.main([str(tmp_path), "--sign", "key.pem", "--out", str(tmp_path / "out")]) == 2
     assert "--criteria FILE.json is missing" in capsys.readouterr().err
-
-
-def test_tables_fit_into_their_lines():
-    table = Table(("head", "what it is"), [("a" * 30, "words " * 40)])
-    lines = laid_out("title", [ReportSection("heading", ["[b]", "words " * 40], [table])], 60)
-    assert max(map(len, lines)) <= 60
-    assert "".join(lines).count("words") == 80
-    assert "[b]" in lines
 
 
 LEFT = json.dumps({"unrecorded": {"size": [0.1, 0.2, 0.3], "time": [1.0, 2.0, 3.0]}})

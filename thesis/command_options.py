@@ -19,11 +19,7 @@ def analysis_parser(
         estimates: where velocities come from by default.
         fewest: ``+``: one run at the least; ``*``: none.
     """
-    made = command_parser(
-        f"thesis.{name}",
-        description,
-        epilog,
-    )
+    made = command_parser(f"thesis.{name}", description, epilog)
     made.add_argument(
         "runs", type=Path, nargs=fewest, metavar="RUN", help="measured run, or folder of a log"
     )
@@ -39,13 +35,18 @@ def analysis_parser(
     return made
 
 
+def ssv_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--ssv``."""
+    made.add_argument(
+        "--ssv",
+        action="store_true",
+        help="write model.ssv also where its part of the force fails the check before simulation",
+    )
+
+
 def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
-    made = command_parser(
-        f"thesis.{name}",
-        description,
-        epilog,
-    )
+    made = command_parser(f"thesis.{name}", description, epilog)
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     made.add_argument(
         "--observer", metavar="NAME", help="an observer of this project (the scenario's, or mdf)"

@@ -15,7 +15,7 @@ from cosim.command import run_command
 from diagnosis.commands import Done, run, ship_option
 from diagnosis.execution import Advance, together
 
-from .command_options import analysis_parser
+from .command_options import analysis_parser, ssv_option
 
 RESULT, MODEL, REPORT = FILES = ("pls.json", "model.ssv", "report.html")
 
@@ -91,11 +91,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help=f"{MODEL} holds the model nearest to it that is stable by construction",
     )
-    made.add_argument(
-        "--ssv",
-        action="store_true",
-        help=f"write {MODEL} also where its part of the force fails the check before simulation",
-    )
+    ssv_option(made)
     return made
 
 

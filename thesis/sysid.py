@@ -17,7 +17,7 @@ from cosim.command import run_command
 from diagnosis.commands import Done, run
 from diagnosis.execution import Advance, together
 
-from .command_options import analysis_parser
+from .command_options import analysis_parser, ssv_option
 
 RESULT, MODEL, REPORT = FILES = ("sysid.json", "model.ssv", "report.html")
 
@@ -81,11 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--recipe", metavar="NAME", help="a row of Table 7.1 in place of learning: SYSID1 to SYSID4"
     )
-    made.add_argument(
-        "--ssv",
-        action="store_true",
-        help=f"write {MODEL} also where its part of the force fails the check before simulation",
-    )
+    ssv_option(made)
     return made
 
 

@@ -27,13 +27,15 @@ class Way:
     Attributes:
         record: from a good table and random numbers to the recorded one.
         noise: standard deviation (3,) of the pose then, from that of the good log and the table; None:
-            it is not white, or cannot be said.
+            it is not white.
+        rates: at which the pose is sampled (3,) [Hz]; infinite: as the good log.
         given: what the file beside it says of the noise, in those of the good log; empty: nothing.
         columns: further keys of the file beside it, by signal.
     """
 
     record: Record
     noise: Noise | None = lambda sigma, _: sigma
+    rates: Sequence[float] = (np.inf, np.inf, np.inf)
     given: Mapping[str, float] = field(default_factory=dict)
     columns: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
@@ -47,9 +49,8 @@ def sampled(table: pd.DataFrame, time: np.ndarray) -> pd.DataFrame:
 
 
 def even(table: pd.DataFrame, rate: float) -> np.ndarray:
-    """Times [s] of a rate [Hz], no quicker than the table's own."""
-    step = max(1.0 / rate, float(np.median(np.diff(table["time"]))))
-    return np.arange(table["time"].iloc[0], table["time"].iloc[-1], step)
+    """Times [s] of a rate [Hz]."""
+    return np.arange(table["time"].iloc[0], table["time"].iloc[-1], 1.0 / rate)
 
 
 def held(rates: dict[str, float], rate: float, empty: bool = False) -> Record:
@@ -187,14 +188,14 @@ DEGREES = {"psi": {"name": "psi", "unit": "deg"}}
 WAYS: dict[str, Way] = {"clean": Way(plain)}
 for of, file in product(RATES, FILES):
     names = dict.fromkeys(POSE, of)
-    WAYS[f"{of:g} Hz held in {file:g}"] = Way(held(names, file))
-    WAYS[f"{of:g} Hz lines in {file:g}"] = Way(interpolated(of, file))
+    WAYS[f"{of:g} Hz held in {file:g}"] = Way(held(names, file), rates=(of, of, of))
+    WAYS[f"{of:g} Hz lines in {file:g}"] = Way(interpolated(of, file), rates=(of, of, of))
 for of in RATES:
-    WAYS[f"place {of:g} Hz held, heading 10 Hz"] = Way(held({"x": of, "y": of, "psi": 10.0}, 10.0))
-    WAYS[f"place {of:g} Hz empty, heading 10 Hz"] = Way(
-        held({"x": of, "y": of, "psi": 10.0}, 10.0, True)
-    )
-WAYS["heading 1 Hz held, place 10 Hz"] = Way(held({"x": 10.0, "y": 10.0, "psi": 1.0}, 10.0))
+    for how, empty in (("held", False), ("empty", True)):
+        record = held({"x": of, "y": of, "psi": 10.0}, 10.0, empty)
+        WAYS[f"place {of:g} Hz {how}, heading 10 Hz"] = Way(record, rates=(of, of, 10.0))
+slow = held({"x": 10.0, "y": 10.0, "psi": 1.0}, 10.0)
+WAYS["heading 1 Hz held, place 10 Hz"] = Way(slow, rates=(10.0, 10.0, 1.0))
 for lag in LAGS:
     WAYS[f"place filtered {lag:g} s"] = Way(filtered(PLACE, lag), None)
     WAYS[f"heading filtered {lag:g} s"] = Way(filtered(["psi"], lag), None)

@@ -174,6 +174,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.one:
         answer_one(*json.loads(options.one))
         return 0
+    if options.evidence is not None:
+        from .on_evidence import changes, read
+
+        for name, half, double in changes(read(options.evidence)):
+            print(f"{name}: {half} at half, {double} at double")
+        return 0
     from .saved_evidence import make, prepare, problem_names
 
     names = [name for c in deciding(constants(PACKAGE)) for name in names_of(c)]
@@ -217,6 +223,12 @@ def _parser() -> argparse.ArgumentParser:
     usual = os.cpu_count()
     parser.add_argument("--jobs", type=whole_number(1), default=usual, metavar="N", help=f"({usual})")
     parser.add_argument("--out", type=Path, default=OUT, metavar="DIR", help=f"for results ({OUT})")
+    parser.add_argument(
+        "--evidence",
+        type=Path,
+        metavar="FILE.csv",
+        help="table of hidden effects: try the verdict's constants on its findings, and nothing else",
+    )
     parser.add_argument("--one", help=argparse.SUPPRESS)
     return parser
 

@@ -26,6 +26,7 @@ from ..command import (
     command_parser,
     complain,
     folder_name,
+    positive,
     printable,
     run_command,
     whole_number,
@@ -58,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     out = result_folder(options.campaign, options.out)
     if options.workers != 0 and STATE.watched:
         mute_started_processes()
+    STATE.timeout = options.timeout
     try:
         _check(options)
         with shown_progress(console, options.quiet) as progress:
@@ -211,6 +213,12 @@ def _parser() -> argparse.ArgumentParser:
         help="also where runs of another campaign would vanish from DIR/runs.parquet",
     )
     parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
+    parser.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help="longest time of a call to an FMU (100 times that of its usual step, 30 s at the least)",
+    )
     parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
     parser.add_argument(
         "--stop-when",

@@ -34,6 +34,7 @@ static double now(void) {
 #endif
 
 #define DISCARD 2             /* of fmi2Status: it and what is worse ends the block */
+#define CALLS 8               /* places behind ``called``, of cosim/process/run_state.py */
 #define NOT_32_BIT (-1)       /* in place of a status: a value that is no fmi2Integer */
 #define LIMIT 2147483648.0    /* 2**31 */
 #define TWO_PI 6.283185307179586 /* as 2.0 * math.pi in Python */
@@ -90,7 +91,8 @@ typedef struct {
     int64_t first;
     double *instants, *rows; /* what is not in the log yet */
     int64_t *finite;         /* how many rows, from the first on, hold nothing but finite numbers */
-    volatile int32_t *called, *taken; /* of cosim/process/run_state.py: the FMU that is called, rows so far */
+    volatile int32_t *called, *taken; /* of cosim/process/run_state.py: the FMU that is called (and the step,
+                                         at CALLS), rows so far */
     int64_t room;                /* for rows */
     double patience;             /* wall time of a block [s] */
     int64_t step, index, status, saved; /* out: base steps done; where and with what it ended early */
@@ -207,6 +209,7 @@ static int one_step(Loop *loop, int64_t step) {
     const double *times = loop->times - loop->first;
     int64_t i;
     int why, status;
+    loop->called[CALLS] = (int32_t)step;
     for (i = 0; i < loop->fmus; i++) {
         const Fmu *fmu = loop->fmu + i;
         if (step % fmu->every) continue;

@@ -12,6 +12,8 @@ from typing import Any
 from distributed import Worker, WorkerPlugin, get_worker
 
 from ..errors import InputError, SimulationError
+from ..process.call_watch import watch_from_copy
+from ..process.run_state import STATE
 from ..process.spawned import end_with_parent
 from .job import RunRow, Task, own_version
 from .travelling_files import put
@@ -31,12 +33,16 @@ class Request:
         files: those names.
         resettable: SHA-256 of the FMUs that may be reset.
         version: of the package, without which equal numbers are not certain.
+        timeout: longest wall time of a call of an FMU [s]; None: by what a step usually takes.
+        notes: file on this computer for what a call took too long; None: on another one.
     """
 
     runs: list[tuple[dict[str, Any], Task]]
     files: tuple[str, ...]
     resettable: frozenset[str]
     version: str
+    timeout: float | None = None
+    notes: str | None = None
 
 
 class OneFile(WorkerPlugin):
@@ -71,7 +77,10 @@ def run_on_worker(request: Request) -> list[RunRow]:
     if (nanny := parent_process()) and nanny.pid:
         end_with_parent(nanny.pid)  # which Dask sees to only where no FMU hangs
     folder = _folder(get_worker())
+    STATE.timeout = request.timeout
     with _making:
+        if not _workplaces and request.notes is not None:
+            watch_from_copy(request.notes)
         work = _workplaces.setdefault(folder, Workplace(folder))
     work.pool.resettable |= request.resettable
     until = time.monotonic() + PATIENCE

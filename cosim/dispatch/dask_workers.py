@@ -28,6 +28,7 @@ from cybership.scratch_folder import Scratch
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
+from ..process.run_state import STATE
 from ..process.spawned import without_program
 from .dask_task import OneFile, Request, run_on_worker
 from .job import Job, RunRow, own_version
@@ -89,6 +90,7 @@ class DaskWorkers:
         self._files = files
         self._cluster: LocalCluster | None = None
         self._scratch = Scratch()
+        self._notes = self._scratch.path / "late"
         self._program = ExitStack()
         for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
             logging.getLogger(logger).setLevel(logging.CRITICAL)
@@ -159,12 +161,18 @@ class DaskWorkers:
                     suspects.extend(batch)
                     found = []
                 elif found is None:
-                    found = [RunRow("lost", "it ended every process that ran it")]
+                    found = [RunRow("lost", self._why_lost())]
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()
         except OSError as error:
             raise SimulationError(f"{LOST}: {error}; {KEPT}") from None
+
+    def _why_lost(self) -> str:
+        """Why the last run that was lost ended its process."""
+        with suppress(OSError, IndexError):
+            return self._notes.read_text(encoding="utf-8").splitlines()[-1]
+        return "it ended every process that ran it"
 
     def _next(self, ended: Queue[Future]) -> Future:
         """The next task that ends.
@@ -203,6 +211,8 @@ class DaskWorkers:
             tuple(names),
             frozenset(self._files.resettable),
             own_version(),
+            STATE.timeout,
+            str(self._notes) if self._cluster is not None else None,
         )
         return self._client.submit(run_on_worker, request, pure=False)
 

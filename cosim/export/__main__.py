@@ -27,6 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         overrides = list(find_parameters(options.parameters))
         scenario = load_scenario(options.scenario)
+        if options.ship is not None:
+            scenario = with_settings(scenario, [("ship", options.ship)], Path.cwd(), "--ship")
         if scenario.native == "auto":  # FMUs in Python run on every computer, compiled ones on this one
             scenario = with_settings(scenario, [("native", False)], Path.cwd())
         system = prepare(scenario, overrides)
@@ -63,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
         "examples:  %(prog)s scenarios/setpoint.json --ssp setpoint.ssp\n"
         "           %(prog)s scenarios/hidden_drag.json --osp hidden_drag --drop-faults\n"
         "           %(prog)s scenarios/ellipse.json --fmu ellipse.fmu --drop-faults\n"
+        "           %(prog)s waypoints --ship otter --ssp otter.ssp\n"
         "exit codes: 0 done, 2 bad input, or something that the format cannot hold",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="JSON file")
@@ -79,6 +82,11 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         help="SSP parameter set whose values override the scenario's; may be given several times",
+    )
+    parser.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="another ship for FMUs with a bare name: a shipped one, or a description of your own",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace a file that is there")
     parser.add_argument(

@@ -165,6 +165,7 @@ class FmuComponent:
         _listeners[self._environment] = listen
         self._callbacks = _callbacks(self._environment)
         self.pointer = self._instantiate(folder)
+        STATE.calls_nothing()
 
     def _instantiate(self, folder: Path) -> int:
         resources = folder / "resources"
@@ -245,6 +246,7 @@ class FmuComponent:
         if self.is_python and finalize is not None:
             finalize()
         self.slave.freeLibrary()
+        STATE.calls_nothing()
 
     def _empty_classes(self) -> None:
         """Release what the class of a freed Python FMU refers to: the modules that came with it."""

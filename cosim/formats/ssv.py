@@ -1,8 +1,10 @@
 """Parameter sets of the SSP standard (``.ssv``): values for FMUs, by model name."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -13,7 +15,8 @@ from ..fmu.archive_check import check_xml, real
 from .namespaces import SSC, SSV
 
 # Types of annotations that hold values of this project; the standard leaves annotations to the tools.
-BESIDE, RUN = "cybership.beside", "cybership.run"
+BESIDE, RUN, LEARNED = "cybership.beside", "cybership.run", "cybership.learned_from"
+CONTENT = "Content"  # element of an annotation that holds text
 Values = Mapping[str, Mapping[str, "Parameter"]]  # model name -> parameter -> value
 
 
@@ -43,6 +46,7 @@ class ParameterSet:
         name: of the set.
         runs: measured run -> values that hold in it alone. Those of the first run stand in ``values``,
             too, where nothing else does, so that a tool that knows no measured runs can apply them.
+        learned_from: what is told of each measured run of which the values were learned.
     """
 
     values: Values = field(default_factory=dict)
@@ -50,6 +54,7 @@ class ParameterSet:
     beside: Mapping[str, Parameter] = field(default_factory=dict)
     name: str = "parameters"
     runs: Mapping[str, Values] = field(default_factory=dict)
+    learned_from: Sequence[Mapping[str, Any]] = ()
 
     @property
     def of_one_run(self) -> dict[str, list[str]]:
@@ -119,7 +124,16 @@ def read_parameters(path: Path) -> ParameterSet:
     runs = {s.get("name", ""): _values(s, path) for s in sets}
     if "" in runs:
         raise InputError(f"'{path}' has values of a run without a name")
-    return ParameterSet(values, units, beside, root.get("name", ""), runs)
+    learned = [_told(e.text, path) for e in root.iterfind(f"{own}[@type='{LEARNED}']/{CONTENT}")]
+    return ParameterSet(values, units, beside, root.get("name", ""), runs, learned)
+
+
+def _told(text: str | None, path: Path) -> dict[str, Any]:
+    """What an annotation tells of a run."""
+    try:
+        return dict(json.loads(text or ""))
+    except (ValueError, TypeError, RecursionError):
+        raise InputError(f"'{path}': an annotation {LEARNED} is not an object of JSON") from None
 
 
 def _values(root: Element, path: Path) -> dict[str, dict[str, Parameter]]:
@@ -178,7 +192,7 @@ def write_parameters(path: Path, content: ParameterSet) -> None:
         for name, own in content.units.items():
             unit = SubElement(units, f"{{{SSC}}}Unit", name=name)
             SubElement(unit, f"{{{SSC}}}BaseUnit", {key: f"{value:.17g}" for key, value in own.items()})
-    if content.beside or content.runs:
+    if content.beside or content.runs or content.learned_from:
         annotations = SubElement(root, f"{{{SSV}}}Annotations")
         if content.beside:
             _write_entries(SubElement(annotations, f"{{{SSC}}}Annotation", type=BESIDE), content.beside)
@@ -186,6 +200,9 @@ def write_parameters(path: Path, content: ParameterSet) -> None:
             own = SubElement(annotations, f"{{{SSC}}}Annotation", type=RUN)
             within = SubElement(own, f"{{{SSV}}}ParameterSet", version="1.0", name=run)
             _write_entries(within, _named(values))
+        for told in content.learned_from:
+            within = SubElement(annotations, f"{{{SSC}}}Annotation", type=LEARNED)
+            SubElement(within, CONTENT).text = json.dumps(told)  # the standard wants an element
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')

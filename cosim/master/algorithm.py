@@ -10,7 +10,7 @@ from ..errors import SimulationError
 from ..fmu.component import WARNING
 from ..fmu.fmu_model import FmuVariable
 from ..fmu.instance import Instance
-from ..process.run_state import INSTANCE, STATE, Owner
+from ..process.run_state import CALLS, INSTANCE, STATE, Owner
 from ..scenario.plans import TIME_TOLERANCE
 from ..scenario.schema import Event
 from ..system.instance_pool import InstancePool
@@ -48,7 +48,8 @@ class Master:
         self.system = system
         self._pool = pool or InstancePool()
         self._owner = Owner()
-        STATE.steps(system.order)
+        apart = [name for name, entry in system.scenario.fmus.items() if entry.isolate]
+        STATE.steps(system.order, apart)
         self._interrupted = interrupted
         self.messages = Messages(show)
         self._instances: dict[str, Instance] = {}
@@ -195,6 +196,7 @@ class Master:
             if multirate:
                 # An FMU with a longer step steps at the end of it, with the inputs of that instant.
                 due = [s for s in steppers if k % s.every == 0]
+            STATE.numbers[CALLS] = k
             advance_all(due, k, t, t_next)
             t = t_next
             yield t

@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from ..process.run_state import STATE
+
 # Longest time without a look at the interrupt flag [s]; chosen: not noticeable.
 LONGEST_SLEEP = 0.05
 
@@ -32,6 +34,7 @@ class RealTimePace:
     def wait(self, t: float) -> None:
         """Return when wall time reaches t [s], or when the user has stopped the run."""
         due = self.started + t / self.factor
+        STATE.calls_nothing()
         while (left := due - time.perf_counter()) > 0.0 and not self.interrupted():
             time.sleep(min(left, LONGEST_SLEEP))
         late = time.perf_counter() - due

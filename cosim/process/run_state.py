@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 # signals. Only the pages that are written take room.
 SIZE = 2**26
 # Texts: first byte and most bytes of each. A call is a name and a short text, a folder a path.
-CALL, FOLDER, LAYOUT = (256, 4096), (8192, 8192), (2**15, 2**20)
+CALL, LATE, FOLDER, LAYOUT = (256, 2048), (2304, 2048), (8192, 8192), (2**15, 2**20)
 CAMPAIGN, UNFINISHED = (2**14, 2**13), (3 * 2**13, 2**13)
-NAMES, DESCRIPTION = (2**21, 2**21), (2**22, 2**22)
+NAMES, APART, DESCRIPTION = (2**21, 2**20), (3 * 2**20, 2**20), (2**22, 2**22)
 ROWS = (2**23, SIZE - 2**23)  # the rows that are not in the log yet
 LENGTH = struct.Struct("<I")
 # Values of ``numbers[INSTANCE]`` that are no instance.
 NOTHING, NAMED = -1, -2
 # Places in ``numbers``.
-INSTANCE, REQUESTS, ENDED, CODE, LOGGING, TAKEN, STEPS, HELD = range(8)
+INSTANCE, REQUESTS, ENDED, CODE, LOGGING, TAKEN, STEPS, HELD, CALLS, ALLOWED = range(10)
 
 
 class RunState:
@@ -39,7 +39,8 @@ class RunState:
             interrupts that the supervisor has received; ENDED is 1 once the command has ended in
             order, with exit code CODE; LOGGING is 1 once the log is the run's own; TAKEN is the number
             of rows that wait in ROWS, and STEPS that of the rows before them, both at every base step;
-            HELD is 1 while interrupts wait.
+            HELD is 1 while interrupts wait; CALLS is the base step that is under way; ALLOWED the
+            longest wall time of a call [ms], 0 where none is given.
         watched: whether another process reads it.
     """
 
@@ -83,9 +84,28 @@ class RunState:
             return self._octets[first : first + room], self.numbers
         return memoryview(bytearray(octets)), memoryview(bytearray(64)).cast("i")
 
-    def steps(self, names: Sequence[str]) -> None:
-        """From now on the step loop calls these instances, in this order."""
+    def steps(self, names: Sequence[str], apart: Sequence[str]) -> None:
+        """From now on the step loop calls these instances, in this order.
+
+        Args:
+            names: of all.
+            apart: of those with a process of their own.
+        """
         self.write(NAMES, "\n".join(names))
+        self.write(APART, "\n".join(apart))
+
+    def is_apart(self, name: str) -> bool:
+        """Whether an instance has a process of its own."""
+        return name in self.read(APART).split("\n")
+
+    @property
+    def timeout(self) -> float | None:
+        """Longest wall time that a call of an FMU may take [s]; None: by what a step usually takes."""
+        return self.numbers[ALLOWED] / 1000.0 or None
+
+    @timeout.setter
+    def timeout(self, seconds: float | None) -> None:
+        self.numbers[ALLOWED] = 0 if seconds is None else min(max(1, round(1000.0 * seconds)), 2**31 - 1)
 
     def unfinished(self, *paths: str | os.PathLike[str]) -> None:
         """Folders to remove if this process dies: the first with all that is in it, others if empty."""

@@ -78,7 +78,8 @@ class FmuEntry(StrictModel):
     )
     isolate: bool = Field(False, description="run it in a process of its own")
     timeout: PositiveFloat | None = Field(
-        None, description="with isolate: longest time [s] that one call may take (60)"
+        None,
+        description="with isolate: longest time [s] of a call (100 usual steps, 30 at the least)",
     )
 
     @model_validator(mode="after")

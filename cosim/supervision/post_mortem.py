@@ -13,7 +13,7 @@ from cybership.scratch_folder import is_scratch, sweep
 from ..command import FAILED, INTERRUPTED, complain
 from ..files import update_json, write_json
 from ..interrupts import ignore_interrupts
-from ..process.run_state import CAMPAIGN, DESCRIPTION, FOLDER, LOGGING, STATE, UNFINISHED
+from ..process.run_state import CAMPAIGN, DESCRIPTION, FOLDER, LATE, LOGGING, STATE, UNFINISHED
 from ..results.log import CSV, SIDECAR, cut_to_rows
 from ..results.pending_rows import rescue
 from ..results.result_files import clear_results
@@ -47,6 +47,8 @@ def report(code: int, interrupted: bool) -> int:
     message = f"{instance}: the simulating process died in {what} ({ending(code)})"
     if not instance:
         message = f"the process of this command died ({ending(code)})"
+    if late := STATE.read(LATE):
+        message = f"{late}; --timeout sets that"
     status, kept = "interrupted" if interrupted else "failed", ""
     try:
         if folder and not is_scratch(Path(folder)):

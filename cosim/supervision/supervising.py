@@ -2,8 +2,9 @@
 
 An FMU in the working process can end it without a word: by a crash, or by exit(0), which looks like
 success. The supervisor is the one that was started; it forks before the imports, does nothing but
-wait, passes interrupts on, ends a process that does not follow them, and returns the exit code. It reads
-what was being called from :mod:`cosim.process.run_state`. On systems without fork() there is none.
+wait, passes interrupts on, ends a process that does not follow them or in which an FMU hangs, and
+returns the exit code. It reads what was being called from :mod:`cosim.process.run_state`. On systems
+without fork() there is none.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import time
 from contextlib import suppress
 
 from ..interrupts import SIGNALS, leave_on_interrupt
+from ..process.call_watch import LOOK as LOOK_AT_CALL
+from ..process.call_watch import CallWatch
 from ..process.run_state import CODE, ENDED, HELD, REQUESTS, STATE
 from ..process.spawned import end_with_parent
 
@@ -70,7 +73,7 @@ class _Supervisor:
     """
 
     def __init__(self, child: int) -> None:
-        self._child = child
+        self._child, self._watch = child, CallWatch()
         self._last = -ONE_REQUEST
         for name in INDIFFERENT:
             if hasattr(signal, name):
@@ -83,13 +86,17 @@ class _Supervisor:
             waited: interrupts, SIGCHLD and SIGALRM; all are blocked.
         """
         ended = status = 0
+        signal.setitimer(signal.ITIMER_REAL, LOOK_AT_CALL, LOOK_AT_CALL)
         while not ended:
             # Not a handler beside waitpid(): one that is due just before that call would run after it.
             number = signal.sigwait(waited)
             if number in SIGNALS:
                 self._pass_on(number)
-            elif number == signal.SIGALRM:
+            elif number == signal.SIGALRM and STATE.numbers[REQUESTS]:
                 self._end_late()
+            elif number == signal.SIGALRM:
+                if self._watch.is_late():
+                    self._send(signal.SIGKILL)
             else:
                 ended, status = os.waitpid(self._child, os.WNOHANG)
         code = STATE.numbers[CODE]

@@ -13,8 +13,9 @@ from pathlib import Path
 from ..errors import SimulationError
 from ..fmu.fmu_model import FmuModel
 from ..fmu.instance import Instance, OnMessage
-from ..fmu.isolated import TIMEOUT, IsolatedInstance
+from ..fmu.isolation.isolated import IsolatedInstance
 from ..fmu.local import LocalInstance
+from ..process.run_state import STATE
 from ..scenario.schema import FmuEntry, Scenario
 
 # Instances that wait for another run; chosen: beyond what a comparison of controllers needs. The one
@@ -65,7 +66,7 @@ class InstancePool:
             InputError: no binary for this platform, or instantiation refused.
         """
         if entry.isolate:
-            return IsolatedInstance(name, model, on_message, entry.timeout or TIMEOUT)
+            return IsolatedInstance(name, model, on_message, entry.timeout or STATE.timeout)
         waiting = self._waiting.pop((model.sha256, name), None)
         if waiting is not None:
             try:

@@ -1,9 +1,9 @@
 from .criterion import json_schema as json_schema
 from .criterion import read_criteria as read_criteria
 from .criterion import template as template
-from .record import Validation as Validation
-from .record import lines as lines
-from .record import validate as validate
-from .record_files import FILES as FILES
-from .verification import Check as Check
-from .verification import verify_record as verify_record
+from .record.record_files import FILES as FILES
+from .record.validation import Validation as Validation
+from .record.validation import lines as lines
+from .record.validation import validate as validate
+from .record.verification import Check as Check
+from .record.verification import verify_record as verify_record

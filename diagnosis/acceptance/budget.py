@@ -4,10 +4,13 @@ As in ASME V&V 20, u_val^2 = u_num^2 + u_input^2 + u_D^2. Each is a standard
 uncertainty of the judged quantity at the judged horizon, the RMS over windows. What goes into a
 prediction is changed by one standard deviation at a time (of parameters: along the principal axes of
 their covariance), and the changes of the prediction are added in quadrature. All in SI.
+
+u_num is the error that Richardson's extrapolation from steps h, h/2 and h/4 leaves to those of h, with
+the order of convergence that these show (ASME V&V 20, section 2); where they show none, it is not known.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, isfinite
 from pathlib import Path
@@ -20,12 +23,18 @@ from cosim import InputError
 from cosim.campaign import Posterior, read_posterior
 from fmus.frames import rotate_to_body
 
+from ..predictors import Model
 from ..predictors.shooting import Shooting
-from ..runs import Smoothed
+from ..runs import Fingerprint, Smoothed, fingerprints
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
-from .criterion import JUDGED
+from .criterion import JUDGED, InputStd
 from .predictions import Predictions, difference, judged
 
+# Parameters of the effects current and earth_force.
+CURRENT, WIND = ("V_n", "V_e"), ("F_n", "F_e")
+SAME = 1e-6  # of a value or its standard deviation: rounding in files; chosen
+ROUNDING = 1e-9  # of the motion: a change that is none, but of the last digits of a log; chosen
+SLOWEST = 0.5  # order of convergence below which there is none; chosen, an explicit Euler method has 1
 # Quantity -> variance in each window (w,); None: not known.
 Variances = Mapping[str, np.ndarray] | None
 
@@ -37,11 +46,23 @@ class Learned(NamedTuple):
         posterior: of its parameters; None where nothing was fitted.
         push: the force that no command and no effect explains.
         files: that it was read from.
+        learned_from: runs of which it was made.
     """
 
     posterior: Posterior | None
     push: ForceDisturbance
     files: tuple[Path, ...]
+    learned_from: tuple[Fingerprint, ...] = ()
+
+    def is_of(self, model: Model) -> bool:
+        """Whether a model has the values that the posterior is about."""
+        if self.posterior is None:
+            return True
+        p, known = self.posterior, model.values
+        names = [name.partition(".")[2] for name in p.names]
+        values = np.array([model.value(n) if "@" in n or n in known else np.nan for n in names])
+        reach = SAME * np.maximum(p.std, np.abs(p.mean))
+        return bool(np.all(np.abs(values - p.mean) <= reach))
 
 
 def read_learned(folder: str | Path) -> Learned:
@@ -54,7 +75,8 @@ def read_learned(folder: str | Path) -> Learned:
     try:
         told = json.loads(path.read_text(encoding="utf-8"))["unrecorded"]
         size, time = (np.array(told[key], float).reshape(3) for key in ("size", "time"))
-        some = other.exists() and json.loads(other.read_text(encoding="utf-8"))["names"]
+        rest = json.loads(other.read_text(encoding="utf-8")) if other.exists() else {"names": []}
+        some, learned_from = rest["names"], fingerprints(rest.get("learned_from", []), other)
     except OSError as error:
         raise InputError(f"'{error.filename}' cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
@@ -62,7 +84,8 @@ def read_learned(folder: str | Path) -> Learned:
     if not (np.isfinite([size, time]).all() and (size >= 0.0).all() and (time > 0.0).all()):
         raise InputError(f"'{path}': the unrecorded force has no size and time")
     posterior = read_posterior(other) if some else None
-    return Learned(posterior, ForceDisturbance(size, time), (path, *([other] if some else [])))
+    files = (path, *([other] if other.exists() else []))
+    return Learned(posterior, ForceDisturbance(size, time), files, learned_from)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +94,7 @@ class Sources:
 
     Attributes:
         measurement: of what a prediction is held against (u_D).
-        initial_state, parameters, process_noise: of what goes into it (u_input).
+        initial_state, parameters, process_noise, current, wind: of what goes into it (u_input).
         numerical: of the steps (u_num).
         notes: source -> why it is not known, or what it leaves out.
     """
@@ -80,6 +103,8 @@ class Sources:
     initial_state: Variances
     parameters: Variances
     process_noise: Variances
+    current: Variances
+    wind: Variances
     numerical: Variances
     notes: Mapping[str, str]
 
@@ -91,6 +116,8 @@ class Budget(NamedTuple):
     initial_state: float | None
     parameters: float | None
     process_noise: float | None
+    current: float | None
+    wind: float | None
     numerical: float | None
 
     @property
@@ -99,7 +126,7 @@ class Budget(NamedTuple):
 
     @property
     def u_input(self) -> float:
-        return combined(self.initial_state, self.parameters, self.process_noise)
+        return combined(self.initial_state, self.parameters, self.process_noise, self.current, self.wind)
 
     @property
     def u_num(self) -> float:
@@ -136,8 +163,8 @@ def budget(quantity: str, sources: list[Sources], counted: list[np.ndarray]) -> 
     return Budget(*(over_runs(name) for name in Budget._fields))
 
 
-def sources_of(p: Predictions, learned: Learned | None) -> Sources:
-    """The uncertainty of a run's predictions, by source."""
+def sources_of(p: Predictions, learned: Learned | None, acting: InputStd | None = None) -> Sources:
+    """The uncertainty of a run's predictions, by source; ``acting``: that of current and wind."""
     notes: dict[str, str] = {}
 
     def known(name: str, found: Callable[[], Variances]) -> Variances:
@@ -153,7 +180,9 @@ def sources_of(p: Predictions, learned: Learned | None) -> Sources:
         known("initial_state", lambda: _initial(p, base)),
         known("parameters", lambda: _parameters(p, base, learned)),
         known("process_noise", lambda: _process_noise(p, learned)),
-        known("numerical", lambda: _squares(difference(p.with_half_steps(), base))),
+        known("current", lambda: _acting(p, base, CURRENT, acting and acting.current)),
+        known("wind", lambda: _acting(p, base, WIND, acting and acting.wind)),
+        known("numerical", lambda: _numerical(p, base)),
         notes,
     )
 
@@ -203,6 +232,37 @@ def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Va
     steps = (axes * np.sqrt(np.maximum(variances, 0.0))).T
     models = [p.model.plus(dict(zip(names, step.tolist(), strict=True))) for step in steps if step.any()]
     return _squares(np.zeros_like(base), *(difference(m, base) for m in p.motions(models)))
+
+
+def _acting(p: Predictions, base: np.ndarray, names: Sequence[str], std: float | None) -> Variances:
+    """By what acts from north and from east, each by its standard deviation."""
+    if std is None:
+        raise InputError("the criteria do not state it (input_std)")
+    return _squares(*(difference(p.with_addition({name: std}), base) for name in names))
+
+
+def _numerical(p: Predictions, base: np.ndarray) -> Variances:
+    """By two halvings of the step; of a quantity that they do not let converge nothing."""
+    half, quarter = p.finer(2), p.finer(4)
+    first, second = difference(base, half), difference(half, quarter)
+    moved = difference(base, np.pad(p.smoothed.eta[p.first], ((0, 0), (0, 3))))
+    found: dict[str, np.ndarray] = {}
+    for q in JUDGED:
+        d, d_2, size = (judged(q, x) for x in (first, second, moved))
+        with np.errstate(invalid="ignore", over="ignore"):
+            one, two, all_ = (float(np.sqrt(np.mean(x**2))) for x in (d, d_2, size))
+        if one <= ROUNDING * all_:
+            if p.predictor.parametric:
+                found[q] = d**2
+        elif isfinite(one) and two * 2.0**SLOWEST <= one:
+            found[q] = (d * one / (one - two)) ** 2
+    if not found:
+        raise InputError(
+            f"halving the step does not make the predictions of {p.predictor.name} converge: its own "
+            "step "
+            "is out of reach, or acts otherwise"
+        )
+    return found
 
 
 def _process_noise(p: Predictions, learned: Learned | None) -> Variances:

@@ -1,7 +1,8 @@
 """What counts as agreement, written down before anybody looks: the file of ``--criteria``."""
 
 import json
-from datetime import datetime, timezone
+from collections.abc import Mapping
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -11,6 +12,7 @@ from pydantic import (
     ConfigDict,
     Field,
     FiniteFloat,
+    NonNegativeFloat,
     PositiveFloat,
     ValidationError,
     model_validator,
@@ -25,6 +27,9 @@ from ..runs import UNITS
 # Quantity of each signal that can be judged.
 JUDGED = {"position": "length", "heading": "angle", "u": "speed", "v": "speed", "r": "rate"}
 
+# Unit of what ``within`` may name, of commands that of the ship.
+MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
+
 Quantity = Literal["position", "heading", "u", "v", "r"]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 
@@ -34,8 +39,8 @@ class Criterion(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Annotated[str, Field(min_length=1)] | None = Field(
-        None, description="in the record; else made of the rest"
+    name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = (
+        Field(None, description="in the record; else made of the rest")
     )
     quantity: Quantity = Field(description="distance, heading, or velocity of the body over ground")
     horizon: Positive = Field(description="time of prediction after which the error is judged [s]")
@@ -54,6 +59,10 @@ class Criterion(BaseModel):
     )
     within: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
         {}, description="lowest and highest mean of u, v, r, speed, drift or a command in windows [SI]"
+    )
+
+    training_runs: bool = Field(
+        False, description="count runs that the model was learned from, too, which else do not count"
     )
 
     @model_validator(mode="after")
@@ -98,8 +107,59 @@ class Criterion(BaseModel):
         }[self.statistic]
         return (
             f"{what} of {self.quantity} after {self.horizon:g} s within {self.tolerance:g} {self.unit}, "
-            f"at {100.0 * self.confidence:g} % confidence"
+            f"at {100.0 * self.confidence:g} % confidence{''.join(f'; {r}' for r in self.restrictions)}"
         )
+
+    @property
+    def restrictions(self) -> list[str]:
+        """What narrows or widens the data that count, a part of a sentence each."""
+        limits = [
+            f"{s} from {low:g} to {high:g} {MOTION.get(s, '(SI)')}"
+            for s, (low, high) in self.within.items()
+        ]
+        told = [] if self.runs is None else [f"only runs {', '.join(self.runs)}"]
+        told += [f"only windows with a mean of {' and '.join(limits)}"] if limits else []
+        return told + ["runs that the model was learned from count"] * self.training_runs
+
+
+Text = Annotated[str, Field(min_length=1, max_length=1000)]  # chosen: a paragraph
+
+
+class Particulars(BaseModel):
+    """What ITTC 7.5-02-06-03 and DNV-RP-0513 ask for, and no data tell; printed as "not given" else."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    document: Text | None = Field(None, description="number of the document")
+    client: Text | None = Field(None, description="for whom the model is judged")
+    assessor: Text | None = Field(None, description="who judges it")
+    model: Text | None = Field(None, description="what the model is called")
+    model_version: Text | None = Field(None, description="its version")
+    lineage: Text | None = Field(None, description="by whom and from what data it was made")
+    ship: Text | None = Field(None, description="name, type and main dimensions of what was measured")
+    loading: Text | None = Field(None, description="mass, centre of gravity, radius of gyration")
+    draught: Text | None = Field(None, description="fore and aft")
+    depth: Text | None = Field(None, description="of the water")
+    sea: Text | None = Field(None, description="wind, waves and current during the runs")
+    calibration: Text | None = Field(None, description="of the sensors: when, by whom, to what")
+
+    @property
+    def lines(self) -> dict[str, str]:
+        """Each in words, in order."""
+        return {name.replace("_", " "): text or "not given" for name, text in dict(self).items()}
+
+
+class InputStd(BaseModel):
+    """Standard uncertainty of what acts on the ship and no data tell."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    current: Annotated[NonNegativeFloat, Field(allow_inf_nan=False)] | None = Field(
+        None, description="of its speed north, and of that east [m/s]"
+    )
+    wind: Annotated[NonNegativeFloat, Field(allow_inf_nan=False)] | None = Field(
+        None, description="of its force north, and of that east [N]"
+    )
 
 
 class Criteria(BaseModel):
@@ -108,6 +168,12 @@ class Criteria(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     purpose: str | None = Field(None, description="what the model is to be used for")
+    particulars: Particulars = Field(
+        default_factory=lambda: Particulars.model_validate({}), description="for the head of the record"
+    )
+    input_std: InputStd = Field(
+        default_factory=lambda: InputStd.model_validate({}), description="for u_input of the record"
+    )
     criteria: Annotated[list[Criterion], Field(min_length=1)]
 
 
@@ -118,7 +184,7 @@ class ReadCriteria(NamedTuple):
         content: of the file.
         path: of it.
         sha256: of the bytes that were read.
-        modified, read: times in UTC, ISO 8601.
+        modified, read: local times with their offset, ISO 8601.
     """
 
     content: Criteria
@@ -137,7 +203,11 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     path = Path(path)
     try:
         changed, text = path.stat().st_mtime, path.read_bytes()
-        content = Criteria.model_validate(json.loads(text))
+        json.loads(text, object_pairs_hook=_once)
+        # As JSON, where "0.01" is no number and true no metre.
+        content = Criteria.model_validate_json(text, strict=True)
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from None
     except ValidationError as error:
         raise InputError(f"'{path}': {first_fault(error, _nearest_key, special=_special)}") from None
     except FileNotFoundError:
@@ -146,13 +216,22 @@ def read_criteria(path: str | Path) -> ReadCriteria:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as criteria: {error}") from None
-    modified = datetime.fromtimestamp(changed, timezone.utc)
+    modified = datetime.fromtimestamp(changed).astimezone()
     return ReadCriteria(content, str(path), sha256(text).hexdigest(), _stamp(modified), now())
 
 
 def now() -> str:
-    """The time, UTC, ISO 8601."""
-    return _stamp(datetime.now(timezone.utc))
+    """The time of this computer with its offset, ISO 8601."""
+    return _stamp(datetime.now().astimezone())
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; of a key that occurs twice, Python's json would silently drop the first."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice = next(n for n, (name, _) in enumerate(pairs) if name in dict(pairs[:n]))
+        raise InputError(f"the key {quoted(pairs[twice][0])} stands twice in one object")
+    return found
 
 
 def _stamp(time: datetime) -> str:
@@ -160,7 +239,9 @@ def _stamp(time: datetime) -> str:
 
 
 def _nearest_key(location: Location) -> str:
-    return nearest(str(location[-1]), (Criteria if len(location) == 1 else Criterion).model_fields)
+    parts: Mapping[str | int, type[BaseModel]] = {"particulars": Particulars, "input_std": InputStd}
+    model = Criteria if len(location) == 1 else parts.get(location[0], Criterion)
+    return nearest(str(location[-1]), model.model_fields)
 
 
 def _special(kind: str, location: Location, value: object) -> str:
@@ -173,7 +254,12 @@ def template() -> dict[str, Any]:
     """A first file, whose numbers are to be replaced."""
     first = {"quantity": "position", "horizon": 8.0, "tolerance": 0.1, "unit": "m", "coverage": 0.9}
     second = {"quantity": "heading", "horizon": 8.0, "tolerance": 5.0, "unit": "deg", "coverage": 0.9}
-    return {"purpose": "what the model is to be used for", "criteria": [first, second]}
+    given = dict.fromkeys(Particulars.model_fields)
+    return {
+        "purpose": "what the model is to be used for",
+        "particulars": given,
+        "criteria": [first, second],
+    }
 
 
 def json_schema() -> dict[str, Any]:

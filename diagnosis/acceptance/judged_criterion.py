@@ -1,12 +1,14 @@
 """Whether criteria are met: for sure, surely not, or not to be judged from these data, and why."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+from scipy.special import chdtr
 
 from cosim import InputError
 from cosim.errors import nearest
+from fmus.frames import rotate_to_body
 
 from .budget import Budget, Sources, budget
 from .criterion import Criterion
@@ -15,6 +17,27 @@ from .statistics import Interval, independent, needed, root_mean_square, share
 
 Outcome = Literal["met", "not met", "cannot be judged"]
 EXPANDED = 2.0  # standard uncertainties in the expanded one, about 95 % of a normal distribution
+# Of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half, as
+# noise may be stated too large (chosen).
+FAR_BELOW, CHANCE = 0.5, 1e-3
+LEARNED, FEW = "the model was learned from it", "too few samples"
+
+
+class WindowCounts(NamedTuple):
+    """Windows and runs: how many were offered, and why some do not count.
+
+    Attributes:
+        offered, judged: windows.
+        excluded: reason -> windows.
+        runs: names of those that count.
+        left_out: name of another -> why it does not.
+    """
+
+    offered: int
+    judged: int
+    excluded: Mapping[str, int]
+    runs: Sequence[str]
+    left_out: Mapping[str, str]
 
 
 class Judgement(NamedTuple):
@@ -24,24 +47,30 @@ class Judgement(NamedTuple):
         criterion: that is judged.
         outcome: of it.
         reason: in a sentence.
-        runs: names of those that count.
-        run, start: (w,), of each window the number of its run, and when it begins [s].
-        errors: (w,), measured less predicted; of position the distance.
+        counts: what it rests on.
+        run, start: (w,), of each window that counts the number of its run, and when it begins [s].
+        errors: (w,), predicted less measured, E = S - D; of position the distance.
+        offset: mean of predicted less measured position, forward and to starboard [m].
         independent: how many of the windows are.
         interval: share, or RMS, with bounds.
         budget: uncertainty of the errors; None without windows.
+        flags: what a reader must know of the outcome, a sentence each.
+        windows: those that count, of each run that does.
     """
 
     criterion: Criterion
     outcome: Outcome
     reason: str
-    runs: Sequence[str]
-    run: np.ndarray
-    start: np.ndarray
-    errors: np.ndarray
-    independent: float
-    interval: Interval | None
-    budget: Budget | None
+    counts: WindowCounts
+    run: np.ndarray = np.zeros(0)
+    start: np.ndarray = np.zeros(0)
+    errors: np.ndarray = np.zeros(0)
+    offset: np.ndarray = np.full(2, np.nan)
+    independent: float = 0.0
+    interval: Interval | None = None
+    budget: Budget | None = None
+    flags: Sequence[str] = ()
+    windows: Sequence[tuple["Predicted", np.ndarray]] = ()
 
 
 class Predicted(NamedTuple):
@@ -52,41 +81,71 @@ class Predicted(NamedTuple):
         predictions: in windows of the criterion's horizon.
         sources: of their uncertainty.
         signals: name -> mean (w,) in each window, of what ``within`` may name.
+        same: names of runs that are this one, or nearly.
+        learned: whether the model was learned from it.
     """
 
     name: str
     predictions: Predictions
     sources: Sources
     signals: dict[str, np.ndarray]
+    same: frozenset[str] = frozenset()
+    learned: bool = False
 
 
-def judge(c: Criterion, given: Sequence[str], predicted: Sequence[Predicted]) -> Judgement:
+def judge(
+    c: Criterion,
+    given: Sequence[str],
+    predicted: Sequence[Predicted],
+    short: Mapping[str, int] | None = None,
+) -> Judgement:
     """Judge a criterion.
 
     Args:
         c: the criterion.
         given: names of all runs that were compared.
         predicted: those that have windows of the criterion's horizon.
+        short: name of another -> windows that it would have, were no sample missing.
     """
     lacking = [name for name in c.runs or () if name not in given]
-    chosen = [p for p in predicted if c.runs is None or p.name in c.runs]
+    chosen, counts = _counted(c, predicted, short or {})
     if lacking:
-        return _unjudged(c, f"run {', '.join(lacking)} was not compared")
-    if not chosen:
-        return _unjudged(c, f"no run has a window of {c.horizon:g} s with enough samples")
-    counted = [_counted(c, p) for p in chosen]
-    off = [difference(p.predictions.measured, p.predictions.motion) for p in chosen]
-    errors = np.concatenate([judged(c.quantity, d)[rows] for d, rows in zip(off, counted, strict=True)])
-    if not errors.size:
-        limits = ", ".join(f"{s} from {a:g} to {b:g}" for s, (a, b) in c.within.items())
-        return _unjudged(c, f"outside the data: no window has {limits}")
-    run = np.repeat(np.arange(len(chosen)), [int(rows.sum()) for rows in counted])
-    start = np.concatenate([p.predictions.start[rows] for p, rows in zip(chosen, counted, strict=True)])
-    told = budget(c.quantity, [p.sources for p in chosen], counted)
+        return Judgement(c, "cannot be judged", f"run {', '.join(lacking)} was not compared", counts)
+    if not counts.judged:
+        return Judgement(c, "cannot be judged", _why_nothing(c, counts), counts)
+    off = [difference(p.predictions.motion, p.predictions.measured)[rows] for p, rows in chosen]
+    errors = np.concatenate([judged(c.quantity, d) for d in off])
+    run = np.repeat(np.arange(len(chosen)), [int(rows.sum()) for _, rows in chosen])
+    start = np.concatenate([p.predictions.start[rows] for p, rows in chosen])
+    psi = np.concatenate([p.predictions.measured[rows, 2] for p, rows in chosen])
+    every = np.concatenate(off)
+    offset = np.array([np.mean(x) for x in rotate_to_body(psi, every[:, 0], every[:, 1])])
+    sources, masks = [p.sources for p, _ in chosen], [rows for _, rows in chosen]
+    told = budget(c.quantity, sources, masks)
     n = independent(np.abs(errors), run)
     outcome, reason, interval = decide(c, errors, n, told.u_val)
-    names = [p.name for p in chosen]
-    return Judgement(c, outcome, reason, names, run, start, errors, n, interval, told)
+    if outcome == "met" and told.unknown:
+        reason += f"; u_val is without {', '.join(told.unknown)}, not known"
+    flags = [
+        _too_good(q, judged(q, every), n, budget(q, sources, masks)) for q in ("position", "heading")
+    ]
+    if any(p.learned for p, _ in chosen):
+        flags.append("Runs that the model was learned from count, as the criterion says.")
+    return Judgement(
+        c,
+        outcome,
+        reason,
+        counts,
+        run,
+        start,
+        errors,
+        offset,
+        n,
+        interval,
+        told,
+        [*filter(None, flags)],
+        chosen,
+    )
 
 
 def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Outcome, str, Interval]:
@@ -127,21 +186,78 @@ def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Ou
     return "cannot be judged", left if open_ else beyond, found
 
 
-def _counted(c: Criterion, p: Predicted) -> np.ndarray:
-    """(w,), the windows of a run that count.
+def _counted(
+    c: Criterion, predicted: Sequence[Predicted], short: Mapping[str, int]
+) -> tuple[list[tuple[Predicted, np.ndarray]], WindowCounts]:
+    """The windows that count, of each run that has some, a mask (w,).
 
     Raises:
-        InputError: ``within`` names what is no signal of the run.
+        InputError: ``within`` names what is no signal of a run.
     """
-    keep = np.ones(p.predictions.rows.size, bool)
-    for signal, (low, high) in c.within.items():
-        if signal not in p.signals:
-            hint = nearest(signal, p.signals)
-            raise InputError(f"criterion '{c.title}': within: run {p.name} has no '{signal}'{hint}")
-        keep &= (p.signals[signal] >= low) & (p.signals[signal] <= high)
-    return keep
+    excluded = {FEW: sum(short.values())}
+    left_out, chosen = dict.fromkeys(short, f"no window of {c.horizon:g} s has enough samples"), []
+    for p in predicted:
+        excluded[FEW] += p.predictions.possible - p.predictions.rows.size
+        keep = np.ones(p.predictions.rows.size, bool)
+        if why := _left_out(c, p, [q.name for q, _ in chosen]):
+            excluded[why] = excluded.get(why, 0) + keep.size
+            left_out[p.name] = why
+            continue
+        for signal, (low, high) in c.within.items():
+            if signal not in p.signals:
+                hint = nearest(signal, p.signals)
+                raise InputError(f"criterion '{c.title}': within: run {p.name} has no '{signal}'{hint}")
+            inside = (p.signals[signal] >= low) & (p.signals[signal] <= high)
+            why = f"mean {signal} not from {low:g} to {high:g}"
+            excluded[why] = excluded.get(why, 0) + int(np.sum(keep & ~inside))
+            keep &= inside
+        if keep.any():
+            chosen.append((p, keep))
+        else:
+            left_out[p.name] = f"no window has {_limits(c)}"
+    offered = sum(p.predictions.possible for p in predicted) + sum(short.values())
+    excluded = {why: count for why, count in excluded.items() if count}
+    windows = sum(int(rows.sum()) for _, rows in chosen)
+    return chosen, WindowCounts(offered, windows, excluded, [p.name for p, _ in chosen], left_out)
 
 
-def _unjudged(c: Criterion, reason: str) -> Judgement:
-    none = np.zeros(0)
-    return Judgement(c, "cannot be judged", reason, [], none, none, none, 0.0, None, None)
+def _left_out(c: Criterion, p: Predicted, before: Sequence[str]) -> str:
+    """Why a run does not count, of which others count before it; empty where it does."""
+    if c.runs is not None and p.name not in c.runs:
+        return "not among the runs of the criterion"
+    if p.learned and not c.training_runs:
+        return LEARNED
+    again = next((name for name in before if name in p.same), None)
+    return f"the same motion as {again}, which counts" if again else ""
+
+
+def _why_nothing(c: Criterion, counts: WindowCounts) -> str:
+    whys = {*counts.left_out.values()}
+    if c.within and any(why.startswith("no window") for why in whys):
+        return f"outside the data: no window has {_limits(c)}"
+    return (
+        LEARNED_ONLY
+        if LEARNED in whys
+        else f"no run has a window of {c.horizon:g} s with enough samples"
+    )
+
+
+LEARNED_ONLY = "no run is left that the model was not learned from (training_runs lets those count)"
+
+
+def _limits(c: Criterion) -> str:
+    return ", ".join(f"{s} from {a:g} to {b:g}" for s, (a, b) in c.within.items())
+
+
+def _too_good(quantity: str, errors: np.ndarray, n: float, b: Budget) -> str:
+    """A sentence where errors (w,) are far smaller than the measurement's own; else nothing."""
+    parts = 2 if quantity == "position" else 1  # independent errors of a measurement
+    rms, u_D = float(np.sqrt(np.mean(errors**2))), b.u_D
+    if not rms < FAR_BELOW * u_D or chdtr(n * parts, n * parts * (rms / u_D) ** 2) > CHANCE:
+        return ""
+    return (
+        f"The error of {quantity} (RMS {rms:.3g}) is far below the uncertainty of its measurement "
+        "(u_D = "
+        f"{u_D:.3g}, SI), which no prediction can be: the model may have had the measurement, or u_D "
+        "is too large."
+    )

@@ -1,6 +1,6 @@
 """The windows that criteria judge: the motion at their horizon, predicted and measured."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,6 @@ from fmus.ops import wrap
 
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
-from ..predictors.windows import Windows
 from ..runs import Smoothed
 from .criterion import JUDGED
 
@@ -26,7 +25,9 @@ class Predictions:
         horizon: of the predictions [s].
 
     Attributes:
+        name: of the run.
         windows: of that length; of a predictor whose velocity cannot be set one, the whole run.
+        possible: windows that there would be, were no sample missing.
         rows: (w,), row of the last sample of each, near the horizon.
         measured: (w, 6), the sample of the pose there, and the smoothed velocity.
 
@@ -35,7 +36,7 @@ class Predictions:
     """
 
     def __init__(self, e: Evaluation, horizon: float) -> None:
-        self.smoothed, self.predictor = e.smoothed, e.predictor
+        self.name, self.smoothed, self.predictor = e.name, e.smoothed, e.predictor
         self._learned = [] if e.learned is None else [e.learned]
         self.model = (e.learned or e.model).during(e.name)
         none = InputError(f"run '{e.name}' has no window of {horizon:g} s with enough samples")
@@ -57,6 +58,8 @@ class Predictions:
         window = self.windows.sample_window[self._last]
         self._since = self.windows.since
         time = self.windows.start[window] + self._since[self._last]
+        whole, seconds = self.predictor.whole, possible(self.smoothed, horizon)
+        self.possible = self._last.size if whole else max(seconds, self._last.size)
         self.first = np.searchsorted(self.smoothed.time, self.windows.start[window] + begin - 1e-6)
         self.rows = np.searchsorted(self.smoothed.time, time - 1e-6)
         self.measured = np.hstack([self.windows.measured[self._last], self.smoothed.nu[self.rows]])
@@ -67,13 +70,24 @@ class Predictions:
         return self.smoothed.time[self.first]
 
     @cached_property
+    def residuals(self) -> np.ndarray:
+        """(samples, 3), measured minus predicted pose [m, m, rad] at the samples of the windows."""
+        return self.predictor.residuals(self.windows, self._learned)[-1]
+
+    @cached_property
     def motion(self) -> np.ndarray:
         """(w, 6), the predicted motion at the horizon."""
-        return self._predicted(self.windows)
+        return self._at_end(self.residuals)
 
-    def with_half_steps(self) -> np.ndarray:
-        """The predicted motion (w, 6) of which each step is halved."""
-        return self._predicted(self.windows.finer(2))
+    def finer(self, parts: int) -> np.ndarray:
+        """The predicted motion (w, 6) of which each step is divided into so many."""
+        return self._at_end(self.predictor.residuals(self.windows.finer(parts), self._learned)[-1])
+
+    def with_addition(self, changes: Mapping[str, float]) -> np.ndarray:
+        """The predicted motion (w, 6) with additions to parameters of effects, also of what is no "
+        "model of ours."""
+        added = [m.plus(changes) for m in self._learned or [self.predictor.model]]
+        return self._at_end(self.predictor.residuals(self.windows, added)[-1])
 
     def from_others(self, states: Sequence[Smoothed]) -> list[np.ndarray]:
         """The predicted motion (w, 6) from each of some other states of the run on."""
@@ -85,9 +99,6 @@ class Predictions:
     def motions(self, models: Sequence[Model]) -> list[np.ndarray]:
         """The predicted motion (w, 6) of each of some models of this project."""
         return [self._at_end(r) for r in self.windows.residuals_of_each(models)]
-
-    def _predicted(self, windows: Windows) -> np.ndarray:
-        return self._at_end(self.predictor.residuals(windows, self._learned)[-1])
 
     def _at_end(self, residuals: np.ndarray) -> np.ndarray:
         """The last pose, and the slope of the parabola through the last three as velocity."""
@@ -101,6 +112,11 @@ class Predictions:
         psi = pose[k, 2]
         u, v = rotate_to_body(psi, rate[:, 0], rate[:, 1])
         return np.column_stack([pose[k], u, v, rate[:, 2]])
+
+
+def possible(smoothed: Smoothed, horizon: float) -> int:
+    """Windows of a length [s] that there would be in a run, were no sample missing."""
+    return int((smoothed.time[-1] - smoothed.time[0] + smoothed.track.period) // horizon)
 
 
 def difference(motion: np.ndarray, other: np.ndarray) -> np.ndarray:

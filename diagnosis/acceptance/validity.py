@@ -1,16 +1,16 @@
-"""What data cover: speeds, drift, rates and commands, by quantiles and extremes."""
+"""What the judged data cover: speeds, drift, rates and commands, by quantiles and extremes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..predictors import at_samples
 from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
+from .criterion import MOTION
 from .predictions import Predictions
 
 QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
-MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
 # By the quantity of a command.
 SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
 SLOW = 0.1  # of the speed that a run reaches, below which there is no drift angle; chosen
@@ -50,14 +50,25 @@ def window_means(p: Predictions) -> dict[str, np.ndarray]:
     return found
 
 
-def covered(evaluations: Sequence[Evaluation]) -> list[dict[str, str | float]]:
-    """Each signal over all samples that are used."""
+def covered(
+    judged: Sequence[tuple[Predictions, np.ndarray]], evaluations: Mapping[str, Evaluation]
+) -> list[dict[str, str | float]]:
+    """Each signal over all samples that are used of windows that are judged.
+
+    Args:
+        judged: of each run its predictions, and a mask (w,) of the windows.
+        evaluations: of the runs, by name.
+    """
     found: dict[str, list[np.ndarray]] = {}
     units = {}
-    for e in evaluations:
-        for name, values in signals(e.smoothed).items():
-            if (chosen := values[e.smoothed.used & np.isfinite(values)]).size:
-                found.setdefault(name, []).append(chosen)
+    for p, chosen in judged:
+        smoothed, e = p.smoothed, evaluations[p.name]
+        inside = np.zeros(smoothed.time.size, bool)
+        for first, last in zip(p.first[chosen], p.rows[chosen], strict=True):
+            inside[first : last + 1] = True
+        for name, values in signals(smoothed).items():
+            if (known := values[inside & smoothed.used & np.isfinite(values)]).size:
+                found.setdefault(name, []).append(known)
                 units[name] = unit_of(name, e)
     at = [*QUANTILES.values()]
     spread = {n: np.quantile(np.concatenate(parts), at).tolist() for n, parts in found.items()}

@@ -87,7 +87,8 @@ def closed_loop(
     observer = _Part(serving(mdf.COMPONENT), reference.observer)
     controller = _Part(serving(adaptive.COMPONENT), {})
     drive, told = _Part(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
-    s, vessel = ship.begin(Force())
+    pushed = model.ship.vessel.inputs
+    s, vessel = ship.begin(pushed())
     g, target = path.begin(Nothing())
     measured = ObserverInputs(vessel.measured, Force())
     o, estimate = observer.begin(measured)
@@ -100,7 +101,7 @@ def closed_loop(
         s, g, o, c, t = now.states
         c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
         t, thrust = drive.advance(t, told(demand.tau, now.velocity), h)
-        acting = Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
+        acting = pushed(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
         s, vessel = ship.advance(s, acting, h_path)
         g, target = path.advance(g, Nothing(), h_path)
         x, y = vessel.pose.x - target.x_t, vessel.pose.y - target.y_t

@@ -6,8 +6,11 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.thrust import full_thrust
-from ..runs import Run
+from ..predictors.weak_form import BLOCK
+from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU
+from ..runs.columns.side_car import ColumnChange
+from ..runs.files.resolution import FUZZ
 from .readings import inertial, needed
 from .settings import SETTINGS
 
@@ -53,11 +56,28 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
     return None
 
 
+def without_force(run: Run, model: Model) -> str:
+    """A clause about commands that give no force at all, as where a propeller cannot reverse."""
+    beyond = {}
+    if run.commands is not None:
+        limits = model.ship.layout_of(run.commands).limits(model.drive.params)
+        for name, c, (low, high) in zip(run.signals, run.commands.T, limits, strict=True):
+            if c.any() and ((c <= low) | (c >= high)).all():
+                beyond[name] = f"{name} is beyond its limits, {low:.4g} to {high:.4g}"
+    if not beyond:
+        return "its commands are zero throughout"
+    flipped = {name: ColumnChange(name, -1.0) for name in beyond}
+    clause = (
+        f"its commands give no force: {', '.join(beyond.values())}, in all rows; has it the wrong sign?"
+    )
+    return clause + line_beside(run.file, flipped)
+
+
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
-    varies = np.ptp(tau, axis=0) > SETTINGS.rounding * largest
+    varies = np.ptp(tau, axis=0) > FUZZ * largest
     if not varies.any():
         return "none of its commands ever varies, which tells nothing of what the ship does with them"
     z = needed(w, model)
@@ -66,7 +86,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
         follows = (z[:, k] * given > 0.0).mean() >= SETTINGS.negligible
         opposed = not follows and size[k] > SETTINGS.least_gain * abs(given)
-        if opposed and abs(given) > SETTINGS.rounding * largest:
+        if opposed and abs(given) > FUZZ * largest:
             return (
                 f"{name} is {given:.3g} {unit} in all rows, and the motion needs {z[:, k].mean():.3g} "
                 f"{unit} all the time: another column is meant, or it was not logged"
@@ -84,12 +104,14 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
 def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     """A clause about a ship that goes on as before while all of its commands are zero."""
     s, tau = w.smoothed, w.run.tau_cmd
-    if not (np.abs(tau).max(axis=1) == 0.0).any():
+    # Beyond a limit it is a command, though it gives no force; a rudder has one under way.
+    given = np.abs(tau if w.run.commands is None else w.run.commands)
+    if not (given.max(axis=1) == 0.0).any():
         return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
-    idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
-    if idle.sum() < SETTINGS.long:
+    idle = (every.held @ given).max(axis=1) == 0.0
+    if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
     still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))
     if (still < SETTINGS.explained * size).any():

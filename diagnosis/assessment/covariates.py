@@ -4,16 +4,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.constants import degree
 
 from fmus.scale import REFERENCE, Scale
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import BLOCK
+from ..runs.columns.unit_check import UNITS
 
 AXES = "XYN"
 BINS = 8  # of equal numbers of windows, or sectors of heading; of time twice as many at most; chosen
-DISPLAYED = {"rad": 1.0 / degree, "rad/s": 1.0 / degree, "1": 100.0}  # degrees and percent for people
+# Unit of values -> quantity and unit for people.
+DISPLAYED = {"rad": ("angle", "deg"), "rad/s": ("rate", "deg/s"), "1": ("command", "%")}
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,10 @@ class Covariate:
     @property
     def display_factor(self) -> float:
         """What a value is multiplied by for people, such as degrees for radians."""
-        return DISPLAYED.get(self.unit, 1.0)
+        if self.unit not in DISPLAYED:
+            return 1.0
+        quantity, shown = DISPLAYED[self.unit]
+        return 1.0 / UNITS[quantity][shown]
 
 
 def _quantiles(x: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:

@@ -18,8 +18,10 @@ import numpy as np
 from scipy.linalg import pinv
 
 from ..predictors import Model, WeakWindows
-from ..predictors.correlation import correlated_windows
+from ..predictors.prediction import FAR_OFF
+from ..predictors.uncertainty import correlated_windows
 from ..predictors.weak_form import OVERLAP, commanded_force
+from ..runs.files.resolution import FUZZ
 from .readings import inertial, needed
 from .settings import SETTINGS
 
@@ -41,7 +43,7 @@ class ThrustGains:
     @property
     def wrong(self) -> np.ndarray:
         """(3,), axes whose k no ship has; where all are less, it is a clock or a unit."""
-        most, off = SETTINGS.most_gain, SETTINGS.sure * self.error
+        most, off = SETTINGS.most_gain, FAR_OFF * self.error
         low, high = self.value - off, self.value + off
         weak = (self.told & (high < 1.0 / most))[np.isfinite(self.value)]
         return self.told & ((low > most) | (high < SETTINGS.least_gain) | weak.all())
@@ -65,7 +67,7 @@ class ThrustGains:
 def gains(w: WeakWindows, model: Model) -> ThrustGains:
     """The acceleration that the commands of a run give, as shares of what they give by a model."""
     a, z, T = inertial(w, model), needed(w, model), w.held @ commanded_force(w, model)
-    moves = T.std(axis=0) > SETTINGS.rounding * np.abs(T).max()
+    moves = T.std(axis=0) > FUZZ * np.abs(T).max()
     psi = w.smoothed.eta[:, 2]
     u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
     north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
@@ -79,7 +81,7 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
             [T[:, j], *others, (z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]
         )
         few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
-        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.own:
+        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.hardly:
             continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
         inverse = pinv(x / size)

@@ -16,6 +16,7 @@ from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.weak_form import WIDTH
 from ..runs import PreparedRun, Run, Smoothed, prepare, read_each
 from ..runs.columns.unit_check import GO_ON
+from .command_check import without_force
 from .plausibility import refuse_implausible
 from .trial_errors import measured_passage
 
@@ -91,7 +92,7 @@ def usable(
     for s in smoothed:
         name = s.track.run.name
         if not np.abs(s.track.run.tau_cmd).max() > 1e-6:
-            raise InputError(f"run '{name}': its commands are zero throughout")
+            raise InputError(f"run '{name}': {without_force(s.track.run, model)}")
         windows.append(weak_windows(s, horizon))
         if not windows[-1].middle.size:
             raise InputError(f"run '{name}': too much is missing while the thrusters are at work")

@@ -1,45 +1,35 @@
 """Whether a run's file is read as it was meant, by the data themselves: units, signs, axes, columns.
 
-The force that a motion needs, z = M nu_dot + hull forces in weak form, follows the commanded force T.
-For each mistake that a file may have (an axis that points the other way, another unit, ...) the motion
-is put right, and the commands of each axis are explained by it,
-
-    U = min_c sum (T - c z)^2 / sum T^2,    0.1 <= c <= 10 or c = 0,    T, z without their means,
-
-the share of the commands of which the motion shows nothing. T is the same whatever the motion, so that
-U of two readings can be compared; c is one for the model's inertia and the right units. A hull,
-thrusters or surroundings that differ from the model raise U in every reading, and an axis on which
-nothing arrives has c = 0 in each; only a mistake lets *another* reading explain the commands.
-
-The likeliest mistake is told if it lowers the product of the three U by a factor, by more than chance in
-so many windows (likelihood ratio), makes no axis worse and leaves none mostly unexplained, and an
-offset of the heading does not do as well. A mistake in the pose needs commands on all three axes: one
-alone is explained by another ship's hull as well.
+Each mistake that a file may have (an axis that points the other way, another unit, columns in each
+other's place, ...) is put right in turn, and the densities of the motion are compared
+(:mod:`.reading_odds`). A mistake is reported, with its odds, if it is likelier than the file as it was
+read by more than chance gives to one of all, and lawful effects, a constant offset of the heading or
+dead actuators, do not do as well.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, compress
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri
 
 from cosim import InputError
 
-from ..predictors import Model, WeakWindows
-from ..predictors.weak_form import OVERLAP, commanded_force
+from ..predictors import Model, WeakWindows, omega
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU
 from ..runs.columns.side_car import ColumnChange
 from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
-from .gains import ThrustGains, gains
-from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
+from .gains import gains
+from .reading_odds import ReadingOdds, most_thrust
+from .readings import AS_READ, Reading, other_factors, readings, reread
 from .settings import SETTINGS
 
 # rad; a heading that is off by any of them is an effect of the library, and no mistake where it explains
 # a run as well. Chosen: 30 degrees apart, so that one is within 15 degrees.
-TURNS = tuple(np.arange(1, 12) * np.pi / 6.0)
+TURNS = tuple(k * np.pi / 6.0 for k in range(-5, 6) if k)
+MOST = 6  # power of ten of the odds that are stated; no model is true enough for more
 
 
 def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
@@ -72,50 +62,32 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChan
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
         return silent, {}, None
-    found = likeliest_mistake(w, model)
-    if found:
-        seen = (
-            f"it seems that {found.reading.mistake}: then {found.after:.0%} of its "
-            f"commands show in its motion, as it was read {found.before:.0%}"
-        )
-        return seen, found.reading.changes, None
     given = gains(w, model)
     wrong = [f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong)]
-    reading = likeliest_unit(w, model, given) if wrong else None
-    if beyond is None and not wrong:
+    seen = beyond or (
+        f"its accelerations follow {', '.join(wrong)}" if wrong else pushed_aside(w, model)
+    )
+    found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean)
+    if found:
+        clause = f"{beyond}; {found.clause}" if beyond else found.clause
+        return clause, found.readings[0].changes, None
+    return (seen, {}, None) if seen else None
+
+
+def pushed_aside(w: WeakWindows, model: Model) -> str | None:
+    """A clause about a force that a ship cannot give, on an axis that no actuator commands."""
+    e, T = omega(w, model), w.held @ w.run.tau_cmd
+    lacking, full = np.sqrt((e**2).mean(axis=0)), most_thrust(w, model)
+    idle = ~T.any(axis=0) & (lacking > SETTINGS.drift * full)
+    if not idle.any():
         return None
-    seen = beyond or f"its accelerations follow {', '.join(wrong)}"
-    if reading is None:
-        return seen, {}, None
-    return f"{seen}; it seems that {reading.mistake}", reading.changes, None
-
-
-def likeliest_unit(w: WeakWindows, model: Model, given: ThrustGains) -> Reading | None:
-    """The reading in which the commands give the accelerations that they should, if there is any.
-
-    Of several that in which the model's error is the least part of the commands: the median of the axes
-    counts, as what is hidden in the ship is mostly on one. Units without a name come last.
-
-    Args:
-        w: windows of the run.
-        model: its inertia, hull and thrusters.
-        given: its gains as it was read.
-    """
-    k = given.mean
-    for readings in (units(w.run, model), () if k is None else other_factors(w.run, k)):
-        found = []
-        for reading in readings:
-            meant = reread(w, reading)
-            then = gains(meant, model)
-            known = (then.told | ~given.told).all()
-            if not (known and then.close) or beyond_thrusters(meant.run, model):
-                continue
-            T = meant.held @ commanded_force(meant, model)
-            off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
-            found.append((float(np.median(np.nan_to_num(off, nan=np.inf))), reading))
-        if found:
-            return min(found, key=lambda each: each[0])[1]
-    return None
+    k = int(np.argmax(idle))
+    unit = "N.m" if k == 2 else "N"
+    return (
+        f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no "
+        f"actuator pushes, and the ship can do {full[k]:.3g} {unit} at all: are columns swapped, or in "
+        "other units or axes?"
+    )
 
 
 def same_columns(run: Run) -> tuple[str, str] | None:
@@ -138,64 +110,55 @@ def still_column(run: Run) -> str | None:
 
 
 class Mistake(NamedTuple):
-    """A reading that explains a run better, and 1 - U before and after, mean of the axes."""
+    """Readings that are far likelier than the file as it was read, the likeliest first, and the odds."""
 
-    reading: Reading
-    before: float
-    after: float
+    readings: Sequence[Reading]
+    log_odds: float
+
+    @property
+    def clause(self) -> str:
+        """What seems to be wrong, and how sure that is."""
+        ten = self.log_odds / np.log(10.0)
+        odds = f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
+        return f"it seems that {', or that '.join(r.mistake for r in self.readings)} (odds {odds})"
 
 
-def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
-    """The mistake without which the commands of a run are explained far better, if there is any.
+def likeliest_mistake(
+    w: WeakWindows, model: Model, doubted: bool = False, factor: float | None = None
+) -> Mistake | None:
+    """The readings of a run that are far likelier than the file as it was read, if there are any.
 
-    A model's inertia and hull give the force that a motion needs.
+    Args:
+        w: windows of the run.
+        model: of its ship.
+        doubted: whether commands or accelerations show that the file is wrong.
+        factor: by which a column without a unit may be off; None: by none.
     """
-    commands = w.held @ commanded_force(w, model)
-    commands = commands - commands.mean(axis=0)
-    size = (commands**2).sum(axis=0)
-    heard = size > SETTINGS.rounding * size.max()
-    if not heard.any():
+    odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
+    named = len(possible)
+    possible += [] if factor is None else other_factors(w.run, factor)
+    if beyond_thrusters(w.run, model):
+        sound = [not beyond_thrusters(reread(w, r, model).run, model) for r in possible]
+        named, possible = sum(sound[:named]), [*compress(possible, sound)]
+        if not possible:
+            return None
+    needed = np.log((1 if doubted else len(possible)) / SETTINGS.chance)
+    found = np.array([odds.log_density(reading) for reading in possible])
+    as_read = odds.log_density(AS_READ)
+    if not found.max() > as_read + needed:
         return None
-
-    def shares(z: np.ndarray, T: np.ndarray = commands) -> np.ndarray:
-        missing = _unexplained(T, z)[heard] / (T**2).sum(axis=0)[heard]
-        return np.maximum(missing, SETTINGS.negligible)
-
-    as_read = _varying(w, model, AS_READ)
-    now = shares(as_read)
-    if now.max() <= SETTINGS.negligible:
+    best = possible[int(np.argmax(found))]
+    lawful = [Reading("", turn=turn) for turn in TURNS]
+    if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
+        lawful = []
+    elif best.commands is not None:  # actuators that are dead show nothing of any command
+        same = (best.commands == np.eye(len(best.commands))).all(axis=1)
+        lawful.append(Reading("", commands=np.diag(same.astype(float))))
+    better = found.max() - max([as_read, *map(odds.log_density, lawful)])
+    if better < needed:
         return None
-    found, readings = [], [*directions(w.run, model)]
-    by_chance = chdtri(1, SETTINGS.chance / len(readings)) / (w.middle.size / OVERLAP)
-    for reading in readings:
-        z = as_read if reading.still else _varying(w, model, reading)
-        then = shares(z, commands @ reading.commands.T)
-        better = float(np.log(now / then).sum())
-        worse = (then > now + SETTINGS.negligible).any()
-        sound = not worse and then.max() < SETTINGS.explained
-        alone = reading.still and np.array_equal(np.abs(reading.commands), np.eye(3))
-        if better > max(np.log(SETTINGS.factor), by_chance) and sound and (alone or heard.all()):
-            found.append((better, reading, then))
-    if not found:
-        return None
-    better, reading, then = max(found, key=lambda each: each[0])
-    turned = (shares(_varying(w, model, Reading("", turn=turn))) for turn in TURNS)
-    lawful = max(float(np.log(now / each).sum()) for each in turned)
-    if better < np.log(SETTINGS.factor) + max(lawful, 0.0):
-        return None
-    return Mistake(reading, 1.0 - float(now.mean()), 1.0 - float(then.mean()))
-
-
-def _varying(w: WeakWindows, model: Model, reading: Reading) -> np.ndarray:
-    """Force (K, 3) that the motion of a run needs by a reading [N, N, N m], less its mean."""
-    z = needed(reread(w, reading), model)
-    return z - z.mean(axis=0)
-
-
-def _unexplained(commands: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Sum of squares (3,) of what of commands (K, 3) does not follow from the needed force z (K, 3)."""
-    with np.errstate(all="ignore"):
-        c = np.nan_to_num((commands * z).sum(axis=0) / (z * z).sum(axis=0))
-        c = np.clip(c, SETTINGS.least_gain, 1.0 / SETTINGS.least_gain)
-        off = ((commands - c * z) ** 2).sum(axis=0)
-    return np.fmin(off, (commands**2).sum(axis=0))
+    near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
+    order = sorted(near, key=lambda k: (k >= named, len(possible[k].changes), -found[k]))
+    if order[0] < named:  # a unit with a name is as good as a number
+        order = [k for k in order if k < named]
+    return Mistake([possible[k] for k in order], better)

@@ -2,16 +2,19 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
 from fmus.declare import variables
 
-from ..predictors import Model, WeakWindows, omega
+from ..predictors import Model, WeakWindows
 from ..predictors.thrust import full_thrust
+from ..predictors.weak_form import needed_force
 from ..runs import Run
-from ..runs.columns.columns import POSE, TAU, UNITS
+from ..runs.columns.columns import OF_UNIT, POSE, TAU
 from ..runs.columns.side_car import ColumnChange
+from ..runs.columns.unit_check import OTHERS, UNITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,24 +25,22 @@ class Reading:
         mistake: what is wrong if it is right, as a clause.
         changes: signal -> what its column should be read as.
         motion: (3, 3), from the pose as it was read to the pose as it was meant.
-        commands: (3, 3), the same of the commanded force.
+        commands: (k, k), the same of the run's commands, or of its commanded force; None: as read.
         turn: what is added to the heading [rad].
         pace: of the clock, seconds meant for a second read.
-        force: (n, 3), commanded force at rest where actuators' own commands are others; None: as read.
     """
 
     mistake: str
     changes: Mapping[str, ColumnChange] = field(default_factory=dict)
     motion: np.ndarray = field(default_factory=lambda: np.eye(3))
-    commands: np.ndarray = field(default_factory=lambda: np.eye(3))
+    commands: np.ndarray | None = None
     turn: float = 0.0
     pace: float = 1.0
-    force: np.ndarray | None = None
 
     @property
-    def still(self) -> bool:
-        """Whether the motion is as it was read."""
-        return np.array_equal(self.motion, np.eye(3)) and self.turn == 0.0 and self.pace == 1.0
+    def density(self) -> float:
+        """Logarithm of the density of numbers as they were read over that of those that were meant."""
+        return float(np.log(np.abs(np.linalg.det(self.motion)))) - 6.0 * float(np.log(self.pace))
 
 
 AS_READ = Reading("nothing")
@@ -50,9 +51,9 @@ def of_pose(mistake: str, factors: Sequence[float]) -> Reading:
     return Reading(mistake, _scaled(POSE, factors), motion=np.diag(factors))
 
 
-def of_commands(mistake: str, factors: Sequence[float]) -> Reading:
-    """A commanded force with factors (3,)."""
-    return Reading(mistake, _scaled(TAU, factors), commands=np.diag(factors))
+def of_commands(mistake: str, factors: Sequence[float], signals: Sequence[str] = TAU) -> Reading:
+    """Commands with factors (k,) on their columns."""
+    return Reading(mistake, _scaled(signals, factors), commands=np.diag(factors))
 
 
 def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, ColumnChange]:
@@ -62,16 +63,18 @@ def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, Colum
 
 def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
     """Two columns of the pose or of the commands in each other's place."""
-    order = np.eye(3)
+    order = np.eye(len(signals))
     order[[i, k]] = order[[k, i]]
     pair = signals[i], signals[k]
     changes = {a: ColumnChange(b) for a, b in (pair, pair[::-1])}
-    motion, commands = (order, np.eye(3)) if signals is POSE else (np.eye(3), order)
-    return Reading(f"{pair[0]} and {pair[1]} are swapped", changes, motion, commands)
+    mistake = f"{pair[0]} and {pair[1]} are swapped"
+    if signals is POSE:
+        return Reading(mistake, changes, motion=order)
+    return Reading(mistake, changes, commands=order)
 
 
-def directions(run: Run, model: Model) -> Iterator[Reading]:
-    """Readings in which axes point elsewhere, columns are swapped, or the heading is in degrees."""
+def readings(run: Run, model: Model) -> Iterator[Reading]:
+    """Ways in which the file of a run may be meant, other than it was read."""
     yield of_pose("its heading is mirrored (clockwise is positive here)", (1.0, 1.0, -1.0))
     yield of_pose("y points west (east is positive here)", (1.0, -1.0, 1.0))
     yield of_pose("x points south (north is positive here)", (-1.0, 1.0, 1.0))
@@ -80,33 +83,24 @@ def directions(run: Run, model: Model) -> Iterator[Reading]:
     )
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
-    wrong = "its commands have the wrong sign"
-    if run.commands is None:
-        yield of_commands(wrong, (-1.0, -1.0, -1.0))
-        for k, name in enumerate(TAU):
-            yield of_commands(f"{name} has the wrong sign", (1.0 - 2.0 * np.eye(3)[k]).tolist())
-        yield from (swapped(TAU, *pair) for pair in ((0, 1), (0, 2), (1, 2)))
-    else:
-        unit = model.ship.commands  # a force turns round with its thrust, at the same angle
-        thrusts = [s for s in run.signals if unit.get(s) != "rad"]
-        changes = {s: ColumnChange(s, -1.0) for s in thrusts or run.signals}
-        yield Reading(wrong, changes, commands=-np.eye(3))
-
-
-def units(run: Run, model: Model) -> Iterator[Reading]:
-    """Readings in which the pose or the commands are in other units, or percent of the full thrust."""
-    for unit, m in UNITS["length"].items():
-        for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
-            yield of_pose(f"{name} is in {unit}", factors)
     half = ColumnChange("psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
-    if run.commands is not None:
-        yield from _shares(run, run.commands, model)
-        return
-    forces, moments = UNITS["force"], UNITS["moment"]
+    for unit, m in OTHERS["length"][1].items():
+        for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
+            yield of_pose(f"{name} is in {unit}", factors)
+    yield from _of_force(model) if run.commands is None else _of_actuators(run, run.commands, model)
+
+
+def _of_force(model: Model) -> Iterator[Reading]:
+    """Signs, order and units of the columns of a commanded force."""
+    yield of_commands("its commands have the wrong sign", (-1.0, -1.0, -1.0))
+    for k, name in enumerate(TAU):
+        yield of_commands(f"{name} has the wrong sign", (1.0 - 2.0 * np.eye(3)[k]).tolist())
+    yield from (swapped(TAU, *pair) for pair in combinations(range(3), 2))
     percent = (0.01 * full_thrust(model)).tolist()
     yield of_commands("its commands are in percent of the full thrust", percent)
-    yield from (of_commands(f"tau_N is in {u}", (1.0, 1.0, moments[u])) for u in moments if u != "N.m")
+    forces, moments = UNITS["force"], UNITS["moment"]
+    yield from (of_commands(f"tau_N is in {u}", (1.0, 1.0, m)) for u, m in moments.items() if m != 1.0)
     for unit, moment in (("mN", "N.mm"), ("kN", "kN.m")):
         f = forces[unit]
         yield of_commands(f"its commands are in {unit} and {moment}", (f, f, f))
@@ -115,16 +109,36 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
         yield of_commands(f"tau_Y is in {unit}", (1.0, f, 1.0))
 
 
-def _shares(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
-    """Readings in which commands that no share is a unit of are shares of their limits, or percent."""
+def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
+    """Signs, order and units of the columns of actuators' own commands."""
+    names, form = run.signals, model.ship.form_of(commands)
+    ones, unit = np.ones(len(names)), np.array([form[s] for s in names])
+    turned = {s: -np.where(np.arange(len(names)) == k, 1.0, -1.0) for k, s in enumerate(names)}
+    thrusts = np.where(
+        unit == "rad", 1.0, -1.0
+    )  # a force turns round with its thrust, at the same angle
+    groups = {"its commands have": -ones, "its thrusts have": thrusts}
+    signs = {f"{s} has": f for s, f in turned.items()} | groups
+    for who, factors in {tuple(f.tolist()): (who, f) for who, f in reversed(signs.items())}.values():
+        if (factors < 0.0).any():
+            yield of_commands(f"{who} the wrong sign", factors.tolist(), names)
+    yield from (swapped(names, *pair) for pair in combinations(range(len(names)), 2))
+    for si, quantity in OF_UNIT.items():
+        for size, other in {size: other for other, size in OTHERS[quantity][1].items()}.items():
+            factors = np.where(unit == si, size, 1.0)
+            if (factors != 1.0).any():
+                yield of_commands(
+                    f"{' and '.join(_scaled(names, factors.tolist()))} are in {other}",
+                    factors.tolist(),
+                    names,
+                )
     limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for whole, name in ((1.0, "shares"), (100.0, "percent")):
         meant = (np.abs(commands).max(axis=0) <= whole) & (limits > 1.0)
-        factor = np.where(meant, limits / whole, 1.0)
-        changes = _scaled(run.signals, factor.tolist())
-        if changes:
-            force = model.ship.commanded_force(commands * factor)
-            yield Reading(f"{' and '.join(changes)} are {name} of their limits", changes, force=force)
+        factors = np.where(meant, limits / whole, 1.0)
+        if meant.any():
+            changed = " and ".join(_scaled(names, factors.tolist()))
+            yield of_commands(f"{changed} are {name} of their limits", factors.tolist(), names)
 
 
 def other_factors(run: Run, k: float) -> Iterator[Reading]:
@@ -136,25 +150,30 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock, pace=k**0.5)
 
 
-def reread(w: WeakWindows, reading: Reading) -> WeakWindows:
-    """The windows of a run by another reading, its commands as forces."""
-    s, run = w.smoothed, w.run
-    force = run.tau_cmd if reading.force is None else reading.force
-    given = replace(run, tau_cmd=force @ reading.commands.T, commands=None, power=None)
+def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
+    """The windows of a run of a model's ship by another reading."""
+    s, run, memory = w.smoothed, w.run, {}
+    if reading.commands is None:
+        if reading.pace == 1.0:
+            memory["response"] = w.memory.setdefault("response", {})
+    elif run.commands is None:
+        run = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T)
+    else:
+        commands = run.commands @ reading.commands.T
+        run = replace(run, commands=commands, tau_cmd=model.ship.commanded_force(commands, run.power))
     meant = replace(
         s,
-        track=replace(s.track, run=given),
+        track=replace(s.track, run=run),
         eta=s.eta @ reading.motion.T + [0.0, 0.0, reading.turn],
         eta_dot=s.eta_dot @ reading.motion.T / reading.pace,
     )
-    return replace(w, smoothed=meant, slope=w.slope / reading.pace, memory={})
+    return replace(w, smoothed=meant, slope=w.slope / reading.pace, memory=memory)
 
 
 def needed(w: WeakWindows, model: Model) -> np.ndarray:
     """Force (K, 3) that the motion of a run needs by a model's inertia and hull [N, N, N m]."""
-    idle = reread(w, Reading("", force=0.0 * w.run.tau_cmd))
     with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
-        return np.nan_to_num(omega(idle, model), posinf=0.0, neginf=0.0)
+        return np.nan_to_num(needed_force(w, model), posinf=0.0, neginf=0.0)
 
 
 def inertial(w: WeakWindows, model: Model) -> np.ndarray:

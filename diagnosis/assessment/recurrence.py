@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..predictors import WeakWindows
-from ..predictors.correlation import correlated_windows
+from ..predictors.uncertainty import correlated_windows
 from ..predictors.weak_form import BLOCK, EVERY
 from .clusters import numbered
 from .settings import SETTINGS
@@ -87,11 +87,8 @@ def _neighbours(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows (K, n) of the nearest windows of another run or time, and which of them there are.
 
-    Args:
-        x: (K, k), where windows are.
-        run, time: (K,), of each.
-        least: apart [s]; infinite: only those of other runs.
-        count: of the nearest windows that are searched.
+    Nearest by places x (K, k), among so many, and apart by at least so many seconds; infinite: only of
+    other runs.
     """
     rows = KDTree(x).query(x, min(count, len(x)))[1].reshape(len(x), -1)
     apart = (run[rows] != run[:, None]) | (np.abs(time[rows] - time[:, None]) >= least)
@@ -124,4 +121,4 @@ def _in_part(error: np.ndarray, command: np.ndarray, stretch: np.ndarray, always
         squares = np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0])
         return float(squares / max(error @ error, np.finfo(float).tiny))
 
-    return explained(command) > max(explained(np.ones_like(error)), always) + SETTINGS.clearer
+    return explained(command) > max(explained(np.ones_like(error)), always) + SETTINGS.negligible

@@ -17,12 +17,53 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from fmus.scale import REFERENCE, Scale
+
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
 from ..predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
 from .clusters import numbered
 from .covariates import AXES
+from .recurrence import Recurrence
+from .regions import NAMES, UNITS, Region
 from .settings import SETTINGS
+
+NOTHING_LEFT = "What the model leaves is within the uncertainty of the measurement."
+LITTLE_LEFT = (
+    "What the model leaves is beyond the noise of the measurement, but less than 5 % of the first error "
+    "or 2 % of the commanded force."
+)
+# Space in which most repeats -> how, and what kind of cause does so.
+REPEATS = {
+    "place": (
+        "repeats with the place",
+        "a cause that stands in the basin, such as a bank, shallow water or a current",
+    ),
+    "motion": (
+        "repeats with speed, drift and turn",
+        "a force on the hull that no effect of the list has the shape of",
+    ),
+    "command": (
+        "repeats with the commands",
+        "thrusters that give another force than the model of them, in a shape that no effect has",
+    ),
+    "time": (
+        "repeats with the time since a run began",
+        "something that happens at the same time of each run, or a drift",
+    ),
+}
+IN_PART = (
+    "is in proportion to the command of its axis for a while and then not",
+    "a thruster that fails and comes back, or whose power changes",
+)
+LASTS = (
+    "repeats with neither place, motion, command nor time, but lasts for about {0:.0f} s at a time",
+    "something that comes and goes, such as gusts, a changing current, or a towed cable",
+)
+BRIEF = (
+    "repeats with neither place, motion, command nor time, and is soon over",
+    "waves, a disturbance of the measurement, or commands other than those recorded",
+)
 
 
 @dataclass(frozen=True)
@@ -71,13 +112,9 @@ def axis_remainders(
     std: Sequence[np.ndarray],
     model: Model,
 ) -> dict[str, AxisRemainder]:
-    """What a model leaves on each axis, X, Y and N.
+    """What a model leaves on each axis, by the model error of the first model and of this.
 
-    Args:
-        data: windows of each run.
-        before, after: of each run the model error (K, 3) of the first model and of this [N, N, N m].
-        std: of each run its standard deviation by noise (K, 3) [N, N, N m].
-        model: the first one.
+    These, and their standard deviation by noise, are (K, 3) of each run [N, N, N m].
     """
     command = commanded(data, model)
     first, left, noise = (np.concatenate(x) for x in (before, after, std))
@@ -88,7 +125,7 @@ def axis_remainders(
         by_size = float(chdtrc(dof, dof * size**2))
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups)
         rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
-        least = max(SETTINGS.share_of_first * start, SHARE_OF_COMMAND * _rms(command[:, k]))
+        least = max(SETTINGS.negligible * start, SHARE_OF_COMMAND * _rms(command[:, k]))
         matters = (by_size < level() and rms > least) or (by_slowness < level() and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
         p_value = min(by_size, by_slowness)
@@ -151,3 +188,53 @@ class Remainder:
     def beyond_chance(self) -> bool:
         """Whether more is left on some axis than chance gives."""
         return any(a.beyond_chance for a in self.axes.values())
+
+
+def remainder_sentence(
+    axes: Mapping[str, AxisRemainder],
+    how: Sequence[Recurrence] | None,
+    regions: Sequence[Region],
+    waves: bool,
+    scale: Scale = REFERENCE,
+) -> str:
+    """The remainder of all axes in words.
+
+    Args:
+        axes: X, Y, N -> what is left.
+        how: of each axis how it comes again; None where nothing is left.
+        regions: where the model that is judged fails, the clearest of an axis first.
+        waves: whether waves were found, which the model cannot take away.
+        scale: of the ship.
+    """
+    left = [axis for axis in axes if axes[axis].significant]
+    if not left or how is None:
+        return LITTLE_LEFT if any(a.beyond_chance for a in axes.values()) else NOTHING_LEFT
+    parts: dict[tuple[str, str], list[str]] = {}
+    for k, axis in enumerate(axes):
+        if axis in left:
+            parts.setdefault(_kind(how[k], WIDTH * scale.time), []).append(axis)
+    texts = []
+    for (comes, cause), group in parts.items():
+        amounts = " and ".join(_amount(axis, axes[axis]) for axis in group)
+        where = [r for axis in group for r in regions if r.axis == axis][:1]
+        place = f", most {where[0].phrase}" if where else ""
+        texts.append(f"{amounts} not explained{place}. It {comes}: that suggests {cause}.")
+    if waves:
+        texts.append("A part of it are the waves that were found, which no model can foretell.")
+    return " ".join(texts)
+
+
+def _amount(axis: str, r: AxisRemainder) -> str:
+    share = 100.0 * np.sqrt(r.share)
+    of_first = f", {share:.2g} % of the first error" if share < 99.5 else ""
+    return f"{NAMES[axis]}: {r.rms:.2g} {UNITS[axis]} (uncertainty {r.uncertainty:.1g}{of_first})"
+
+
+def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
+    if r.in_part and r.best != "place":
+        return IN_PART
+    if r.best is not None:
+        return REPEATS[r.best]
+    if r.lasts > briefly:
+        return LASTS[0].format(r.lasts), LASTS[1]
+    return BRIEF

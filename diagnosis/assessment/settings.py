@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from ..predictors.uncertainty import NEGLIGIBLE
 from ..runs.cleaning import CHANCE
 
 
@@ -13,7 +14,7 @@ class AssessmentSettings:
     """
 
     chance: float = CHANCE  # 1, of an error of the first kind, all tests of a question together
-    negligible: float = 0.05  # 1, share of commands or windows that may be false or unexplained; chosen
+    negligible: float = NEGLIGIBLE  # 1, share of commands or windows that may be false or unexplained
     explained: float = 0.5  # 1, share from which on most is explained, so that it has this cause
     # 1, of accelerations over commands, of commands over full thrust. Derived: half of the way, in
     # logarithms, between one thruster of two and the foot, the smallest of the units: sqrt(2 * 3.28).
@@ -21,33 +22,29 @@ class AssessmentSettings:
     # 1. Derived: half of the way, in logarithms, to the nearest wrong unit, a hundredth. A thruster that
     # gives a tenth, or none, is a matter of the diagnosis.
     least_gain: float = 0.1
-    sure: float = 3.0  # standard errors beyond which a gain is wrong; chosen
-    rounding: float = 1e-6  # 1, of the largest command; what is less is no command but rounding
-    # 1, least share of a command that follows from no other; chosen: a thruster aft that pushes sideways
-    # and turns at once has none.
-    own: float = 0.01
-    factor: float = 4.0  # 1, by which another reading explains a right file better, at most; chosen
+    windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
+    inexact: float = 0.1  # 1, of the inertial force, that a model lacks at the least; chosen
+    lost: float = 0.5  # 1, deviation of the share of a thruster's force that is lost; chosen
+    drift: float = 0.5  # 1, of the full thrust, that nothing but an actuator gives all the time; chosen
+    steady: float = 0.1  # 1, of the full thrust, deviation of a force that is steady; chosen
+    # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no
+    # coefficient is known to 1 %.
+    hardly: float = 0.01
     unbalanced: float = 0.2  # 1, of what inertia and hull need. Derived: twice 10 % of a coefficient
-    long: int = 20  # windows without a command after which the ship has forgotten its thrust; chosen
     neighbours: int = 5  # windows by which that of a model error is predicted; chosen
     repeats: float = 0.25  # 1, share from which on an error is said to repeat; chosen
-    clearer: float = 0.1  # 1, by which commands must explain more than what comes and goes; chosen
     # 1. Calibrated by tests/test_diagnosis_where.py: with one block three times as many regions were
     # found where an error depends on no covariate.
     blocks_per_cluster: int = 2
     least_contrast: float = 1.4  # 1, of the RMS in a region to that elsewhere; chosen
     largest_region: float = 0.6  # 1, share of the windows; chosen
     least_clusters: int = 4  # 1, inside and outside, for three degrees of freedom of each variance
-    share_of_first: float = 0.05  # 1, of an axis' first model error, which is too little; contract
     # 1, variance by noise of a mean over windows, as a share of that of independent ones: measured 0.04
     # to 0.13 without a hidden cause, and doubled.
     slow_noise: float = 0.25
-    no_less: float = 0.01  # 1, share of a dissipation; chosen, as no coefficient is known to 1 %
     directions: int = 21  # along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
-    coverage: float = 0.99  # 1, share of a measured motion that an operating region holds; chosen
     least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen
     limits: tuple[float, float, float] = (0.4, 0.2, 0.6)  # m/s, m/s, rad/s: 99 % of each published run
-    coasting: float = 60.0  # s, after which motion has died away, or doubled many times; chosen
     runaway: float = 3.0  # 1, times the speeds of the region; chosen
     step: float = 0.08  # s, of simulations; chosen, distances agree with those at 0.01 s to 3 %
     bound: float = 5.0  # m, four ship lengths, beyond which a ship is lost; chosen

@@ -22,6 +22,7 @@ from fmus.vessel.vessel_effects import NONE
 from ..execution.parallel import for_each
 from ..execution.progress import Advance, silent
 from ..predictors import Model
+from ..predictors.thrust import FORGOTTEN
 from .closed_loop import REFERENCES, bound_of, largest_distance
 from .settings import SETTINGS
 
@@ -48,7 +49,7 @@ class OperatingRegion(NamedTuple):
     def of(cls, nu: np.ndarray, scale: Scale = REFERENCE) -> "OperatingRegion":
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
         known = np.abs(nu[np.isfinite(nu).all(axis=1)])
-        most = np.quantile(known, SETTINGS.coverage, axis=0) if len(known) else np.zeros(3)
+        most = np.quantile(known, 1.0 - SETTINGS.chance, axis=0) if len(known) else np.zeros(3)
         return cls(*map(float, np.maximum(most, SETTINGS.least_region * np.array(cls.at(scale)))))
 
 
@@ -219,7 +220,7 @@ def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
 
 
 def _less(after: Any, before: Any) -> Any:
-    return after < before - SETTINGS.no_less * np.abs(before)
+    return after < before - SETTINGS.hardly * np.abs(before)
 
 
 def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: OperatingRegion) -> str:
@@ -239,20 +240,16 @@ def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: O
 
 
 def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, notes: list[str]) -> bool:
-    """Whether a ship without thrust stays near the speeds of its region, from whatever motion there.
+    """Whether a ship without thrust stays near the speeds of its region, from motions (n, 3) there.
 
-    Args:
-        model: its hull, in still water and without what acts from outside.
-        motions: (n, 3) that it begins with [m/s, m/s, rad/s].
-        region: speeds that it may exceed by no more than a factor.
-        notes: receives what was found.
+    In still water and without what acts from outside; ``notes`` receives what was found.
     """
     scale = model.ship.scale
     still = np.zeros(len(motions))
     s = vessel.State._make([still, still, still, *motions.T, still])
     most, h = 0.0, SETTINGS.step
     with np.errstate(all="ignore"):
-        for _ in range(round(SETTINGS.coasting / h)):
+        for _ in range(round(FORGOTTEN / h)):
             s = vessel.integrate(s, Force(0.0, 0.0, 0.0), model.hull.hull, h * scale.time)
             speeds = np.abs(np.stack([s.u, s.v, s.r])) / np.array(region)[:, None]
             most = max(most, float(np.nan_to_num(speeds, nan=np.inf).max()))

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Console, RenderableType
 
 from cosim import InputError
-from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name
+from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name, positive
 from cosim.interrupts import Held
 from cybership.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
@@ -23,8 +23,22 @@ from ..execution.progress import Advance, progress
 from ..execution.result_folder import clean, default_folder, keep_inputs, sha256
 from ..search import Prior
 
+if TYPE_CHECKING:
+    from ..predictors import Execution
+
 # Options that name files which decide a result.
-INPUTS = ("train", "validate", "test", "runs", "run", "model", "map", "effects", "criteria")
+INPUTS = (
+    "train",
+    "validate",
+    "test",
+    "runs",
+    "run",
+    "model",
+    "map",
+    "parameters",
+    "effects",
+    "criteria",
+)
 RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 
 
@@ -90,14 +104,39 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     return made
 
 
-def map_option(made: argparse.ArgumentParser) -> None:
-    """Add ``--map``."""
+def fmu_options(made: argparse.ArgumentParser) -> None:
+    """Add ``--map`` and how an FMU given by ``--model`` is run."""
     made.add_argument(
         "--map",
         type=Path,
         metavar="FILE.json",
         help="which variables of an FMU given by --model are which signals (as names and units tell)",
     )
+    made.add_argument(
+        "--step",
+        type=positive,
+        metavar="SECONDS",
+        help="length of the FMU's steps (its stepSize if it takes no other, else as predictions need)",
+    )
+    made.add_argument(
+        "--timeout",
+        type=positive,
+        metavar="SECONDS",
+        help="longest time of a call to the FMU (100 times that of its usual step, 30 s at the least)",
+    )
+    made.add_argument(
+        "--unconfined",
+        action="store_true",
+        help="run the FMU with access to files, network and other processes, which the result says (as "
+        "an FMU needs that is a client of a tool)",
+    )
+
+
+def execution_of(options: argparse.Namespace) -> "Execution":
+    """How the options have an FMU run."""
+    from ..predictors import Execution  # only now: it takes a while to import
+
+    return Execution(options.timeout, options.step, not options.unconfined)
 
 
 def ship_option(made: argparse.ArgumentParser) -> None:

@@ -7,19 +7,35 @@ from pathlib import Path
 from cosim import InputError
 from fmus.ship import Ship
 
-from ..predictors import MAP, DescribedShip, Model, ModelSource, UnmatchedError, open_model, refuse_map
+from ..predictors import (
+    MAP,
+    DescribedShip,
+    Execution,
+    Model,
+    ModelSource,
+    UnmatchedError,
+    open_model,
+    refuse_execution,
+    refuse_map,
+)
 
 
-def initial_model(path: Path | None, map: Path | None, craft: Ship) -> ModelSource:  # noqa: A002
-    """The model of a ship by ``--model`` and ``--map``; by default the nominal one.
+def initial_model(
+    path: Path | None,
+    map: Path | None,  # noqa: A002
+    craft: Ship,
+    execution: Execution,
+) -> ModelSource:
+    """The model of a ship by ``--model``, ``--map`` and how it is run; by default the nominal one.
 
     Raises:
         InputError: no such file, or not what its name says.
     """
     if path is None:
         refuse_map(map)
+        refuse_execution(execution)
         return DescribedShip(Model(ship=craft))
-    return open_model(path, map, craft)
+    return open_model(path, map, craft, execution)
 
 
 @contextmanager

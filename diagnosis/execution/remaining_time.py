@@ -1,7 +1,8 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
 The number of effects is known only in the end: that of the rounds is the usual one, or the present one
-and half a round more. How long a step takes is scaled by what the steps so far took.
+and half a round more. Where no effect was found, none is validated and
+fitted. How long a step takes is scaled by what the steps so far took.
 """
 
 import re
@@ -9,22 +10,22 @@ import time
 from collections.abc import Callable
 
 # s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count.
-ROUND = {"every effect as a candidate": 0.8, "candidates refined": 1.0}
+ROUND = {"every effect as a candidate": 1.0, "candidates refined": 0.5}
 AGAIN = {"its place searched again": 3.0}
+OF_EFFECTS = {"validation data are predicted better": 1.1, "fit to predictions": 1.3}
 LAST = {
-    "waves": 1.2,
-    "validation data are predicted better": 4.0,
-    "fit to predictions": 4.5,
-    "residual": 0.2,
-    "gained over calibration": 0.3,
-    "predicting": 1.0,
-    "stability": 1.4,
-    "report: figures": 1.5,
-    "report: page": 0.5,
+    "waves": 0.7,
+    **OF_EFFECTS,
+    "residual": 0.1,
+    "gained over calibration": 1.7,
+    "predicting": 0.4,
+    "stability": 1.1,
+    "report: figures": 1.0,
+    "report: page": 0.1,
 }
-FIRST = {"reading": 0.2, "smoothing": 1.7, "calibration of the coefficients": 2.5}
+FIRST = {"reading": 0.1, "smoothing": 1.2, "calibration of the coefficients": 2.9}
 USUAL = {**FIRST, **ROUND, **AGAIN, **LAST}
-ROUNDS = 3.0  # usual number, the last of which finds nothing; chosen
+ROUNDS = 2.0  # usual number, the last of which finds nothing; chosen
 LATE = (
     0.3  # share of its time that a step is taken to go on for where it takes longer than usual; chosen
 )
@@ -82,14 +83,17 @@ class RemainingTime:
             self._left = self._following()
         elif self._step in LAST and self._round:
             names = [*LAST]
-            self._left = {name: LAST[name] for name in names[names.index(self._step) + 1 :]}
+            skipped = OF_EFFECTS if self._round == 1 else ()
+            names = [name for name in names[names.index(self._step) + 1 :] if name not in skipped]
+            self._left = {name: LAST[name] for name in names}
 
     def _following(self) -> dict[str, float]:
         """The time of each kind of step that usually follows the present one of a round."""
         rounds = max(ROUNDS, self._round + 0.5)
         left = {name: (rounds - self._round) * usual for name, usual in ROUND.items()}
         # A place is searched again twice for each effect but one, and goes on where it went on long.
-        again = rounds * (rounds - 1.0) - self._round * (self._round - 1.0)
+        before, effects = self._round - 1.0, rounds - 1.0
+        again = effects * (effects - 1.0) - before * (before - 1.0)
         if self._again:
             again = max(2.0 - self._again, 0.5 * self._again)
         if self._step == next(iter(ROUND)):

@@ -19,7 +19,7 @@ forces are its own; else that of the ship.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -31,21 +31,18 @@ from cosim import InputError
 from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.ops import wrap
 
-from ..runs import Run, Smoothed
+from ..runs import Fingerprint, Run, Smoothed
 from .described_ship import DescribedShip, windows_of
 from .prediction import WindowStarts, at_rest
 from .predictor import Predictor, PredictorDescription
 from .ship_model import Model, SampledForce
 from .thrust import FORGOTTEN
-from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
-from .windows import Windows, first_row, free_runs, step_of
+from .weak_form import SMALL, WeakWindows, acceleration, inflow_along, thrust_along
+from .windows import Windows, between_steps, first_row, first_time, free_runs, step_of
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
 TAU = ("tau_X", "tau_Y", "tau_N")
-# Of the ship's speeds the step of slopes; of the ship's answer to a force one that is none, and its
-# inverse too much. Chosen, as a black box solves its equations to some digits only.
-SMALL = 1e-3
 
 # Name of a pose, velocity, force or command -> values (n,) [SI].
 Signals = Mapping[str, np.ndarray]
@@ -61,6 +58,7 @@ class BlackBox(ABC):
 
     Attributes:
         kind, sha256, given_map: see :class:`.predictor.PredictorDescription`.
+        learned_from: runs of which it was learned, as far as it tells.
         starts: what a prediction can begin with, of :data:`MOTION`.
         inputs: the forces and commands that it takes.
         own_run_in: the run-in of every run [s]; None: none from rest, else the usual one.
@@ -68,6 +66,7 @@ class BlackBox(ABC):
 
     parametric = False
     kind, sha256 = "black box", ""
+    learned_from: tuple[Fingerprint, ...] = ()
 
     def __init__(self, name: str, runs: Sequence[WeakWindows], ship: Model) -> None:
         self.name, self.runs, self.ship = name, runs, ship
@@ -129,13 +128,14 @@ class BlackBox(ABC):
         """A model that moves as the black box does along its runs."""
         body = Model({**self.ship.vessel, **self._inertia()}, self.ship.thrusters, ship=self.ship.ship)
         given = {w.run.name: self._beyond_along(w, body) for w in self.runs}
-        return Model(body.vessel, body.thrusters, ship=body.ship, given=given)
+        known = self.learned_from
+        return Model(body.vessel, body.thrusters, ship=body.ship, given=given, learned_from=known)
 
     def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
         if not self.whole:
             return windows_of(runs, length)
         (smoothed,) = runs
-        seconds = float(smoothed.time[-1] - smoothed.time[0]) + 0.75 * smoothed.track.period
+        seconds = smoothed.time[-1] - first_time(smoothed) + 0.75 * smoothed.track.period
         try:
             return Windows(runs, seconds).after(self.run_in(smoothed))
         except InputError as error:
@@ -162,9 +162,10 @@ class BlackBox(ABC):
         row, h = first_row(smoothed, begin), step_of(smoothed)
         start = 0 if self.whole else row
         steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
-        first = round((smoothed.time[row] - smoothed.time[start]) / h)
+        since = smoothed.time[row] - smoothed.time[start]
+        first = int(np.ceil(since / h - 1e-6))
         motion = self.motion(smoothed, np.array([start]), h, steps)
-        pose = self._placed_at(motion, h, first, smoothed.eta[[row]])[first:, :, 0]
+        pose = self._placed_at(motion, h, np.array([since]), smoothed.eta[[row]])[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
 
     def description(self) -> PredictorDescription:
@@ -200,22 +201,23 @@ class BlackBox(ABC):
         """The predicted pose (steps + 1, 3, 1, w) in windows."""
         found, h = [], starts.h
         for smoothed, rows in starts.runs:
-            first = round(self.run_in(smoothed) / h)
-            onto = np.searchsorted(smoothed.time, smoothed.time[rows] + first * h - 1e-9)
+            time = smoothed.time
+            onto = np.searchsorted(time, time[rows] + self.run_in(smoothed) - 1e-9)
             motion = self.motion(smoothed, rows, h, starts.steps)
-            found.append(self._placed_at(motion, h, first, smoothed.eta[onto]))
+            since = time[onto] - time[rows]  # a sample, which need not be a step
+            found.append(self._placed_at(motion, h, since, smoothed.eta[onto]))
         return np.concatenate(found, axis=-1)[:, :, None]
 
-    def _placed_at(self, motion: np.ndarray, h: float, first: int, eta: np.ndarray) -> np.ndarray:
-        """Pose (steps + 1, 3, w) of a motion, at a step laid onto others (w, 3) if it cannot be set."""
-        return _laid(_pose(motion, h), first, eta.T) if self.placed else _pose(motion, h)
+    def _placed_at(self, motion: np.ndarray, h: float, since: np.ndarray, eta: np.ndarray) -> np.ndarray:
+        """Pose (steps + 1, 3, w), laid onto others (w, 3) at times (w,) [s] if it cannot be set."""
+        return _laid(_pose(motion, h), since / h, eta.T) if self.placed else _pose(motion, h)
 
     def _whole_run(self, smoothed: Smoothed) -> np.ndarray:
         """Pose and velocity (n, 6) along a run from its start."""
         h = step_of(smoothed)
         steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
         motion = self.motion(smoothed, np.array([0]), h, steps)
-        pose = _laid(_pose(motion, h), 0, smoothed.eta[:1].T)[:, :, 0]
+        pose = _laid(_pose(motion, h), np.zeros(1), smoothed.eta[:1].T)[:, :, 0]
         nu = motion[:, 3:, 0]
         if np.isnan(nu).any():
             rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
@@ -287,8 +289,20 @@ def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarr
 
 
 def commanded(run: Run) -> dict[str, np.ndarray]:
-    """Force or command -> its values (n,) in a run [SI]."""
-    return dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    """Force or command -> its values (n,) in a run [SI], forces in the plane also as size and angle."""
+    found = dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    for name, (ahead, aside) in planes(found).items():
+        found[f"{name}.force"] = np.hypot(found[ahead], found[aside])
+        found[f"{name}.angle"] = np.arctan2(found[aside], found[ahead])
+    return found
+
+
+def planes(signals: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Name of a force in the plane -> its components ahead and to starboard, among some signals."""
+    known = [*signals]
+    pairs = {"tau": (TAU[0], TAU[1])}
+    pairs |= {n[:-2]: (n, f"{n[:-2]}.Y") for n in known if n.endswith(".X")}
+    return {name: pair for name, pair in pairs.items() if {*pair} <= {*known}}
 
 
 def commands_at(run: Run, time: np.ndarray) -> dict[str, np.ndarray]:
@@ -306,7 +320,7 @@ def at_samples(smoothed: Smoothed) -> dict[str, np.ndarray]:
 def _beyond(w: WeakWindows, body: Model, motion: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
     """Force (n, 3) that a model of a ship lacks in a motion (n, 6)."""
     eta, nu = motion[:, :3], motion[:, 3:]
-    free = acceleration(body, w.run.time, eta, nu)
+    free = acceleration(body, w.smoothed, eta, nu)
     return (nu_dot - free) @ body.mass.T - thrust_along(w, body, inflow_along(w, body, eta, nu))
 
 
@@ -321,8 +335,9 @@ def _pose(motion: np.ndarray, h: float) -> np.ndarray:
     return np.stack([sums(north), sums(east), psi], axis=1)
 
 
-def _laid(pose: np.ndarray, first: int, onto: np.ndarray) -> np.ndarray:
-    """Tracks (steps + 1, 3, w), moved and turned so that at a step they are where others (3, w) are."""
-    x, y, psi = (pose - pose[first]).transpose(1, 0, 2)
-    north, east = rotate_to_earth(onto[2] - pose[first, 2], x, y)
+def _laid(pose: np.ndarray, place: np.ndarray, onto: np.ndarray) -> np.ndarray:
+    """Tracks (steps + 1, 3, w), moved and turned onto poses (3, w) after steps (w,), or parts."""
+    at = between_steps(pose[:, :, None], np.arange(place.size), place)[0].T
+    x, y, psi = (pose - at).transpose(1, 0, 2)
+    north, east = rotate_to_earth(onto[2] - at[2], x, y)
     return np.stack([onto[0] + north, onto[1] + east, onto[2] + psi], axis=1)

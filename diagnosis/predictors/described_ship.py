@@ -1,6 +1,7 @@
 """A described ship as a predictor: the functions of its vessel and thrusters, by its parameters."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ from fmus.ship import Ship, ship
 from fmus.ships.naming import described_ship
 
 from ..execution.progress import Advance, silent
-from ..runs import Smoothed
+from ..execution.result_folder import sha256
+from ..runs import Fingerprint, Smoothed
 from .parameter_set import read_model, write_model
 from .predictor import MODEL, Predictor, PredictorDescription, refuse_map
 from .ship_model import Model
@@ -19,12 +21,29 @@ from .windows import Windows, free_runs
 
 
 class DescribedShip:
-    """A model of this project, see :class:`.predictor.Predictor` and :class:`.predictor.ModelSource`."""
+    """A model of this project, see :class:`.predictor.Predictor` and :class:`.predictor.ModelSource`.
+
+    Args:
+        model: its parameters.
+        file: that they were read from.
+    """
 
     parametric, whole = True, False
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    def __init__(self, model: Model, file: Path | None = None) -> None:
+        self.model, self.file = model, file
+        self.sha256 = "" if file is None else sha256(file)
+
+    @property
+    def files(self) -> list[tuple[str, Path, str]]:
+        """What decides its predictions: what each file is for, its path, its SHA-256 when it was "
+        "read."""
+        return [] if self.file is None else [("model", self.file, self.sha256)]
+
+    def learning_from(self, runs: Sequence[WeakWindows]) -> "DescribedShip":
+        """The same model, which remembers that it and what is made from it is learned from some runs."""
+        known = (*self.model.learned_from, *(Fingerprint.of(w.smoothed) for w in runs))
+        return DescribedShip(replace(self.model, learned_from=known), self.file)
 
     @property
     def name(self) -> str:
@@ -99,4 +118,4 @@ def open_parameters(
 ) -> DescribedShip:
     """The model in a parameter set, see :func:`.predictor.open_model`."""
     refuse_map(map)
-    return DescribedShip(read_model(path, of))
+    return DescribedShip(read_model(path, of), path)

@@ -25,6 +25,7 @@ from fmus.installed import plus_files
 from fmus.ship import Ship, ship
 from fmus.ships.naming import described_ship
 
+from ..runs import fingerprints
 from .ship_model import Model
 
 MEASUREMENT, THRUSTERS = "measurement", "thrusters"
@@ -59,7 +60,8 @@ def write_model(path: Path, model: Model) -> None:
     groups = (*values.values(), beside, *(own[THRUSTERS] for own in runs.values()))
     used = [str(given.unit) for group in groups for given in group.values()]
     units = {unit: base_exponents(unit) for unit in sorted(set(used))}
-    write_parameters(path, ParameterSet(values, units, beside, "model", runs))
+    learned = [f.content() for f in model.learned_from]
+    write_parameters(path, ParameterSet(values, units, beside, "model", runs, learned))
 
 
 def _told(
@@ -126,7 +128,8 @@ def read_model(path: Path, of: Ship | None = None) -> Model:
     runs = {run: numbers(own)[THRUSTERS] for run, own in given.runs.items()}
     known = of.parameters[MEASUREMENT]
     beside = {name: p.value for name, p in given.beside.items() if name in known}
-    return Model(found["vessel"], found[THRUSTERS], beside, of, runs=runs)
+    learned = fingerprints(given.learned_from, path)
+    return Model(found["vessel"], found[THRUSTERS], beside, of, runs=runs, learned_from=learned)
 
 
 def _find(name: str, declared: Mapping[str, Variable], where: str) -> Variable:

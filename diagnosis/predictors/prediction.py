@@ -22,7 +22,9 @@ from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
 
 HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
-UNSURE = 3.0  # standard deviations of a speed within which it may be none
+# Standard deviations beyond which a speed is none of rest, a gain is wrong, and a nominal coefficient is
+# no explanation alone (contract).
+FAR_OFF = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,22 @@ class WindowStarts:
         together = np.moveaxis(np.concatenate(found, axis=1), 1, -1)[..., None, :]
         return together[:, :, 0], together[:, :, 1:]
 
+    def air(self, model: Model) -> np.ndarray | None:
+        """(steps, 2, 1, w): velocity of the air to north and east [m/s], mean over each step.
+
+        None: the model's ship takes no measured wind, or none was measured. In a run without it is calm.
+        """
+        if model.hull.effects.wind < 0 or all(s.air is None for s, _ in self.runs):
+            return None
+        found, steps = [], np.arange(self.steps + 1)[:, None]
+        for smoothed, rows in self.runs:
+            t = smoothed.time
+            air = np.zeros((t.size, 2)) if smoothed.air is None else smoothed.air
+            edges = np.concatenate([t[:1], 0.5 * (t[1:] + t[:-1]), t[-1:]])
+            at = Integral(edges, air, air[0])(t[rows] + self.h * steps)
+            found.append(np.diff(at, axis=0) / self.h)
+        return np.moveaxis(np.concatenate(found, axis=1), 1, -1)[:, :, None]
+
     def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""
         found, steps = [], np.arange(self.steps + 1)
@@ -96,7 +114,7 @@ def at_rest(smoothed: Smoothed) -> bool:
     """Whether a ship hardly moves at the start of a run, for its noise and its usual speeds."""
     first = np.isfinite(smoothed.nu[:, 0]).argmax()
     usual = np.sqrt(np.nanmean(smoothed.nu**2, axis=0))
-    still = np.maximum(idle(smoothed.scale), UNSURE * smoothed.nu_std[first])
+    still = np.maximum(idle(smoothed.scale), FAR_OFF * smoothed.nu_std[first])
     still = np.maximum(still, HARDLY * usual)
     return bool((np.abs(smoothed.nu[first]) < still).all())
 
@@ -162,13 +180,14 @@ def propagate(
     body, drive, h = model.hull, starts.drive(model), starts.h
     layout = drive.effects.layout
     power = starts.power(model.clock)
-    thrusters, beside = drive, starts.given(model)
+    thrusters, beside, air = drive, starts.given(model), starts.air(model)
     # The smoothed motion, seen through the model's measurement effects.
     pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), body)
     s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
     steps: Sequence[Any] = thrust
     if single:
         s, steps = vessel.State._make([x.item() for x in s]), [x[..., 0, 0].tolist() for x in thrust]
+        air = None if air is None else air[..., 0, 0].tolist()
     yield s
     for k, (given, shares) in enumerate(zip(*steps, strict=True)):
         with np.errstate(all="ignore"):
@@ -176,10 +195,11 @@ def propagate(
                 thrusters = layout.powered(drive, power[k])
             now = layout.running(s.t + h, *inflow(s, model), tuple(given), thrusters)
             tau = Force(*layout.act(tuple(shares), now, thrusters))
+            at = body if air is None else vessel.blown(body, s, *air[k])
             if beside is None:
-                s = moved(s, tau, body, h)
+                s = moved(s, tau, at, h)
             else:
-                s = vessel.integrate(s, tau, body, h, _with(beside[0][k], beside[1][k]))
+                s = vessel.integrate(s, tau, at, h, _with(beside[0][k], beside[1][k]))
         yield s
 
 

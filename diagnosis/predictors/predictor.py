@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -45,6 +45,9 @@ class PredictorDescription:
         whole_runs: see :attr:`Predictor.whole`.
         run_in: name of a run -> its first part that does not count [s].
         sentences: the same for a reader.
+        confinement: what confines the processes that it runs in, in words, "unconfined" where nothing
+            does; empty where it is not a program of its own.
+        outside: files beyond its own and those of the system that it has opened or tried to.
     """
 
     kind: str
@@ -54,6 +57,25 @@ class PredictorDescription:
     whole_runs: bool
     run_in: Mapping[str, float]
     sentences: Sequence[str]
+    confinement: str = ""
+    outside: Sequence[str] = ()
+
+
+class Execution(NamedTuple):
+    """How a model that is a program is run.
+
+    Attributes:
+        timeout: longest wall time of a call [s]; None: by what a step usually takes.
+        step: length of its steps [s]; None: as it declares.
+        confined: whether it is kept from files, network and other processes, where the system can.
+    """
+
+    timeout: float | None = None
+    step: float | None = None
+    confined: bool = True
+
+
+DEFAULT_EXECUTION = Execution()
 
 
 class Predictor(Protocol):
@@ -214,6 +236,7 @@ def open_model(
     path: str | Path,
     map: str | Path | None = None,  # noqa: A002 - as the option of the commands
     ship: Ship | None = None,
+    execution: Execution = DEFAULT_EXECUTION,
 ) -> ModelSource:
     """The model in a file, by its ending; any other ending is that of a parameter set.
 
@@ -221,13 +244,17 @@ def open_model(
         path: of the file.
         map: file that tells which of its variables are which signals.
         ship: that it is a model of; None: that of the runs.
+        execution: how an FMU is run.
 
     Raises:
-        InputError: no such file, or not what its name says.
+        InputError: no such file, or not what its name says; an execution for what is not an FMU.
     """
     module, opens = SOURCES.get(Path(path).suffix, SOURCES[".ssv"])
+    runs = [execution] if opens == "Fmu" else []
+    if not runs:
+        refuse_execution(execution)
     found = import_module(f".{module}", __package__)
-    return getattr(found, opens)(Path(path), None if map is None else Path(map), ship)
+    return getattr(found, opens)(Path(path), None if map is None else Path(map), ship, *runs)
 
 
 def refuse_map(map: Path | None) -> None:  # noqa: A002
@@ -238,3 +265,13 @@ def refuse_map(map: Path | None) -> None:  # noqa: A002
     """
     if map is not None:
         raise InputError("--map tells the variables of an FMU: --model NAME.fmu is missing")
+
+
+def refuse_execution(execution: Execution) -> None:
+    """Refuse what says how an FMU is run for what is none.
+
+    Raises:
+        InputError: something is said.
+    """
+    if execution != DEFAULT_EXECUTION:
+        raise InputError("--timeout, --step and --unconfined are of an FMU: --model NAME.fmu is missing")

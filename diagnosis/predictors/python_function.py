@@ -70,8 +70,10 @@ class FunctionPredictor(BlackBox):
     def __init__(self, source: PythonFunction, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(source.name, runs, ship)
         self.source, self.inputs = source, frozenset(TAU)
+        self.files: list[tuple[str, Path, str]] = []
         if source.file is not None:
             self.sha256 = hashlib.sha256(source.file.read_bytes()).hexdigest()
+            self.files = [("model", source.file, self.sha256)]
 
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
         """By the classical Runge-Kutta method, the command constant within a step."""

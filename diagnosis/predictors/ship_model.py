@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from fmus.effects.measurement import CLOCK_OFFSET
 from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
 from fmus.vessel.vessel import PreparedVessel
+
+if TYPE_CHECKING:  # at run time it takes a while to import
+    from ..runs import Fingerprint
 
 Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
@@ -95,6 +98,7 @@ class Model:
             by which a model error is a force.
         runs: run -> parameter of the thrusters -> value that it has in that run alone.
         given: run -> force at its samples that acts beside all else.
+        learned_from: runs of which the parameters were learned.
     """
 
     vessel: Mapping[str, float] = field(default_factory=dict)
@@ -104,6 +108,7 @@ class Model:
     origin: "Model | None" = None
     runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     given: Mapping[str, SampledForce] = field(default_factory=dict)
+    learned_from: "tuple[Fingerprint, ...]" = ()
 
     def __repr__(self) -> str:
         parts = (*self.ship.parameters, "measurement")

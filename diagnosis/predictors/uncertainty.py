@@ -1,4 +1,4 @@
-"""Standard deviation of the model error of each window, from the noise of the measurement.
+"""Noise of the model error of each window, by the measurement, and how long such an error lasts.
 
 In weak form the inertia force of a window is the integral of the pose times the second derivative of the
 kernel, and that carries nearly all of the noise where a pose is measured to millimetres. The smoothing
@@ -14,13 +14,14 @@ mass M and the slope F of the force by nu make of an error of the pose at the fr
 (-w^2 M B + i w (M A - F B) - F A) of it; the last term is counted as if it were independent.
 """
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 from scipy.special import hyp0f1
 
 from .ship_model import Model
-from .weak_form import WIDTH, WeakWindows, modelled_force
+from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
@@ -31,8 +32,12 @@ FREQUENCIES = np.geomspace(0.02, 60.0, 400)
 # Factor within which the standard deviation is right (tests/test_diagnosis_where.py).
 NOISE_TOLERANCE = 1.3
 # Of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come from
-# how a simulator integrates. Contract, for what is left; the same for what is found.
+# how a simulator integrates. Contract, for what is left; the same for what is found, there also of the
+# squares of the first model error.
 SHARE_OF_COMMAND = 0.02
+# 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
+# from a limit; the same for commands and windows, and for what must be explained.
+NEGLIGIBLE = 0.05
 
 
 @cache
@@ -90,3 +95,47 @@ def _slope(w: WeakWindows, model: Model) -> np.ndarray:
     first = modelled_force(w, model, nu)
     changes = [modelled_force(w, model, nu + step) - first for step in np.diag(steps)]
     return np.stack(changes, axis=2) / steps
+
+
+def independent(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
+    """Factor (3,) by which the windows that count as one are more than those that overlap, at least 1.
+
+    Args:
+        data: windows of every run.
+        error: (K, 3), a model error in them.
+    """
+    return np.maximum(1.0, correlated_windows(data, error) / OVERLAP)
+
+
+def correlated_windows(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
+    """Windows (3,) that carry as much as one independent window; arguments as of :func:`independent`.
+
+    With the autocorrelation rho_l of a stationary series at a lag of l windows, the variance of its mean
+    is that of independent samples times tau = 1 + 2 sum rho_l. The sum ends before the first correlation
+    that is not positive, beyond which an estimate is noise (C. J. Geyer, Practical Markov chain Monte
+    Carlo, Statistical Science 7, 1992).
+    """
+    mean = autocovariance(data, error, round(2.0 * BLOCK / EVERY))  # lags up to two blocks
+    rho = mean / np.maximum(mean[0], np.finfo(float).tiny)
+    positive = np.cumprod(rho[1:] > 0.0, axis=0)
+    return 1.0 + 2.0 * np.sum(rho[1:] * positive, axis=0)
+
+
+def autocovariance(data: Sequence[WeakWindows], error: np.ndarray, longest: int) -> np.ndarray:
+    """(longest + 1, 3), mean product of a model error with itself some windows later.
+
+    Args:
+        data, error: as of :func:`independent`.
+        longest: lag [windows].
+    """
+    sums, pairs = np.zeros((longest + 1, 3)), np.zeros(longest + 1)
+    edges = np.cumsum([w.middle.size for w in data])[:-1]
+    for w, part in zip(data, np.split(error, edges), strict=True):
+        apart = np.minimum(np.round(np.diff(w.middle) / w.every), longest + 1.0)  # not a gap of years
+        place = np.concatenate([[0], np.cumsum(apart)]).astype(int)
+        series, there = np.zeros((place[-1] + 1, 3)), np.zeros(place[-1] + 1)
+        series[place], there[place] = part, 1.0
+        for lag in range(min(longest + 1, place[-1] + 1)):
+            sums[lag] += (series[lag:] * series[: len(series) - lag]).sum(axis=0)
+            pairs[lag] += there[lag:] @ there[: len(there) - lag]
+    return sums / np.maximum(pairs, 1.0)[:, None]

@@ -30,7 +30,8 @@ from .thrust import Response, inflow, thrust
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
-BLOCKS = 64
+BLOCKS = 64  # 1; chosen: Gram matrices of more take memory, and no fold needs them
+SMALL = 1e-3  # of its usual size: step of a finite difference where nothing is linear; chosen
 # Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.
 ROOM = 4e7
@@ -185,11 +186,7 @@ def _span(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of the time from a row to the next: the kernel's area, its part of the next row, and its length.
 
-    Args:
-        t: (n,), times of the rows [s].
-        middle: (m,), of windows [s].
-        half: their half width [s].
-        row: (m,), a row of each; before the first and after the last there is no time.
+    Of rows (m,) of windows with middles (m,), times t (n,) [s]; outside of these there is no time.
     """
     a, b = t[np.maximum(row, 0)], t[np.minimum(row + 1, t.size - 1)]
     low, high = (np.clip((x - middle) / half, -1.0, 1.0) for x in (a, b))
@@ -204,6 +201,16 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 
     An acceleration counts as a force by the inertia of the model that this one was made from.
     """
+    return _balance(w, model, thrust=True)
+
+
+def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
+    """Force (K, 3) [N, N, N m] that a motion needs by a model's inertia and hull."""
+    return _balance(w, model, thrust=False)
+
+
+def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
+    """The force that a motion needs, less that of the thrusters and what is given, if these count."""
     model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
@@ -213,7 +220,9 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
     eta, nu = w.recall("motion", measured, lambda: _motion(w, model))
     change = w.recall("change", measured, lambda: w.slope @ nu)
-    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
+    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.smoothed, eta, nu))
+    if not thrust:
+        return (change - free) @ model.reference_mass.T
 
     def drives() -> np.ndarray:
         key = measured, water
@@ -227,7 +236,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
     """Force (K, 3) [N, N, N m] of hull and thrusters over the windows, at the velocity nu (n, 3)."""
     model, (eta, _) = model.during(w.run.name), w.motion
-    hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
+    hull = w.smooth @ acceleration(model, w.smoothed, eta, nu) @ model.reference_mass.T
     driven = w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
     return hull + _acting(w, model, driven, eta, nu)
 
@@ -301,10 +310,14 @@ def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
     return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
 
 
-def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust, at its pose and velocity (n, 3)."""
-    s = vessel.State._make([*eta.T, *nu.T, time])
-    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), model.hull)
+def acceleration(model: Model, run: Smoothed, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust, at its pose and velocity (n, 3).
+
+    The wind is that of the run, where it was measured.
+    """
+    s = vessel.State._make([*eta.T, *nu.T, run.time])
+    body = model.hull if run.air is None else vessel.blown(model.hull, s, *run.air.T)
+    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), body)
     return np.column_stack(np.broadcast_arrays(*nu_dot))
 
 

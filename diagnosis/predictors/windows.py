@@ -16,14 +16,15 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
+from ..runs.cleaning import BRIEF
 from .prediction import WindowStarts, by_clock, predict
 from .ship_model import Model
 from .thrust import LONGEST_STEP
-from .weak_form import HORIZON
+from .weak_form import BLOCK, BLOCKS, HORIZON
 
-# Times the scale of the ship.
-FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
-LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
+# Of a run that is predicted as a whole, times the scale of the ship.
+FREE_STEP = BRIEF  # the mean of the commands acts in it
+LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,12 +234,15 @@ def step_of(smoothed: Smoothed) -> float:
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
-    """The windows of a length [s] of a run that have their first sample and at least half of all."""
+    """The windows of a length [s] of a run that have their first sample and at least half of all.
+
+    They follow each other from the first sample that is used.
+    """
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
-    since = smoothed.time - smoothed.time[0] + 0.25 * period
+    since = smoothed.time - first_time(smoothed) + 0.25 * period
     number = np.floor(since / length).astype(int)
     complete = int((since[-1] + period) // length)
-    measured = np.flatnonzero(~track.between & (number < complete))
+    measured = np.flatnonzero(~track.between & (number >= 0) & (number < complete))
     _, at = np.unique(number[measured], return_index=True)
     first = measured[at]  # the first sample of each window that has any
     prompt = since[first] - length * number[first] < period
@@ -247,6 +251,11 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     first = first[prompt & used[first] & np.isin(number[first], full)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
+
+
+def first_time(smoothed: Smoothed) -> float:
+    """Time of the first sample that is used, which an outlier is not [s]; else that of the first row."""
+    return float(smoothed.time[smoothed.used.argmax()])
 
 
 def first_row(smoothed: Smoothed, begin: float) -> int:
@@ -283,15 +292,11 @@ def free_runs(
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Predicted pose at the samples, by cubic interpolation between steps.
+    """Pose (p, samples, 3) of p models at samples, by cubic interpolation between steps.
 
     Args:
-        predicted: (steps + 1, 3, p, w), pose [m, m, rad] of p models in w windows at each step.
-        column: (samples,), the window of each sample.
-        place: (samples,), number of steps from the window's start to it, a fraction included.
-
-    Returns:
-        (p, samples, 3) [m, m, rad].
+        predicted: (steps + 1, 3, p, w), in w windows at each step.
+        column, place: (samples,), the window of each sample, and steps from its start to it.
     """
     first = np.clip(np.floor(place + 1e-6).astype(int) - 1, 0, max(len(predicted) - 4, 0))
     nodes = range(min(4, len(predicted)))

@@ -6,6 +6,7 @@ All numbers are in SI; a number that is not finite, or not known, is null.
 import platform
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib.metadata import version
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from typing_extensions import deprecated
 from ..assessment.regions import ErrorRegions
 from ..predictors.evaluation import Evaluation
 from ..predictors.ship_model import parameter_and_run
-from ..runs import channels_of
+from ..runs import by_name, channels_of
 from ..runs.cleaning import Z95
 from ..session import CalibratedModel, Comparison, Diagnosis
 from ..verdict.prediction_gain import PredictionGain
@@ -256,14 +257,17 @@ def sensor_results(e: Evaluation) -> Iterator[Content]:
 def _data(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
     """Numbers of samples of all runs together, and of each, with its duration [s] and notes on it."""
     counts = [part(e.smoothed.counts, COUNTS) for e in evaluations]
+    channels = [[*channels_of(e.smoothed)] for e in evaluations]
     runs = [
         c
         | part(e, "run=name held_out")
         | {"seconds": seconds(e), "notes": list(e.smoothed.notes)}
-        | {"channels": [finite(vars(x)) for x in channels_of(e.smoothed)]}
-        for c, e in zip(counts, evaluations, strict=True)
+        | {"channels": {x.name: finite(x.content()) for x in of}}
+        for c, e, of in zip(counts, evaluations, channels, strict=True)
     ]
-    return {name: sum(c[name] for c in counts) for name in COUNTS.split()} | {"runs": runs}
+    every = {x.name: finite(x.content()) for x in by_name(chain(*channels))}
+    total = {name: sum(c[name] for c in counts) for name in COUNTS.split()}
+    return total | {"channels": every, "runs": runs}
 
 
 def _errors(r: ReportData) -> Iterator[dict[str, Any]]:

@@ -13,12 +13,11 @@ from ..predictors.evaluation import Evaluation
 from ..runs import Smoothed
 from ..runs.cleaning import Z95
 from ..search.findings import Ranked
-from ..search.shortlist import TIE
+from ..search.shortlist import LENGTH, TIE
 from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Chart, ChartAxis, Panel
 from .formatting import percent
 from .shape import Curve
 
-MAX_RANKED = 14  # candidates in the chart; chosen
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
 RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
@@ -114,7 +113,7 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     The percentage is the share of the model error that each explains beyond other values of the nominal
     coefficients, where a method tells that. Hollow: so near that only chance decides.
     """
-    shown = ranked[:MAX_RANKED]
+    shown = ranked[: 2 * LENGTH]  # the shortlist, and as many again
     behind = np.array([_behind(r, shown[0]) for r in shown])
     linear = TIE * float(np.median(behind[:, 1]))
     # Linear below what may be a tie, logarithmic far above.

@@ -62,13 +62,7 @@ def told(e: ReportedEffect) -> str:
 
 
 def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over: float) -> list[str]:
-    """What one model gains over another, in words and in numbers; none where that is not known.
-
-    Args:
-        gain: of the other model.
-        gained, nothing: the first sentence where it gains, and where it does not.
-        over: length of the windows [s].
-    """
+    """What a model gains in windows of so many seconds, in words and numbers; empty: not known."""
     if gain is None:
         return []
     parts = []

@@ -167,6 +167,6 @@ def _curve(
     sure = None
     if effect.linear:  # in weights that are never negative
         sure = by(lambda c: (c.ci95 or (c.value,))[0]), by(lambda c: (c.ci95 or (c.value,))[-1])
-    low, high = np.quantile(data, [1.0 - SETTINGS.coverage, SETTINGS.coverage])
+    low, high = np.quantile(data, [SETTINGS.chance, 1.0 - SETTINGS.chance])
     nominal, learned = by(lambda _: 0.0), by(lambda c: c.value)
     return Curve(effect.id, s.over, s.what, x, nominal, learned, sure, (float(low), float(high)))

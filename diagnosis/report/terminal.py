@@ -1,8 +1,7 @@
 """Output of the commands on a terminal of 80 columns, or in a pipe."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from math import degrees
-from statistics import median
 
 from rich.console import RenderableType
 from rich.padding import Padding
@@ -10,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
-from ..runs import sensor_lines
+from ..runs import MeasuredChannel, by_name, sensor_lines
 from ..session import CalibratedModel
 from .finding_text import SHOWN
 from .formatting import number, percent
@@ -131,25 +130,7 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     for e in r.evaluations:
         table.add_row(Text(r.called(e)), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
     yield from _titled("Data", table)
-    table = _table("channel", "rate", "held", "noise", "", "outliers", "used")
-    for name in dict.fromkeys(c.name for _, channels in r.channels for c in channels):
-        of = [(run, c) for run, channels in r.channels for c in channels if c.name == name]
-        every = [c for _, c in of]
-        rate, held, noise = (
-            median(x) for x in zip(*((c.rate, c.held, c.noise) for c in every), strict=True)
-        )
-        first = next((f": {run} {_number(c.outlier_times[0])} s" for run, c in of if c.outliers), "")
-        table.add_row(
-            name,
-            f"{_number(rate)} Hz",
-            _percent(held),
-            f"{_number(noise, 2)} {every[0].unit}",
-            every[0].noise_from,
-            f"{sum(c.outliers for c in every)}{first}",
-            next((c.reason for c in every if c.reason), "yes"),
-        )
-    if r.channels:
-        yield from _titled("Channels, medians of all runs", table)
+    yield from channel_table(r.channels)
     notes = [f"{e.name}: {note}" for e in r.evaluations for note in e.smoothed.notes]
     if notes:
         yield from _lines("Found in the data", notes)
@@ -161,6 +142,27 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     if kind:
         yield from _lines(f"How the {kind} predicts", sentences)
     yield from _lines("Where the model fails", r.comparison.before.sentences)
+
+
+def channel_table(
+    of_runs: Sequence[tuple[str, Sequence[MeasuredChannel]]],
+) -> Iterator[RenderableType]:
+    """A row for each channel of some runs, by their names; nothing where there is none."""
+    table = _table("channel", "rate", "held", "noise", "", "outliers", "used")
+    for c in by_name(c for _, channels in of_runs for c in channels):
+        runs = ((run, x) for run, channels in of_runs for x in channels if x.name == c.name)
+        first = next((f": {run} {_number(x.outlier_times[0])} s" for run, x in runs if x.outliers), "")
+        table.add_row(
+            c.name,
+            f"{_number(c.rate)} Hz",
+            _percent(c.held),
+            f"{_number(c.noise, 2)} {c.unit}",
+            c.noise_from if c.known else "hardly known",
+            f"{c.outliers}{first}",
+            c.why or "yes",
+        )
+    if of_runs:
+        yield from _titled("Channels, medians of all runs", table)
 
 
 def _effect(e: ReportedEffect) -> Iterator[str]:

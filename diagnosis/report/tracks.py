@@ -10,12 +10,11 @@ from fmus.ship import Ship
 
 from ..assessment.covariates import means_of_run
 from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
+from ..predictors.shooting import INSTANTS
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
 
 QUARTILES = (0.25, 0.5, 0.75)  # 1
-# Of a window over which errors are summarised; of forces along a track twice as many; chosen.
-PARTS = 32
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
@@ -55,7 +54,7 @@ def place(e: Evaluation, learned: bool, stretches: Sequence[tuple[float, float]]
         stretches: begin and end [s] of parts that are marked; then only what is left is drawn.
     """
     eta, time = e.smoothed.eta, e.smoothed.time
-    shown = np.linspace(0, e.weak_windows.middle.size - 1, 2 * PARTS).astype(int)
+    shown = np.linspace(0, e.weak_windows.middle.size - 1, 4 * INSTANTS).astype(int)
     *_, headings, places = means_of_run(e.weak_windows)
     at, psi = places[shown], headings[shown]
     c, s = np.cos(psi), np.sin(psi)
@@ -126,9 +125,10 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
     known = [e for e in evaluations if e.windows is not None]
     windows = [e.windows for e in known if e.windows is not None]
     since = np.concatenate([w.since for w in windows])
-    edges = np.linspace(0.0, windows[0].length, PARTS + 1)
+    parts = 2 * INSTANTS
+    edges = np.linspace(0.0, windows[0].length, parts + 1)
     middle = (edges[:-1] + edges[1:]) / 2
-    part = np.clip(np.digitize(since, edges) - 1, 0, PARTS - 1)
+    part = np.clip(np.digitize(since, edges) - 1, 0, parts - 1)
     time = ChartAxis("time since the window began [s]", (0.0, edges[-1]))
     position = Panel(
         ChartAxis(limits=time.limits, shown=False), ChartAxis("position [mm]", scale=np.log10)
@@ -139,7 +139,7 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
         _, colour, label = models[0]
         errors = (1e3 * np.hypot(residuals[:, 0], residuals[:, 1]), np.degrees(np.abs(residuals[:, 2])))
         for panel, error in zip(panels, errors, strict=True):
-            bands = np.full((3, PARTS), np.nan)
+            bands = np.full((3, parts), np.nan)
             for k in np.unique(part):
                 bands[:, k] = np.quantile(error[part == k], QUARTILES, method="nearest")
             panel.fill(middle, bands[0], bands[2], colour)

@@ -27,7 +27,11 @@ from .files.reading import read as read
 from .files.reading import read_frame as read_frame
 from .files.reading import ship_of_logs as ship_of_logs
 from .files.reading import table_of as table_of
+from .fingerprint import Fingerprint as Fingerprint
+from .fingerprint import fingerprints as fingerprints
+from .fingerprint import samples_sha256 as samples_sha256
 from .measured_channels import MeasuredChannel as MeasuredChannel
+from .measured_channels import by_name as by_name
 from .measured_channels import channels_of as channels_of
 from .prepared_run import PreparedRun as PreparedRun
 from .prepared_run import examine as examine

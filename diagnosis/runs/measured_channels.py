@@ -1,7 +1,9 @@
 """Each channel of a run as it was measured: how often, with which noise, and whether it is used."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -14,39 +16,74 @@ from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
 FIRST = 3  # outliers whose times are stated
+# Relative standard deviation from which on a noise is hardly known. Chosen: its 95 % interval then
+# begins below half of it.
+HARDLY_KNOWN = 0.3
 GIVEN, ESTIMATED = "given", "estimated"
 UNUSED = "not used for the motion"
 
 
 @dataclass(frozen=True)
 class MeasuredChannel:
-    """One channel of a run.
+    """One channel of a run, or of several runs.
 
     Attributes:
         name: of its signal.
         rate: of its samples [Hz].
         held: share of its rows that repeat the sample before, or lie on a line between two samples.
         noise: standard deviation.
-        unit: of that, SI.
-        noise_from: whether that is given or estimated.
+        noise_rel_std: relative standard deviation of that estimate; zero where it is given.
+        unit: of the noise, SI.
+        noise_from: whether it is given or estimated.
         correlation: time constant of the correlation of its residuals [s]; 0: they are white.
-        delay: by which it is later than the pose [s], where that was found.
+        latency: by which it is later than the pose [s], where that was found.
         outliers: number of samples that contradict all others.
         outlier_times: of the first ones [s].
-        reason: why it is not used; empty: it is.
+        why: reason why it is not used; empty: it is.
     """
 
     name: str
     rate: float
     held: float
     noise: float
+    noise_rel_std: float
     unit: str
     noise_from: str
     correlation: float = 0.0
-    delay: float = 0.0
+    latency: float = 0.0
     outliers: int = 0
     outlier_times: tuple[float, ...] = ()
-    reason: str = ""
+    why: str = ""
+
+    @property
+    def used(self) -> bool:
+        """Whether the smoother uses it."""
+        return not self.why
+
+    @property
+    def known(self) -> bool:
+        """Whether the noise is known so well that it tells anything."""
+        return self.noise_rel_std < HARDLY_KNOWN
+
+    def content(self) -> dict[str, Any]:
+        """What a result file has of it, beside its name."""
+        return {n: v for n, v in vars(self).items() if n != "name"} | {"used": self.used}
+
+
+def by_name(channels: Iterable[MeasuredChannel]) -> Iterator[MeasuredChannel]:
+    """Each channel of some runs: medians, the sum of its outliers, the first reason not to use it."""
+    middle = ("rate", "held", "noise", "noise_rel_std", "correlation", "latency")
+    of_name: dict[str, list[MeasuredChannel]] = {}
+    for c in channels:
+        of_name.setdefault(c.name, []).append(c)
+    for of in of_name.values():
+        yield replace(
+            of[0],
+            **{name: median(getattr(c, name) for c in of) for name in middle},
+            outliers=sum(c.outliers for c in of),
+            outlier_times=next((c.outlier_times for c in of if c.outliers), ()),
+            why=next((c.why for c in of if c.why), ""),
+        )
 
 
 def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
@@ -64,6 +101,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
             _rate(s.time[rows]),
             1.0 - float(track.fresh[there, k].mean()),
             float(s.noise[k]),
+            float(s.noise_rel_std[k]),
             _unit(name),
             GIVEN if name in given else ESTIMATED,
             _correlation(s.time[right], off[right, k]),
@@ -84,10 +122,11 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
                 _rate(time[new]),
                 1.0 - float(new.sum() / there.sum()),
                 given.get(name, float(noise(values[new, None])[0])),
+                0.0 if name in given else _of_differences(int(new.sum())),
                 _unit(name),
                 GIVEN if name in given else ESTIMATED,
-                delay=delays.get(name, 0.0),
-                reason="" if name in s.sensors.agreeing else reasons.get(name, UNUSED),
+                latency=delays.get(name, 0.0),
+                why="" if name in s.sensors.agreeing else reasons.get(name, UNUSED),
             )
 
 
@@ -95,6 +134,14 @@ def _unit(name: str) -> str:
     """The SI unit of a signal."""
     quantity = (QUANTITY | outputs([name])).get(name, "command")
     return next(unit for unit, factor in UNITS[quantity].items() if factor == 1.0)
+
+
+def _of_differences(samples: int) -> float:
+    """Relative standard deviation of a noise by the median of that many third differences.
+
+    A median deviation has 37 % of the information of a root mean square; differences overlap fourfold.
+    """
+    return float(np.sqrt(5.4 / samples))
 
 
 def _rate(time: np.ndarray) -> float:

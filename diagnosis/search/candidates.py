@@ -15,16 +15,11 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from .nonlinear.multistart import Landscape, best_values, limits
+from ..predictors.weak_form import SMALL
+from .nonlinear.multistart import MULTIPLES, Landscape, best_values, limits
 from .nonlinear.segmentation import FLOOR, intervals, problem
 
 # Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
-# Step of a finite difference where the model error is not linear.
-SMALL = 1e-3
-# A nonlinear effect without values of its own is tried at these multiples of the value at which its
-# force is as large as the model error, found in steps of ten from 1 / LARGEST units to LARGEST.
-MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
-LARGEST = 1e6
 LEAST_SHARE = 0.003  # of a sum of squares: what is less changes no prediction; chosen
 SLIGHT = np.finfo(float).eps  # sum of squares of a force, in the units above, that is rounding
 
@@ -198,18 +193,19 @@ def scaled(
 ) -> Iterator[dict[str, float]]:
     """Multiples of a coefficient's value at which its force is as large as the model error.
 
-    Where the force never is, because it saturates, of the value at which it has half of its largest.
-    The effect's other parameters are refined as well, from where they are.
+    That is found in steps of ten, from SMALL^2 units on. Where the force never is, because it saturates,
+    of the value at which it has half of its largest. The effect's other parameters are refined as well,
+    from where they are.
     """
     unit, forces_of = model.unit(name), model.ship.scale.forces
     allowed = limits(next(p for p in e.parameters if p.name == name))
-    low, high = np.clip(allowed, -LARGEST * unit, LARGEST * unit).tolist()
+    low, high = np.clip(allowed, -unit / SMALL**2, unit / SMALL**2).tolist()
     wanted = float(np.square(base / forces_of).sum())
     others = {n: model.value(n) for n in e.shape_parameters}
     others |= {n: 0.0 for n in e.coefficients if n != name}
     for sign in (1.0, -1.0):
         forces: dict[float, float] = {}
-        size = unit / LARGEST
+        size = unit * SMALL**2
         while max(forces.values(), default=0.0) < wanted and low <= sign * size <= high:
             change = base - model_error(data, model.plus({name: sign * size}))
             forces[size] = float(np.square(change / forces_of).sum())

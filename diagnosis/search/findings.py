@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..predictors import Model
+from ..predictors.prediction import FAR_OFF
 from ..predictors.ship_model import parameter_and_run
 from .effect_evidence import EffectEvidence
 from .prior import NominalPrior
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
     from .refinement import RefinedModel
 
 
-# Prior standard deviations beyond which a coefficient alone is no explanation; contract.
-MOST_MOVED = 3.0
 MOST_REPORTED = 6  # effects, or disturbances, the clearest: with more, no one acts on the last; chosen
 
 
@@ -134,12 +133,12 @@ class Findings:
 
     @property
     def plausible(self) -> bool:
-        """Whether no nominal coefficient is further from what is believed of it than MOST_MOVED."""
-        return all(abs(z) <= MOST_MOVED for z in self.moved.values())
+        """Whether no nominal coefficient is FAR_OFF prior standard deviations or more off."""
+        return all(abs(z) <= FAR_OFF for z in self.moved.values())
 
     def plausible_by(self, prior: NominalPrior) -> bool:
         """The same by another prior than that of the search, which believes in all to a tenth."""
         if self.searched is None or self.estimate is None:
             return self.plausible
         offset = prior.rescaled(self.estimate.offset, self.searched)
-        return bool((np.abs(offset) <= MOST_MOVED).all())
+        return bool((np.abs(offset) <= FAR_OFF).all())

@@ -18,6 +18,7 @@ from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
+from ..predictors.uncertainty import NEGLIGIBLE
 from ..predictors.weak_form import OVERLAP
 from .candidates import SMALL, CandidateShape, model_error
 from .gram import Nuisance, block_numbers
@@ -25,8 +26,6 @@ from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
 from .nonlinear.multistart import limits
 from .nonlinear.segmentation import likely, problem, segmented
 from .prior import NominalPrior
-
-NEAR_LIMIT = 0.05  # of a limit of a parameter's range, within which a value is at it; contract
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +160,7 @@ def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[
     for name, addition in additions.items() if not e.search.smooth else ():
         declared, value = start.declared(name), start.value(name) + addition
         for is_upper, end in enumerate(limits(declared)):
-            if 0.0 < abs(end) < np.inf and abs(value - end) <= NEAR_LIMIT * abs(end):
+            if 0.0 < abs(end) < np.inf and abs(value - end) <= NEGLIGIBLE * abs(end):
                 measured = e.wording.measured(value, start.value) if e.wording.measured else ""
                 found.append(ValueAtLimit(name, value, end, bool(is_upper), declared.unit, measured))
     return found

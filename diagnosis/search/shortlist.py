@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ..execution.parallel import for_each
-from ..predictors.correlation import independent
+from ..predictors.uncertainty import independent
 from .candidates import SLIGHT, Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
 from .map_regression import Scored, regression, score

@@ -4,14 +4,10 @@ import numpy as np
 
 from fmus.ship import Ship
 
-from ..predictors.uncertainty import SHARE_OF_COMMAND
+from ..predictors.uncertainty import NEGLIGIBLE, SHARE_OF_COMMAND
 from .candidates import LEAST_SHARE
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
-
-LEAST_Q2 = 0.05  # cross-validated share of the model error that must be explained; chosen
-# Share of some axis' first sum of squares that must go with an effect: less shows in no prediction.
-LEAST_OF_AXIS = 0.02
 
 
 def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
@@ -20,7 +16,7 @@ def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
     ``nothing`` is the score without it, ``total`` the first model error in units of the noise, squared.
     """
     fall = nothing.score - best.score
-    explains = float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
+    explains = float(best.blocks.sum()) < (1.0 - NEGLIGIBLE) * total
     return explains and fall > max(LEAST_SHARE * nothing.score, NEW)
 
 
@@ -74,7 +70,7 @@ def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: n
         command: (K, 3), the commanded force.
     """
     fall = np.sum(without**2 - left**2, axis=0)
-    of_error = LEAST_OF_AXIS * np.sum(first**2, axis=0)
+    of_error = SHARE_OF_COMMAND * np.sum(first**2, axis=0)
     of_command = SHARE_OF_COMMAND**2 * np.sum(command**2, axis=0)
     return bool(np.any(fall >= np.maximum(of_error, of_command)))
 

@@ -39,7 +39,7 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     """The model that the findings amount to.
 
     Coefficients alone explain the data if something was missing, nothing is with them, none is further
-    than MOST_MOVED from its prior, by where its value is from, and the data that decide are not worse
+    than FAR_OFF from its prior, by where its value is from, and the data that decide are not worse
     than without. They then take the place of effects of which none is a finding, if the data that decide
     are not worse either.
 

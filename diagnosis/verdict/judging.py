@@ -8,8 +8,7 @@ import numpy as np
 
 from ..assessment.recurrence import recurrence
 from ..assessment.regions import find_regions
-from ..assessment.remainder import Remainder, remaining
-from ..assessment.remainder_text import remainder_sentence
+from ..assessment.remainder import Remainder, remainder_sentence, remaining
 from ..assessment.stability import OperatingRegion, drives_on
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows, omega

@@ -39,7 +39,7 @@ def unique_shares(
     """Share of the first sum of squares that comes back without one finding.
 
     The other findings and the nominal coefficients are fitted anew, and so explain what they can in its
-    place; coefficients that would be further than MOST_MOVED from their prior stay as they are. Of two
+    place; coefficients that would be further than FAR_OFF from their prior stay as they are. Of two
     findings that explain the same, neither has a share of its own.
 
     Args:

@@ -10,6 +10,7 @@ from ..ops import Number, clip, wrap
 from ..ship_description import Description
 from . import azimuth_leg as azimuth_leg  # registers laws, as the next ones do
 from . import force_table as force_table
+from . import four_quadrants as four_quadrants
 from . import laws as laws
 from . import standard_method as standard_method
 from . import thrust_forms as thrust_forms
@@ -178,9 +179,9 @@ def forces(
         settings: of the power of each actuator that has one; empty: full.
         apart: whether each unit has commands of its own.
     """
-    X, Y, xs, ys, gains = [], [], [], [], []
+    X, Y, xs, ys, gains, couples = [], [], [], [], [], []
     every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
-    power = power_of(ship, settings)
+    power, couple = power_of(ship, settings), any(a.law.has_couple for a in actuators(ship))
     for a, (p, x, y), gain in zip(actuators(ship), every, power, strict=True):
         flow = water_at(ship, a, every, commands, nu)
         at, sides = a.law.acts_at(x, p), a.sides
@@ -195,7 +196,10 @@ def forces(
             xs.append(at)
             ys.append(y + side if side else y)
             gains.append(each)
-    return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), tuple(gains))
+            if couple:
+                place = places[k] if len(given) == len(sides) else places[0]
+                couples.append(a.law.couple(within(a, commands[place], p), flow, p))
+    return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), tuple(gains), couple=tuple(couples))
 
 
 def power_of(ship: Description, settings: Sequence[Number] = ()) -> list[Number]:

@@ -36,11 +36,15 @@ class Race(NamedTuple):
         inflow: speed of the water that it meets [m/s].
         jet: speed of its race far behind it [m/s], by momentum theory.
         diameter: of the propeller [m].
+        added: 8 T / (pi rho D^2) [m2/s2], what the thrust T adds to the square of the speed.
+        n: shaft speed [1/s], negative where it turns astern.
     """
 
     inflow: Number
     jet: Number
     diameter: Number
+    added: Number = 0.0
+    n: Number = 0.0
 
 
 class Flow(NamedTuple):
@@ -70,6 +74,7 @@ class Law(Generic[P]):
         limiting: parameters that are limits of commands, which are not fitted.
         changes: what a ship may have otherwise than described.
         in_race: whether it works in the race of a propeller; has_race: whether it has one itself.
+        has_couple: whether it turns the ship by more than its force at its place.
         measurable: what can be measured of it beside its commands -> unit.
         by_axis: whether its first command pushes ahead and its last one to starboard.
         powered: whether its force is scaled by a power setting.
@@ -89,6 +94,7 @@ class Law(Generic[P]):
     changes: ClassVar[tuple[Change, ...]] = ()
     in_race: ClassVar[bool] = False
     has_race: ClassVar[bool] = False
+    has_couple: ClassVar[bool] = False
     measurable: ClassVar[Mapping[str, str]] = {}
     by_axis: ClassVar[bool] = False
     powered: ClassVar[bool] = False
@@ -120,6 +126,11 @@ class Law(Generic[P]):
     def acts_at(cls, x: Number, p: P) -> Number:
         """Where along the ship [m] the force of an actuator at x [m] acts."""
         return x
+
+    @classmethod
+    def couple(cls, commands: tuple[Number, ...], flow: Flow, p: P) -> Number:
+        """Yaw moment on the hull [N m], beside that of its force where it acts."""
+        return 0.0
 
     @classmethod
     def race(cls, commands: tuple[Number, ...], flow: Flow, p: P) -> Race | None:

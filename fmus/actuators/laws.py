@@ -111,26 +111,29 @@ class OpenWaterPropeller(OnShaft, Law[OpenWater]):
         return (1.0 - p.wake) * flow.u
 
     @classmethod
+    def coefficient(cls, n: Number, flow: Flow, p: OpenWater) -> Number:
+        """n |n| K_T [1/s2]: thrust over rho D^4."""
+        return square_by_coefficient(n, cls.advance(flow, p), p)
+
+    @classmethod
     def force(cls, commands: tuple[Number, ...], flow: Flow, p: OpenWater) -> tuple[Number, Number]:
         (n,) = commands
-        thrust = square_by_coefficient(n, cls.advance(flow, p), p)
+        thrust = cls.coefficient(n, flow, p)
         return (1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0) * thrust, 0.0 * n
 
     @classmethod
     def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: OpenWater) -> Number:
         (n,) = commands
-        coefficient = square_by_coefficient(n, cls.advance(flow, p), p)
-        return p.water_density * power(p.diameter, 4.0) * coefficient
+        return p.water_density * power(p.diameter, 4.0) * cls.coefficient(n, flow, p)
 
     @classmethod
     def race(cls, commands: tuple[Number, ...], flow: Flow, p: OpenWater) -> Race:
         """By momentum theory, V sqrt(1 + 8 K_T / (pi J^2)), multiplied out."""
         (n,) = commands
         inflow = cls.advance(flow, p)
-        coefficient = square_by_coefficient(n, inflow, p)
-        added = 8.0 / pi * p.diameter * p.diameter * coefficient
+        added = 8.0 / pi * p.diameter * p.diameter * cls.coefficient(n, flow, p)
         jet = signed_root(inflow * abs(inflow) + added)
-        return Race(inflow, jet, p.diameter)
+        return Race(inflow, jet, p.diameter, added, n)
 
     @classmethod
     def reach(cls, flow: Flow, p: OpenWater) -> tuple[Span, ...]:

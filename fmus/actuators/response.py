@@ -41,6 +41,8 @@ def total(f: Thrust) -> Triple:
     for gain, f_x, f_y, x, y in zip(f.gain, f.X, f.Y, f.x, f.y, strict=True):
         f_x, f_y = gain * f_x, gain * f_y
         X, Y, N = X + f_x, Y + f_y, N + x * f_y - y * f_x
+    for gain, couple in zip(f.gain, f.couple, strict=False):
+        N = N + gain * couple
     N = N + f.dx * Y - f.dy * X
     return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
 

@@ -104,17 +104,17 @@ class RudderInRace(Law[RaceFoil]):
     def force(cls, commands: tuple[Number, ...], flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
         (delta,) = commands
         angle = delta + p.bias
-        u, v = RudderInRace.met(flow, p)
+        u, v = cls.met(flow, p)
         normal = 0.5 * p.water_density * p.area * p.lift * sqrt(u * u + v * v)
         normal = normal * (u * sin(angle) - v * cos(angle))
         along = (1.0 - p.steering_deduction) * normal * sin(angle)
         return -along, -(1.0 + p.hull_force) * normal * cos(angle)
 
-    @staticmethod
-    def met(flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
+    @classmethod
+    def met(cls, flow: Flow, p: RaceFoil) -> tuple[Number, Number]:
         """u_R along the ship and v_R, positive from port, of the water that meets the rudder [m/s]."""
         assert flow.race is not None
-        inflow, jet, diameter = flow.race
+        inflow, jet, diameter = flow.race[:3]
         covered = diameter / p.span
         raced = inflow + p.race * (jet - inflow)
         speed = sqrt(covered * raced * raced + (1.0 - covered) * inflow * inflow)

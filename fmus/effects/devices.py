@@ -113,8 +113,9 @@ def by_command(
 
 
 def changed(f: Thrust, members: Sequence[int], change: Callable[[Number], Number]) -> Thrust:
-    """The forces with both components of some actuators changed."""
-    return f._replace(X=replaced(f.X, members, change), Y=replaced(f.Y, members, change))
+    """The forces with both components of some actuators changed, and their couples alike."""
+    couple = replaced(f.couple, members, change) if f.couple else ()
+    return f._replace(X=replaced(f.X, members, change), Y=replaced(f.Y, members, change), couple=couple)
 
 
 def added(f: Thrust, members: Sequence[int], axis: str, extra: Number) -> Thrust:

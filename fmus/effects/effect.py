@@ -108,7 +108,8 @@ class Thrust(NamedTuple):
     """Forces X and Y [N] of each actuator, where they act (x, y) [m], and what their sum loses.
 
     ``gain`` is by which each counts in the sum; ``loss_*`` is the part of tau that is lost on each axis;
-    ``dx`` and ``dy`` [m] is how far from the assumed point all of it acts.
+    ``dx`` and ``dy`` [m] is how far from the assumed point all of it acts. ``couple`` [N m] is the yaw
+    moment of each beside that of its force; empty: none has any.
     """
 
     X: tuple[Number, ...] = ()
@@ -121,6 +122,7 @@ class Thrust(NamedTuple):
     loss_N: Number = 0.0
     dx: Number = 0.0
     dy: Number = 0.0
+    couple: tuple[Number, ...] = ()
 
 
 class Memory(NamedTuple):

@@ -27,16 +27,20 @@ from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
-from .hull_errors import WIND_SETTINGS
 from .numbers_told import Finite, Given, Number, Prime, StrictTable, Term, valued
 from .ship_doubts import doubts, line_of
 from .ship_warning import ShipWarning
+from .wind import by_regression, described_numbers
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
 NAME = r"^[a-z][a-z0-9_]*$"
 VARIABLE = r"^[A-Za-z][A-Za-z0-9_]*$"
 REQUIRED = ("m", "I_z")  # of the inertia; what else is not named is zero
+
+# Of a force that is given, over the cube of the length [N/m3]; chosen: a tenth of the weight of so much
+# water, which no thruster reaches.
+LARGEST_GIVEN = 1e3
 
 
 class HullTable(StrictTable):
@@ -57,6 +61,16 @@ class ActuatorTable(BaseModel):
     label: Annotated[str, Field(max_length=60)] = ""
     order: Annotated[str, Field(pattern=NAME, max_length=30)] | None = None
     behind: str = ""
+
+
+class WindTable(BaseModel):
+    """What the wind acts on: areas and drag, or areas and superstructure for Fujiwara's regression."""
+
+    model_config = ConfigDict(extra="allow")
+
+    measured: Annotated[bool, Field(strict=True)] = Field(
+        False, description="whether the wind over time is an input of the vessel and of predictions"
+    )
 
 
 class PrimeTable(StrictTable):
@@ -83,9 +97,11 @@ class ShipTable(StrictTable):
     allocates: bool = Field(True, description="false: the thrusters get commands instead of a force")
     inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
     prime: PrimeTable | None = None
-    wind: dict[str, Given] = Field({})
+    wind: WindTable | None = None
     hull: HullTable = HullTable()
-    actuators: list[ActuatorTable] = Field([])
+    actuators: list[ActuatorTable] = Field(
+        [], description="empty: two forces as they are commanded, a quarter of the length fore and aft"
+    )
     effects: list[str] = Field(
         [],
         description="effects of its actuators, in their order; all that each may have where it is empty",
@@ -199,7 +215,9 @@ def _description(table: ShipTable) -> Description:
     prime, L = None, table.length
     if table.prime is not None:
         prime = Prime(L, 0.5 * table.prime.water_density * L * L * table.prime.draft)
-    actuators = tuple(_actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators)
+    actuators = tuple(
+        _actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators or _given_forces(L)
+    )
     _once([a.name for a in actuators], "actuators")
     _belong_together(actuators, table.allocates)
     if any(a.number("abreast") for a in actuators) and not table.effects:
@@ -218,10 +236,36 @@ def _description(table: ShipTable) -> Description:
         tuple(_function(name, given, prime) for name, given in table.hull.functions.items()),
         actuators,
         table.allocates,
-        _values("wind", table.wind, WIND_SETTINGS, prime),
+        () if table.wind is None else _wind(table.wind, prime),
         tuple(table.effects),
         tuple(table.aliases.items()),
+        table.wind is not None and table.wind.measured,
     )
+
+
+def _wind(table: WindTable, prime: Prime | None) -> tuple[Value, ...]:
+    """Numbers of what is above the water.
+
+    Raises:
+        DeclarationError: one is unknown, out of its range, or missing for the regression.
+    """
+    given = {name: _checked("wind", name, x) for name, x in (table.model_extra or {}).items()}
+    declared = described_numbers(given)
+    missing = [v.name for v in declared if v.name not in given and v.name != "air_density"]
+    if by_regression(given) and missing:
+        raise DeclarationError(f"wind: {missing[0]} is missing, which a superstructure needs as well")
+    if table.measured and not given:
+        raise DeclarationError("wind: frontal_area is missing, on which a measured wind acts")
+    return _values("wind", given, declared, prime)
+
+
+def _given_forces(L: float) -> list[ActuatorTable]:
+    """What pushes a ship without actuators: two forces as they are commanded, which make any moment."""
+    largest = LARGEST_GIVEN * L**3
+    force = {"law": "given_force", "F_X": largest, "F_Y": largest}
+    places = {"fore": 0.25 * L, "aft": -0.25 * L}
+    named = ({"name": name, "title": f"force {name}", "x": x} for name, x in places.items())
+    return [ActuatorTable.model_validate(force | of) for of in named]
 
 
 def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:

@@ -21,7 +21,7 @@ from ..declare import (
     variables,
 )
 from ..effects import EffectSet, Loaded, Motion
-from ..frames import rotate_to_earth
+from ..frames import air_velocity, rotate_to_earth
 from ..hull import (
     Damping,
     Hull,
@@ -40,7 +40,7 @@ from ..hull import (
 from ..hull_functions import FUNCTIONS
 from ..ops import Condition, Number, Series, finite, when, wrap
 from ..ship_description import GUESSED, Description, Part, Value
-from ..signals import Force, Measurement, VelocityInCurrent
+from ..signals import Force, ForceInWind, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
 
@@ -150,6 +150,31 @@ def through_water(s: State, b: PreparedVessel) -> tuple[Motion, Number, Number]:
 def water_velocity(s: State, b: PreparedVessel) -> tuple[Number, Number]:
     """The water's body-fixed velocity [m/s, m/s]; zero at once where it does not move."""
     return when(b.flows, lambda: through_water(s, b)[1:], lambda: (0.0, 0.0))
+
+
+def blown(b: PreparedVessel, s: State, W_n: Number, W_e: Number) -> PreparedVessel:
+    """The vessel in a wind that is measured, beside the one of its parameters.
+
+    Args:
+        b: the vessel; one that takes no measured wind stays as it is.
+        s: its state, at whose place the water moves.
+        W_n, W_e: velocity of the air over ground [m/s].
+    """
+    k = b.effects.wind
+    if k < 0:
+        return b
+    c_n, c_e = rotate_to_earth(s.psi, *water_velocity(s, b))
+    at = b.params.outside
+    params = b.params._replace(outside=at._replace(W_n=at.W_n + W_n - c_n, W_e=at.W_e + W_e - c_e))
+    outside = tuple([True if k == j else acts for j, acts in enumerate(b.outside)])
+    return b._replace(params=params, outside=outside, disturbed=True)
+
+
+def _known_wind(b: PreparedVessel, s: State, W_n: Number, W_e: Number) -> Triple:
+    """Force of the wind that is measured alone [N, N, N m], which the nominal model has as well."""
+    member = b.effects.outside.members[b.effects.wind]
+    at = b.params.outside._replace(W_n=W_n, W_e=W_e)
+    return member.apply(True, at, NONE, s)
 
 
 def nominal(s: State, tau: Force, b: Hull) -> Triple:
@@ -278,7 +303,9 @@ def make(effects: EffectSet, ship: Description) -> Component:
         ship: whose hull it is.
     """
     inertia, damping, start = described(ship)
-    groups = vessel_effects(effects, type(damping))
+    windy = ship.wind_measured
+    inputs: type[Any] = ForceInWind if windy else Force
+    groups = vessel_effects(effects, type(damping), windy)
     unchanged, undisturbed = groups.change_forces(), groups.outside_forces()
     params = bundle(
         "Params",
@@ -293,22 +320,27 @@ def make(effects: EffectSet, ship: Description) -> Component:
     )
     outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
 
-    def init(i: Force, p: Fields) -> State:
+    def init(i: Fields, p: Fields) -> State:
         return State(*p.start)
 
     def prepare(p: Fields) -> PreparedVessel:
         return prepared(p, groups)
 
-    def prepared_step(s: State, i: Force, b: PreparedVessel, h: Number) -> tuple[State, Fields]:
+    def prepared_step(s: State, i: Fields, b: PreparedVessel, h: Number) -> tuple[State, Fields]:
         p = b.params
         tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
+        wind: tuple[Number, ...] = ()
+        if windy:
+            wind = air_velocity(finite(i.wind_speed, 0.0), finite(i.wind_direction, 0.0))
+            b = blown(b, s, *wind)
         after, nu_dot = when(
             b.disturbed,
             lambda: moved(s, tau, b, h, disturbed),
             lambda: moved(s, tau, b.hull, h, nominal),
         )
         wrong = b.changed | b.disturbed | b.heavier
-        omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
+        known = Force(*map(add, tau, _known_wind(b, after, *wind))) if wind else tau
+        omega = when(wrong, lambda: model_error(after, nu_dot, known, p), lambda: NONE)
         change = when(b.changed, lambda: change_forces(after, b), lambda: unchanged)
         outside = when(b.disturbed, lambda: outside_forces(after, tau, b), lambda: undisturbed)
         phi = [getattr(p.damping.terms, name) for name in RotationalDamping._fields]
@@ -332,7 +364,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
             outside,
         )
 
-    def step(s: State, i: Force, p: Fields, h: Number) -> tuple[State, Fields]:
+    def step(s: State, i: Fields, p: Fields, h: Number) -> tuple[State, Fields]:
         return prepared_step(s, i, prepare(p), h)
 
     return Component(
@@ -340,7 +372,7 @@ def make(effects: EffectSet, ship: Description) -> Component:
         description=f"Hull of {ship.title} in surge, sway and yaw",
         params=params,
         state=State,
-        inputs=Force,
+        inputs=inputs,
         outputs=outputs,
         init=init,
         step=step,

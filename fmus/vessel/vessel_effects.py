@@ -21,6 +21,7 @@ class VesselEffects(NamedTuple):
         outside: all other forces on the hull.
         inertia, measurement: what changes mass and inertia, and the measured pose.
         change_forces, outside_forces: NamedTuple classes of the force outputs.
+        wind: place among ``outside`` of the wind, where it is measured over time; -1: it is not.
     """
 
     water: Group
@@ -30,10 +31,13 @@ class VesselEffects(NamedTuple):
     measurement: Group
     change_forces: type[Fields]
     outside_forces: type[Fields]
+    wind: int = -1
 
 
 @cache
-def vessel_effects(effects: EffectSet, damping: Declared = Damping) -> VesselEffects:
+def vessel_effects(
+    effects: EffectSet, damping: Declared = Damping, wind_measured: bool = False
+) -> VesselEffects:
     """The groups of a set of effects, for a hull with these damping coefficients."""
     order = [v.name for v in variables(damping)]
     forces = effects.of_kind("force", "environment")
@@ -50,6 +54,7 @@ def vessel_effects(effects: EffectSet, damping: Declared = Damping) -> VesselEff
         ),
         vector("ChangeForces", [o for e in changes for o in _outputs_of(e)]),
         vector("OutsideForces", [o for e in outside for o in _outputs_of(e)]),
+        [e.id for e in outside].index("wind") if wind_measured else -1,
     )
 
 

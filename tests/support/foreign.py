@@ -109,7 +109,13 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def build_lag(folder, name="lag", habit="", capabilities=ANY_STEP):
+def _with(before):
+    """The source with functions of a habit, behind what it includes."""
+    head, _, rest = SOURCE.partition("typedef")
+    return f"#define _GNU_SOURCE\n{head}{before}typedef{rest}"
+
+
+def build_lag(folder, name="lag", habit="", capabilities=ANY_STEP, before=""):
     """Path of the compiled FMU.
 
     Args:
@@ -117,8 +123,9 @@ def build_lag(folder, name="lag", habit="", capabilities=ANY_STEP):
         name: of the file.
         habit: C statements at the start of fmi2DoStep(Lag *m, double t, double h).
         capabilities: attributes of the CoSimulation element.
+        before: C at the start of the file.
     """
-    (folder / f"{name}.c").write_text(SOURCE.replace("HABIT", habit))
+    (folder / f"{name}.c").write_text(_with(before).replace("HABIT", habit))
     library = folder / f"{name}{fmpy.sharedLibraryExtension}"
     subprocess.run(
         [ccode.COMPILER, "-O1", "-shared", "-fPIC", "-o", library, folder / f"{name}.c", "-lm"],

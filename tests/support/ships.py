@@ -8,6 +8,7 @@ from fmus.declare import Component, variables
 from fmus.ship import ship
 from fmus.ship_description import Description, Part, Value
 from fmus.ships.ship_file import find_ship, read_ship, shipped_ships
+from fmus.ships.wind import described_numbers
 
 
 def part(name: str, law: str, values: Mapping[str, float]) -> Part:
@@ -43,8 +44,10 @@ def scaled(d: Description, ratio: float) -> Description:
         placed = {"lag": "s", "abreast": "m"}
         return placed[name] if name in placed else units[d.called(f"{a.part.name}_{name}")]
 
+    in_wind = {v.name: v.unit for v in described_numbers([v.name for v in d.wind])}
     return d._replace(
         length=d.length * ratio,
+        beam=d.beam * ratio,
         inertia=of(d.inertia, units.__getitem__),
         terms=of(d.terms, units.__getitem__),
         functions=tuple(f._replace(values=of(f.values, units.__getitem__)) for f in d.functions),
@@ -52,6 +55,7 @@ def scaled(d: Description, ratio: float) -> Description:
             a.part._replace(values=of(a.part.values, lambda name, a=a: of_actuator(a, name)))
             for a in actuators(d)
         ),
+        wind=of(d.wind, in_wind.__getitem__),
     )
 
 

@@ -1,37 +1,37 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
 from weakref import finalize
 
-import numpy as np
+from typing_extensions import deprecated
 
 import cosim
 from cosim.export import export_fmu
+from cosim.fmu import MEANS, ConfinedFmu
 from cosim.fmu import FmuModel as FmuModel
 from cosim.system import prepare
 from cybership.scratch_folder import Scratch
-from fmus.frames import rotate_to_body
-from fmus.ship import Ship, ship
+from fmus.ship import Ship
 
 from ...execution.progress import Advance, silent
-from ...runs import OF_UNIT, QUANTITY, Run, Smoothed
-from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
+from ...execution.result_folder import sha256
+from ...runs import Fingerprint, Run
 from ..described_ship import nominal
-from ..predictor import FOUND, MAP, UnmatchedError
+from ..predictor import (
+    DEFAULT_EXECUTION,
+    Execution,
+    UnmatchedError,
+)
 from ..ship_model import Model
-from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
-from ..windows import FREE_STEP
-from .instances import Begun, simulate
-from .short_steps import ShortSteps
-from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
-from .wrapper import Wrapped, write_wrapper
-
-SYSTEMS = (".ssp", ".json")
+from .fmu_predictor import FmuPredictor, FmuUse, commands_of
+from .lineage import learned_from, parts_of
+from .ship_of_fmu import SYSTEMS
+from .variable_map import VariableMap, completed, propose, read_map, unmatched
 
 
 class Fmu:
@@ -42,6 +42,7 @@ class Fmu:
             connection feeds as its inputs, and variables called ``instance.variable``.
         map: which of its variables is which signal, a file; None: as names and units tell.
         ship: that it is a model of; None: that of the runs.
+        execution: how it is run.
 
     Raises:
         InputError: no such FMU, or none for co-simulation by FMI 2.0; a system that one FMU cannot hold.
@@ -54,12 +55,17 @@ class Fmu:
         path: str | Path,
         map: str | Path | None = None,  # noqa: A002 - as the option of the commands
         ship: Ship | None = None,
+        execution: Execution = DEFAULT_EXECUTION,
     ) -> None:
+        self.execution = execution
         self._given = self.path = Path(path).absolute()
+        self.inner: Sequence[tuple[str, Path]] = ()
         if self.path.suffix in SYSTEMS:
             self._made = Scratch()
             finalize(self, self._made.remove)
-            self.path = _as_one(self._given, self._made.path)
+            self.path, inner = _as_one(self._given, self._made.path)
+            # Of an archive the parts are unpacked for a while, and hashed with it.
+            self.inner = inner if self._given.suffix == ".json" else ()
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
         self.model = FmuModel(self.path)
@@ -75,17 +81,46 @@ class Fmu:
         """Of the file."""
         return hashlib.sha256(self._given.read_bytes()).hexdigest()
 
-    @property
-    def step(self) -> float | None:
-        """The step that it suggests [s]; None: it suggests none."""
-        suggested = self.model.description.defaultExperiment
-        return float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
+    @cached_property
+    def learned_from(self) -> tuple[Fingerprint, ...]:
+        """Runs of which it was learned, as far as it tells.
+
+        Raises:
+            InputError: it tells what is broken.
+        """
+        fmus = [self.path, *(path for _, path in self.inner if path.suffix == ".fmu")]
+        return learned_from(fmus)
 
     @property
+    def files(self) -> list[tuple[str, Path]]:
+        """What decides its predictions: each file, after what it is for."""
+        return [("model", self._given), *self.inner, *([("map", self.map)] if self.map else [])]
+
+    @property
+    def step(self) -> float | None:
+        """The step that is asked for, or that it suggests [s]; None: neither."""
+        suggested = self.model.description.defaultExperiment
+        told = float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
+        return self.execution.step or told
+
+    @property
+    @deprecated("Each instance has a process of its own.")
     def isolated(self) -> bool:
-        """Whether each instance needs a process of its own: where one process may hold only one."""
+        """Whether each instance has a process of its own."""
+        return True
+
+    @property
+    def fixed_step(self) -> float | None:
+        """The only step that it takes, or that is asked for [s]; None: it takes steps of any length."""
         told = self.model.description.coSimulation
-        return bool(told is not None and told.canBeInstantiatedOnlyOncePerProcess)
+        varies = told is not None and told.canHandleVariableCommunicationStepSize
+        return self.step if self.execution.step or not varies else None
+
+    @property
+    def needs_tool(self) -> bool:
+        """Whether it needs the tool that it was made with (``needsExecutionTool``)."""
+        told = self.model.description.coSimulation
+        return bool(told is not None and told.needsExecutionTool)
 
     def given(self, runs: Sequence[Run]) -> VariableMap:
         """The map of the file, else the one that names and units tell, for some runs."""
@@ -106,127 +141,42 @@ class Fmu:
             raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
         return found
 
-    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> "FmuPredictor":
+    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> FmuPredictor:
         """The predictor of some runs, see :meth:`..predictor.ModelSource.on`.
 
         Raises:
             InputError: as :meth:`variables`; the FMU refuses to be set to a measured state, or fails.
         """
-        predictor = FmuPredictor(self, runs, self.start or nominal(runs))
+        predictor = self.begun_on(runs)
         advance(f"what {self.name} does in measured states")
         assert predictor.model  # which takes a while
         return predictor
 
+    def begun_on(self, runs: Sequence[WeakWindows]) -> FmuPredictor:
+        """The predictor of some runs, of which nothing is computed yet.
 
-class FmuPredictor(BlackBox):
-    """How an FMU predicts some runs.
-
-    Attributes:
-        given: which of its variables is which signal, as it was told or proposed.
-        map: the same with the units that the FMU declares.
-        lines: see :func:`.variable_map.signal_lines`.
-    """
-
-    kind = "FMU"
-
-    def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
-        super().__init__(fmu.name, runs, ship)
+        Raises:
+            InputError: as :meth:`variables`; there is no process for it.
+        """
         measured = [w.run for w in runs]
-        self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
-        self.lines = signal_lines(self.map, commands_of(measured))
-        self.starts = frozenset(self.map.told("start")) & set(MOTION)
-        self.inputs = frozenset(self.map.told("inputs"))
-        self.sha256, self.given_map, self.own_run_in = fmu.sha256, self.given.content(), self.map.run_in
-
-    @property
-    def whole(self) -> bool:
-        return not set(VELOCITY) <= {*self.starts, *self.map.fixed}
-
-    @property
-    def placed(self) -> bool:
-        return not set(POSE) <= self.map.told("outputs").keys() & self.starts
-
-    @cached_property
-    def _along_runs(self) -> Model:
-        inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
-        time = self.runs[0].scale.time
-        h = min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
-        with closing(ShortSteps(self.fmu.model, inputs, outputs, h)) as self._steps:
-            return super()._along_runs
-
-    def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
-        run, columns = smoothed.track.run, self.map.told("outputs")
-        at, middle = self._variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
-        given = [commands_at(run, time + middle) for time in smoothed.time[rows]]
-        begun = [
-            Begun(_row(at, row), self._variables("inputs", commands))
-            for row, commands in zip(rows, given, strict=True)
-        ]
-        names = [c.name for c in columns.values()]
+        maps = self.given(measured), self.variables(measured)  # before a process is started
+        means = MEANS if self.execution.confined else ()
         try:
-            told = simulate(self.fmu.path, self.fmu.isolated, begun, names, h, steps)
-        except cosim.InputError as error:
-            raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {error}") from None
-        motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
-        for signal, values in self._outputs(told).items():
-            motion[:, MOTION.index(signal)] = values
-        return motion
-
-    def accelerations(self, signals: Signals) -> np.ndarray:
-        start, inputs = (self._variables(group, signals) for group in ("start", "inputs"))
-        size = next(iter(signals.values())).size
-        return np.array([self._accelerated(_row(start, k), _row(inputs, k)) for k in range(size)])
-
-    def _accelerated(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> np.ndarray:
-        """nu_dot (3,) from a start on, by differences of a few short steps."""
-        motion = self._outputs(self._steps.run(start, inputs))
-        slopes = self._steps.derivatives
-        if set(VELOCITY) <= motion.keys():
-            return np.array([slopes(motion[s])[0] for s in VELOCITY])
-        x, y, psi = (motion[s] for s in POSE)
-        rate, change = np.transpose([slopes(p) for p in (x, y, np.unwrap(psi))])
-        u, v = rotate_to_body(psi[0], rate[0], rate[1])
-        u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
-        return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])
-
-    @property
-    def _started_by(self) -> str:
-        return f", by {', '.join(c.name for c in self.map.told('start').values())}"
-
-    def write(
-        self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
-    ) -> list[str]:
-        """Its map; with additions, one FMU of both, and the map of that."""
-        if learned is None:
-            write_map(folder / MAP, self.given.content())
-            return []
-        wrapped = Wrapped(self.name, self.fmu.model, self.map, self.lines)
-        told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
-        write_map(folder / MAP, (of_both or self.given).content())
-        return [told]
-
-    def _variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
-        """Variable -> its values, for those of some signals [SI] that a group of the map has."""
-        lines, told = self.lines[group], self.map.told(group)
-        known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
-        return {name: (x - line.offset) / line.gain for x, line, name in known}
-
-    def _outputs(self, values: Signals) -> dict[str, np.ndarray]:
-        """Signal -> its values [SI], by variables' values; also of those that stay the same."""
-        lines, columns = self.lines["outputs"], self.map.told("outputs")
-        found = {s: lines[s].gain * values[c.name] + lines[s].offset for s, c in columns.items()}
-        like = next(iter(values.values()))
-        return found | {s: np.full(like.shape, x) for s, x in self.map.fixed.items()}
+            confined = ConfinedFmu(self.model, means, self.execution.timeout)
+        except cosim.SimulationError as error:
+            raise cosim.InputError(str(error)) from None
+        steps = self.step, self.fixed_step, self.needs_tool
+        files = [(role, path, sha256(path)) for role, path in self.files]
+        use = FmuUse(self.name, self.sha256, confined, *steps, *maps, self.learned_from, files)
+        predictor = FmuPredictor(use, runs, self.start or nominal(runs))
+        finalize(predictor, confined.close)
+        return predictor
 
 
-def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
-    return {name: float(x[k]) for name, x in values.items()}
-
-
-def _as_one(path: Path, folder: Path) -> Path:
-    """A system as one FMU, whose parameters are all that the system leaves open."""
-    made = folder / f"{path.stem}.fmu"
-    with closing(prepare(cosim.load_scenario(path))) as system:
+def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
+    """A system as one FMU, whose parameters are all that the system leaves open, and its files."""
+    made, scenario = folder / f"{path.stem}.fmu", cosim.load_scenario(path)
+    with closing(prepare(scenario)) as system:
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
         every = {
             f"{name}.{v.name}"
@@ -235,12 +185,4 @@ def _as_one(path: Path, folder: Path) -> Path:
             if v.causality == "parameter" and v.type == "Real"
         }
         export_fmu(system, made, expose=every - given)
-    return made
-
-
-def commands_of(runs: Sequence[Run]) -> dict[str, str]:
-    """Signal -> quantity of the forces and commands that all of some runs of a ship have."""
-    units = ship(description=runs[0].ship).commands
-    every = [{*TAU, *run.commanded} for run in runs]
-    common = [s for s in dict.fromkeys([*TAU, *runs[0].commanded]) if all(s in e for e in every)]
-    return {s: QUANTITY[s] if s in QUANTITY else OF_UNIT[units[s]] for s in common}
+        return made, parts_of(scenario, system)

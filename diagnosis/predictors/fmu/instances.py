@@ -1,16 +1,14 @@
-"""Predictions of an FMU by cosim, one instance for each."""
+"""Predictions of an FMU, one confined instance for each."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
-import cosim
-from cosim.process import scratch_folder
+from cosim import InputError, SimulationError
+from cosim.fmu import ConfinedFmu, DoubleMemory, Port
 
-TOGETHER = 16  # instances in one simulation; chosen: each may have a process of its own
+TOGETHER = 8  # instances that step at the same time; chosen: as processes that a computer has cores for
 
 
 class Begun(NamedTuple):
@@ -20,14 +18,91 @@ class Begun(NamedTuple):
     inputs: Mapping[str, np.ndarray]
 
 
+class FmuRun:
+    """A run of an FMU in a process of its own; the first input acts when it is initialised.
+
+    Args:
+        fmu: of which it is one.
+        inputs: names of inputs.
+        outputs: names of outputs.
+        h: length of a step [s].
+    """
+
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], h: float
+    ) -> None:
+        self._variables, self._instance, self._h = fmu.model.variables, fmu.instance(), h
+        names, count = [*inputs, *outputs], len(inputs)
+        self._memory, self._count, self.outputs = DoubleMemory(len(names)), count, tuple(outputs)
+        ports = [Port(self._variables[name], k) for k, name in enumerate(names)]
+        self._access = self._instance.bind(ports[:count], ports[count:], self._memory, h)
+
+    def initialise(self, start: Mapping[str, float], inputs: Sequence[float], stop: float) -> np.ndarray:
+        """Begin with some values, up to a time [s]; returns the outputs."""
+        self._instance.set_up(stop)
+        for name, value in start.items():
+            self._instance.set_value(self._variables[name], value)
+        self._instance.enter_initialization()
+        self.put(inputs)
+        self._instance.exit_initialization()
+        self._access.get()
+        return self._told(0)
+
+    def put(self, inputs: Sequence[float]) -> None:
+        """Set the inputs."""
+        for k, value in enumerate(inputs):
+            self._memory.values[k] = value
+        self._access.put()
+
+    def begin(self, k: int) -> None:
+        """Begin the step of a number; others may step meanwhile."""
+        assert self._access.begin is not None
+        self._access.begin(k * self._h)
+
+    def end(self, k: int) -> np.ndarray:
+        """The outputs after the step of a number.
+
+        Raises:
+            SimulationError: the FMU fails, or an output is not finite.
+        """
+        self._access.step(k * self._h)
+        return self._told(k + 1)
+
+    def short_run(self, start: Mapping[str, float], inputs: Sequence[float], steps: int) -> np.ndarray:
+        """Outputs (steps + 1, m) of a whole run with inputs that stay the same."""
+        told = self._instance.short_run(start, inputs, steps, self._h)
+        return np.array([self._finite(np.array(row), k) for k, row in enumerate(told)])
+
+    def _told(self, k: int) -> np.ndarray:
+        told = np.array(self._memory.values[self._count : self._count + len(self.outputs)])
+        return self._finite(told, k)
+
+    def _finite(self, told: np.ndarray, k: int) -> np.ndarray:
+        if not np.isfinite(told).all():
+            name = self.outputs[int(np.flatnonzero(~np.isfinite(told))[0])]
+            raise SimulationError(f"{name} is not finite at t = {k * self._h:.6g} s after its start")
+        return told
+
+    def restart(self) -> None:
+        """Return to the state after instantiation."""
+        self._instance.reset()
+
+    def terminate(self) -> None:
+        """End the simulation."""
+        self._instance.terminate()
+
+    def free(self) -> None:
+        """End its process."""
+        self._instance.free()
+
+
 def simulate(
-    path: Path, isolated: bool, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
+    fmu: ConfinedFmu, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
 ) -> dict[str, np.ndarray]:
     """Each output (steps + 1, w) of w predictions in steps of h [s].
 
     Args:
-        path: of the FMU.
-        isolated: whether each instance needs a process of its own.
+        fmu: what predicts.
         begun: what is predicted.
         outputs: names of variables.
         h, steps: length of a step [s], and how many.
@@ -35,36 +110,35 @@ def simulate(
     Raises:
         InputError: the FMU fails.
     """
-    groups = [begun[k : k + TOGETHER] for k in range(0, len(begun), TOGETHER)]
-    parts = [_together(path, isolated, group, outputs, h, steps) for group in groups]
-    return {name: np.concatenate([part[name] for part in parts], axis=1) for name in outputs}
+    names = tuple(dict.fromkeys(outputs))
+    try:
+        groups = [begun[k : k + TOGETHER] for k in range(0, len(begun), TOGETHER)]
+        told = np.concatenate([_together(fmu, group, names, h, steps) for group in groups], axis=1)
+    except (InputError, SimulationError) as error:
+        raise InputError(fmu.told(error)) from None
+    return {name: told[:, :, k] for k, name in enumerate(names)}
 
 
 def _together(
-    path: Path, isolated: bool, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
-) -> dict[str, np.ndarray]:
-    windows = {f"window{k}": one for k, one in enumerate(begun)}
-    with scratch_folder() as folder:
-        recording = folder / "commands.csv"
-        # A row acts in the step that ends at its time, the first one before that, too.
-        columns = {"time": np.round((np.arange(steps) + 1) * h, 12)}
-        columns |= {f"{k}.{name}": x for k, one in windows.items() for name, x in one.inputs.items()}
-        pd.DataFrame(columns).to_csv(recording, index=False)
-        scenario = {
-            "name": "prediction",
-            "step": h,
-            "stop": round(steps * h, 9),
-            "fmus": {
-                k: {"path": str(path), "parameters": one.start, "isolate": isolated}
-                for k, one in windows.items()
-            },
-            "recordings": [{"path": str(recording), "inputs": {n: n for n in columns if n != "time"}}],
-            "log": {"signals": [f"{k}.{name}" for k in windows for name in outputs]},
-        }
-        result = cosim.simulate(cosim.load_scenario(scenario), folder / "out", pictures=False)
-        if result.status == "interrupted":
-            raise KeyboardInterrupt
-        if result.status != "done":
-            raise cosim.InputError(result.message)
-        log = cosim.read_log(result.folder)
-    return {name: np.column_stack([log[f"{k}.{name}"] for k in windows]) for name in outputs}
+    fmu: ConfinedFmu, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
+) -> np.ndarray:
+    """Outputs (steps + 1, w, m) of predictions side by side."""
+    told, running = np.empty((steps + 1, len(begun), len(outputs))), list[FmuRun]()
+    try:
+        for one in begun:
+            running.append(FmuRun(fmu, tuple(one.inputs), outputs, h))
+        inputs = [np.column_stack([*one.inputs.values()]).tolist() for one in begun]
+        for w, (one, each) in enumerate(zip(running, begun, strict=True)):
+            told[0, w] = one.initialise(each.start, inputs[w][0], steps * h)
+        for k in range(steps):
+            for w, one in enumerate(running):
+                one.put(inputs[w][k])
+                one.begin(k)
+            for w, one in enumerate(running):
+                told[k + 1, w] = one.end(k)
+        for one in running:
+            one.terminate()
+    finally:
+        for one in running:
+            one.free()
+    return told

@@ -10,7 +10,9 @@ from contextlib import suppress
 import numpy as np
 
 from cosim import InputError, SimulationError
-from cosim.fmu import DoubleMemory, FmuModel, LocalInstance, Port
+from cosim.fmu import ConfinedFmu
+
+from .instances import FmuRun
 
 STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
 
@@ -21,22 +23,22 @@ class ShortSteps:
     """What an FMU does within a few short steps from its start.
 
     Args:
-        model: the FMU.
-        inputs, outputs: names of what is set in each step, and of what is told.
+        fmu: the FMU.
+        inputs, outputs: names of what is set in each step, and of what is returned.
         h: length of a step [s].
+        late: whether outputs follow the start values only after the first step.
     """
 
-    def __init__(self, model: FmuModel, inputs: Sequence[str], outputs: Sequence[str], h: float) -> None:
-        self._model, self.h = model, h
-        self._inputs = [Port(model.variables[name], k) for k, name in enumerate(inputs)]
-        told = dict.fromkeys(outputs)
-        self._outputs = [Port(model.variables[name], len(inputs) + k) for k, name in enumerate(told)]
-        self._memory = DoubleMemory(len(inputs) + len(told))
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], h: float, late: bool
+    ) -> None:
+        self._fmu, self.h, self._late = fmu, h, late
+        self._inputs, self._outputs = tuple(inputs), tuple(dict.fromkeys(outputs))
         self._resets: bool | None = None
-        self._instance: LocalInstance | None = None
+        self._instance: FmuRun | None = None
 
     def run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
-        """Each output (STEPS + 1,) from a start on.
+        """Each output (STEPS + 1,) from a start on; from the first step on where outputs are late.
 
         Raises:
             InputError: the FMU refuses it, or fails.
@@ -45,15 +47,14 @@ class ShortSteps:
             if self._resets is None:
                 self._resets = self._tried(start, inputs)
             return self._run(start, inputs)
-        except SimulationError as error:
+        except (InputError, SimulationError) as error:
             self.close()
-            raise InputError(
-                f"'{self._model.path.name}' cannot be set to a measured state: {error}"
-            ) from None
+            told, name = self._fmu.told(error), self._fmu.model.path.name
+            raise InputError(f"'{name}' cannot be set to a measured state: {told}") from None
 
     def derivatives(self, x: np.ndarray) -> tuple[float, float]:
         """First and second derivative at the start of an output (STEPS + 1,), of a polynomial."""
-        powers = np.vander(self.h * np.arange(len(x)), increasing=True)
+        powers = np.vander(self.h * (np.arange(len(x)) + self._late), increasing=True)
         _, first, half, *_ = np.linalg.solve(powers, x).tolist()
         return first, 2.0 * half
 
@@ -74,27 +75,10 @@ class ShortSteps:
 
     def _run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
         if self._instance is not None and self._resets is not False:
-            self._instance.reset(lambda *_: None)
+            self._instance.restart()
         else:
             self.close()
-            self._instance = LocalInstance("model", self._model, lambda *_: None)
-            self._access = self._instance.bind(self._inputs, self._outputs, self._memory, self.h)
-        instance, values = self._instance, self._memory.values
-        instance.set_up(STEPS * self.h)
-        for name, value in start.items():
-            instance.set_value(self._model.variables[name], value)
-        for port in self._inputs:
-            values[port.slot] = inputs[port.variable.name]
-        instance.enter_initialization()
-        self._access.put()
-        instance.exit_initialization()
-        self._access.get()
-        told = [[values[port.slot] for port in self._outputs]]
-        for k in range(STEPS):
-            self._access.step(k * self.h)
-            told.append([values[port.slot] for port in self._outputs])
-        instance.terminate()
-        return {
-            port.variable.name: np.array(v)
-            for port, v in zip(self._outputs, zip(*told, strict=True), strict=True)
-        }
+            self._instance = FmuRun(self._fmu, self._inputs, self._outputs, self.h)
+        given, steps = [inputs[name] for name in self._inputs], STEPS + self._late
+        told = self._instance.short_run(start, given, steps)
+        return dict(zip(self._outputs, told[int(self._late) :].T, strict=True))

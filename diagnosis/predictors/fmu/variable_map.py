@@ -17,6 +17,7 @@ ahead alone. A variable whose unit the map does not tell is in the one that its 
 import json
 import re
 from collections.abc import Iterable, Mapping
+from math import pi
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,9 +38,11 @@ from cybership.message_text import Location, first_fault, quoted
 from fmus.addition import Line
 from fmus.base_units import base_exponents
 
-from ...runs import QUANTITY, UNITS, Column, meaning
+from ...runs import QUANTITY, UNITS, Column
 from ..black_box import MOTION, POSE, VELOCITY
+from .signal_names import NONE, Meant, lone, meant
 
+QUARTER = 0.5 * pi  # rad, from north to east
 PROPOSED = ("inputs", "outputs", "start")
 GROUPS = (*PROPOSED, "beside")
 # Inputs that act beside all else: forces, or accelerations.
@@ -160,15 +163,28 @@ def propose(model: FmuModel, commands: Mapping[str, str]) -> VariableMap:
         commands: of the runs: signal -> quantity.
     """
     found: dict[str, Any] = {}
-    every = quantities(commands)
+    every, refused = quantities(commands), set[str]()
     for group, known in ((g, every[g]) for g in PROPOSED):
         signals: dict[str, Column | None] = dict.fromkeys(known)
-        meant = [(v, *_signal(v.name, group, known)) for v in _candidates(model, group)]
-        for v, signal, flip in sorted(meant, key=lambda m: not _same(m[0].name, m[1])):
-            if signal in known and signals[signal] is None and _fits(v.unit, known[signal]):
-                signals[signal] = Column(name=v.name, flip=flip)
+        each = [(v, _meant(v, group, known)) for v in _candidates(model, group)]
+        by: dict[str, tuple[FmuVariable, Meant]] = {}
+        for v, m in sorted(each, key=lambda pair: not _same(pair[0].name, pair[1].signal)):
+            if m.signal in known and m.signal not in by and _fits(v.unit, known[m.signal]):
+                by[m.signal] = v, m
+        seen = {signal: m for signal, (_, m) in by.items()}
+        if group != "start":  # whose marks say more than a letter, unless the output is another thing
+            refused = {s for each in (POSE, VELOCITY) for s in lone(seen, each)}
+        for signal, (v, m) in by.items():
+            if signal not in refused:
+                signals[signal] = _column(v, m)
         found[group] = signals
     return VariableMap(**found)
+
+
+def _column(v: FmuVariable, m: Meant) -> Column:
+    told = m.unit or (v.unit.name if v.unit else "rad")
+    quarter = QUARTER / UNITS["angle"].get(told, 1.0) if m.quarter else 0.0
+    return Column(name=v.name, unit=m.unit, flip=m.flip, offset=quarter)
 
 
 def completed(
@@ -232,14 +248,12 @@ def _candidates(model: FmuModel, group: str) -> list[FmuVariable]:
     return [v for v in real if v.causality == ("output" if group == "outputs" else "input")]
 
 
-def _signal(name: str, group: str, known: Mapping[str, str]) -> tuple[str, bool]:
-    """The signal that a variable's name means, whole or its last part, and whether it is flipped."""
-    for part in (name, name.rpartition(".")[2]):
-        for core in _cores(part) if group == "start" else [part]:
-            found = meaning(core, known)
-            if found[0]:
-                return found
-    return "", False
+def _meant(v: FmuVariable, group: str, known: Mapping[str, str]) -> Meant:
+    """The signal that a variable is by its name, whole or its last part."""
+    if group != "start":
+        return meant(v, v.name, known)
+    cores = [core for part in (v.name, v.name.rpartition(".")[2]) for core in _cores(part)]
+    return next((m for core in cores if (m := meant(v, core, known)).signal), NONE)
 
 
 def _same(name: str, signal: str) -> bool:

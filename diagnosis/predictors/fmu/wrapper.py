@@ -62,6 +62,7 @@ def write_wrapper(
     change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
     needed = ~np.isclose(np.abs(change).max(axis=0) / start.ship.scale.forces, 0.0)
     takes = {*fmu.map.told("inputs"), *fmu.map.told("beside")}
+    takes |= {*FORCE[:2]} if {"tau.force", "tau.angle"} <= takes else set()
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
         return "Nothing is added to the FMU.", None

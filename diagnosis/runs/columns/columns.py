@@ -64,6 +64,8 @@ BESIDE = {
     **dict.fromkeys(("a_x", "a_y"), "acceleration"),
     "wind_speed": "speed",
     "wind_direction": "angle",
+    "wind_speed_relative": "speed",
+    "wind_direction_relative": "angle",
     "x_2": "length",
     "y_2": "length",
     "psi_2": "angle",

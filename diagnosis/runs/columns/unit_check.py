@@ -88,7 +88,10 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
     speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
     if speed > FASTEST:
-        yield Doubt(("x", "y"), "mm", f"goes {speed:.3g} m/s: is its position in mm?")
+        slow = (u for u, size in OTHERS["length"][1].items() if speed * size < FASTEST)
+        units = sorted(slow, key=UNITS["length"].__getitem__)
+        reason = f"goes {speed:.3g} m/s: is its position in {' or '.join(units)}?"
+        yield Doubt(("x", "y"), units[0] if units else "mm", reason)
     psi = pose[:, 2]
     reach = float(np.quantile(np.abs(psi), 0.9))
     if reach <= math.tau:

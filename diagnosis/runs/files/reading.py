@@ -20,6 +20,7 @@ from fmus.ship import Ship, ship
 from fmus.ship_description import Description
 from fmus.ships.naming import DEFAULT
 
+from ...execution.result_folder import sha256
 from ..columns.columns import (
     BESIDE,
     POSE,
@@ -30,6 +31,7 @@ from ..columns.columns import (
     outputs,
     quantities,
     read_layout,
+    side_cars,
     signals,
     to_si,
 )
@@ -38,7 +40,7 @@ from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
 from .tables import column_names, date_stamps, numbers, table_of_file
 
-LOGS = ("log.csv", "log.parquet")
+LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
 
@@ -65,6 +67,7 @@ class Run:
         ship: that was measured; None: the default ship.
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
         resolution: (n, 3), step to which the pose is rounded in the file [m, m, rad]; None: not at all.
+        hashes: file that it was read from -> SHA-256 when it was read: the measurement, then side-cars.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Run:
     ship: Description | None = None
     trial: str | None = None
     resolution: np.ndarray | None = None
+    hashes: Mapping[Path, str] = field(default_factory=dict)
 
     @property
     def coarse(self) -> np.ndarray:
@@ -138,14 +142,17 @@ def read(
     is_log = path.name in LOGS
     name = path.absolute().parent.name if is_log else path.stem
     of = of or ship()
+    told = [path.with_name(LOG_OPTIONS)] if is_log and path.with_name(LOG_OPTIONS).is_file() else []
+    hashes = {file: sha256(file) for file in (path, *side_cars(path), *told)}
     if path.suffix == ".mat" and fits_matlab(of):
-        return replace(_run(name, read_matlab(path, of), f"'{path}'", of), file=path)
+        return replace(_run(name, read_matlab(path, of), f"'{path}'", of), file=path, hashes=hashes)
     table, layout = _tabular(path, layout, of, set(also))
-    run = replace(_of_table(name, table, layout, path, f"'{path}'", of), file=path)
+    run = _of_table(name, table, layout, path, f"'{path}'", of)
+    run = replace(run, file=path, hashes=hashes)
     others = {n: pd.to_numeric(table[n], errors="coerce") for n in also if n in table}
     run = replace(run, measured={**run.measured, **{n: np.asarray(c, float) for n, c in others.items()}})
-    told = read_options(path.parent).trial if is_log else None
-    return run if told is None else replace(run, trial=told.kind)
+    trial = read_options(path.parent).trial if is_log else None
+    return run if trial is None else replace(run, trial=trial.kind)
 
 
 def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None) -> Run:

@@ -8,7 +8,8 @@ deviations from its prediction by all others is a spike.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -21,11 +22,13 @@ from fmus.scale import Scale
 from ..cleaning import BRIEF, CHANCE, HORIZON, LONG, WIDTH, Counts, Track, noise
 from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
+from ..measured_wind import air_along
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
 from .likelihood import adapt, criteria, likeliest, with_noise
+from .noise_uncertainty import noise_rel_std
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots
@@ -38,6 +41,7 @@ LEAST_NOISE = 2e-5
 # Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
 # of channels against each other are wrong by less than four.
 MISSTATED = 2.0
+FILTERED = "; behind a filter samples scatter less than they are wrong"
 
 # Channel -> standard deviation of what it says over a sampling period, in SI.
 Agreeing = Mapping[str, float]
@@ -89,6 +93,7 @@ class Smoothed:
         pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
         doubted: lines on noise that was given and contradicts the samples.
         sensors: what the run's channels say of each other; None where nobody asked.
+        noise_rel_std: (3,), relative standard deviation of the noise; zero where it was given.
     """
 
     track: Track
@@ -109,6 +114,7 @@ class Smoothed:
     pose_only: PoseOnly
     doubted: tuple[str, ...] = ()
     sensors: Examined | None = None
+    noise_rel_std: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def time(self) -> np.ndarray:
@@ -119,6 +125,11 @@ class Smoothed:
     def scale(self) -> Scale:
         """Of the ship."""
         return self.track.scale
+
+    @cached_property
+    def air(self) -> np.ndarray | None:
+        """(n, 2), velocity of the air to north and east [m/s]; None: no wind was measured."""
+        return air_along(self.track.run, self.eta[:, 2], self.nu)
 
     @property
     def used(self) -> np.ndarray:
@@ -269,6 +280,8 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
+    estimated = np.isnan(given_noise(track))
+    uncertain = np.where(estimated, noise_rel_std(p, smoothness, weights, fit), 0.0)
     spikes = track.valid.copy()  # those of parts that agree with nothing
     spikes[rows] = False
     spikes[dense] = track.valid[dense] & (weights[:, 0] == 0.0)
@@ -293,6 +306,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         response.sure,
         pose_only,
         tuple(_doubted(track, alone, even)),
+        noise_rel_std=uncertain,
     )
 
 
@@ -318,6 +332,8 @@ def _doubted(track: Track, found: Inliers, even: Problem) -> Iterator[str]:
             yield (
                 f"the noise of {POSE[k]} is given as {given[k]:.3g} {unit}, its samples scatter by "
                 f"{free.sigma[k]:.2g} {unit} ({odds} : 1): leave it out, and it is estimated"
+                + FILTERED
+                * (size < 1.0)
             )
 
 

@@ -23,7 +23,10 @@ from fmus.effects import Effect
 
 POINTS = 32  # of the Sobol sequence, besides the start; chosen: of one parameter every 3 % of the range
 REFINED = 3  # of the best; chosen
-FAR = 10.0  # times its scale to both sides a parameter without limits is tried; chosen
+# An effect without values of its own is tried at these multiples of the value at which its force is as
+# large as the model error, a parameter without limits as far to both sides of its scale; chosen.
+MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
+FAR = MULTIPLES[-1]
 
 Force = Callable[[Mapping[str, float]], np.ndarray]
 Values = dict[str, float]

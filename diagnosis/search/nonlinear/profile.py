@@ -32,7 +32,6 @@ from ..refinement import (
 )
 
 REACH = 1.5  # factor to both sides within which the best value is looked for; chosen
-FINEST = 1e-4  # of what is searched, to which a value and the ends of its interval are found; chosen
 
 Interval = tuple[float, float]
 
@@ -57,7 +56,7 @@ def profiled(
     trial = _profile(t, at, p, name)
     present = at.start.value(name) + at.values[name]
     ends = sorted((present / REACH, present * REACH))
-    finest = {"xatol": FINEST * (ends[1] - ends[0])}
+    finest = {"xatol": SMALL * (ends[1] - ends[0])}
     found: Any = minimize_scalar(lambda x: trial(x).cost, bounds=ends, method="bounded", options=finest)
     best = min((trial(present), trial(float(found.x))), key=lambda r: r.cost)
     start = at.start.value(name)
@@ -111,4 +110,4 @@ def _end(trial: Callable[[float], Refined], least: float, value: float, end: flo
 
     if beyond(end) <= 0.0:
         return end
-    return float(brentq(beyond, value, end, xtol=FINEST * abs(end - value)))  # pyright: ignore
+    return float(brentq(beyond, value, end, xtol=SMALL * abs(end - value)))  # pyright: ignore

@@ -236,13 +236,9 @@ def intervals(p: SegmentationProblem) -> Spans:
 
 
 def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool = False) -> Spans:
-    """Intervals of bins that gain the most, less a charge for each change, by dynamic programming.
+    """Intervals of bins that gain (B,) the most, less a charge for each change, by dynamic programming.
 
-    Args:
-        gain: (B,), of each bin inside an interval.
-        charge: of each change point; the end of the data is none.
-        most: intervals, at the most.
-        lasting: whether an interval has no end but that of the data.
+    There are so many at the most. The end of the data is no change; those that last have no other end.
     """
     # A state is the number of changes so far: the thruster is dead in those that are odd.
     states = 1 + most * (2 - lasting)

@@ -116,12 +116,12 @@ def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what drawn noise makes of that, and its noise (3,)."""
-    run, time, step = smoothed.track.run, smoothed.time, BRIEF * smoothed.scale.time
+    time, step = smoothed.time, BRIEF * smoothed.scale.time
     motion = without_commands(smoothed)
-    error, noise = model_error(run, motion, model), []
+    error, noise = model_error(smoothed, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
         pose = np.where(smoothed.used[:, None], motion.eta + smoothed.noise * each, smoothed.track.pose)
-        other = model_error(run, without_commands(smoothed, pose), model)
+        other = model_error(smoothed, without_commands(smoothed, pose), model)
         noise += stretches(other - error, time, step)
     white = 2.0 * smoothed.noise**2 * smoothed.track.period
     return stretches(error, time, step), noise, white
@@ -187,8 +187,9 @@ def peak(
     return level, Peak(int(row), int(axis), float(height[row, axis]))
 
 
-def model_error(run: Run, motion: SmoothMotion, model: Model) -> np.ndarray:
+def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.ndarray:
     """omega (n, 3) [N, N, N m] by the acceleration of a run's motion, NaN where there is none."""
+    run = smoothed.track.run
     eta, _, eta_ddot, nu = motion
     u_dot, v_dot = rotate_to_body(eta[:, 2], eta_ddot[:, 0], eta_ddot[:, 1])
     u, v, r = nu.T
@@ -196,7 +197,7 @@ def model_error(run: Run, motion: SmoothMotion, model: Model) -> np.ndarray:
     between = Response(run, model).between_samples
     met = inflow(State._make([*eta.T, *nu.T, run.time]), model)
     driven = by_mass(model, thrust(run, model, between, np.nan_to_num(np.column_stack(met))))
-    free = acceleration(model, run.time, eta, nu)
+    free = acceleration(model, smoothed, eta, nu)
     return (nu_dot - free - driven) @ model.reference_mass.T
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import Shooting
+from ...predictors.uncertainty import NEGLIGIBLE
 from ..candidates import SMALL, model_error
 from ..findings import Findings
 from ..gram import run_folds
@@ -40,7 +41,6 @@ AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; 
 # for a ship of 34 m; chosen.
 STREAM = 0.05
 CONSTANTS = ("body_bias_Y", "body_bias_N")  # of each run
-FLOOR = 0.05  # of the mean square that is missed: what is not linear about a prediction; chosen
 
 
 class Calibration(PredictionFit):
@@ -96,8 +96,8 @@ class Calibration(PredictionFit):
 
     def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
         pooled = squares.sum(axis=(0, 1)) / max(seen.sum(), 1)
-        pooled[:2] = pooled[:2].mean()
-        return np.broadcast_to(FLOOR * pooled, (len(squares), 3))
+        pooled[:2] = pooled[:2].mean()  # a part of it is not linear
+        return np.broadcast_to(NEGLIGIBLE * pooled, (len(squares), 3))
 
     def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
         r, total = whitened(weights, self.windows[k].residuals(model)), 0.0

@@ -12,15 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...predictors import WeakWindows
-from ...predictors.correlation import autocovariance
-from ...predictors.shooting import Linear
+from ...predictors.shooting import PARTS, Linear
+from ...predictors.thrust import LONGEST_STEP
+from ...predictors.uncertainty import autocovariance
 from ...predictors.weak_form import EVERY, WIDTH, kernel
 
 # s, times the scale of the ship; correlation times that are tried. A shorter one is white for windows of
 # the weak form, a longer one a bias.
 TIMES = np.geomspace(0.2, 12.0, 25)
-POINTS = 301  # of the kernel's integrals; chosen, a twentieth of the shortest of these times apart
-GAUSS = 4  # points of the integral of the noise between two instants; chosen, exact to its 8th power
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +35,13 @@ def _kernels() -> tuple[np.ndarray, np.ndarray]:
 
     Beyond lags of twice the width of a window it is hardly determined.
     """
-    t = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, POINTS)
+    half = round(0.5 * WIDTH / LONGEST_STEP)  # steps that are a tenth of the shortest of these times
+    t = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, 2 * half + 1)
     w = kernel(2.0 * t / WIDTH)
     step = t[1] - t[0]
     lags = np.arange(0.0, 2.0 * WIDTH + EVERY, EVERY)
     both = np.convolve(w, w) * step / (w.sum() * step) ** 2  # of the difference of two places
-    apart = step * np.arange(-POINTS + 1, POINTS)
+    apart = step * np.arange(-2 * half, 2 * half + 1)
     force = np.exp(-np.abs(lags[:, None] + apart) / TIMES[:, None, None]) @ both * step
     bent = np.gradient(np.gradient(w, t), t)
     noise = np.interp(lags, apart, np.convolve(bent, bent), right=0.0)
@@ -102,7 +102,7 @@ def _steps(motion: Linear, push: ForceDisturbance) -> tuple[np.ndarray, np.ndarr
         return _exponential(motion.every * A), np.zeros_like(A)
     rate = np.broadcast_to(2.0 * push.size**2 / push.time, (len(A), 3))[:, None, None]
     added = np.zeros_like(A)
-    for x, weight in zip(*np.polynomial.legendre.leggauss(GAUSS), strict=True):
+    for x, weight in zip(*np.polynomial.legendre.leggauss(PARTS), strict=True):
         G = _exponential(0.5 * motion.every * (x + 1.0) * A)[..., 6:]
         added += 0.5 * motion.every * weight * (G * rate) @ np.swapaxes(G, -1, -2)
     return _exponential(motion.every * A), added

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from ...runs import Fingerprint
 from ..prior import NominalPrior
 from .fit import Fitted
 
@@ -72,12 +73,13 @@ class JointPosterior:
         groups = [[n for n, g in zip(self.names, group, strict=True) if g == k] for k in range(count)]
         return [members for members in groups if len(members) > 1]
 
-    def write(self, path: Path) -> None:
-        """Write ``posterior.json``."""
+    def write(self, path: Path, learned_from: Sequence[Fingerprint] = ()) -> None:
+        """Write ``posterior.json``, with the runs of which the values were learned."""
         content = {
             "names": list(self.names),
             "units": list(self.units),
             "mean": self.mean.tolist(),
             "covariance": self.covariance.tolist(),
+            "learned_from": [f.content() for f in learned_from],
         }
         path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

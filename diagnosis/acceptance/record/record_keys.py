@@ -1,6 +1,6 @@
 """What each record says of itself."""
 
-FORM = "cybership validation record 1"
+FORM = "cybership validation record 2"
 STANDING = (
     "This record uses terms of ASME V&V 20, ITTC 7.5-02-06-03 and DNV-RP-0513. "
     "It claims conformity with none of them."

@@ -1,16 +1,14 @@
 """The files of a record: the report as HTML and PDF, the record, its signature."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..execution.result_folder import sha256
-from ..report.content import Content
-from ..report.document import Document, Plot, write_document
-from ..report.formatting import as_json
-from .error_figure import error_figure
-from .judged_criterion import Judgement
+from ...report.content import Content
+from ...report.document import Document, Plot, write_document
+from ...report.formatting import as_json
 from .pdf import write_pdf
+from .provenance import entry
 from .sections import sections
 from .signature import public_key, sign
 
@@ -19,13 +17,8 @@ FILES = (RECORD, PAGE, PDF, SIGNATURE)
 TITLE = "Validation record"
 
 
-def entry(role: str, path: Path) -> dict[str, str]:
-    """A file: what it was for, its path as it was given, its SHA-256 (of a log's folder: of the log)."""
-    return {"role": role, "path": str(path), "sha256": sha256(path)}
-
-
 def write_record(
-    content: Content, judgements: Sequence[Judgement], folder: Path, key: str | Path | None
+    content: Content, figures: Sequence[Plot], folder: Path, key: str | Path | None
 ) -> list[str]:
     """Write all files into a folder that is there; returns their names.
 
@@ -37,12 +30,9 @@ def write_record(
     if key is not None:
         content = Content(content | {"public_key": public_key(key)})
     parts = [*sections(content)]
-    figures = [(error_figure(j), j) for j in judgements if j.errors.size]
-    plots = [
-        Plot(f, f"{j.criterion.title}: error of each window, and the tolerance.") for f, j in figures
-    ]
-    write_pdf(folder / PDF, TITLE, parts, [f.figure() for f, _ in figures])
-    write_document(folder / PAGE, Document(TITLE, sections=[replace(parts[0], plots=plots), *parts[1:]]))
+    write_pdf(folder / PDF, TITLE, _head(content), parts, figures)
+    shown = [replace(parts[0], plots=figures), *parts[1:]]
+    write_document(folder / PAGE, Document(TITLE, sections=shown))
     reports = [entry("report", folder / name) | {"path": name} for name in FILES[1:3]]
     text = as_json(content | {"reports": reports}) + "\n"
     (folder / RECORD).write_bytes(text.encode())
@@ -50,3 +40,17 @@ def write_record(
         return [*FILES[:3]]
     (folder / SIGNATURE).write_bytes(sign(text.encode(), key))
     return [*FILES]
+
+
+def _head(r: Content) -> Mapping[str, str]:
+    """What stands on page one of the PDF above the verdict."""
+    told = r.particulars
+    return {
+        "document": told.document,
+        "client": told.client,
+        "assessor": told.assessor,
+        "model": f"{r.model} ({told.model}, version {told['model version']})",
+        "ship": f"{r.ship} ({told.ship})",
+        "made": f"{r.made}, by cybership {r.code.version}",
+        "runs": ", ".join(s.run for s in r.samples),
+    }

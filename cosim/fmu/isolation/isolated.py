@@ -5,26 +5,27 @@ request carries the inputs and one answer the outputs.
 """
 
 import json
-import os
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
-from ..errors import InputError, SimulationError
+from ...errors import InputError, SimulationError
+from ...process.call_watch import TIMEOUT, TIMES_USUAL
+from ..component import WARNING
+from ..fmu_model import FmuModel, FmuVariable, Value
+from ..instance import Access, OnMessage
+from ..memory import DoubleMemory, Port
 from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
-from .component import WARNING
-from .fmu_model import FmuModel, FmuVariable, Value
-from .instance import Access, OnMessage
-from .memory import DoubleMemory, Port
+from .worker_process import Printed, StartedProcess, WorkerProcess
 
-# Longest wall time of one call [s] where the scenario gives none. Instantiation, for which a process is
-# started, may always take that long. Chosen: loading a large tool may take tens of seconds.
-TIMEOUT = 60.0
+# Longest wall time of instantiation where none is given, for which a process is started [s]; chosen:
+# loading a large tool may take tens of seconds.
+START_TIMEOUT = 60.0
 # Wall time that an idle process may take to exit [s]; chosen: far beyond the clean-up of any library.
 EXIT_TIMEOUT = 5.0
 # Wall time between two looks at a call that is under way [s], at most; chosen: short beside TIMEOUT.
@@ -39,7 +40,9 @@ class IsolatedInstance:
         name: instance name.
         model: what to run.
         on_message: receives the messages that the FMU logs.
-        timeout: longest wall time that one call may take [s].
+        timeout: longest wall time that one call may take [s]; None: by what a step usually takes.
+        start: makes its process.
+        printed: receives each line that the FMU prints.
 
     Raises:
         InputError: the archive cannot be unpacked. An FMU that cannot be instantiated raises it in the
@@ -51,7 +54,9 @@ class IsolatedInstance:
         name: str,
         model: FmuModel,
         on_message: OnMessage,
-        timeout: float = TIMEOUT,
+        timeout: float | None = None,
+        start: Callable[[], WorkerProcess] = StartedProcess,
+        printed: Callable[[str], None] | None = None,
     ) -> None:
         self.name = name
         self.model = model
@@ -59,23 +64,17 @@ class IsolatedInstance:
         self._timeout = timeout
         folder = model.unpack()
         try:
-            # A session of its own: Ctrl-C reaches the master only, and children end with their parent.
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "cosim.fmu.worker"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                start_new_session=True,
-            )
+            self._process = start()
         except OSError as error:
             raise SimulationError(f"{name}: its process cannot be started: {error}") from None
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._channel = Channel(self._process.stdout, self._process.stdin)
+        self._printed = Printed(self._process.printed, printed or _to_standard_error)
+        self._channel = Channel(self._process.reader, self._process.writer)
         self._lost = ""  # why the process has ended
         self._asked = ""  # the call whose answer is due
         self._in_frame = False  # an exception inside a frame makes the channel unusable
         self._waiting_since: float | None = None
         self._is_late = False
+        self._spent, self._answers = 0.0, 0  # on answers but that of the instantiation [s]
         self._closed = threading.Event()
         threading.Thread(target=self._watch, name=f"watch {name}", daemon=True).start()
         path = str(model.path.resolve())
@@ -83,23 +82,17 @@ class IsolatedInstance:
 
     def _watch(self) -> None:
         """End the process when an answer takes too long; the thread that waits for it notices."""
-        while not self._closed.wait(min(WATCH_INTERVAL, self._timeout / 4)):
+        while not self._closed.wait(min(WATCH_INTERVAL, (self._timeout or TIMEOUT) / 4)):
             since, allowed = self._waiting_since, self._allowed()
             if since is not None and time.monotonic() - since > allowed:
                 self._is_late = True
-                self._kill()
+                self._process.kill()
 
     def _allowed(self) -> float:
-        return max(self._timeout, TIMEOUT) if self._asked == START else self._timeout
-
-    def _kill(self) -> None:
-        with suppress(OSError):
-            if hasattr(os, "killpg"):
-                os.killpg(
-                    self._process.pid, signal.SIGKILL
-                )  # including the processes that the FMU started
-            else:
-                self._process.kill()
+        if self._asked == START:
+            return max(self._timeout or 0.0, START_TIMEOUT)
+        usual = self._spent / max(1, self._answers)
+        return self._timeout or max(TIMEOUT, TIMES_USUAL * usual)
 
     def _send(self, what: str, kind: int, body: bytes) -> None:
         """Send a request, after the answer to the one before."""
@@ -137,6 +130,8 @@ class IsolatedInstance:
             self._give_up()
         except (GarbledError, ValueError, TypeError):
             self._give_up(is_garbled=True)
+        self._spent += 0.0 if self._asked == START else time.monotonic() - self._waiting_since
+        self._answers += self._asked != START
         self._waiting_since = None
         what, self._in_frame, self._asked = self._asked, False, ""
         if kind == DONE:
@@ -154,13 +149,14 @@ class IsolatedInstance:
         self._waiting_since = None
         self._closed.set()
         if is_garbled:
-            self._kill()
+            self._process.kill()
         try:
             code = self._process.wait(EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:  # it closed its pipes and runs on
-            self._kill()
-            code = self._process.wait()
-        self._kill()
+            self._process.kill()
+            code = self._process.wait(EXIT_TIMEOUT)
+        self._process.kill()
+        self._printed.finish()
         if self._is_late:
             how = f"{self._asked} took longer than {self._allowed():g} s; its process was ended"
         elif is_garbled:
@@ -228,27 +224,59 @@ class IsolatedInstance:
 
         return Access(put, get, step, begin)
 
+    def short_run(
+        self, start: Mapping[str, Value], inputs: Sequence[float], steps: int, h: float
+    ) -> list[list[float]]:
+        """A whole run of a few steps, from its set-up to its termination, as one request.
+
+        Args:
+            start: start value -> number.
+            inputs: of the variables that are bound, which stay the same.
+            steps, h: how many steps, and of what length [s].
+
+        Returns:
+            The outputs that are bound, at the start and after each step.
+
+        Raises:
+            SimulationError: the FMU refuses or fails.
+        """
+        return self._call("a short run", "short_run", dict(start), [*inputs], steps, h)
+
+    def reset(self) -> None:
+        """Return to the state after instantiation, for another run (fmi2Reset).
+
+        Raises:
+            SimulationError: the FMU refuses.
+        """
+        self._call("fmi2Reset", "reset")
+
     def terminate(self) -> None:
         if not self._lost and not self._in_frame:
             self._call("fmi2Terminate", "terminate")
 
     def free(self) -> None:
         if self._in_frame:  # interrupted during a call
-            self._kill()
+            self._process.kill()
         elif not self._lost:
             try:
                 self._call("fmi2FreeInstance", "free")
             except (SimulationError, InputError) as error:
                 self._on_message(self.name, WARNING, str(error))
         self._closed.set()
-        for pipe in (self._process.stdin, self._process.stdout):
+        for pipe in (self._process.writer, self._process.reader):
             with suppress(OSError):
-                if pipe is not None:
-                    pipe.close()
+                pipe.close()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(EXIT_TIMEOUT)
-        self._kill()  # also for the processes that the FMU started
-        self._process.wait()
+        self._process.kill()  # also for the processes that the FMU started
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(EXIT_TIMEOUT)
+        self._printed.finish()
+
+
+def _to_standard_error(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 def _part(ports: Sequence[Port], memory: DoubleMemory) -> memoryview:

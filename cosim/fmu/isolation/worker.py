@@ -1,4 +1,6 @@
-"""The process of one isolated FMU: ``python -m cosim.fmu.worker``, started by the master only.
+"""The process of one isolated FMU: ``python -m cosim.fmu.isolation.worker``, started by the master only.
+
+A confined one is forked instead, see :mod:`cosim.fmu.isolation.fork_server`.
 
 It carries out the frames on its standard input with the same code that runs an FMU inside the master,
 and ends when the master does, also when that is killed.
@@ -10,27 +12,31 @@ import json
 import os
 import signal
 import sys
+from array import array
 from pathlib import Path
 
-from ..errors import InputError, SimulationError
-from ..process.spawned import end_with_parent
+from ...errors import InputError, SimulationError
+from ...process.spawned import end_with_parent
+from ..fmu_model import FmuModel, Value
+from ..local import LocalInstance
+from ..memory import DoubleMemory, Port
 from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
-from .fmu_model import FmuModel, Value
-from .local import LocalInstance
-from .memory import DoubleMemory, Port
 
 
 class Worker:
     """Answers one request after the other."""
 
-    def __init__(self, channel: Channel) -> None:
+    def __init__(self, channel: Channel, model: FmuModel | None = None) -> None:
         self._channel = channel
+        self._known = model
         self._calls = {
             "start": self._start,
             "bind": self._bind,
             "set_value": self._set_value,
             "get_value": self._get_value,
             "free": self._free,
+            "reset": self._reset,
+            "short_run": self._short_run,
         }
 
     def serve(self) -> None:
@@ -55,7 +61,7 @@ class Worker:
         return json.dumps(action(*arguments)).encode()
 
     def _start(self, name: str, path: str, folder: str) -> None:
-        self._model = FmuModel(Path(path), Path(folder))
+        self._model = self._known or FmuModel(Path(path), Path(folder))
         self._instance = LocalInstance(name, self._model, self._log)
 
     def _log(self, _: str, status: int, text: str) -> None:
@@ -87,14 +93,38 @@ class Worker:
             self._access.get()
         return bytes(self._outputs)
 
+    def _short_run(
+        self, start: dict[str, Value], inputs: list[float], steps: int, h: float
+    ) -> list[list[float]]:
+        """A whole run with inputs that stay the same: the outputs at its start and after each step."""
+        self._instance.set_up(steps * h)
+        for name, value in start.items():
+            self._set_value(name, value)
+        self._instance.enter_initialization()
+        self._inputs[:] = array("d", inputs).tobytes()
+        self._access.put()
+        self._instance.exit_initialization()
+        self._access.get()
+        told = [[*self._outputs.cast("d")]]
+        for k in range(steps):
+            self._access.step(k * h)
+            told.append([*self._outputs.cast("d")])
+        self._instance.terminate()
+        return told
+
+    def _reset(self) -> None:
+        self._instance.reset(self._log)
+
     def _free(self) -> None:
         self._instance.free()
 
 
-def main() -> None:
-    """Serve the master, over pipes of its own: whatever the FMU prints goes to standard error."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the master handles Ctrl-C
-    end_with_parent(os.getppid())  # an FMU that hangs would outlive a master that was killed
+def serve(model: FmuModel | None = None) -> None:
+    """Serve the master, over pipes of its own: whatever the FMU prints goes to standard error.
+
+    Args:
+        model: the FMU, where it has been read already.
+    """
     if sys.platform == "linux":
         libc = ctypes.CDLL(None)
         libc.setlinebuf(ctypes.c_void_p.in_dll(libc, "stdout"))  # as below, for FMUs in C
@@ -105,12 +135,19 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)  # a crash must not lose what was printed before
     try:
-        Worker(channel).serve()
+        Worker(channel, model).serve()
     except OSError:
         os._exit(1)  # the master has ended, or the FMU has closed the pipes
     sys.stdout.flush()
     # Libraries of FMUs sometimes crash in their clean-up at the end of a process.
     os._exit(0)
+
+
+def main() -> None:
+    """Serve the master that has started this process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the master handles Ctrl-C
+    end_with_parent(os.getppid())  # an FMU that hangs would outlive a master that was killed
+    serve()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,138 @@
+"""The systems: what is measured of each, what is off, and which force is missing."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from .c_fmu import CSystem, Quantity, build_c_fmu
+
+
+class ForeignSystem(NamedTuple):
+    """An FMU under test.
+
+    Attributes:
+        name: of the file, without its ending.
+        inputs: variable -> size of its random steps.
+        output: variable that is measured.
+        off: parameter that is off, to ``factor`` times its value.
+        parameters: all that are calibrated -> start value and relative standard deviation of the prior.
+        force: input on which a force acts; empty: there is none.
+        lacks: output that the missing force goes with, and its power, as y |y|^(power - 1); power 0:
+            constant.
+        size: coefficient of the force.
+        step: from sample to sample [s].
+        inputs_at_rest: values of the inputs about which they step.
+    """
+
+    name: str
+    inputs: dict[str, float]
+    output: str
+    off: str
+    parameters: dict[str, tuple[float, float]]
+    force: str = ""
+    lacks: tuple[str, int] = ("", 0)
+    size: float = 0.0
+    step: float = 0.05
+    inputs_at_rest: float = 0.0
+
+
+N, M, V = Quantity(0.0, "N"), Quantity(0.0, "m"), Quantity(0.0, "m/s")
+NM, RAD, W = Quantity(0.0, "N.m"), Quantity(0.0, "rad"), Quantity(0.0, "rad/s")
+# Written from FMI's standard and textbook equations.
+OWN = {
+    "oscillator": CSystem(
+        {"f": N},
+        {"x": M, "v": V},
+        {"m": Quantity(2.0, "kg"), "c": Quantity(10.0, "N/m"), "d": Quantity(1.0, "N.s/m")},
+        "der_x = v; der_v = (f - c * x - d * v) / m;",
+    ),
+    "pendulum": CSystem(
+        {"f": NM},
+        {"th": RAD, "w": W},
+        {"l": Quantity(0.8, "m"), "d": Quantity(0.15, "N.m.s")},
+        "der_th = w; der_w = (f - 9.81 * l * sin(th) - d * w) / (l * l);",
+    ),
+    "motor": CSystem(
+        {"u": Quantity(0.0, "V"), "load": NM},
+        {"i": Quantity(0.0, "A"), "w": W},
+        {"R": Quantity(1.0, "Ohm"), "k": Quantity(0.5, "N.m/A"), "J": Quantity(0.4, "kg.m2")},
+        "der_i = (u - R * i - k * w) / 0.2; der_w = (k * i - 0.1 * w + load) / J;",
+    ),
+    "heater": CSystem(
+        {"P": Quantity(0.0, "W")},
+        {"T": Quantity(0.0, "K")},
+        {"C": Quantity(50.0, "J/K"), "G": Quantity(5.0, "W/K")},
+        "der_T = (P - G * T) / C;",
+    ),
+    "two_masses": CSystem(
+        {"f": N},
+        {"x": M, "y": M, "v": V, "w": V},
+        {"c": Quantity(8.0, "N/m"), "k": Quantity(3.0, "N/m"), "d": Quantity(0.8, "N.s/m")},
+        "der_x = v; der_y = w; der_v = f - c * x - k * (x - y) - d * v; "
+        "der_w = (k * (x - y) - 2.0 * y - d * w) / 1.5;",
+    ),
+    "duffing": CSystem(
+        {"f": N},
+        {"x": M, "v": V},
+        {"c": Quantity(4.0, "N/m"), "c3": Quantity(20.0, "N/m3"), "d": Quantity(0.6, "N.s/m")},
+        "der_x = v; der_v = f - c * x - c3 * x * x * x - d * v;",
+    ),
+    "surge": CSystem(
+        {"f": N},
+        {"u": V},
+        {"m": Quantity(15.0, "kg"), "d1": Quantity(2.0, "N.s/m"), "d2": Quantity(6.0, "N.s2/m")},
+        "der_u = (f - d1 * u - d2 * fabs(u) * u) / m;",
+    ),
+    "crane": CSystem(
+        {"f": N},
+        {"x": M, "th": RAD, "v": V, "w": W},
+        {"M": Quantity(4.0, "kg"), "l": Quantity(1.2, "m"), "d": Quantity(3.0, "N.s/m")},
+        "double s = sin(th), q = cos(th), F = f - d * v; "
+        "der_x = v; der_th = w; der_v = (F + s * (l * w * w + 9.81 * q)) / (M + s * s); "
+        "der_w = -(der_v * q + 9.81 * s + 0.1 * w) / l;",
+    ),
+}
+CASES = (
+    ForeignSystem("oscillator", {"f": 3.0}, "x", "c",
+                  {"m": (2.0, 0.1), "c": (10.0, 0.3), "d": (1.0, 0.5)},
+                  "f", ("v", 2), -3.0),
+    ForeignSystem("pendulum", {"f": 3.0}, "th", "l",
+                  {"l": (0.8, 0.2), "d": (0.15, 0.5)},
+                  "f", ("w", 2), -0.3),
+    ForeignSystem("motor", {"u": 6.0}, "w", "R",
+                  {"R": (1.0, 0.3), "k": (0.5, 0.3), "J": (0.4, 0.3)},
+                  "load", ("w", 2), -0.05),
+    ForeignSystem("heater", {"P": 60.0}, "T", "G",
+                  {"C": (50.0, 0.3), "G": (5.0, 0.3)},
+                  "P", ("T", 2), -0.4, 1.0, 60.0),
+    ForeignSystem("two_masses", {"f": 4.0}, "x", "k",
+                  {"c": (8.0, 0.3), "k": (3.0, 0.3), "d": (0.8, 0.5)},
+                  "f", ("v", 2), -2.0),
+    ForeignSystem("duffing", {"f": 3.0}, "x", "c3",
+                  {"c": (4.0, 0.3), "c3": (20.0, 0.3), "d": (0.6, 0.5)},
+                  "f", ("v", 2), -2.0),
+    ForeignSystem("surge", {"f": 4.0}, "u", "d1",
+                  {"m": (15.0, 0.1), "d1": (2.0, 0.5), "d2": (6.0, 0.5)},
+                  "f", ("", 0), 0.5, 0.2),
+    ForeignSystem("crane", {"f": 4.0}, "x", "d",
+                  {"M": (4.0, 0.1), "l": (1.2, 0.1), "d": (3.0, 0.5)},
+                  "f", ("v", 2), -3.0),
+)  # fmt: skip
+# By other tools: damped_oscillator (eta-utility, BSD-2-Clause, Dymola 2021), the others (gemseo-fmu,
+# LGPL-3.0, OpenModelica). The subsystems export parameters as inputs, and have no force input.
+OTHERS = (
+    ForeignSystem("damped_oscillator", {"f": 3.0}, "s", "springDamper.c",
+                  {"mass.m": (2.0, 0.1), "springDamper.c": (10.0, 0.3), "springDamper.d": (1.0, 0.5)},
+                  "f", ("v", 2), -3.0, 0.1),
+    ForeignSystem("Mass_Damper", {"f": 50.0}, "y", "damper.d",
+                  {"mass.m": (1.0, 0.1), "damper.d": (10.0, 0.5), "spring.c": (1e4, 0.3)},
+                  "f", ("", 0), 20.0, 0.002),
+    ForeignSystem("MassSpringSubSystem1", {"x2": 0.5}, "x1", "k1",
+                  {"k1": (1.0, 0.3), "k2": (1.0, 0.3), "m1": (1.0, 0.1)}),
+    ForeignSystem("MassSpringSubSystem2", {"x1": 0.5}, "x2", "k3",
+                  {"k2": (1.0, 0.3), "k3": (1.0, 0.3), "m2": (1.0, 0.1)}),
+)  # fmt: skip
+
+
+def built(system: ForeignSystem, folder: Path) -> Path:
+    """Path of the FMU of one of the systems that are written here."""
+    return build_c_fmu(folder, system.name, OWN[system.name])

@@ -1,0 +1,64 @@
+"""What is aimed at in reading logs as they come, and how much of it is reached."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from .recorded import Recorded
+from .ways_to_log import POSE
+
+CLEAN = "clean"
+WITHIN = 0.3  # of the noise that there is: the estimate counts as right, and as one that is known
+KEPT, WORSE = 0.8, 1.3  # share of the ways that keep verdict and cause; error over the clean one
+SURE = 0.8  # confidence from which on a cause that is not there is wrong
+
+
+def line(o: Recorded, clean: Recorded | None) -> str:
+    """A row of the table that is printed; a noise that is said to be unknown in parentheses."""
+    pairs = zip(o.noise, o.rel_std, strict=True)
+    ratio = " ".join(
+        "-" if np.isnan(r) else f"{r:.2f}" if std <= WITHIN else f"({r:.2f})" for r, std in pairs
+    )
+    said = ", ".join(f"{e} {'-' if c is None else f'{c:.2f}'}" for e, c in o.found.items())
+    doubt = f"; doubted: {' '.join(o.doubted)}" if o.doubted else ""
+    error = f"{o.error / clean.error:.2f}" if clean is not None and o.error > 0.0 else "-"
+    return f"| {o.way} | {o.refused or ratio}{doubt} | {o.verdict} {said} | {error} | {o.seconds:.0f} |"
+
+
+def aims(found: Sequence[Recorded], there: Sequence[str] | None) -> Iterator[tuple[str, str]]:
+    """Each aim, and how much of it is reached.
+
+    Args:
+        found: what was made of each way.
+        there: effects that there are; None: those that the clean log is sure of, if it was learned from.
+    """
+    read_ones = [o for o in found if not o.refused]
+    yield "none refused", f"{len(found) - len(read_ones)} of {len(found)} refused"
+    noise = [p for o in read_ones if not o.misstated for p in zip(o.noise, o.rel_std, strict=True)]
+    white = [(ratio, std) for ratio, std in noise if np.isfinite(ratio)]
+    known = [abs(np.log(ratio)) < np.log1p(WITHIN) for ratio, std in white if std <= WITHIN]
+    if known:
+        unknown = f"{len(white) - len(known)} are said to be unknown"
+        yield f"noise within {WITHIN:.0%}", f"{sum(known)} of {len(known)} channels; {unknown}"
+    wrong = [o for o in read_ones if o.misstated]
+    if wrong:
+        doubted = sum({*o.misstated} <= {*o.doubted} for o in wrong)
+        yield "a noise that is given wrongly is doubted, with odds", f"{doubted} of {len(wrong)}"
+    rights = [o for o in read_ones if not o.misstated]
+    unduly = sum(len(o.doubted) for o in rights)
+    yield "no other is", f"{unduly} channels of {len(POSE) * len(rights)}"
+    clean = next((o for o in found if o.way == CLEAN), None)
+    if clean is None or not clean.verdict:
+        return
+    others = [o for o in read_ones if o is not clean]
+    limited = [o for o in others if not o.misstated]
+    kept = sum(o.verdict == clean.verdict and {*o.found} == {*clean.found} for o in limited)
+    yield f"{KEPT:.0%} keep verdict and cause", f"{kept} of {len(limited)}"
+    true = {e for e, c in clean.found.items() if (c or 0.0) >= SURE} if there is None else {*there}
+    sure = [o.way for o in others if {e for e, c in o.found.items() if (c or 0.0) >= SURE} - true]
+    yield f"none sure ({SURE}) of an absent cause", f"{len(sure)} of {len(others)}: {', '.join(sure)}"
+    errors = {o.way: o.error / clean.error for o in limited if np.isfinite(o.error)}
+    if errors:
+        worst = max(errors, key=lambda way: errors[way])
+        median = f"{np.median([*errors.values()]):.2f}, worst {errors[worst]:.2f} ({worst})"
+        yield f"held-out error over the clean one, median at most {WORSE}", median

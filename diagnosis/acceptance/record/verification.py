@@ -1,0 +1,186 @@
+"""Check a validation record: ``python -m diagnosis.verify validation.json``."""
+
+import json
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel, ValidationError
+
+from cosim import InputError
+from cosim.command import printable
+from cybership.message_text import first_fault
+
+from ...execution.result_folder import sha256
+from .provenance import code
+from .record_keys import FORM
+from .signature import is_signed
+
+# What compare writes next to a record, so that a file of that name is no copy of one that it read.
+OUTPUTS = ("comparison.json", "report.html", "map.json")
+SIGNATURE, KEY, CODE = "signature", "key", "code"  # names that --allow-missing takes besides files
+
+
+class HashedFile(BaseModel):
+    """A file that a record names."""
+
+    role: str = "criteria"
+    path: str
+    sha256: str
+
+
+class RunSamples(BaseModel):
+    """The samples of a run, and the file that they are from; empty: none."""
+
+    run: str
+    file: str
+
+
+class CodeHash(BaseModel):
+    """The code that made a record."""
+
+    version: str
+    sha256: str
+
+
+class Record(BaseModel):
+    """What is checked of a record."""
+
+    form: str
+    code: CodeHash
+    criteria: HashedFile
+    files: list[HashedFile]
+    samples: list[RunSamples]
+    reports: list[HashedFile]
+    public_key: str | None
+
+
+class Check(NamedTuple):
+    """One thing that was checked: whether it holds, in a line.
+
+    Attributes:
+        holds: None: it could not be checked.
+        line: what was found.
+        name: by which it may be missing, see :func:`verify_record`.
+        allowed: whether it may.
+    """
+
+    holds: bool | None
+    line: str
+    name: str = ""
+    allowed: bool = False
+
+
+def verify_record(
+    record: str | Path, key: str | Path | None = None, allow_missing: Collection[str] = ()
+) -> list[Check]:
+    """Check the signature of a record, the code, and the hashes of all files that it names.
+
+    A file is looked for as it was given, from here and from the record's folder, and by its name in the
+    record's folder. Wherever one is found, it must be the one that the record names.
+
+    Args:
+        record: ``validation.json``; its signature lies beside it.
+        key: file of the public key (PEM) that must have signed; None: the one that the record names, of
+            which nobody says whose it is.
+        allow_missing: what need not be checked: ``signature``, ``key``, ``code``, and files by their
+            name, their path or what they are for.
+
+    Raises:
+        InputError: it is no record, or no key; a name that is allowed to be missing is none of these.
+    """
+    path = Path(record)
+    raw, content = _read(path)
+    files = [content.criteria, *content.files, *content.reports]
+    checks = [_signature(path, raw, content, key), *_whose(content, key), _code(content)]
+    checks += [_check(f, path.parent, files) for f in files]
+    tables = [s.run for s in content.samples if not s.file]
+    checks += [Check(None, f"data: run {run} was a table in memory", run) for run in tables]
+    known = {SIGNATURE, KEY, CODE, *tables, *(n for f in files for n in _names(f))}
+    for name in allow_missing:
+        if name not in known:
+            raise InputError(
+                f"nothing called '{name}' can be missing; there are {', '.join(sorted(known))}"
+            )
+    return [
+        c._replace(allowed=c.holds is None and not {*c.name.split("\n")}.isdisjoint(allow_missing))
+        for c in checks
+    ]
+
+
+def _read(path: Path) -> tuple[bytes, Record]:
+    try:
+        raw = path.read_bytes()
+        json.loads(raw, object_pairs_hook=_once)
+        content = Record.model_validate_json(raw, strict=True)
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
+    except ValidationError as error:
+        raise InputError(f"'{path}' is no validation record: {first_fault(error)}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' is no validation record: {error}") from None
+    if content.form != FORM:
+        raise InputError(f"'{path}' is not of the form '{FORM}' but of '{content.form[:40]}'")
+    return raw, content
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object without a key twice, of which readers would take one or the other."""
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("a key stands twice in one object")
+    return dict(pairs)
+
+
+def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) -> Check:
+    beside, named = path.with_suffix(".sig"), content.public_key
+    if not beside.exists():
+        if key is None and named is None:
+            return Check(None, "signature: none; a change of the record would not show", SIGNATURE)
+        return Check(False, f"signature: '{beside.name}' is missing beside the record")
+    if key is not None:
+        try:
+            public = Path(key).read_bytes()
+        except OSError as error:
+            raise InputError(f"the key '{key}' cannot be read: {error.strerror or error}") from None
+        where, by = f"'{key}'", f"of {key}"
+    elif named is not None:
+        public, where, by = named.encode(), "public_key of the record", "that the record names"
+    else:
+        return Check(False, "signature: there is one, but the record names no key; --key gives one")
+    holds = is_signed(raw, beside.read_bytes(), public, where)
+    return Check(holds, f"signature: {'' if holds else 'not of this record '}by the key {by}")
+
+
+def _whose(content: Record, key: str | Path | None) -> Iterator[Check]:
+    if content.public_key is not None and key is None:
+        yield Check(
+            None, "key: whose it is that the record names is not known; --key gives the signer's", KEY
+        )
+
+
+def _code(content: Record) -> Check:
+    here, there = code(), content.code
+    same = there.sha256 == here["sha256"]
+    told = f"code: cybership {there.version}, SHA-256 {there.sha256}"
+    return Check(
+        True if same else None, f"{told}: {'the same as' if same else 'another than'} here", CODE
+    )
+
+
+def _names(f: HashedFile) -> list[str]:
+    return [f.role, f.path, Path(f.path).name]
+
+
+def _check(f: HashedFile, folder: Path, files: Collection[HashedFile]) -> Check:
+    told, name = f"{f.role}: {printable(f.path)}", Path(f.path).name
+    names, copy = "\n".join(_names(f)), (folder / name).resolve()
+    named = {(folder / f.path).resolve(), Path(f.path).resolve()}
+    places = named if name in OUTPUTS else {*named, copy}
+    found = {place: h for place in sorted(places) if (h := sha256(place))}
+    # A copy in the record's folder may be of another file of that name, such as the log of another run.
+    others = {each.sha256 for each in files if Path(each.path).name == name}
+    wrong = [p for p, h in found.items() if h != f.sha256 and (p in named or h not in others)]
+    found = {place: h for place, h in found.items() if h == f.sha256}
+    if wrong:
+        return Check(False, f"{told}: differs ({', '.join(map(str, wrong))})")
+    return Check(True if found else None, f"{told}: {'the same' if found else 'not found here'}", names)

@@ -1,0 +1,158 @@
+"""How likely the motion of a run is by a way to read its file, whatever the ship lacks within reason.
+
+The force that a model lacks in weak form, e = z - T, is explained by what may be wrong with the model,
+
+    r = e - sum_k b_k x_k,    b_k ~ N(0, s_k^2), between limits,
+
+where x_k are the force of each thruster and that on each axis, of which any share may be lost and as
+much be gained as the description's deviations allow, what each axis pushes beside the other two, the
+hull's force of each axis, and forces that are steady in the body or on earth. What remains is noise of
+the size that it has, but never less than a share of the inertial force, as no model is exact. The most
+likely b give the density of the motion; densities are of the file's numbers, so that a length in feet
+is less dense than one in metres.
+
+So many windows tell one reading from another with any certainty, if only the model were true. It is
+not, and counts as if it had been drawn from :data:`WINDOWS` independent ones at the most (J. W. Miller,
+D. B. Dunson, Robust Bayesian inference via coarsening, J. Am. Stat. Assoc. 114, 2019).
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ..predictors import Model, WeakWindows, omega
+from ..predictors.thrust import full_thrust
+from ..predictors.weak_form import OVERLAP
+from .readings import Reading, inertial, needed, reread
+from .settings import SETTINGS
+
+ROUNDS = 5  # of noise and explanation in turn; the density is then within 0.1 of its limit
+
+
+@dataclass
+class Explanation:
+    """Columns (K, 3) that may explain a model error, with deviation and limits of their factors."""
+
+    columns: list[np.ndarray] = field(default_factory=list)
+    priors: list[tuple[float, float, float]] = field(default_factory=list)
+
+    def may(
+        self, column: np.ndarray, deviation: float, low: float = -np.inf, high: float = np.inf
+    ) -> None:
+        """Add a column; one without any deviation explains nothing."""
+        if deviation > 0.0:
+            self.columns.append(column)
+            self.priors.append((deviation, low, high))
+
+    def density(self, e: np.ndarray, least: np.ndarray, windows: float) -> float:
+        """Logarithm of the density of a model error.
+
+        Args:
+            e: (K, 3), the model error.
+            least: (3,), its noise at the least.
+            windows: number of independent ones that it counts as.
+        """
+        s, low, high = np.array(self.priors).T
+        x, unit = np.array(self.columns) * s[:, None, None], np.eye(s.size)
+        r, b, design = e, np.zeros(s.size), unit
+        for _ in range(ROUNDS):
+            noise = np.sqrt((r**2).mean(axis=0) + least**2)
+            weight = np.sqrt(windows / len(e)) / noise
+            A = np.column_stack([(x * weight).reshape(s.size, -1).T, (e * weight).ravel()])
+            R = np.linalg.qr(A).R  # as good as the rows, and few
+            design, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
+            b = lsq_linear(design, y, (low / s, high / s), method="bvls").x
+            r = e - np.tensordot(b, x, 1)
+        noise = np.sqrt((r**2).mean(axis=0) + least**2)
+        known = np.linalg.slogdet(design.T @ design)[1]
+        return float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
+
+
+class ReadingOdds:
+    """The densities of readings of one run.
+
+    Args:
+        w: windows of the run as it was read.
+        model: of its ship.
+    """
+
+    def __init__(self, w: WeakWindows, model: Model) -> None:
+        self.w, self.model = w, model
+        independent = w.middle.size / OVERLAP
+        self._full = most_thrust(w, model)
+        self.windows = independent * SETTINGS.windows / (independent + SETTINGS.windows)
+
+    def log_density(self, reading: Reading) -> float:
+        """Logarithm of the density of the run's motion by a reading."""
+        with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
+            w = reread(self.w, reading, self.model)
+            e, z, a = omega(w, self.model), needed(w, self.model), inertial(w, self.model)
+            each = [omega(w, self.model.plus({n: 1.0})) - e for n in self._thrusters]
+            streams = [omega(w, self.model.plus({n: self._stream})) - e for n in ("V_n", "V_e")]
+            found = np.concatenate([e, z, a, *each, *streams])
+        if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
+            return -np.inf
+        why, T = self._steady(w), z - e
+        for stream in streams:
+            why.may(stream, 1.0)
+        gains = [*[self._gain] * len(each), *np.hypot(self._gain, self._inertia)]
+        axes = np.eye(3)
+        for part, gain in zip([*each, *(T * axis for axis in axes)], gains, strict=True):
+            why.may(part, gain, 0.0)  # an inertia that is less is as well a force that is more
+            why.may(-part, SETTINGS.lost, 0.0, 1.0)
+        for axis in axes:
+            why.may((a - z) * axis, 1.0, -1.0)
+        return why.density(e, SETTINGS.inexact * np.sqrt((a**2).mean(axis=0)), self.windows) + (
+            self.windows * reading.density
+        )
+
+    def _steady(self, w: WeakWindows) -> Explanation:
+        """Forces that are steady in the body or on earth."""
+        north, east = (
+            w.smooth @ np.where(w.known, f(np.nan_to_num(w.smoothed.eta[:, 2])), 0.0)
+            for f in (np.cos, np.sin)
+        )
+        zero, one, why = np.zeros_like(north), np.ones_like(north), Explanation()
+        for j, size in enumerate(SETTINGS.steady * self._full):
+            why.may(np.column_stack([one if k == j else zero for k in range(3)]), size)
+        for column in ([north, -east, zero], [east, north, zero]):
+            why.may(np.column_stack(column), SETTINGS.steady * float(self._full[0]))
+        return why
+
+    @property
+    def _stream(self) -> float:
+        """Deviation of a current [m/s]."""
+        return SETTINGS.steady * self.model.ship.scale.speed
+
+    @cached_property
+    def _thrusters(self) -> list[str]:
+        """Parameters by which a thruster loses its force; of a single one the axes tell as much."""
+        effects = self.model.ship.effects.of_kind("actuator")
+        axes = {f"loss_{axis}" for axis in ("surge", "sway", "yaw")}
+        names = [p.name for e in effects if e.id.startswith("loss_") for p in e.parameters]
+        found = [name for name in names if name not in axes]
+        return found if len(found) > 1 else []
+
+    @cached_property
+    def _gain(self) -> float:
+        """Relative deviation of the thrusters' forces."""
+        known = self.model.ship.coefficients.items()
+        return max([k.share for n, k in known if k.group == "thrust"], default=0.0)
+
+    @cached_property
+    def _inertia(self) -> np.ndarray:
+        """(3,), relative deviation of the inertia of each axis."""
+        own, model = self.model.mass.diagonal(), self.model
+        known = [(n, k) for n, k in model.ship.coefficients.items() if model.owner(n) == "vessel"]
+        others = [model.plus({n: k.deviation(model.value(n))}) for n, k in known]
+        changes = [other.mass.diagonal() - own for other in others]
+        return np.sqrt(np.square(changes).sum(axis=0)) / own
+
+
+def most_thrust(w: WeakWindows, model: Model) -> np.ndarray:
+    """(3,), force and moment [N, N, N m] that a ship can do at the most, sideways as much as ahead."""
+    full = np.fmax(full_thrust(model), np.abs(w.run.tau_cmd).max(axis=0))
+    force = full[:2].max()
+    return np.array([force, force, full[2] or 0.5 * force * model.ship.description.length])

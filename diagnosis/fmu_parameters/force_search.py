@@ -1,0 +1,210 @@
+"""Which additional force explains what parameters do not."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..execution.progress import Advance
+from .additional_force import SHAPES, AdditionalForce
+from .parameter_fit import ParameterFit, added, fit
+from .residuals import Setting, WindowResiduals, replaced
+
+TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
+# Correlation of two signals that are one, and of what two forces change beyond parameters, which no such
+# run discriminates.
+SAME = 0.999  # chosen
+PROBABLE = 0.05  # of a candidate that belongs to the set of those that cannot be told apart; chosen
+ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
+SMALL = 1e-2  # of an input's usual size, a force by which the unit of a coefficient is found; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """An additional force that is in the model.
+
+    Attributes:
+        force: with its coefficient.
+        probability: that it is the cause, of all candidates and of none.
+        together: the same of it and of those that cannot be told from it.
+        alike: these.
+        gain: by which the cost falls.
+    """
+
+    force: AdditionalForce
+    probability: float
+    together: float
+    alike: tuple[str, ...]
+    gain: float
+
+
+def candidates(
+    inputs: Sequence[str], outputs: Sequence[str], measured: Sequence[str]
+) -> list[AdditionalForce]:
+    """The forces that are tried.
+
+    Args:
+        inputs: on which they may act.
+        outputs: that they may be functions of.
+        measured: those of which the derivative by time is tried as well.
+    """
+    found = []
+    for i in inputs:
+        found.append(AdditionalForce(i))
+        for y in outputs:
+            rates = (False, True) if y in measured else (False,)
+            found += [AdditionalForce(i, y, k, rate) for rate in rates for k in range(len(SHAPES))]
+    return found
+
+
+def search(
+    r: WindowResiduals,
+    at: ParameterFit,
+    possible: Sequence[AdditionalForce],
+    usual: dict[str, float],
+    temper_of: Callable[[ParameterFit], float],
+    advance: Advance,
+) -> tuple[ParameterFit, Accepted] | None:
+    """The force that explains most beyond the parameters, if it is more than chance.
+
+    Every candidate is as probable as any other, and all together as none (Schwarz, 1978, for the
+    coefficient; Laplace for the parameters).
+
+    Args:
+        r: the residuals.
+        at: the fit without it.
+        possible: the candidates.
+        usual: of each input a usual size.
+        temper_of: by which squares are divided where the residuals of a fit are not as white as noise.
+        advance: receives the name of each step.
+    """
+    advance("which additional force explains the residual")
+    present = {f.id for f in at.setting.forces}
+    tried = [f for f in _distinct(r, at, possible) if f.id not in present]
+    scaled = _scaled(r, at, tried, usual)
+    if not scaled:
+        return None
+    kept, same = _promising(at, scaled)
+    charge = float(np.log(r.samples) + 2.0 * np.log(len(scaled)))
+    fits: list[tuple[float, ParameterFit, AdditionalForce]] = []
+    for gain, force, size in kept:
+        if gain < charge / 4.0:  # a fit gains hardly more than its slopes promise
+            continue
+        advance(f"fit with {force.id}")
+        begin, sizes = added(at, force, size)
+        one = fit(r, begin, sizes)
+        fits.append((2.0 * (one.log_evidence - at.log_evidence), one, force))
+    if not fits:
+        return None
+    temper = temper_of(min((one for _, one, _ in fits), key=lambda one: one.cost))
+    fits = [(gain / temper - charge, one, force) for gain, one, force in fits]
+    fits.sort(key=lambda x: -x[0])
+    if fits[0][0] <= 0.0:
+        return None
+    log = 0.5 * np.array([0.0, *(score for score, *_ in fits)])
+    weight = np.exp(log - log.max())
+    weight /= weight.sum()
+    own = weight[1:]
+    best, (_, one, force) = float(own[0]), fits[0]
+    near = [f.id for w, (_, _, f) in zip(own, fits, strict=True) if f.id != force.id and w > PROBABLE]
+    alike = (*same.get(force.id, ()), *near)
+    end = one.setting.forces[-1]
+    gained = Accepted(end, best, float(own[own > PROBABLE].sum()), alike, at.cost - one.cost)
+    return one, gained
+
+
+def _promising(
+    at: ParameterFit, scaled: Sequence[tuple[AdditionalForce, float, np.ndarray]]
+) -> tuple[list[tuple[float, AdditionalForce, float]], dict[str, list[str]]]:
+    """The forces that promise most by slopes, all parameters free, and to each those like it.
+
+    Returns:
+        Gain in cost, force, and unit of its coefficient, of each; id -> ids of those like it.
+    """
+    J, e = _with_prior(at), np.concatenate([at.residuals, at.setting.z])
+    Q = np.linalg.qr(J)[0] if J.shape[1] else np.zeros((len(e), 0))
+    ranked = []
+    for force, size, s in scaled:
+        beyond = np.concatenate([s, np.zeros(len(at.setting.z))])
+        beyond = beyond - Q @ (Q.T @ beyond)
+        norm = float(np.linalg.norm(beyond))
+        # What the parameters do as well is no candidate: its change is theirs to rounding.
+        if norm > ROUNDING * np.linalg.norm(s):
+            ranked.append((float(beyond @ e) ** 2 / norm**2, force, size, beyond / norm))
+    ranked.sort(key=lambda x: -x[0])
+    kept, same = [], {}
+    for entry in ranked:
+        twin = next((k for k in kept if abs(float(k[3] @ entry[3])) > SAME), None)
+        if twin is not None:
+            same.setdefault(twin[1].id, []).append(entry[1].id)
+        elif len(kept) < TRIED:
+            kept.append(entry)
+    return [entry[:3] for entry in kept], same
+
+
+def _with_prior(at: ParameterFit) -> np.ndarray:
+    p = len(at.setting.z)
+    return np.concatenate([at.slopes, np.eye(p, at.slopes.shape[1])])
+
+
+def _distinct(
+    r: WindowResiduals, at: ParameterFit, possible: Sequence[AdditionalForce]
+) -> list[AdditionalForce]:
+    """The forces without those of a signal that is another one by another name."""
+    outputs = [p.outputs for p in r.predict([at.setting])[0]]
+    signals: dict[tuple[str, bool], np.ndarray] = {("", False): np.zeros(0)}
+    wanted = {(f.output, f.rate) for f in possible if f.output}
+    for name, rate in sorted(wanted, key=lambda key: (key[1], r.processes.outputs.index(key[0]))):
+        k = r.processes.outputs.index(name)
+        parts = [np.gradient(y[:, k]) if rate else y[:, k] for y in outputs]
+        y = np.concatenate([part - part.mean() for part in parts])
+        size = float(np.linalg.norm(y))
+        if size > 0.0 and all(abs(float(y @ x)) < SAME * size for x in signals.values() if x.size):
+            signals[name, rate] = y / size
+    return [f for f in possible if (f.output, f.rate) in signals]
+
+
+def _scaled(
+    r: WindowResiduals, at: ParameterFit, forces: Sequence[AdditionalForce], usual: dict[str, float]
+) -> list[tuple[AdditionalForce, float, np.ndarray]]:
+    """Each force with a unit of its coefficient, and the slope (n,) of the residuals by that unit.
+
+    A unit changes the residuals by their own size. Those that change nothing are left out.
+    """
+    base = at.residuals
+    wanted = max(float(np.linalg.norm(base)), 1.0)
+    sizes = {o: _size(r, k) for k, o in enumerate(r.processes.outputs)}
+
+    def by(pairs: Sequence[tuple[AdditionalForce, float]]) -> list[np.ndarray]:
+        settings = [Setting(at.setting.z, (*at.setting.forces, replaced(f, c))) for f, c in pairs]
+        return [x - base for x in r.whitened(settings)]
+
+    def first(f: AdditionalForce) -> float:
+        y = sizes.get(f.output, 1.0) if f.output else 1.0
+        if f.rate:
+            y /= max(float(np.median([w.time[-1] for w in r.windows])) / 10.0, 1e-9)
+        power = f.shape + 1
+        return SMALL * usual[f.input] / max(y, 1e-12) ** power
+
+    guess = [(f, first(f)) for f in forces]
+    found = []
+    for (f, c), change in zip(guess, by(guess), strict=True):
+        norm = float(np.linalg.norm(change))
+        if np.isfinite(norm) and norm > 1e-6:
+            found.append((f, c * 0.1 * wanted / norm))
+    changes = zip(found, by(found), strict=True)
+    return [
+        (f, 10.0 * c, 10.0 * change)
+        for (f, c), change in changes
+        if np.isfinite(change).all() and change.any()
+    ]
+
+
+def _size(r: WindowResiduals, k: int) -> float:
+    """A usual size of an output: of a measured one its spread, of another one that of its prediction."""
+    if k < r.noise.size:
+        y = np.concatenate([w.measured[:, k] for w in r.windows])
+    else:
+        zero = Setting((0.0,) * len(r.parameters))
+        y = np.concatenate([p.outputs[:, k] for p in r.predict([zero])[0]])
+    return max(float(np.sqrt(np.nanmean(y**2))), 1e-12) if np.isfinite(y).any() else 1.0

@@ -1,0 +1,200 @@
+"""A, B, C, D of an FMU about a state, by central differences of its first moments from there."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.io import savemat
+
+from cosim import InputError
+from cosim.fmu import ConfinedFmu, FmuModel
+from cybership.message_text import quoted
+
+from ..predictors.black_box import MOTION, TAU
+from ..predictors.fmu.short_steps import ShortSteps
+from ..predictors.fmu.variable_map import VariableMap, propose
+from ..report.document import write_json
+from ..runs import QUANTITY
+from .system_map import SystemMap, column_of_start
+
+SMALL = 1e-3  # of a value, or of one unit where that is less, the step of a difference; chosen
+STEP = 1e-3  # s, of the short steps where the FMU suggests none; chosen
+
+
+class LinearState(NamedTuple):
+    """A state of an FMU.
+
+    Attributes:
+        name: of the variable that sets it.
+        seen: variable by which it is seen.
+        order: of the derivative of that which is the state's own rate: 1, or 2 of a velocity that is
+            seen by its position; 0: that is the rate itself.
+    """
+
+    name: str
+    seen: str
+    order: int
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """d/dt x = x_dot + A (x - x0) + B (u - u0), y = y0 + C (x - x0) + D (u - u0).
+
+    Attributes:
+        states, inputs, outputs: names of the variables.
+        at: variable -> value about which: states and inputs, and what outputs are there.
+        x_dot: (n,), rate of the states there.
+        A, B, C, D: the matrices.
+    """
+
+    states: Sequence[str]
+    inputs: Sequence[str]
+    outputs: Sequence[str]
+    at: Mapping[str, float]
+    x_dot: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+
+    def write(self, folder: Path, units: Mapping[str, str]) -> list[str]:
+        """Write ``linear.json`` and ``linear.mat``; returns their names."""
+
+        def told(names: Sequence[str]) -> list[dict[str, object]]:
+            return [{"name": n, "unit": units[n], "value": self.at[n]} for n in names]
+
+        groups = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
+        matrices = {"A": self.A, "B": self.B, "C": self.C, "D": self.D}
+        roots = np.linalg.eigvals(self.A) if self.A.size else np.zeros(0)
+        content = {
+            **{group: told(names) for group, names in groups.items()},
+            "x_dot": self.x_dot.tolist(),
+            **{name: m.tolist() for name, m in matrices.items()},
+            "eigenvalues": [[float(x.real), float(x.imag)] for x in roots],
+        }
+        write_json(folder / "linear.json", content)
+        cells = {
+            f"{group}{more}": np.array([of(n) for n in names], dtype=object)
+            for group, names in groups.items()
+            for more, of in (("", str), ("_units", units.__getitem__))
+        }
+        savemat(folder / "linear.mat", {**matrices, "x_dot": self.x_dot, **cells})
+        return ["linear.json", "linear.mat"]
+
+
+def states_of(model: FmuModel, given: SystemMap | None) -> list[LinearState]:
+    """The states of an FMU that can be set: by a map, else those that it lists, else those of a ship.
+
+    Raises:
+        InputError: none is known.
+    """
+    if given is not None and given.start:
+        return _of_map(given)
+    listed = _listed(model)
+    if listed:
+        return listed
+    commands = {s: QUANTITY[s] for s in TAU}
+    found = _of_ship(propose(model, commands))
+    if not found:
+        raise InputError(
+            f"no state of '{model.path.name}' can be set: it lists none with an exact start value, and "
+            "a --map with 'start' is missing"
+        )
+    return found
+
+
+def _of_map(given: SystemMap) -> list[LinearState]:
+    rates = {column_of_start(key)[0] for key in given.start if column_of_start(key)[1]}
+    found = []
+    for key, c in given.start.items():
+        column, rate = column_of_start(key)
+        found.append(
+            LinearState(c.name, given.outputs[column].name, 2 if rate and column in rates else 1)
+        )
+    return found
+
+
+def _listed(model: FmuModel) -> list[LinearState]:
+    """Those of the model structure.
+
+    Raises:
+        InputError: one cannot be set.
+    """
+    found = []
+    for unknown in model.description.derivatives:
+        rate = unknown.variable
+        state = getattr(rate, "derivative", None)
+        if rate is None or state is None:
+            continue
+        if not model.can_be_set(model.variables[state.name]):
+            raise InputError(
+                f"state {quoted(state.name)} of '{model.path.name}' cannot be set; a --map with 'start' "
+                "names start values of the states to linearise in"
+            )
+        found.append(LinearState(state.name, rate.name, 0))
+    return found
+
+
+def _of_ship(found: VariableMap) -> list[LinearState]:
+    start, outputs = found.told("start"), found.told("outputs")
+    both = [s for s in MOTION if s in start and s in outputs]
+    return [LinearState(start[s].name, outputs[s].name, 1) for s in both]
+
+
+def linearised(
+    model: FmuModel, states: Sequence[LinearState], at: Mapping[str, float], outputs: Sequence[str]
+) -> LinearModel:
+    """The linear model about a state.
+
+    Args:
+        model: the FMU.
+        states: that are set.
+        at: variable -> value; what it does not name has its start value.
+        outputs: of the linear model.
+
+    Raises:
+        InputError: the FMU refuses the state, or fails; a name that cannot be set.
+    """
+    real = [v for v in model.variables.values() if v.type == "Real"]
+    inputs = [v.name for v in real if v.causality == "input"]
+    start = {s.name: float(model.variables[s.name].start or 0.0) for s in states}
+    start |= {n: x for n, x in at.items() if n not in inputs}
+    driven = {n: at.get(n, float(model.variables[n].start or 0.0)) for n in inputs}
+    suggested = model.description.defaultExperiment
+    h = float(suggested.stepSize) if suggested is not None and suggested.stepSize else STEP
+    seen = [*outputs, *(s.seen for s in states)]
+    with closing(ConfinedFmu(model)) as fmu, closing(ShortSteps(fmu, inputs, seen, h, False)) as steps:
+
+        def answer(start: Mapping[str, float], driven: Mapping[str, float]) -> np.ndarray:
+            found = steps.run(start, driven)
+            rates = []
+            for s in states:
+                x = found[s.seen]
+                rates.append(x[0] if s.order == 0 else steps.derivatives(x)[s.order - 1])
+            return np.array([*rates, *(found[n][0] for n in outputs)])
+
+        base = answer(start, driven)
+        columns = []
+        for name in (*(s.name for s in states), *inputs):
+            value = {**start, **driven}[name]
+            d = SMALL * max(abs(value), 1.0)
+            sides = []
+            for moved in (value - d, value + d):
+                changed = {name: moved}
+                if name in driven:
+                    sides.append(answer(start, {**driven, **changed}))
+                else:
+                    sides.append(answer({**start, **changed}, driven))
+            columns.append((sides[1] - sides[0]) / (2.0 * d))
+    J = np.column_stack([*columns, np.zeros((base.size, 0))])
+    if not (np.isfinite(J).all() and np.isfinite(base).all()):
+        raise InputError(f"'{model.path.name}' has no finite slopes in this state")
+    n, m = len(states), len(states)
+    values = {**start, **driven, **dict(zip(outputs, base[n:].tolist(), strict=True))}
+    names = [s.name for s in states]
+    return LinearModel(
+        names, inputs, list(outputs), values, base[:n], J[:n, :m], J[:n, m:], J[n:, :m], J[n:, m:]
+    )

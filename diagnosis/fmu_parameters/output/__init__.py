@@ -1,0 +1,1 @@
+"""A calibration as files, text and page, and ``learn`` that makes them."""

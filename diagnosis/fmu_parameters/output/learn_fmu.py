@@ -1,0 +1,99 @@
+"""``learn`` with an FMU whose own parameters are calibrated."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ...execution.progress import Advance
+from ...execution.result_folder import together
+from ...predictors import WRITTEN
+from ..residuals import WindowResiduals
+from ..sensitivity import refuse_unknown, sensitivities
+from ..ship_task import ship_task
+from ..system_calibration import calibrate
+from ..system_task import SystemTask, system_task
+from .system_content import CalibrationReport
+from .system_plots import plots_of
+
+FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
+OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.csv", "coefficients.tex")
+
+
+def learn_system(
+    options: argparse.Namespace, advance: Advance, origin: dict[str, str]
+) -> CalibrationReport:
+    """Calibrate the FMU of any system, and write the result.
+
+    Args:
+        options: of the command.
+        advance: receives the name of each step.
+        origin: what the result was made with.
+
+    Raises:
+        InputError: FMU, map, parameters or runs are not as they should be.
+    """
+    runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
+    task = system_task(options.model, options.map, runs, options.parameters, options.horizon)
+    try:
+        parts = task.residuals()
+        train = parts["train"]
+        if options.parameters is None:
+            _only_known(task, parts, advance)
+        result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
+        use = {r.name: u for u, every in task.runs.items() for r in every}
+        content = task.map.model_dump(exclude_none=True)
+        units = dict(zip(task.names, task.units, strict=True))
+        report = CalibrationReport(result, task.model, content, use, train.samples, units, task.notes)
+        return written(report, options.out, origin, parts, task.names, advance)
+    finally:
+        task.close()
+
+
+def written(
+    report: CalibrationReport,
+    out: Path,
+    origin: dict[str, str],
+    parts: Mapping[str, WindowResiduals],
+    names: Sequence[str],
+    advance: Advance,
+) -> CalibrationReport:
+    """Write a report; files of an older result go away."""
+    advance("report")
+    with together(out, [*dict.fromkeys((*FILES, *OTHERS, *WRITTEN))]) as new:
+        report.write(new, origin, plots_of(parts, report.result, names))
+    return report
+
+
+def _only_known(task: SystemTask, parts: Mapping[str, WindowResiduals], advance: Advance) -> None:
+    """Leave to be calibrated what the runs can tell, within the range in which the FMU works.
+
+    Raises:
+        InputError: they can tell nothing.
+    """
+    found = sensitivities(parts["train"], advance)
+    refuse_unknown(found)
+    task.notes += [s.fault for s in found.each if s.fault]
+    if untold := [s.parameter.name for s in found.each if not s.known]:
+        task.notes.append(f"The runs do not determine {', '.join(untold)}: kept at the start value.")
+    task.parameters = [s.parameter for s in found.each if s.known]
+    for part in parts.values():
+        part.choose(task.parameters)
+
+
+def learn_ship(
+    options: argparse.Namespace, advance: Advance, origin: dict[str, str]
+) -> CalibrationReport:
+    """Calibrate the FMU of a ship, and write the result; arguments as of :func:`learn_system`."""
+    runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
+    task = ship_task(options, runs, advance)
+    try:
+        parts = task.residuals()
+        train = parts["train"]
+        result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
+        use = {w.run.name: u for u, every in task.runs.items() for w in every}
+        content, units = task.predictor.given.content(), dict(zip(task.names, task.units, strict=True))
+        model, notes = task.fmu.model, task.notes
+        report = CalibrationReport(result, model, content, use, train.samples, units, notes)
+        return written(report, options.out, origin, parts, task.names, advance)
+    finally:
+        task.close()

@@ -1,0 +1,303 @@
+"""A calibration as JSON, as a parameter set, as text for the terminal, and as a page."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+from scipy.stats import norm
+
+import cosim
+from cosim.fmu import FmuModel
+
+from ...report.document import Document, Plot, ReportSection, numbers, write_document, write_json
+from ...report.document import Table as PageTable
+from ..force_search import Accepted
+from ..system_calibration import MOST_MOVED, CalibratedValue, SystemCalibration
+
+Z95 = float(norm.ppf(0.975))
+SENTENCES = {
+    "parameters": "Parameters of the FMU are off, and nothing else is missing.",
+    "found": "The FMU lacks an additional force.",
+    "ambiguous": "The runs do not show which parameter or force is the cause.",
+    "unexplained": "Neither parameters nor additional forces explain the runs.",
+    "none": "The FMU agrees with the runs; nothing is learned.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationReport:
+    """All that is written of a calibration.
+
+    Attributes:
+        result: the calibration.
+        model: the FMU.
+        map: which variable is what, as JSON has it.
+        use: run -> train, validate or test.
+        samples: number of measured values that were learned from.
+        units: output -> unit.
+        notes: what a reader should know of how it was done.
+    """
+
+    result: SystemCalibration
+    model: FmuModel
+    map: Mapping[str, Any]
+    use: Mapping[str, str]
+    samples: int
+    units: Mapping[str, str]
+    notes: Sequence[str] = ()
+
+    def unit(self, variable: str) -> str:
+        """Unit of a variable of the FMU, 1 where it states none."""
+        unit = self.model.variables[variable].unit
+        return "1" if unit is None else unit.name
+
+    def force_unit(self, f: Accepted) -> str:
+        """Unit of a force's coefficient."""
+        y = self.unit(f.force.output) if f.force.output else "1"
+        return f.force.unit(self.unit(f.force.input), y)
+
+    def force_interval(self, k: int) -> tuple[float, float]:
+        """95 % interval of a force's coefficient."""
+        fit, p = self.result.fit, len(self.result.values)
+        value = fit.setting.forces[k].coefficient
+        std = float(np.sqrt(self.result.covariance[p + k, p + k])) * fit.sizes[k]
+        return value - Z95 * std, value + Z95 * std
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in a sentence or two."""
+        r = self.result
+        text = SENTENCES[r.verdict]
+        off = [v.parameter.name for v in r.values if v.moved]
+        if r.verdict in ("found", "ambiguous") and off and r.forces:
+            text += f" Parameters are off as well: {', '.join(off)}."
+        if far := [v.parameter.name for v in r.values if abs(v.z) > MOST_MOVED and v.moved]:
+            text += (
+                f" Beyond three prior standard deviations: {', '.join(far)}; check the value or prior."
+            )
+        if r.rejected:
+            text += f" The fitted values are rejected: {r.rejected}."
+        return text
+
+    def content(self) -> dict[str, Any]:
+        """``diagnosis.json``."""
+        r = self.result
+        return {
+            "verdict": r.verdict,
+            "sentence": self.sentence,
+            "parameters": [self._parameter(v) for v in r.values],
+            "effects": [self._effect(k, f) for k, f in enumerate(r.forces)],
+            "indistinguishable_groups": [list(group) for group in r.together],
+            "remainder": {
+                "significant": r.remainder.significant,
+                "outputs": {
+                    o.name: {"rms": o.rms, "unit": o.unit, "share": o.share, "p": o.p}
+                    for o in r.remainder.outputs
+                },
+                "sentence": r.remainder.sentence,
+            },
+            "possibilities": [],
+            "withdrawn": [{"id": "parameters", "reason": r.rejected}] if r.rejected else [],
+            "suspect_coefficients": [
+                {"name": v.parameter.name, "z": v.z, "value": v.value}
+                for v in r.values
+                if abs(v.z) > MOST_MOVED
+            ],
+            "ranking": [],
+            "data": {"samples": self.samples, "used": self.samples},
+            "errors": [
+                {
+                    "run": run,
+                    "use": self.use[run],
+                    "held_out": self.use[run] == "test",
+                    "outputs": {
+                        n: {"before": before, "after": after, "unit": self.units[n]}
+                        for n, (before, after) in each.items()
+                    },
+                }
+                for run, each in r.errors.items()
+            ],
+            "fmu": {
+                "name": self.model.path.name,
+                "sha256": self.model.sha256,
+                "map": self.map,
+                "faults": list(r.faults),
+                "notes": list(self.notes),
+            },
+        }
+
+    def _parameter(self, v: CalibratedValue) -> dict[str, Any]:
+        p = v.parameter
+        return {
+            "name": p.name,
+            "unit": p.unit,
+            "value": v.value,
+            "ci95": list(v.ci95),
+            "prior": {"value": p.value, "std": p.std, "log": p.log, "origin": p.prior.origin},
+            "z": v.z,
+            "moved": v.moved,
+        }
+
+    def _effect(self, k: int, f: Accepted) -> dict[str, Any]:
+        value = {
+            "value": f.force.coefficient,
+            "unit": self.force_unit(f),
+            "ci95": [*self.force_interval(k)],
+        }
+        return {
+            "id": f.force.id,
+            "input": f.force.input,
+            "axis": "",
+            "coefficients": {f.force.id: value},
+            "confidence": f.probability,
+            "share_of_error": self._share(),
+            "indistinguishable": list(f.alike),
+            "advice": advice(f),
+        }
+
+    def _share(self) -> float:
+        """Share of the first sum of squares that the learned model explains."""
+        return 1.0 - float(np.mean([o.share for o in self.result.remainder.outputs]))
+
+    def write(self, folder: Path, origin: Mapping[str, str], plots: Sequence[Plot]) -> list[str]:
+        """Write all files; returns their names."""
+        write_json(folder / "diagnosis.json", self.content())
+        files = ["diagnosis.json", "model.ssv", "posterior.json", "report.html"]
+        own = {v.parameter.name: v for v in self.result.values} if self.result.changed else {}
+        values = {
+            n: cosim.Parameter(v.value, None if v.parameter.unit == "1" else v.parameter.unit)
+            for n, v in own.items()
+        }
+        units = {v.unit.name: v.unit for n in own if (v := self.model.variables[n]).unit is not None}
+        told = {
+            name: {
+                **{b: float(e) for b, e in zip(cosim.BASE_UNITS, u.exponents or (), strict=False) if e},
+                "factor": u.factor,
+                "offset": u.offset,
+            }
+            for name, u in units.items()
+            if u is not None and u.exponents is not None
+        }
+        name = self.model.name
+        cosim.write_parameters(
+            folder / "model.ssv",
+            cosim.ParameterSet(values={name: values} if values else {}, units=told, name="calibrated"),
+        )
+        write_json(folder / "posterior.json", self._posterior())
+        write_document(folder / "report.html", self._document(origin, plots))
+        return files
+
+    def _posterior(self) -> dict[str, Any]:
+        r = self.result
+        z = r.fit.setting.z
+        slopes = [v.parameter.slope(x) for v, x in zip(r.values, z, strict=True)]
+        scale = np.array([*slopes, *r.fit.sizes])
+        forces = r.fit.setting.forces
+        names = [v.parameter.name for v in r.values]
+        return {
+            "names": [*(f"{self.model.name}.{n}" for n in names), *(f.id for f in forces)],
+            "units": [
+                *(v.parameter.unit for v in r.values),
+                *(f.unit(self.unit(f.input), self.unit(f.output) if f.output else "1") for f in forces),
+            ],
+            "mean": [
+                *(v.parameter.at(x) for v, x in zip(r.values, z, strict=True)),
+                *(f.coefficient for f in forces),
+            ],
+            "covariance": (r.covariance * np.outer(scale, scale)).tolist(),
+        }
+
+    def rows(self) -> Iterator[list[str]]:
+        """Rows of the table of parameters."""
+        for v in self.result.values:
+            p = v.parameter
+            value, low, high, start = numbers([v.value, *v.ci95, p.value], 4)
+            yield [p.name, start, value, f"{low} to {high}", p.unit, "off" if v.moved else ""]
+
+    def force_rows(self) -> Iterator[list[str]]:
+        """Rows of the table of additional forces."""
+        for k, f in enumerate(self.result.forces):
+            value, low, high = numbers([f.force.coefficient, *self.force_interval(k)], 4)
+            alike = ", ".join(f.alike) or "-"
+            yield [
+                f.force.id,
+                value,
+                f"{low} to {high}",
+                self.force_unit(f),
+                f"{f.probability:.0%}",
+                alike,
+            ]
+
+    def error_rows(self) -> Iterator[list[str]]:
+        """Rows of the table of errors."""
+        for run, each in self.result.errors.items():
+            for n, (before, after) in each.items():
+                yield [f"{run} ({USES[self.use[run]]})", n, *numbers([before, after]), self.units[n]]
+
+    def shown(self, out: str) -> Iterator[RenderableType]:
+        """The answer on the terminal."""
+        yield Text(self.sentence, "bold")
+        yield _table(PARAMETERS, self.rows())
+        if self.result.forces:
+            yield _table(FORCES, self.force_rows())
+        for group in self.result.together:
+            yield f"Known only together: {', '.join(group)}."
+        yield _table(ERRORS, self.error_rows())
+        yield self.result.remainder.sentence
+        for f in self.result.forces:
+            if text := advice(f):
+                yield text
+        yield from self.result.faults
+        yield from self.notes
+        yield f"Files in {out}: diagnosis.json, model.ssv, posterior.json, report.html"
+
+    def _document(self, origin: Mapping[str, str], plots: Sequence[Plot]) -> Document:
+        r = self.result
+        sections = [ReportSection("Parameters", tables=[PageTable(PARAMETERS, [*self.rows()], True)])]
+        if r.forces:
+            text = [advice(f) for f in r.forces if advice(f)]
+            table = PageTable(FORCES, [*self.force_rows()], True)
+            sections.append(ReportSection("Additional forces", text, [table]))
+        if r.together:
+            lines = [f"Known only together: {', '.join(group)}." for group in r.together]
+            sections.append(ReportSection("Not identifiable alone", lines))
+        sections.append(
+            ReportSection(
+                "Errors", [r.remainder.sentence], [PageTable(ERRORS, [*self.error_rows()], True)], plots
+            )
+        )
+        if r.faults or self.notes:
+            sections.append(ReportSection("Notes", [*r.faults, *self.notes]))
+        return Document("Calibration of an FMU", self.sentence, sections, origin)
+
+
+PARAMETERS = ("parameter", "start", "value", "95 % interval", "unit", "")
+FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indistinguishable")
+ERRORS = ("run", "output", "rms before", "rms after", "unit")
+USES = {"train": "learned from", "validate": "validates", "test": "test"}
+
+
+def advice(f: Accepted) -> str:
+    """Which run would discriminate; empty: none is needed."""
+    if not f.alike:
+        return ""
+    others = ", ".join(f.alike)
+    if f.force.output:
+        return (
+            f"{f.force.id} is indistinguishable from {others}: run with other sizes of {f.force.output}."
+        )
+    return f"{f.force.id} is indistinguishable from {others}: run with more motion."
+
+
+def _table(header: Sequence[str], rows: Iterator[Sequence[str]]) -> Table:
+    made = Table(box=None, pad_edge=False, header_style="")
+    for k, name in enumerate(header):
+        made.add_column(name, justify="left" if k in (0, len(header) - 1) else "right", overflow="fold")
+    for row in rows:
+        made.add_row(*map(Text, row))
+    return made

@@ -1,0 +1,273 @@
+"""The file of parameters to calibrate: ``parameters.json``, its checks, and a first proposal of it::
+
+{
+    "parameters": [
+        {"name": "mass.m", "unit": "kg", "value": 2.0, "min": 0.0, "log": true,
+         "prior": {"rel_std": 0.1, "origin": "mass: chosen"}}
+    ]
+}
+"""
+
+import json
+import re
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import (
+    AllowInfNan,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PositiveFloat,
+    ValidationError,
+    model_validator,
+)
+
+import cosim
+from cosim import InputError, Unit
+from cosim.errors import nearest
+from cosim.fmu import FmuModel, FmuVariable
+from cybership.message_text import first_fault, quoted
+
+Positive = Annotated[PositiveFloat, AllowInfNan(False)]
+
+
+class Kind(NamedTuple):
+    """What is known of all parameters with some dimension before any data.
+
+    Attributes:
+        name: of the kind.
+        exponents: of kg, m, s, A, K, mol, cd.
+        rel_std: relative standard deviation of the prior. Chosen: a weighed or measured quantity to a
+            tenth, one that data sheets state to three tenths, one that is mostly guessed to a half.
+        positive: whether a value below zero has no meaning.
+    """
+
+    name: str
+    exponents: tuple[int, ...]
+    rel_std: float
+    positive: bool
+
+
+KINDS = (
+    Kind("mass", (1, 0, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("moment of inertia", (1, 2, 0, 0, 0, 0, 0), 0.3, True),
+    Kind("length", (0, 1, 0, 0, 0, 0, 0), 0.1, False),
+    Kind("area", (0, 2, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("volume", (0, 3, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("density", (1, -3, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("time constant", (0, 0, 1, 0, 0, 0, 0), 0.3, True),
+    Kind("frequency", (0, 0, -1, 0, 0, 0, 0), 0.3, True),
+    Kind("stiffness", (1, 0, -2, 0, 0, 0, 0), 0.3, True),
+    Kind("damping", (1, 0, -1, 0, 0, 0, 0), 0.5, True),
+    Kind("temperature", (0, 0, 0, 0, 1, 0, 0), 0.02, False),
+    Kind("heat capacity", (1, 2, -2, 0, -1, 0, 0), 0.3, True),
+    Kind("thermal conductance", (1, 2, -3, 0, -1, 0, 0), 0.5, True),
+    Kind("electric resistance", (1, 2, -3, -2, 0, 0, 0), 0.1, True),
+    Kind("inductance", (1, 2, -2, -2, 0, 0, 0), 0.3, True),
+    Kind("capacitance", (-1, -2, 4, 2, 0, 0, 0), 0.3, True),
+)
+QUADRATIC = Kind("quadratic damping", (), 0.5, False)
+OTHER = Kind("other", (), 0.3, False)
+
+
+class Prior(BaseModel):
+    """What is known of a value before the runs: a standard deviation, absolute or relative."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    std: Positive | None = Field(default=None, description="standard deviation [unit of the value]")
+    rel_std: Positive | None = Field(default=None, description="the same, relative to the value [1]")
+    origin: str = Field(default="", description="where this is known from")
+
+    @model_validator(mode="after")
+    def _one(self) -> "Prior":
+        if (self.std is None) == (self.rel_std is None):
+            raise ValueError("needs either 'std' or 'rel_std'")
+        return self
+
+
+class CalibratedParameter(BaseModel):
+    """One parameter to calibrate."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(description="variable of the FMU: a parameter, or an input that the map leaves")
+    unit: str = Field(default="1", description="the FMU's; for the reader")
+    value: FiniteFloat = Field(description="mean of the prior, where the fit begins")
+    min: FiniteFloat | None = Field(default=None, description="lower bound")
+    max: FiniteFloat | None = Field(default=None, description="upper bound")
+    log: bool = Field(default=False, description="fit the logarithm: the value is positive")
+    prior: Prior
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "CalibratedParameter":
+        low, high = self.min, self.max
+        if (low is not None and self.value < low) or (high is not None and self.value > high):
+            raise ValueError(f"'value' must lie from 'min' to 'max'; got {self.value:g}")
+        if self.log and self.value <= 0.0:
+            raise ValueError(f"'log' needs a positive value; got {self.value:g}")
+        if self.prior.rel_std is not None and self.value == 0.0:
+            raise ValueError("'rel_std' of a value of zero says nothing; give 'std'")
+        return self
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the prior, in the unit of the value."""
+        p = self.prior
+        return p.std if p.std is not None else float(p.rel_std or 0.0) * abs(self.value)
+
+    # The fit moves z, in prior standard deviations from the prior mean.
+
+    def at(self, z: float) -> float:
+        """The value at z prior standard deviations from the mean."""
+        if self.log:
+            return float(self.value * np.exp(z * self.std / self.value))
+        return self.value + z * self.std
+
+    def z(self, value: float) -> float:
+        """The inverse of :meth:`at`."""
+        if self.log:
+            return float(np.log(value / self.value) * self.value / self.std) if value > 0.0 else -np.inf
+        return (value - self.value) / self.std
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of z."""
+        low, high = self.min, self.max
+        return (-np.inf if low is None else self.z(low)), (np.inf if high is None else self.z(high))
+
+    def slope(self, z: float) -> float:
+        """Derivative of the value by z."""
+        return self.std * (self.at(z) / self.value if self.log else 1.0)
+
+
+class ParameterFile(BaseModel):
+    """The content of ``parameters.json``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    parameters: list[CalibratedParameter] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _different(self) -> "ParameterFile":
+        names = [p.name for p in self.parameters]
+        twice = [n for n in dict.fromkeys(names) if names.count(n) > 1]
+        if twice:
+            raise ValueError(f"'{twice[0]}' stands there twice")
+        return self
+
+
+def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> list[CalibratedParameter]:
+    """The parameters of a file, checked against an FMU.
+
+    Args:
+        path: of the file.
+        model: the FMU.
+        mapped: variables that the map uses, which cannot be calibrated.
+
+    Raises:
+        InputError: no such file, a fault of it, or a name that the FMU does not have.
+    """
+    try:
+        found = ParameterFile.model_validate(json.loads(path.read_text(encoding="utf-8"))).parameters
+    except ValidationError as error:
+        raise InputError(f"'{path}': {first_fault(error)}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' cannot be read as parameters: {error}") from None
+    possible = {v.name for v in model.variables.values() if can_be_calibrated(v)} - set(mapped)
+    for p in found:
+        if p.name in mapped:
+            raise InputError(f"'{path}': {quoted(p.name)} is a variable of the map; remove it from one")
+        if p.name not in possible:
+            hint = nearest(p.name, possible)
+            raise InputError(f"'{path}': {model.path.name} has no parameter {quoted(p.name)}{hint}")
+    return found
+
+
+def write_parameters(path: Path, parameters: Collection[CalibratedParameter]) -> None:
+    """Write ``parameters.json``; an older file is replaced when the new one is complete."""
+    content = ParameterFile(parameters=list(parameters)).model_dump(exclude_none=True)
+    with cosim.atomic_write(path) as scratch:
+        scratch.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def can_be_calibrated(v: FmuVariable) -> bool:
+    """Whether a variable is a real number that keeps the value that it is set to at the start.
+
+    An input that nothing drives is one, too: some tools export parameters so.
+    """
+    if v.type != "Real" or v.start is None:
+        return False
+    return v.causality == "input" or (
+        v.causality == "parameter" and v.variability in ("fixed", "tunable")
+    )
+
+
+def proposed(model: FmuModel, mapped: Collection[str]) -> tuple[list[CalibratedParameter], list[str]]:
+    """The parameters of an FMU with a prior by their kind.
+
+    Args:
+        model: the FMU.
+        mapped: variables that the map uses.
+
+    Returns:
+        The parameters, and a sentence for each that has no scale, which is left out.
+    """
+    every = [
+        v
+        for v in model.variables.values()
+        if v.causality == "parameter" and can_be_calibrated(v) and v.name not in mapped
+    ]
+    found, left_out = [], []
+    for v in every:
+        try:
+            found.append(_with_prior(v))
+        except ValueError as error:
+            left_out.append(f"{v.name} is left out: {error}")
+    return found, left_out
+
+
+def _with_prior(v: FmuVariable) -> CalibratedParameter:
+    """A parameter with the prior of its kind.
+
+    Raises:
+        ValueError: its value is no scale and it has no range.
+    """
+    value, unit = float(v.start or 0.0), "1" if v.unit is None else v.unit.name
+    kind = kind_of(v.unit)
+    positive = value > 0.0 and (kind.positive or (v.min is not None and v.min >= 0.0))
+    if value:
+        prior = Prior(rel_std=kind.rel_std, origin=f"{kind.name}: chosen")
+    elif v.min is not None and v.max is not None and v.max > v.min:
+        # Chosen: the range holds two standard deviations on either side of its middle.
+        prior = Prior(std=0.25 * (v.max - v.min), origin="a quarter of its range")
+    else:
+        raise ValueError("its value is 0 and it has no range; give 'std' to calibrate it")
+    return CalibratedParameter(
+        name=v.name, unit=unit, value=value, min=v.min, max=v.max, log=positive, prior=prior
+    )
+
+
+def kind_of(unit: Unit | None) -> Kind:
+    """The kind of a quantity by its unit; :data:`OTHER` where that says nothing."""
+    exponents = None if unit is None else unit.exponents or _BY_NAME.get(unit.name)
+    # N.s2/m has the dimension of a mass.
+    if unit is not None and re.match(r"N\.(m\.)?s2", unit.name):
+        return QUADRATIC
+    return next((k for k in KINDS if k.exponents == exponents), OTHER)
+
+
+# Exponents of units whose definition a file leaves out.
+_BY_NAME: Mapping[str, tuple[int, ...]] = {
+    name: next(k.exponents for k in KINDS if k.name == kind)
+    for name, kind in (
+        ("kg", "mass"), ("m", "length"), ("m2", "area"), ("m3", "volume"), ("s", "time constant"),
+        ("Hz", "frequency"), ("N/m", "stiffness"), ("N.s/m", "damping"), ("kg.m2", "moment of inertia"),
+        ("K", "temperature"), ("J/K", "heat capacity"), ("W/K", "thermal conductance"),
+        ("Ohm", "electric resistance"), ("H", "inductance"), ("F", "capacitance"),
+    )
+}  # fmt: skip

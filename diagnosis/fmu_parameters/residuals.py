@@ -1,0 +1,263 @@
+"""Measured minus predicted outputs in windows, in units of their standard deviation.
+
+What a window begins with is known by some samples only. Its uncertainty is integrated out: by a start
+value of variance p the residuals of a window have the covariance I + S p S^T, S their slopes by the
+start value, and are whitened by the inverse root of that.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from cosim import InputError
+from fmus.frames import rotate_to_earth
+from fmus.ops import wrap
+
+from .additional_force import AdditionalForce
+from .fmu_playback import PlaybackRequest, PlayedBack, Processes
+from .measured_system import Window
+from .parameter_file import CalibratedParameter
+
+STEP = 0.02  # of a central difference, in prior standard deviations; chosen: solvers keep some digits
+REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit
+LARGEST = 1e50  # of a residual: more is not finite, and its square is; chosen
+START_STEP = 0.5  # of a difference by a start value, in its standard deviations; chosen
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An FMU with other values and additional forces.
+
+    Attributes:
+        z: of each parameter, in prior standard deviations from its prior mean.
+        forces: what acts in addition.
+    """
+
+    z: tuple[float, ...]
+    forces: tuple[AdditionalForce, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Of one window: the directions in which its start moves the residuals, and what is left of them."""
+
+    along: np.ndarray
+    kept: np.ndarray
+
+    def __call__(self, r: np.ndarray) -> np.ndarray:
+        """Whitened residuals (n,), or slopes (n, q)."""
+        return r + self.along @ (
+            (self.kept - 1.0)[:, None] * (self.along.T @ r.reshape(len(r), -1))
+        ).reshape((-1, *r.shape[1:]))
+
+
+class WindowResiduals:
+    """The residuals of an FMU in the windows of some runs.
+
+    Args:
+        processes: that run the FMU.
+        windows: of the runs.
+        first: number of the course of the first window; the others follow.
+        noise: (m,), of each output.
+        parameters: that are calibrated.
+        lines: (2, m), gain and offset that make of an output what is measured; None: it is that.
+        angles: numbers of the outputs that are angles [rad].
+    """
+
+    def __init__(
+        self,
+        processes: Processes,
+        windows: Sequence[Window],
+        first: int,
+        noise: np.ndarray,
+        parameters: Sequence[CalibratedParameter],
+        lines: np.ndarray | None = None,
+        angles: Sequence[int] = (),
+    ) -> None:
+        self.processes, self.windows, self._first = processes, windows, first
+        self.noise, self.parameters, self.angles = noise, parameters, [*angles]
+        m = noise.size
+        self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
+        self._known: dict[Setting, np.ndarray] = {}
+        self._whitening: list[Whitening] | None = None
+        sizes = [w.measured.size for w in windows]
+        ends = np.cumsum([0, *sizes])
+        self.rows = [slice(a, b) for a, b in pairwise(ends.tolist())]
+
+    def choose(self, parameters: Sequence[CalibratedParameter]) -> None:
+        """Calibrate other parameters."""
+        self.parameters = parameters
+        self._known.clear()
+
+    @property
+    def size(self) -> int:
+        """Number of residuals, those without a sample included."""
+        return self.rows[-1].stop
+
+    @property
+    def samples(self) -> int:
+        """Number of measured values."""
+        return int(sum(np.isfinite(w.measured).sum() for w in self.windows))
+
+    def values(self, setting: Setting) -> dict[str, float]:
+        """Parameter -> value."""
+        return {p.name: p.at(z) for p, z in zip(self.parameters, setting.z, strict=True)}
+
+    def predict(
+        self, settings: Sequence[Setting], windows: Sequence[int] | None = None
+    ) -> list[list[PlayedBack]]:
+        """Of each setting the prediction in each window."""
+        which = range(len(self.windows)) if windows is None else windows
+        requests = [
+            PlaybackRequest(self._first + k, self.values(s), s.forces) for s in settings for k in which
+        ]
+        found = self.processes.run(requests)
+        return [found[j : j + len(which)] for j in range(0, len(found), len(which))]
+
+    def raw(self, settings: Sequence[Setting]) -> list[np.ndarray]:
+        """Of each setting the residuals (size,) in units of the noise; NaN where the FMU fails."""
+        new = [s for s in dict.fromkeys(settings) if s not in self._known]
+        for s, each in zip(new, self.predict(new), strict=True):
+            off = [self._off(w, p) for w, p in zip(self.windows, each, strict=True)]
+            self._known[s] = np.concatenate(off)
+        found = [self._known[s] for s in settings]
+        while len(self._known) > REMEMBERED:
+            del self._known[next(iter(self._known))]
+        return found
+
+    def _off(self, w: Window, p: PlayedBack) -> np.ndarray:
+        at = w.course.h * np.arange(len(p.outputs))
+        with np.errstate(invalid="ignore", over="ignore"):
+            outputs = self._gain * p.outputs[:, : self.noise.size] + self._offset
+            for k in self.angles:
+                outputs[:, k] = np.unwrap(outputs[:, k])
+            predicted = np.column_stack([np.interp(w.time, at, y) for y in outputs.T])
+            off = w.measured - (predicted if w.onto is None else laid(predicted, w.onto))
+            off[:, self.angles] = wrap(off[:, self.angles])
+            off /= self.noise
+            off[~(np.abs(off) < LARGEST)] = np.nan
+        off[~np.isfinite(w.measured)] = 0.0
+        return off.ravel()
+
+    def parts(self, r: np.ndarray) -> Iterator[tuple[Window, np.ndarray]]:
+        """Each window with its part of residuals (size,)."""
+        return ((w, r[rows]) for w, rows in zip(self.windows, self.rows, strict=True))
+
+    def whiten(self, r: np.ndarray) -> np.ndarray:
+        """Whitened residuals (size,), or slopes (size, q)."""
+        assert self._whitening is not None
+        return np.concatenate(
+            [white(r[rows]) for white, rows in zip(self._whitening, self.rows, strict=True)]
+        )
+
+    def whitened(self, settings: Sequence[Setting]) -> list[np.ndarray]:
+        """Of each setting the whitened residuals (size,)."""
+        return [self.whiten(r) for r in self.raw(settings)]
+
+    def whiten_about(self, setting: Setting) -> None:
+        """Take the slopes by the start values about a setting.
+
+        Raises:
+            InputError: the FMU fails there.
+        """
+        values, requests = self.values(setting), []
+        for k, w in enumerate(self.windows, self._first):
+            requests.append(PlaybackRequest(k, values, setting.forces))
+            for name, std in w.start_std.items():
+                moved = {name: w.course.start[name] + START_STEP * std}
+                requests.append(PlaybackRequest(k, {**values, **moved}, setting.forces))
+        found = iter(self.processes.run(requests))
+        self._whitening = []
+        for w in self.windows:
+            here = next(found)
+            if here.fault:
+                raise InputError(f"'{self.processes.path.name}' fails on run '{w.run}': {here.fault}")
+            base = self._off(w, here)
+            slopes = [(self._off(w, next(found)) - base) / START_STEP for _ in w.start_std]
+            S = np.column_stack([*slopes, np.zeros((base.size, 0))])
+            S[:, ~np.isfinite(S).all(axis=0)] = 0.0
+            U, size, _ = np.linalg.svd(S, full_matrices=False)
+            self._whitening.append(Whitening(U, 1.0 / np.sqrt(1.0 + size**2)))
+
+    def slopes(self, setting: Setting, sizes: Sequence[float]) -> tuple[np.ndarray, list[str]]:
+        """Slopes (size, p + e) of the whitened residuals by each z and each coefficient.
+
+        By central differences, where one side fails by the other; zero where both do.
+
+        Args:
+            setting: about which.
+            sizes: of each additional force the unit of its coefficient.
+
+        Returns:
+            The slopes, and why those that are zero are not known.
+        """
+        each = [*self._moved(setting, sizes)]
+        settings = [s for _, low, high, _, _ in each for s in (low, high)]
+        found = self.whitened([setting, *settings])
+        base, others = found[0], found[1:]
+        columns, faults = [], []
+        for (name, *_, down, up), low, high in zip(each, others[::2], others[1::2], strict=True):
+            sides = [(low, down), (high, up)]
+            known = [(r, h) for r, h in sides if h and np.isfinite(r).all()]
+            if len(known) == 2:
+                columns.append((known[1][0] - known[0][0]) / (known[0][1] + known[1][1]))
+            elif known:
+                r, h = known[0]
+                columns.append((r - base) / (h if r is high else -h))
+            else:
+                columns.append(np.zeros_like(base))
+                faults.append(f"{name}: it fails on either side of its value")
+        return np.column_stack([*columns, np.zeros((base.size, 0))]), faults
+
+    def _moved(
+        self, setting: Setting, sizes: Sequence[float]
+    ) -> Iterator[tuple[str, Setting, Setting, float, float]]:
+        """Name, two settings about one, and how far they are apart from it, for each value."""
+        for k, p in enumerate(self.parameters):
+            low, high = p.bounds
+            z = setting.z[k]
+            down, up = min(STEP, max(z - low, 0.0)), min(STEP, max(high - z, 0.0))
+            yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
+        for k, (f, size) in enumerate(zip(setting.forces, sizes, strict=True)):
+            low, high = (self._forced(setting, k, sign * STEP * size) for sign in (-1.0, 1.0))
+            yield f.id, low, high, STEP, STEP
+
+    @staticmethod
+    def _forced(setting: Setting, k: int, change: float) -> Setting:
+        """A setting with another coefficient of a force."""
+        forces = list(setting.forces)
+        forces[k] = replaced(forces[k], forces[k].coefficient + change)
+        return Setting(setting.z, tuple(forces))
+
+    @staticmethod
+    def at(setting: Setting, k: int, z: float) -> Setting:
+        """A setting with another value of a parameter."""
+        return Setting((*setting.z[:k], z, *setting.z[k + 1 :]), setting.forces)
+
+
+def laid(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
+    """A track (T, 3), moved and turned so that it begins in another pose (3,)."""
+    x, y, psi = (pose - pose[0]).T
+    north, east = rotate_to_earth(onto[2] - pose[0, 2], x, y)
+    return np.column_stack([onto[0] + north, onto[1] + east, onto[2] + psi])
+
+
+def replaced(f: AdditionalForce, coefficient: float) -> AdditionalForce:
+    """A force with another coefficient."""
+    return AdditionalForce(f.input, f.output, f.shape, f.rate, coefficient)
+
+
+def rms_of(
+    r: WindowResiduals, raw: np.ndarray, outputs: Sequence[str]
+) -> Mapping[str, Mapping[str, float]]:
+    """Run -> output -> root mean square of raw residuals (size,), in the unit of the output."""
+    found: dict[str, dict[str, float]] = {}
+    for run in dict.fromkeys(w.run for w in r.windows):
+        mine = [(w, x) for w, x in r.parts(raw) if w.run == run]
+        squares = np.concatenate([x.reshape(w.measured.shape) for w, x in mine]) ** 2
+        known = np.concatenate([np.isfinite(w.measured) for w, _ in mine])
+        mean = np.where(known, squares, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        found[run] = dict(zip(outputs, (np.sqrt(mean) * r.noise).tolist(), strict=True))
+    return found

@@ -1,0 +1,117 @@
+"""What runs can tell of an FMU's parameters, before any fit: each alone, and groups only together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim import InputError
+
+from ..execution.progress import Advance
+from .parameter_file import CalibratedParameter
+from .residuals import Setting, WindowResiduals
+from .system_calibration import together
+
+# Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
+# it. Chosen: a tenth less is hardly news.
+UNTOLD = 0.9
+HALVINGS = 5  # of a range that the FMU fails in, to find where it works; chosen: to a thirtieth
+EXTREME = 3.0  # prior standard deviations, at which a range without an end is tried; chosen
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What the runs say of one parameter.
+
+    Attributes:
+        parameter: with the range in which the FMU works.
+        std_share: standard deviation with the runs, of that of the prior; 1: they say nothing.
+        change: rms change of the outputs by one prior standard deviation, in units of their noise.
+        fault: where in its range the FMU fails, and why; empty: nowhere that was tried.
+    """
+
+    parameter: CalibratedParameter
+    std_share: float
+    change: float
+    fault: str
+
+    @property
+    def known(self) -> bool:
+        """Whether the runs can tell it."""
+        return self.std_share < UNTOLD
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """The same of all, and groups of those that are known only together."""
+
+    each: Sequence[Sensitivity]
+    together: Sequence[Sequence[str]]
+
+
+def sensitivities(r: WindowResiduals, advance: Advance) -> Sensitivities:
+    """What the windows of some runs can tell, by central differences.
+
+    Raises:
+        InputError: the FMU fails at its start values.
+    """
+    start = Setting((0.0,) * len(r.parameters))
+    advance("predictions with the start values")
+    r.whiten_about(start)
+    advance("ranges in which the FMU works")
+    ranges = [_working(r, start, k) for k in range(len(r.parameters))]
+    r.choose([p for p, _ in ranges])
+    advance("sensitivities of the predictions")
+    J, faults = r.slopes(start, ())
+    H = J.T @ J + np.eye(J.shape[1])
+    covariance = np.linalg.inv(H)
+    std = np.sqrt(np.diag(covariance))
+    change = np.sqrt(np.mean(J**2, axis=0))
+    unknown = {f.partition(":")[0]: f for f in faults}
+    found = [
+        Sensitivity(p, float(s), float(c), fault or unknown.get(p.name, ""))
+        for (p, fault), s, c in zip(ranges, std, change, strict=True)
+    ]
+    seen = [k for k, s in enumerate(found) if s.change > 0.0]
+    # The prior tells apart what the data do not: groups are those of the data alone.
+    data = J[:, seen].T @ J[:, seen]
+    names = [found[k].parameter.name for k in seen]
+    scale = np.sqrt(np.diag(data))
+    weak = np.linalg.pinv(data / np.outer(scale, scale), rcond=1e-9) if seen else np.zeros((0, 0))
+    groups = together(weak, names) if seen else []
+    return Sensitivities(found, groups)
+
+
+def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedParameter, str]:
+    """A parameter with the part of its range in which the FMU works in the first window."""
+    p = r.parameters[k]
+    low, high = p.bounds
+    faults, ends = [], {}
+    for side, bound in (("min", low), ("max", high)):
+        z = float(np.clip(bound, -EXTREME, EXTREME))
+        fault = _fault(r, start, k, z)
+        if not fault or z == 0.0:
+            continue
+        works, fails = 0.0, z
+        for _ in range(HALVINGS):
+            middle = 0.5 * (works + fails)
+            works, fails = (works, middle) if _fault(r, start, k, middle) else (middle, fails)
+        ends[side] = p.at(works)
+        faults.append(f"at {p.name} = {p.at(z):.4g} {p.unit} the FMU fails: {fault}; "
+                      f"{side} is {p.at(works):.4g}")  # fmt: skip
+    return p.model_copy(update=ends), "; ".join(faults)
+
+
+def _fault(r: WindowResiduals, start: Setting, k: int, z: float) -> str:
+    (predicted,) = r.predict([r.at(start, k, z)], [0])[0]
+    return predicted.fault
+
+
+def refuse_unknown(found: Sensitivities) -> None:
+    """Refuse a calibration in which the runs tell no parameter.
+
+    Raises:
+        InputError: they tell none.
+    """
+    if not any(s.known for s in found.each):
+        raise InputError("the runs tell no parameter: no output changes with any beyond its noise")

@@ -1,0 +1,210 @@
+"""The FMU of a ship, and the windows in which its predictions are compared with measured poses."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from cosim import InputError
+
+from ..execution.progress import Advance
+from ..predictors import Fmu, WeakWindows
+from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
+from ..predictors.fmu.fmu_predictor import FmuPredictor
+from ..predictors.windows import step_of, usable_windows
+from ..runs import Smoothed
+from .additional_force import AdditionalForce
+from .fmu_playback import InputCourse
+from .force_search import candidates
+from .measured_system import FEWEST, Window
+from .parameter_file import CalibratedParameter, proposed, read_parameters
+from .residuals import WindowResiduals
+from .system_task import numbered, processes_of
+
+MOST_SAMPLES = (
+    60  # of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion
+)
+UNITS = {"x": "m", "y": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
+
+
+@dataclass
+class ShipTask:
+    """An FMU of a ship, measured runs, and its parameters.
+
+    Attributes:
+        fmu: the FMU and its map.
+        predictor: how the map is read for these runs.
+        parameters: that are calibrated.
+        notes: what a reader should know of the choice of these.
+        runs: use -> runs.
+        horizon: length of the windows [s].
+    """
+
+    fmu: Fmu
+    predictor: FmuPredictor
+    parameters: list[CalibratedParameter]
+    notes: list[str]
+    runs: Mapping[str, Sequence[WeakWindows]]
+    _open: ExitStack = field(default_factory=ExitStack)
+
+    names = POSE
+
+    @property
+    def units(self) -> list[str]:
+        """Of the pose."""
+        return [UNITS[s] for s in POSE]
+
+    @property
+    def forces_on(self) -> list[str]:
+        """Inputs for the force or acceleration that may act in addition."""
+        told = self.predictor.map
+        given = {**told.told("inputs"), **told.told("beside")}
+        return [c.name for s, c in given.items() if s in (*TAU, "u_dot", "v_dot", "r_dot")]
+
+    @property
+    def usual(self) -> dict[str, float]:
+        """Of each of these inputs a usual size: that of its commands, else of the ship's full force."""
+        told, found = self.predictor.map, {}
+        for group in ("beside", "inputs"):
+            for s, c in told.told(group).items():
+                if s in TAU:
+                    k = TAU.index(s)
+                    every = np.concatenate([w.run.tau_cmd[:, k] for w in self.runs["train"]])
+                    size = float(np.sqrt(np.mean(every**2)))
+                    size = size or float(self.predictor.ship.ship.scale.forces[k])
+                    found[c.name] = size / abs(self.predictor.lines[group][s].gain)
+        return dict.fromkeys(self.forces_on, 1.0) | found
+
+    @property
+    def outputs(self) -> list[str]:
+        """Variables of the pose, then of the velocity as far as the map has it."""
+        told = self.predictor.map.told("outputs")
+        return [told[s].name for s in MOTION if s in told]
+
+    @property
+    def possible(self) -> list[AdditionalForce]:
+        """Forces that may act in addition: constant, or a function of one velocity."""
+        told = self.predictor.map.told("outputs")
+        return candidates(self.forces_on, [told[s].name for s in VELOCITY if s in told], ())
+
+    def residuals(self) -> dict[str, WindowResiduals]:
+        """Use -> the residuals of its runs, of those that there are.
+
+        Raises:
+            InputError: no window has enough samples.
+        """
+        windows = {use: [x for w in runs for x in self._windows(w)] for use, runs in self.runs.items()}
+        if not windows["train"]:
+            names = ", ".join(w.run.name for w in self.runs["train"])
+            raise InputError(f"no window of {names} has enough samples")
+        driven = [c.name for c in self.predictor.map.told("inputs").values()]
+        processes = processes_of(self, [*chain(*windows.values())], self.fmu.model, driven)
+        self._open.enter_context(processes)
+        lines = [self.predictor.lines["outputs"][s] for s in POSE]
+        gains = np.array([[line.gain for line in lines], [line.offset for line in lines]])
+        noise = np.median([w.smoothed.noise for w in self.runs["train"]], axis=0)
+        return {
+            use: WindowResiduals(processes, own, first, noise, self.parameters, gains, [2])
+            for use, own, first in numbered(windows)
+        }
+
+    def _windows(self, w: WeakWindows) -> list[Window]:
+        """Those of a run: of the ship's length from smoothed states, or the whole run."""
+        s, p = w.smoothed, self.predictor
+        if p.whole:
+            length, rows = float(s.time[-1] - s.time[0]), np.array([0])
+        else:
+            length, rows = w.horizon, usable_windows(s, w.horizon).first_rows
+        found = (self._window(s, row, length) for row in rows.tolist())
+        return [window for window in found if window is not None]
+
+    def _window(self, s: Smoothed, row: int, length: float) -> Window | None:
+        """The window of a run that begins in a row; None: it has too few samples."""
+        p, run, begin, h = self.predictor, s.track.run, s.time[row], step_of(s)
+        since = s.time - begin
+        rows = np.flatnonzero((since >= p.run_in(s)) & (since <= length + 1e-9) & s.used)
+        if rows.size < FEWEST // 2:
+            return None
+        if not p.whole:
+            rows = rows[:: max(1, rows.size // MOST_SAMPLES)]
+        steps = int(np.ceil(since[rows[-1]] / h - 1e-6))
+        middle = begin + (np.arange(steps) + 0.5) * h
+        at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
+        start = {n: float(x[0]) for n, x in self._of_variables("start", at).items()}
+        inputs = self._of_variables("inputs", commands_at(run, middle))
+        sure = dict(zip(MOTION, [*s.eta_std[row], *s.nu_std[row]], strict=True))
+        std = {
+            c.name: float(sure[signal]) / abs(p.lines["start"][signal].gain)
+            for signal, c in p.map.told("start").items()
+            if signal in sure and not p.whole
+        }
+        course = InputCourse(h, start, np.column_stack([*inputs.values()]))
+        onto = s.eta[rows[0]] if p.placed else None
+        return Window(run.name, float(begin), course, since[rows], s.track.pose[rows], std, onto)
+
+    def _of_variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
+        """Variable -> its values, for the signals [SI] that a group of the map has."""
+        lines, told = self.predictor.lines[group], self.predictor.map.told(group)
+        known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
+        return {name: (x - line.offset) / line.gain for x, line, name in known}
+
+    def state_at(self, time: float) -> dict[str, float]:
+        """Start values and inputs of the FMU in the smoothed state of the first run at a time [s].
+
+        Raises:
+            InputError: there is none then.
+        """
+        s = self.runs["train"][0].smoothed
+        known = np.flatnonzero(np.isfinite(s.nu).all(axis=1))
+        row = known[np.argmin(np.abs(s.time[known] - time))]
+        if abs(float(s.time[row]) - time) > s.track.period:
+            raise InputError(f"run '{s.track.run.name}' has no state at {time:g} s")
+        at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
+        both = {**self._of_variables("start", at), **self._of_variables("inputs", at)}
+        return {n: float(x[0]) for n, x in both.items()}
+
+    def close(self) -> None:
+        """End the processes in which the FMU runs."""
+        self._open.close()
+
+
+def ship_task(
+    options: argparse.Namespace, paths: Mapping[str, Sequence[Path]], advance: Advance
+) -> ShipTask:
+    """Read the FMU of a ship, its map, its parameters and measured runs.
+
+    Args:
+        options: of the command.
+        paths: use -> files of the runs.
+        advance: receives the name of each step.
+
+    Raises:
+        InputError: one of them is not as it should be.
+    """
+    from ..assessment.gathering import gather
+    from ..predictors import ship_with
+
+    craft = ship_with(options.effects, options.ship)
+    path = getattr(options, "model", None) or options.fmu
+    fmu = Fmu(path, options.map, craft)
+    every = [p for each in paths.values() for p in each]
+    gathered = gather(every, advance, options.anyway, fmu.start, options.horizon)
+    ends = np.cumsum([0, *(len(each) for each in paths.values())])
+    runs = {use: gathered[a:b] for use, a, b in zip(paths, ends[:-1], ends[1:], strict=True)}
+    predictor = fmu.begun_on(gathered)
+    told = predictor.map
+    if not set(POSE) <= told.told("outputs").keys():
+        raise InputError(f"'{fmu.name}' needs outputs for x, y and psi to calibrate its parameters")
+    mapped = {c.name for g in ("inputs", "outputs", "start", "beside") for c in told.told(g).values()}
+    notes: list[str] = []
+    if getattr(options, "parameters", None) is not None:
+        chosen = read_parameters(options.parameters, fmu.model, mapped)
+    else:
+        chosen, notes = proposed(fmu.model, mapped)
+    if not chosen:
+        raise InputError(f"'{fmu.name}' has no parameter that can be calibrated")
+    return ShipTask(fmu, predictor, chosen, notes, runs)

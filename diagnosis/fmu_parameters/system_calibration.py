@@ -1,0 +1,241 @@
+"""Is a parameter off, or is something missing? The fit of parameters, the search, and one verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from ..execution.progress import Advance, silent
+from .additional_force import AdditionalForce
+from .force_search import Accepted, search
+from .parameter_file import CalibratedParameter
+from .parameter_fit import ParameterFit, fit, fitted, intervals
+from .residuals import Setting, WindowResiduals, rms_of
+from .system_remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
+
+FOUND, EVEN_ODDS = 0.8, 0.5  # contract
+MOST_MOVED = 3.0  # prior standard deviations; contract
+MOST_FORCES = 3  # in one model; chosen
+WORSE = 2.0  # paired standard errors; contract
+TOGETHER = 0.97  # of a correlation, from which on two values are known only together; chosen
+Verdict = Literal["found", "ambiguous", "parameters", "unexplained", "none"]
+
+
+@dataclass(frozen=True)
+class CalibratedValue:
+    """A parameter after the calibration.
+
+    Attributes:
+        parameter: with its prior.
+        value, ci95: in its unit.
+        z: prior standard deviations from its prior mean.
+        moved: whether the runs show that it is off.
+    """
+
+    parameter: CalibratedParameter
+    value: float
+    ci95: tuple[float, float]
+    z: float
+    moved: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SystemCalibration:
+    """A verdict, and what it rests on.
+
+    Attributes:
+        verdict: by the rule of :func:`verdict_of`.
+        values: of all parameters, as the learned model has them.
+        forces: what was accepted.
+        remainder, first: what the learned and the first model leave.
+        rejected: why nothing was learned though something was fitted; empty: it was kept.
+        together: groups of values that are known only together.
+        fit: the most likely values.
+        covariance: (q, q), of z and of coefficients, the latter in their units.
+        errors: run -> output -> rms before and after.
+        faults: what could not be asked.
+    """
+
+    verdict: Verdict
+    values: Sequence[CalibratedValue]
+    forces: Sequence[Accepted]
+    remainder: SystemRemainder
+    first: SystemRemainder
+    rejected: str
+    together: Sequence[Sequence[str]]
+    fit: ParameterFit
+    covariance: np.ndarray
+    errors: Mapping[str, Mapping[str, tuple[float, float]]]
+    faults: Sequence[str]
+
+    @property
+    def changed(self) -> bool:
+        """Whether the learned model differs from the first."""
+        return not self.rejected and self.verdict != "none"
+
+
+def calibrate(
+    parts: Mapping[str, WindowResiduals],
+    possible: Sequence[AdditionalForce],
+    names: Sequence[str],
+    units: Sequence[str],
+    usual: Mapping[str, float],
+    advance: Advance = silent,
+) -> SystemCalibration:
+    """Fit parameters to runs, find what is missing in addition, and judge.
+
+    Args:
+        parts: residuals of the runs to learn from, ``train``, and as far as there are any, of those that
+            decide, ``validate``, and of those that only judge, ``test``.
+        possible: forces that may act in addition.
+        names, units: of the measured outputs.
+        usual: of each input on which such a force acts a usual size.
+        advance: receives the name of each step.
+
+    Raises:
+        InputError: the FMU fails at its start values.
+    """
+    train, start = parts["train"], Setting((0.0,) * len(parts["train"].parameters))
+    advance("predictions with the start values")
+    train.whiten_about(start)
+    before = fit(train, start, (), range(len(start.z)))
+    advance("fit of the parameters")
+    alone = fitted(train, start)
+    (first_white,) = train.whitened([start])
+    first = remainder(train, first_white, first_white, 0, names, units)
+
+    def left(f: ParameterFit) -> SystemRemainder:
+        return remainder(train, f.residuals, first_white, f.slopes.shape[1], names, units)
+
+    best, accepted = alone, []
+
+    def temper(f: ParameterFit) -> float:
+        return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
+
+    while possible and len(accepted) < MOST_FORCES and (left(best).significant or _far(best)):
+        found = search(train, best, possible, dict(usual), temper, advance)
+        if found is None:
+            break
+        best = fitted(train, found[0].setting, found[0].sizes)
+        # The fit may have moved the earlier forces as well.
+        accepted = [
+            replace(a, force=f) for a, f in zip([*accepted, found[1]], best.setting.forces, strict=True)
+        ]
+    rest, grown = left(best), temper(best)
+    covariance = best.covariance * grown
+    moved = _moved(train, best, grown)
+    rejected = _rejected(parts.get("validate"), best, start)
+    verdict = verdict_of(accepted, moved, best, rest, bool(rejected))
+    advance("intervals")
+    ends = intervals(train, best, grown)
+    kept = not rejected and verdict != "none"
+    values = [
+        CalibratedValue(p, p.at(z) if kept else p.value, e, z, bool(m))
+        for p, z, e, m in zip(train.parameters, best.setting.z, ends, moved.each, strict=True)
+    ]
+    learned = best.setting if kept else start
+    errors: dict[str, dict[str, tuple[float, float]]] = {}
+    for part in parts.values():
+        errors |= _errors(part, start, learned, names)
+    every = [*(p.name for p in train.parameters), *(f.id for f in best.setting.forces)]
+    return SystemCalibration(
+        verdict,
+        values,
+        accepted if kept else [],
+        rest if kept else first,
+        first,
+        rejected,
+        together(covariance, every),
+        best,
+        covariance,
+        errors,
+        (*before.faults, *best.faults),
+    )
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Whether parameters are off: together by a likelihood ratio, and each."""
+
+    any: bool
+    each: Sequence[bool]
+
+
+def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
+    """Which parameters the runs show to be off, forces fitted anew where they are not."""
+    p = len(best.setting.z)
+    held = Setting((0.0,) * p, best.setting.forces)
+    other = fit(r, held, best.sizes, range(p))
+    ratio = (other.data_cost - best.data_cost) / grown
+    some = ratio > float(chi2.ppf(1.0 - CHANCE, p))
+    # Beyond the interval that holds all of them with 99 %.
+    wide = float(norm.ppf(1.0 - 0.5 * CHANCE / max(p, 1)))
+    std = np.sqrt(grown * np.diag(best.covariance)[:p])
+    each = [some and abs(z) > wide * s for z, s in zip(best.setting.z, std.tolist(), strict=True)]
+    return Moved(some, each)
+
+
+def verdict_of(
+    forces: Sequence[Accepted], moved: Moved, best: ParameterFit, rest: SystemRemainder, rejected: bool
+) -> Verdict:
+    """The verdict, by the rule of ships with parameters in place of coefficients.
+
+    A force with a probability of 0.8 or more is found, with less than that its set is ambiguous; else
+    parameters that are off explain the runs if nothing significant is left. Which of them is off must be
+    known. Beyond three prior standard deviations a force was looked for, and explained less.
+    """
+    if rejected:
+        return "unexplained"
+    if forces and forces[0].together >= EVEN_ODDS and not (rest.significant and rest_is_large(rest)):
+        return "found" if forces[0].probability >= FOUND and not forces[0].alike else "ambiguous"
+    if rest.significant:
+        return "unexplained"
+    if not moved.any:
+        return "none"
+    return "parameters" if any(moved.each) else "ambiguous"
+
+
+def _far(best: ParameterFit) -> bool:
+    """Whether a parameter is further from its prior mean than that allows."""
+    return bool(np.abs(best.setting.z).max() > MOST_MOVED)
+
+
+def rest_is_large(rest: SystemRemainder) -> bool:
+    """Whether half of the first squares of an output or more is left: then nothing is explained."""
+    return any(o.share > EVEN_ODDS and o.matters for o in rest.outputs)
+
+
+def _rejected(validate: WindowResiduals | None, best: ParameterFit, start: Setting) -> str:
+    """Why validation runs reject what was learned; empty: they do not."""
+    if validate is None:
+        return ""
+    validate.whiten_about(start)
+    before, after = validate.whitened([start, best.setting])
+    if not np.isfinite(after).all():
+        return "with it the FMU fails on the validation runs"
+    change = blocks(validate, after) - blocks(validate, before)
+    error = float(np.std(change, ddof=1) * np.sqrt(change.size)) if change.size > 1 else 0.0
+    worse = float(change.sum()) > WORSE * error and change.sum() > 0.0
+    return "with it the validation runs are predicted worse" if worse else ""
+
+
+def _errors(
+    r: WindowResiduals, start: Setting, learned: Setting, names: Sequence[str]
+) -> dict[str, dict[str, tuple[float, float]]]:
+    before, after = (rms_of(r, raw, names) for raw in r.raw([start, learned]))
+    return {run: {n: (x, after[run][n]) for n, x in each.items()} for run, each in before.items()}
+
+
+def together(covariance: np.ndarray, names: Sequence[str]) -> list[list[str]]:
+    """Groups of values that are known only together: chains of correlations above TOGETHER."""
+    from scipy.sparse.csgraph import connected_components
+
+    std = np.sqrt(np.diag(covariance))
+    if not std.size:
+        return []
+    correlation = covariance / np.outer(std, std)
+    count, group = connected_components(np.abs(correlation) > TOGETHER, directed=False)
+    groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
+    return [members for members in groups if len(members) > 1]

@@ -1,0 +1,184 @@
+"""Which column of a measurement is which variable of an FMU that is not a ship: ``map.json``::
+
+    {
+        "inputs": {"force": "f"},
+        "outputs": {"position": {"name": "s", "unit": "mm", "noise": 0.5}},
+        "start": {"position": "springDamper.s_rel", "der(position)": "springDamper.v_rel"},
+        "beside": ["f"],
+        "window": 20.0,
+        "run_in": 0.0
+    }
+
+The key is the column, the name that of the variable, as in the map of a ship. Without a map, columns
+that are called as inputs and outputs are those.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import (
+    AllowInfNan,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeFloat,
+    PositiveFloat,
+    ValidationError,
+    field_validator,
+)
+
+from cosim import InputError
+from cosim.errors import nearest
+from cosim.fmu import FmuModel, FmuVariable
+from cybership.message_text import first_fault, quoted
+
+# Units of an input that acts in addition to all else.
+FORCES = ("N", "N.m", "Nm", "m/s2", "rad/s2")
+TIME = "time"
+Positive = Annotated[PositiveFloat, AllowInfNan(False)]
+
+
+class MappedVariable(BaseModel):
+    """A column in terms of a variable: variable = factor * column + offset."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(description="variable of the FMU")
+    factor: FiniteFloat = Field(default=1.0, description="unit of the column in that of the variable")
+    offset: FiniteFloat = Field(default=0.0, description="what is added, in the variable's unit")
+
+
+class MeasuredOutput(MappedVariable):
+    """An output that is compared with a column."""
+
+    noise: Positive | None = Field(
+        default=None, description="standard deviation of the column's noise (estimated)"
+    )
+
+
+class DrivenInput(MappedVariable):
+    """An input that a column drives."""
+
+    linear: bool = Field(
+        default=False, description="straight between samples, in place of held until the next"
+    )
+
+
+class SystemMap(BaseModel):
+    """The content of a map of any FMU."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    inputs: dict[str, DrivenInput] = Field(default_factory=dict)
+    outputs: dict[str, MeasuredOutput] = Field(min_length=1)
+    start: dict[str, MappedVariable] = Field(
+        default_factory=dict, description="start values, by measured outputs or their derivatives"
+    )
+    beside: list[str] | None = Field(
+        default=None, description="inputs on which a force may act in addition (those in N, N.m, m/s2)"
+    )
+    window: Positive | None = Field(default=None, description="length of the windows [s] (whole runs)")
+    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] = Field(
+        default=0.0, description="time before a prediction counts [s]"
+    )
+
+    @field_validator("inputs", "outputs", "start", mode="before")
+    @classmethod
+    def _names_alone(cls, value: Any) -> Any:
+        given = value.items() if isinstance(value, dict) else ()
+        return {k: {"name": c} if isinstance(c, str) else c for k, c in given} or value
+
+    @property
+    def variables(self) -> set[str]:
+        """All variables that are in use."""
+        groups: tuple[Mapping[str, MappedVariable], ...] = (self.inputs, self.outputs, self.start)
+        return {c.name for group in groups for c in group.values()}
+
+
+def read_system_map(path: Path) -> SystemMap:
+    """A map from its file.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return SystemMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
+    except ValidationError as error:
+        raise InputError(f"'{path}': {first_fault(error)}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+
+
+def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemMap:
+    """The map in which columns are the variables of their names.
+
+    Raises:
+        InputError: no column is an output.
+    """
+    known = model.variables
+    named = [c for c in columns if c in known and known[c].type == "Real"]
+    outputs = [c for c in named if known[c].causality == "output"]
+    if not outputs:
+        names = ", ".join(v.name for v in known.values() if v.causality == "output") or "none"
+        raise InputError(
+            f"{where}: no column is called as an output of '{model.path.name}' ({names}); "
+            "--map FILE.json says which column is which variable"
+        )
+    return SystemMap.model_validate(
+        {
+            "inputs": {c: c for c in named if known[c].causality == "input"},
+            "outputs": {c: c for c in outputs},
+        }
+    )
+
+
+def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
+    """Check a map against an FMU.
+
+    Raises:
+        InputError: it names a variable that the FMU does not have, or not in this role.
+    """
+
+    def real(test: Any) -> dict[str, FmuVariable]:
+        return {v.name: v for v in model.variables.values() if v.type == "Real" and test(v)}
+
+    roles: dict[str, tuple[dict[str, FmuVariable], str]] = {
+        "inputs": (real(lambda v: v.causality == "input"), "input"),
+        "outputs": (real(lambda v: v.causality in ("output", "local")), "output"),
+        "start": (real(model.can_be_set), "value that can be set before a simulation"),
+    }
+    for group, (possible, role) in roles.items():
+        channels: Mapping[str, MappedVariable] = getattr(found, group)
+        for column, channel in channels.items():
+            place = f"{where}: {group}.{column}"
+            if channel.name not in possible:
+                hint = nearest(channel.name, possible)
+                raise InputError(f"{place}: the FMU has no {role} {quoted(channel.name)}{hint}")
+            if channel.factor == 0.0:
+                raise InputError(f"{place}.factor must not be zero")
+    for name in found.beside or ():
+        if name not in roles["inputs"][0]:
+            hint = nearest(name, roles["inputs"][0])
+            raise InputError(f"{where}: beside: the FMU has no input {quoted(name)}{hint}")
+    for column in found.start:
+        if column_of_start(column)[0] not in found.outputs:
+            raise InputError(
+                f"{where}: start.{column} must be a column of 'outputs', or der(COLUMN) of one"
+            )
+
+
+def column_of_start(key: str) -> tuple[str, bool]:
+    """The column that a start value is of, and whether it is its derivative by time."""
+    rate = key.startswith("der(") and key.endswith(")")
+    return (key[4:-1] if rate else key), rate
+
+
+def force_inputs(found: SystemMap, model: FmuModel) -> list[str]:
+    """Inputs on which a force may act in addition."""
+    if found.beside is not None:
+        return list(found.beside)
+    real = (v for v in model.variables.values() if v.causality == "input" and v.type == "Real")
+    return [v.name for v in real if v.unit is not None and v.unit.name in FORCES]

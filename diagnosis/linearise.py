@@ -1,0 +1,160 @@
+"""Linearise an FMU in a state: ``python -m diagnosis.linearise vendor.fmu --at state.json``."""
+
+if __name__ == "__main__":
+    from cosim.supervision import supervised
+
+    supervised()  # before all other imports, which take a while
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cosim import InputError
+from cosim.command import command_parser, run_command
+from cosim.errors import nearest
+from cybership.message_text import quoted
+
+from .commands.command_line import Done, anyway_option, out_options, run, ship_option
+from .execution.progress import Advance
+from .execution.result_folder import together
+
+if TYPE_CHECKING:
+    from cosim.fmu import FmuModel
+
+    from .fmu_parameters.system_map import SystemMap
+
+FILES = ("linear.json", "linear.mat")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(linearise, _parser().parse_args(arguments))
+
+
+def linearise(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    from cosim.fmu import FmuModel
+
+    from .fmu_parameters.linear_model import linearised, states_of
+    from .fmu_parameters.system_map import check_map, read_system_map
+    from .fmu_parameters.system_task import is_system
+
+    model, given = FmuModel(options.fmu.absolute()), None
+    of_ship = options.run is not None and not is_system([options.run], options.map)
+    if options.map is not None and not of_ship:
+        given = read_system_map(options.map)
+        check_map(given, model, f"'{options.map}'")
+    if (options.run is None) != (options.time is None):
+        raise InputError("--run and --time belong together: a run, and the time in it [s]")
+    states = states_of(model, given)
+    if options.at is not None:
+        at = _read_state(options.at, model)
+    elif options.run is None:
+        at = {}
+    elif of_ship:
+        at = _of_ship(options, advance)
+    else:
+        at = _of_run(options, model, given)
+    outputs = [v.name for v in model.variables.values() if v.causality == "output" and v.type == "Real"]
+    advance("slopes")
+    found = linearised(model, states, at, outputs)
+    names = (*found.states, *found.inputs, *found.outputs)
+    units = {n: "1" if (u := model.variables[n].unit) is None else u.name for n in names}
+    with together(options.out, FILES) as new:
+        found.write(new, units)
+    roots = ", ".join(f"{x:.4g}" for x in np.linalg.eigvals(found.A))
+    shown = [
+        f"states: {', '.join(found.states)}; inputs: {', '.join(found.inputs) or 'none'}; "
+        f"outputs: {', '.join(found.outputs)}",
+        f"eigenvalues of A [1/s]: {roots}",
+        f"Files in {options.out}: {', '.join(FILES)}",
+    ]
+    return Done(0, shown)
+
+
+def _read_state(path: Path, model: "FmuModel") -> dict[str, float]:
+    """Variable -> value, of a JSON file.
+
+    Raises:
+        InputError: it is not that.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' cannot be read as a state: {error}") from None
+    if not isinstance(content, dict):
+        raise InputError(f'\'{path}\' must be an object of numbers, as {{"u_0": 0.1, "tau_X": 0.5}}')
+    possible = [v.name for v in model.variables.values() if v.type == "Real" and model.can_be_set(v)]
+    for name, value in content.items():
+        if name not in possible:
+            raise InputError(
+                f"'{path}': {quoted(name)} cannot be set at the start{nearest(name, possible)}"
+            )
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+            raise InputError(f"'{path}': {quoted(name)} must be a finite number; got {quoted(value)}")
+    return {name: float(value) for name, value in content.items()}
+
+
+def _of_run(
+    options: argparse.Namespace, model: "FmuModel", given: "SystemMap | None"
+) -> Mapping[str, float]:
+    """Start values and inputs at a time of a measured run."""
+    from .fmu_parameters.measured_system import MeasuredRun, columns_of, noises, read_runs, windows_of
+    from .fmu_parameters.system_map import map_by_names
+
+    given = given or map_by_names(model, columns_of(options.run), f"'{options.run}'")
+    (whole,) = read_runs([options.run], [*given.inputs, *given.outputs])
+    rows = whole.time >= options.time
+    rest = MeasuredRun(whole.name, whole.time[rows], {n: x[rows] for n, x in whole.columns.items()})
+    if not whole.time[0] <= options.time <= whole.time[-1] or rest.time.size < 2:
+        ends = f"{whole.time[0]:g} to {whole.time[-1]:g} s"
+        raise InputError(f"--time {options.time:g} must lie in the run '{whole.name}', {ends}")
+    window, *_ = windows_of(rest, given, model, noises([whole], given), None)
+    inputs = zip((c.name for c in given.inputs.values()), window.course.inputs[0].tolist(), strict=True)
+    return {**window.course.start, **dict(inputs)}
+
+
+def _of_ship(options: argparse.Namespace, advance: Advance) -> Mapping[str, float]:
+    """The smoothed state and the commands at a time of a run of a ship."""
+    from .fmu_parameters.ship_task import ship_task
+
+    return ship_task(options, {"train": [options.run]}, advance).state_at(options.time)
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = command_parser(
+        "diagnosis.linearise",
+        "Compute A, B, C, D of an FMU in a state, with names and units, as JSON and MAT.",
+        "examples:  %(prog)s vendor.fmu --at state.json\n"
+        "           %(prog)s vendor.fmu --run trial.csv --time 60\n"
+        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
+    )
+    made.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMI 2.0 FMU for co-simulation")
+    where = made.add_mutually_exclusive_group()
+    where.add_argument(
+        "--at",
+        type=Path,
+        metavar="STATE.json",
+        help="start values, parameters and inputs by their names (the FMU's start values)",
+    )
+    where.add_argument("--run", type=Path, metavar="RUN", help="measured run, in which the state is")
+    made.add_argument("--time", type=float, metavar="SECONDS", help="time in that run [s]")
+    made.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE.json",
+        help="which variables of the FMU are which columns, and its start values (as names say)",
+    )
+    ship_option(made)
+    anyway_option(made)
+    out_options(made, Path("results", "linear"))
+    made.set_defaults(effects=[], horizon=None)
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)

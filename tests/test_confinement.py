@@ -1,0 +1,209 @@
+"""An FMU in a confined process finds nothing of the user's, and the process says what confines it."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from support.foreign import build_lag, needs_compiler
+from support.spy import build_spy, found
+
+from cosim import SimulationError
+from cosim.fmu import ConfinedFmu, DoubleMemory, FmuModel, Port
+from cosim.fmu.isolation.worker_process import LONGEST_PRINTED, MOST_PRINTED, cleaned
+
+pytestmark = needs_compiler
+MEANS = [("namespaces", "landlock"), ("landlock",), ("namespaces",)]
+EACH = [MEANS[0], *(pytest.param(m, marks=pytest.mark.slow) for m in MEANS[1:])]
+
+
+def opened(fmu, **options):
+    return ConfinedFmu(FmuModel(fmu), **options)
+
+
+def stepped(confined, steps=1):
+    """The lag's output after each of some steps of 0.1 s with an input of 1."""
+    instance, memory = confined.instance(), DoubleMemory(2)
+    known = confined.model.variables
+    ports = [Port(known["in[1]"], 0)], [Port(known["out, filtered"], 1)]
+    try:
+        access = instance.bind(*ports, memory, 0.1)
+        instance.set_up(1.0)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        memory.values[0], told = 1.0, []
+        for k in range(steps):
+            access.put()
+            access.step(0.1 * k)
+            told.append(memory.values[1])
+        instance.terminate()
+        return told
+    finally:
+        instance.free()
+
+
+@pytest.fixture
+def hidden(tmp_path, monkeypatch):
+    """A file: in the working directory, open, in the environment, and an argument of another process."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    path = folder / "MARKED_NAME.csv"
+    path.write_text("time,x,y,psi\n0,1,2,3\n")
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("MEASURED", str(path))
+    other = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)", str(path)])
+    with path.open() as kept:
+        os.set_inheritable(kept.fileno(), True)
+        yield path
+    other.kill()
+    other.wait()
+
+
+@pytest.mark.parametrize("means", EACH)
+def test_an_fmu_finds_no_file_of_the_user(tmp_path, hidden, means):
+    """By name, in its environment, arguments, descriptors, folder and memory, or in another process."""
+    fmu = build_spy(tmp_path, hidden)
+    confined = opened(fmu, means=means)
+    try:
+        if confined.confinement.startswith("unconfined"):
+            pytest.skip(confined.confinement)
+        assert found(stepped(confined)[0]) == []
+        assert not _notifies() or str(hidden) in confined.outside
+    finally:
+        confined.close()
+
+
+@pytest.mark.slow
+def test_the_spy_finds_the_file_where_nothing_confines_it(tmp_path, hidden):
+    """So the test above can fail; and what is not confined is called so."""
+    confined = opened(build_spy(tmp_path, hidden), means=())
+    try:
+        assert confined.confinement.startswith("unconfined: own process in an empty folder")
+        seen = found(stepped(confined)[0])
+        assert {"open", "other processes", "walk"} <= {*seen}
+        assert not {"environment", "arguments", "descriptors", "own memory"} & {*seen}
+    finally:
+        confined.close()
+
+
+def test_files_that_it_opens_are_named(tmp_path, hidden):
+    """Where the kernel says it; a system's library is none of them."""
+    for target, named in ((hidden, True), ("/etc/hostname", False)):
+        habit = f'FILE *f = fopen("{target}", "r"); if (f) fclose(f);'
+        confined = opened(build_lag(tmp_path, habit=habit))
+        try:
+            stepped(confined)
+            if sys.platform == "linux" and _notifies():
+                assert (str(target) in confined.outside) == named
+                assert len(confined.outside) == named
+        finally:
+            confined.close()
+
+
+def _notifies():
+    """Whether the kernel has notifications of system calls (since 5.5)."""
+    return tuple(map(int, re.findall(r"\d+", os.uname().release)[:2])) >= (5, 5)
+
+
+def test_numbers_are_those_of_the_same_process(tmp_path):
+    confined = opened(build_lag(tmp_path))
+    try:
+        assert stepped(confined, 3) == pytest.approx([0.1, 0.19, 0.271], rel=1e-15)
+    finally:
+        confined.close()
+
+
+def test_an_instance_knows_nothing_of_another_one(tmp_path):
+    """Neither by a variable of its library nor by a file; else windows would tell each other the run."""
+    habit = """static int before = 0; FILE *f = fopen("note", "r"); m->y = before++ + (f ? 10 : 0); if (f) fclose(f);
+    f = fopen("note", "w"); if (f) fclose(f); return 0;"""
+    confined = opened(build_lag(tmp_path, habit=habit))
+    try:
+        assert stepped(confined, 2) == [0.0, 11.0]
+        assert stepped(confined, 2) == [0.0, 11.0]
+    finally:
+        confined.close()
+
+
+@pytest.mark.parametrize(
+    ("habit", "message"),
+    [
+        ("sleep(60);", r"the step from t = 0.0 s took longer than 0.5 s; its process was ended"),
+        ("*(volatile int *)0 = 1;", r"\(signal 11, SIGSEGV\)"),
+        ("abort();", r"\(signal 6, SIGABRT\)"),
+        ("if (!fork()) for (;;) pause(); exit(7);", "died|took"),
+    ],
+)
+@pytest.mark.parametrize("means", [MEANS[0], ()])
+def test_a_crash_or_a_hang_is_one_message_and_leaves_no_process(tmp_path, habit, message, means):
+    confined = opened(build_lag(tmp_path, habit=habit), timeout=0.5, means=means)
+    try:
+        with pytest.raises(SimulationError) as error:
+            stepped(confined)
+        assert re.search(message, str(error.value))
+        pid = confined._process.pid
+    finally:
+        confined.close()
+    listed = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False
+    )
+    assert listed.stdout.split() == []
+
+
+def test_usual_time_of_a_step_sets_the_timeout(tmp_path):
+    """30 s at the least, else a hundred times what a step has taken."""
+    confined = opened(build_lag(tmp_path))
+    instance = confined.instance()
+    try:
+        instance.set_up(1.0)
+        assert instance._allowed() == 30.0
+        instance._spent, instance._answers = 10.0, 10
+        assert instance._allowed() == 100.0
+    finally:
+        instance.free()
+        confined.close()
+
+
+def test_what_it_prints_is_kept_once_shortened_and_without_escape_codes(tmp_path):
+    habit = r"""fprintf(stderr, "\033[2J\033[31mred\033[0m %s\n", m->name); printf("\033]0;title\007plain\n");"""
+    confined = opened(build_lag(tmp_path, habit=habit))
+    try:
+        stepped(confined, 3)
+        stepped(confined, 3)
+        assert {*confined.printed} == {"red model", "plain"}
+    finally:
+        confined.close()
+    assert len(cleaned("word " * 1000)) == LONGEST_PRINTED
+
+
+def test_only_so_many_lines_are_kept(tmp_path):
+    confined = opened(build_lag(tmp_path, habit='for (int k = 0; k < 5000; k++) printf("%d\\n", k);'))
+    try:
+        stepped(confined)
+        assert len(confined.printed) == MOST_PRINTED + 1
+        assert [*confined.printed][-1] == "... and 4900 more lines"
+    finally:
+        confined.close()
+
+
+def test_processes_end_with_a_master_that_is_killed(tmp_path):
+    """Those of the instances and the one that makes them."""
+    fmu = build_lag(tmp_path)
+    code = (
+        "import sys, time; from pathlib import Path; from cosim.fmu import ConfinedFmu, FmuModel\n"
+        f"c = ConfinedFmu(FmuModel(Path({str(fmu)!r}))); i = c.instance(); i.set_up(1.0)\n"
+        "print(c._process.pid, i._process._pid, flush=True); time.sleep(60)"
+    )
+    master = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    pids = master.stdout.readline().split()
+    master.send_signal(signal.SIGKILL)
+    master.wait()
+    master.stdout.close()
+    until = time.monotonic() + 20.0
+    while time.monotonic() < until and any(Path(f"/proc/{pid}").exists() for pid in pids):
+        time.sleep(0.05)
+    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]

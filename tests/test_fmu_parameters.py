@@ -1,0 +1,401 @@
+"""An FMU's own parameters on data: what is read, how sure values are, and the verdict."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import loadmat
+from support.foreign import needs_compiler
+from support.oscillator import build_oscillator
+
+import cosim
+from cosim import InputError, Unit
+from cosim.fmu import FmuModel
+from diagnosis import learn, linearise, parameters
+from diagnosis.fmu_parameters.additional_force import AdditionalForce
+from diagnosis.fmu_parameters.fmu_playback import InputCourse, Playback, PlaybackRequest, Processes
+from diagnosis.fmu_parameters.force_search import candidates
+from diagnosis.fmu_parameters.measured_system import MeasuredRun, noise_of, noises, windows_of
+from diagnosis.fmu_parameters.parameter_file import (
+    CalibratedParameter,
+    Prior,
+    kind_of,
+    proposed,
+    read_parameters,
+)
+from diagnosis.fmu_parameters.residuals import Whitening, laid
+from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
+
+pytestmark = needs_compiler
+
+H, NOISE = 0.05, 1e-3
+MAP = {"inputs": {"force": "f"}, "outputs": {"position": "x"}}
+START = {"position": "x0", "der(position)": "v0"}
+DRAG = AdditionalForce("f", "v", 1, False, -3.0)
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    return build_oscillator(tmp_path_factory.mktemp("oscillator"))
+
+
+@pytest.fixture
+def work(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def measured(fmu, folder, name, values, forces=(), seed=1, seconds=30.0):
+    """A run of the FMU with other values and a force beside it, and noise, as a CSV file."""
+    rng = np.random.default_rng(seed)
+    t = H * np.arange(round(seconds / H) + 1)
+    force = 2.0 * np.sin(0.7 * t + seed) + 1.5 * rng.uniform(-1.0, 1.0, t.size)[(t / 3.0).astype(int)]
+    playback = Playback(fmu, ["f"], ["x", "v"], [InputCourse(H, {}, force[:-1, None])])
+    x = playback.run(PlaybackRequest(0, values, forces)).outputs[:, 0]
+    playback.close()
+    table = {"time": t, "force": force, "position": x + NOISE * rng.standard_normal(t.size)}
+    path = folder / f"{name}.csv"
+    pd.DataFrame(table).to_csv(path, index=False)
+    return str(path)
+
+
+def written(path, content):
+    path.write_text(json.dumps(content))
+    return str(path)
+
+
+def some(**changes):
+    """A file of parameters: mass, spring and damper."""
+    each = [("m", 2.0, 0.1), ("c", 10.0, 0.3), ("d", 1.0, 0.5)]
+    return {
+        "parameters": [
+            {"name": n, "value": v, "log": True, "prior": {"rel_std": s}, **changes.get(n, {})}
+            for n, v, s in each
+        ]
+    }
+
+
+# What is read
+
+
+def test_proposal_has_the_prior_of_each_kind(fmu):
+    found, left_out = proposed(FmuModel(fmu), {"x0", "v0"})
+    assert {p.name: (p.prior.rel_std, p.log) for p in found} == {
+        "m": (0.1, True), "c": (0.3, True), "d": (0.5, True), "unused": (0.3, False)
+    }  # fmt: skip
+    assert [s.split()[0] for s in left_out] == ["c3"]
+    (c,) = (p for p in found if p.name == "c")
+    assert (c.min, c.max, c.unit) == (0.0, 100.0, "N/m")
+
+
+def test_damping_by_a_square_is_no_mass():
+    assert kind_of(Unit("N.s2/m", (1, 0, 0, 0, 0, 0, 0), 1.0, 0.0)).name == "quadratic damping"
+    assert kind_of(Unit("kg", (1, 0, 0, 0, 0, 0, 0), 1.0, 0.0)).name == "mass"
+    assert kind_of(None).name == "other"
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_values_and_standard_deviations_are_inverse(log):
+    p = CalibratedParameter(name="k", value=4.0, min=0.0, max=9.0, log=log, prior=Prior(rel_std=0.5))
+    for z in (-1.5, 0.0, 0.7):
+        assert p.z(p.at(z)) == pytest.approx(z, abs=1e-12)
+        ahead, behind = p.at(z + 1e-6), p.at(z - 1e-6)
+        assert p.slope(z) == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
+    assert p.at(p.bounds[1]) == pytest.approx(9.0)
+
+
+WRONG = {
+    "unknown name": (some(c={"name": "k"}), "no parameter 'k'"),
+    "no prior": ({"parameters": [{"name": "c", "value": 1.0}]}, "prior"),
+    "two priors": (some(c={"prior": {"std": 1.0, "rel_std": 0.1}}), "either 'std' or 'rel_std'"),
+    "outside": (some(c={"min": 11.0}), "from 'min' to 'max'"),
+    "log of a negative one": (some(c={"value": -1.0}), "positive"),
+    "of the map": (some(c={"name": "f"}), "variable of the map"),
+    "twice": (some(c={"name": "m"}), "twice"),
+    "extra key": (some(c={"guess": 1}), "guess"),
+    "none": ({"parameters": []}, "parameters"),
+    "no object": ([1], "parameters.json"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_parameters_are_refused(fmu, tmp_path, name):
+    content, message = WRONG[name]
+    path = tmp_path / "parameters.json"
+    written(path, content)
+    with pytest.raises(InputError, match=message):
+        read_parameters(path, FmuModel(fmu), {"f", "x"})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"outputs": {"position": "y"}}, "no output 'y'"),
+        ({"inputs": {"force": "x"}}, "no input 'x'"),
+        ({"start": {"velocity": "v0"}}, r"der\(COLUMN\)"),
+        ({"beside": ["c"]}, "no input 'c'"),
+        ({"outputs": {"position": {"name": "x", "factor": 0.0}}}, "must not be zero"),
+    ],
+)
+def test_wrong_map_is_refused(fmu, change, message):
+    with pytest.raises(InputError, match=message):
+        check_map(SystemMap.model_validate({**MAP, **change}), FmuModel(fmu), "map.json")
+
+
+def test_force_inputs_are_those_in_newtons(fmu):
+    given = SystemMap.model_validate(MAP)
+    assert force_inputs(given, FmuModel(fmu)) == ["f"]
+    assert force_inputs(given.model_copy(update={"beside": []}), FmuModel(fmu)) == []
+
+
+# Properties
+
+
+def test_noise_of_a_smooth_signal_is_found():
+    t = 0.02 * np.arange(5000)
+    noisy = np.sin(t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    assert noise_of(noisy) == pytest.approx(0.01, rel=0.05)
+    assert noise_of(np.round(np.sin(t), 2)) > 0.0
+
+
+def test_whitening_is_the_inverse_root_of_the_covariance():
+    S = np.random.default_rng(2).standard_normal((12, 2)) * [3.0, 0.1]
+    U, size, _ = np.linalg.svd(S, full_matrices=False)
+    W = Whitening(U, 1.0 / np.sqrt(1.0 + size**2))(np.eye(12))
+    assert np.allclose(W @ (np.eye(12) + S @ S.T) @ W.T, np.eye(12))
+
+
+def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():
+    track = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
+    moved = laid(track, np.array([2.0, 3.0, np.pi / 2]))
+    assert moved[0] == pytest.approx([2.0, 3.0, np.pi / 2])
+    assert moved[4] == pytest.approx([2.0, 7.0, np.pi / 2])
+
+
+def test_candidates_have_different_names():
+    ids = [f.id for f in candidates(["f", "g"], ["x", "v"], ["x"])]
+    assert len(ids) == len(set(ids))
+    assert {"f:1", "f:v", "f:|v|v", "f:v³", "g:der(x)"} <= set(ids)
+
+
+def test_start_values_are_those_of_the_motion(fmu):
+    t = H * np.arange(400)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(t.size)
+    run = MeasuredRun("r", t, {"force": 0.0 * t, "position": np.sin(t) + noise})
+    given = SystemMap.model_validate({**MAP, "start": START})
+    found = windows_of(run, given, FmuModel(fmu), noises([run], given), 5.0)
+    assert len(found) == 3  # the remainder is dropped
+    for w in found:
+        assert w.course.start["x0"] == pytest.approx(np.sin(w.begin), abs=4.0 * w.start_std["x0"])
+        assert w.course.start["v0"] == pytest.approx(np.cos(w.begin), abs=4.0 * w.start_std["v0"])
+
+
+def test_playback_adds_a_force_as_the_fmu_has_it(fmu):
+    """A spring beside the FMU is its own spring, but for what a step is late."""
+    force = np.sin(0.5 * np.arange(2000) * 0.01)[:, None]
+    playback = Playback(fmu, ["f"], ["x", "v"], [InputCourse(0.01, {}, force)])
+    own = playback.run(PlaybackRequest(0, {"c": 11.0})).outputs
+    beside = playback.run(PlaybackRequest(0, {}, [AdditionalForce("f", "x", 0, False, -1.0)])).outputs
+    plain = playback.run(PlaybackRequest(0, {})).outputs
+    playback.close()
+    assert np.abs(own - beside).max() < 0.05 * np.abs(own - plain).max()
+
+
+# Linear model
+
+
+@pytest.mark.parametrize("seen", [{"position": "x"}, {"position": "x", "speed": "v"}])
+def test_linear_model_of_the_oscillator_is_its_equation(fmu, work, seen):
+    second = "speed" if "speed" in seen else "der(position)"
+    content = {"outputs": seen, "start": {"position": "x0", second: "v0"}}
+    at = written(work / "at.json", {"x0": 0.2, "v0": -0.1, "f": 1.0, "c": 20.0})
+    given = written(work / "map.json", content)
+    assert linearise.main([str(fmu), "--at", at, "--map", given, "--out", "linear"]) == 0
+    found = json.loads((work / "linear/linear.json").read_text())
+    assert np.allclose(found["A"], [[0.0, 1.0], [-10.0, -0.5]], atol=5e-3)
+    assert np.allclose(found["B"], [[0.0], [0.5]], atol=1e-3)
+    seen_by = [[1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [-10.0, -0.5]]
+    assert np.allclose(found["C"], seen_by, atol=1e-6)
+    assert np.allclose(found["D"], [[0.0], [0.0], [0.0], [0.5]], atol=1e-6)
+    assert found["x_dot"] == pytest.approx([-0.1, (1.0 - 4.0 + 0.1) / 2.0], abs=1e-3)
+    assert [s["name"] for s in found["states"]] == ["x0", "v0"]
+    assert [o["unit"] for o in found["outputs"]] == ["m", "m/s", "m/s", "m/s2"]
+    mat = loadmat(work / "linear/linear.mat")
+    assert np.array_equal(mat["A"], found["A"])
+    assert [str(x[0]) for x in mat["states"].ravel()] == ["x0", "v0"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--at", "at.json"], "'y0' cannot be set"),
+        (["--time", "3"], "belong together"),
+    ],
+)
+def test_state_that_cannot_be_is_refused(fmu, work, capsys, arguments, message):
+    written(work / "at.json", {"y0": 1.0})
+    given = written(work / "map.json", {**MAP, "start": START})
+    assert linearise.main([str(fmu), *arguments, "--map", given, "--out", "linear"]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (work / "linear").exists()
+
+
+def test_fmu_whose_states_cannot_be_set_is_refused(work, capsys):
+    closed = build_oscillator(work, "closed", left_out=("x0", "v0"))
+    assert linearise.main([str(closed), "--out", "linear"]) == 2
+    assert "no state of 'closed.fmu' can be set" in " ".join(capsys.readouterr().err.split())
+
+
+# Commands
+
+
+def test_parameters_without_runs(fmu, work, capsys):
+    assert parameters.main([str(fmu)]) == 0
+    names = [p["name"] for p in json.loads((work / "parameters.json").read_text())["parameters"]]
+    assert names == ["m", "c", "d", "unused"]
+    assert "c3 is left out" in capsys.readouterr().out
+    assert parameters.main([str(fmu)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_fmu_without_parameters(work, capsys):
+    bare = build_oscillator(work, "bare", left_out=("m", "c", "d", "x0", "v0", "c3", "unused"))
+    assert parameters.main([str(bare)]) == 2
+    assert "no parameter that can be calibrated" in " ".join(capsys.readouterr().err.split())
+    assert not (work / "parameters.json").exists()
+
+
+@pytest.mark.slow
+def test_parameters_that_runs_determine(fmu, work, capsys):
+    run = measured(fmu, work, "run", {})
+    given = written(work / "map.json", MAP)
+    assert parameters.main([str(fmu), "--map", given, "--runs", run]) == 0
+    names = [p["name"] for p in json.loads((work / "parameters.json").read_text())["parameters"]]
+    assert names == ["m", "c", "d"]
+    assert "no influence" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.slow
+def test_values_known_only_together_are_said(work, capsys):
+    """Only the product of spring constant and another value acts."""
+    fmu = build_oscillator(
+        work, "product", habit="p[V_f] += p[V_c] * p[V_x] - p[V_c] * p[V_unused] * p[V_x];"
+    )
+    run = measured(fmu, work, "run", {})
+    assert parameters.main([str(fmu), "--map", written(work / "map.json", MAP), "--runs", run]) == 0
+    assert "known only together: c, unused" in " ".join(capsys.readouterr().out.split())
+
+
+CASES = {
+    "nothing": ({}, (), "none"),
+    "a parameter": ({"c": 12.0}, (), "parameters"),
+    "physics": ({}, (DRAG,), "found"),
+    "both": ({"c": 12.0}, (DRAG,), "found"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_verdict(fmu, work, name):
+    values, forces, verdict = CASES[name]
+    train = [measured(fmu, work, f"run{k}", values, forces, seed=k) for k in (1, 2)]
+    test = measured(fmu, work, "other", values, forces, seed=3)
+    given = written(work / "map.json", MAP)
+    own = written(work / "parameters.json", some())
+    options = ["--model", str(fmu), "--map", given, "--parameters", own, "--out", "out"]
+    assert learn.main([*train, "--test", test, *options]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["verdict"] == verdict
+    assert {p["name"] for p in found["parameters"] if p["moved"]} == set(values)
+    for p in found["parameters"]:
+        low, high = p["ci95"]
+        truth = {"m": 2.0, "c": 10.0, "d": 1.0, **values}[p["name"]]
+        wide = high - low  # twice the interval: one of fifteen misses its own
+        assert low - 0.5 * wide < truth < high + 0.5 * wide
+        assert low <= p["value"] <= high or verdict == "none"
+    assert [e["id"] for e in found["effects"]] == [f.id for f in forces]
+    for e in found["effects"]:
+        value = e["coefficients"]["f:|v|v"]
+        assert value["value"] == pytest.approx(-3.0, rel=0.05)
+        assert value["unit"] == "N/(m/s)^2"
+        assert e["confidence"] >= 0.8
+    (held_out,) = (e for e in found["errors"] if e["held_out"])
+    error = held_out["outputs"]["x"]
+    assert error["after"] == pytest.approx(NOISE, rel=0.2)
+    assert (error["after"] < error["before"]) == (verdict != "none")
+    ssv = cosim.read_parameters(work / "out/model.ssv").values
+    fitted = {p["name"]: p["value"] for p in found["parameters"]}
+    own = {n: v.value for n, v in ssv.get("oscillator", {}).items()}
+    assert own == ({} if verdict == "none" else fitted)
+    posterior = json.loads((work / "out/posterior.json").read_text())
+    assert np.linalg.eigvalsh(posterior["covariance"]).min() > 0.0
+    assert (work / "out/report.html").stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_physics_that_no_force_can_show_is_unexplained(fmu, work):
+    """A cubic spring, and no input on which a force may act."""
+    run = measured(fmu, work, "run", {"c3": 400.0})
+    given = written(work / "map.json", {**MAP, "beside": []})
+    own = written(work / "parameters.json", some())
+    options = ["--model", str(fmu), "--map", given, "--parameters", own, "--out", "out"]
+    assert learn.main([run, *options]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["verdict"] == "unexplained"
+    assert found["remainder"]["significant"]
+
+
+@pytest.mark.slow
+def test_windows_from_measured_states_agree_with_whole_runs(fmu, work):
+    values = {"c": 12.0}
+    run = measured(fmu, work, "run", values, seconds=60.0)
+    given = written(work / "map.json", {**MAP, "start": START, "window": 10.0})
+    own = written(work / "parameters.json", some())
+    options = ["--model", str(fmu), "--map", given, "--parameters", own, "--out", "out"]
+    assert learn.main([run, *options]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["verdict"] == "parameters"
+    (c,) = (p for p in found["parameters"] if p["name"] == "c")
+    assert c["value"] == pytest.approx(12.0, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_range_in_which_the_fmu_fails_is_said_and_the_rest_goes_on(work, capsys):
+    habit = "if (p[V_c] > 40.0) return 3; if (p[V_d] > 3.0) p[V_x] = NAN;"
+    fmu = build_oscillator(work, "fragile", habit=habit)
+    run = measured(fmu, work, "run", {"c": 12.0})
+    given = written(work / "map.json", MAP)
+    assert learn.main([run, "--model", str(fmu), "--map", given, "--out", "out"]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["verdict"] == "parameters"
+    notes = " ".join(found["fmu"]["notes"])
+    assert "the FMU fails" in notes
+    assert "x is not finite" in notes
+    assert "do not determine unused" in notes
+
+
+@pytest.mark.slow
+def test_fmu_that_ends_its_process_is_said(work, capsys):
+    fmu = build_oscillator(work, "fatal", habit="if (t > 1.0) abort();")
+    with Processes(
+        fmu, ["f"], ["x"], [InputCourse(H, {}, np.zeros((40, 1))), InputCourse(H, {}, np.zeros((10, 1)))]
+    ) as p:
+        first, second = p.run([PlaybackRequest(0, {}), PlaybackRequest(1, {})])
+    assert "ends the process" in first.fault
+    assert np.isnan(first.outputs).all()
+    assert not second.fault
+    assert np.isfinite(second.outputs).all()
+
+
+@pytest.mark.slow
+def test_interrupted_or_refused_calls_leave_nothing(fmu, work, capsys):
+    run = measured(fmu, work, "run", {})
+    for arguments, message in (
+        ([run, "--parameters", "p.json"], "--model NAME.fmu is missing"),
+        ([run, "--model", str(fmu)], "no column is called as an output"),
+        ([run, "--model", str(fmu), "--map", written(work / "m.json", {"outputs": {"y": "x"}})], "'y'"),
+    ):
+        assert learn.main([*arguments, "--out", "out"]) == 2
+        assert message in " ".join(capsys.readouterr().err.split())
+        assert not (work / "out").exists()
