@@ -68,7 +68,7 @@ TOLD = [
     ("psi_180", column(psi={"offset": 3.142})),
     ("const_tau", "none of its commands ever varies"),
     ("const_x", "x is the same number in all rows"),
-    ("outliers_tau", "leave the cells of false commands empty"),
+    ("outliers_tau", "leave false cells empty"),
     ("commands_zero_half", "all commands are zero for 2"),
 ]
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 from support.cases import slow
@@ -60,6 +60,7 @@ def test_for_linear_damping_it_is_the_smallest_eigenvalue(changes):
 @given(st.floats(-0.3, 0.3), st.floats(-0.15, 0.15), st.floats(-0.4, 0.4), coefficient, coefficient)
 def test_it_is_the_rate_at_which_the_ship_loses_its_energy(u, v, r, cubic, mixed):
     nu = np.array([[u, v, r]]) + 0.01
+    assume(np.abs(nu).max() > 1e-9)  # a ship at rest has no energy to lose
     model = Model({"delta_X_uuu": cubic, "delta_N_uv": mixed, "curve_X_u_7": 0.1})
     calm = SimpleNamespace(time=np.zeros(1), air=None)
     nu_dot = acceleration(model, calm, np.zeros((1, 3)), nu)  # Coriolis forces included

@@ -27,12 +27,12 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     k = int(np.argmax((size / full).max(axis=0) * (share > SETTINGS.negligible)))
     rows, unit = int(beyond[:, k].sum()), "N.m" if k == 2 else "N"
     seen = (
-        f"{TAU[k]} reaches {size[:, k].max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times "
+        f"{TAU[k]} reaches {size[:, k].max():.4g} {unit}, more than {SETTINGS.most_gain:g} times "
         f"the {full[k]:.4g} {unit} that the thrusters give in {rows} of {len(size)} rows"
     )
     if 2 * rows > len(size):
         return seen
-    return f"{seen}: leave the cells of false commands empty, and log commands after they are clipped"
+    return f"{seen}: leave false cells empty, and log commands after they are clipped"
 
 
 def _beyond_limits(run: Run, model: Model) -> str | None:

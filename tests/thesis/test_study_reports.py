@@ -590,7 +590,7 @@ def test_report_of_the_estimators(tmp_path, monkeypatch, figures):
     )
     monkeypatch.setattr(estimators, "run_all", lambda runs, *_, **__: dict.fromkeys(runs, made))
     monkeypatch.setattr(estimators, "examples", lambda *_: None)
-    text, results = written(estimators.study(tmp_path, 3, None, False, None), tmp_path)
+    text, results = written(estimators.study(tmp_path, 3, None, False, []), tmp_path)
     assert [row["here"] for row in results["claims"]] == [
         *["reproduced"] * 5,
         "reproduced for nonlinear and luenberger",
@@ -857,7 +857,6 @@ def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
         (chapter6, ["--seeds", "3"], [range(3), 1.0, None, None, True]),
         (chapter6, ["--quick", "--trials"], [range(2), 0.25, None, None, False]),
         (chapter7, ["--quick", "--jobs", "1"], [60.0, 1, None]),
-        (estimators, ["--quick"], [10, None, True, None]),
         (improved, [], [range(10), 198.0, None]),
         (lost_thrust, [], []),
         (observer_gains, [], [range(3), estimators.STOP, None]),
