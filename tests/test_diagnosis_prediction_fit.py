@@ -34,6 +34,8 @@ STEPS = {
     "lag": 1e-2,
     "heading_offset": 1e-3,
     "marker_offset_dx": 1e-3,
+    "position_lag": 1e-2,
+    "heading_lag": 1e-2,
 }
 DRAG = -2.0  # N s/m, hidden
 LIGHTLY_DAMPED = -0.62  # N m s/rad, hidden

@@ -52,10 +52,10 @@ def aims(found: Sequence[Recorded], there: Sequence[str] | None) -> Iterator[tup
         return
     others = [o for o in read_ones if o is not clean]
     limited = [o for o in others if not o.misstated]
-    kept = sum(o.verdict == clean.verdict and {*o.found} == {*clean.found} for o in limited)
+    kept = sum(o.verdict == clean.verdict and o.physics == {*clean.found} for o in limited)
     yield f"{KEPT:.0%} keep verdict and cause", f"{kept} of {len(limited)}"
     true = {e for e, c in clean.found.items() if (c or 0.0) >= SURE} if there is None else {*there}
-    sure = [o.way for o in others if {e for e, c in o.found.items() if (c or 0.0) >= SURE} - true]
+    sure = [o.way for o in others if {e for e in o.physics if (o.found[e] or 0.0) >= SURE} - true]
     yield f"none sure ({SURE}) of an absent cause", f"{len(sure)} of {len(others)}: {', '.join(sure)}"
     errors = {o.way: o.error / clean.error for o in limited if np.isfinite(o.error)}
     if errors:

@@ -81,6 +81,11 @@ class Recorded:
     error: float = np.nan
     seconds: float = 0.0
 
+    @property
+    def physics(self) -> set[str]:
+        """Effects that were found, without those that the way itself has."""
+        return {*self.found} - WAYS[self.way].adds
+
     def content(self) -> dict[str, Any]:
         """What a file of results holds, in which a number that is not finite is null."""
         return json.loads(json.dumps(asdict(self)), parse_constant=lambda _: None)
@@ -144,6 +149,8 @@ def _learned(o: Recorded, file: Path, ship: str | None, seed: int, test: Good | 
     """The same with the cause, and the error on the test run."""
     tests = [] if test is None else diagnosis.load(test.table, ship=ship)
     d = diagnosis.diagnose(diagnosis.load(file, ship=ship), tests, seed=seed)
-    error = d.comparison.evaluations[-1].after.position if tests else np.nan
+    # The test run is measured without what the way does to the pose.
+    model = replace(d.learned.model, measurement={})
+    error = diagnosis.compare(tests, model).evaluations[-1].before.position if tests else np.nan
     effects = {e.id: e.confidence for e in d.content.effects}
     return replace(o, verdict=d.content.verdict, found=effects, error=error)

@@ -31,6 +31,7 @@ class Way:
         rates: at which the pose is sampled (3,) [Hz]; infinite: as the good log.
         given: what the file beside it says of the noise, in those of the good log; empty: nothing.
         columns: further keys of the file beside it, by signal.
+        adds: effects of the measurement that the way itself has, which are right findings.
     """
 
     record: Record
@@ -38,6 +39,7 @@ class Way:
     rates: Sequence[float] = (np.inf, np.inf, np.inf)
     given: Mapping[str, float] = field(default_factory=dict)
     columns: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    adds: frozenset[str] = frozenset()
 
 
 def sampled(table: pd.DataFrame, time: np.ndarray) -> pd.DataFrame:
@@ -197,8 +199,9 @@ for of in RATES:
 slow = held({"x": 10.0, "y": 10.0, "psi": 1.0}, 10.0)
 WAYS["heading 1 Hz held, place 10 Hz"] = Way(slow, rates=(10.0, 10.0, 1.0))
 for lag in LAGS:
-    WAYS[f"place filtered {lag:g} s"] = Way(filtered(PLACE, lag), None)
-    WAYS[f"heading filtered {lag:g} s"] = Way(filtered(["psi"], lag), None)
+    for of, names in (("place", PLACE), ("heading", ["psi"])):
+        added = frozenset({"heading_lag" if of == "heading" else "position_lag"})
+        WAYS[f"{of} filtered {lag:g} s"] = Way(filtered(names, lag), None, adds=added)
 for gain in (0.2, 0.5):
     WAYS[f"Kalman pose {gain:g} held"] = Way(tracked(POSE, gain), None)
     WAYS[f"Kalman heading {gain:g}, place 5 Hz held"] = Way(tracked(["psi"], gain), None)

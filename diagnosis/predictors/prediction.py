@@ -7,6 +7,7 @@ parameters.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
 # Standard deviations beyond which a speed is none of rest, a gain is wrong, and a nominal coefficient is
 # no explanation alone (contract).
 FAR_OFF = 3.0
+MOTION = (attrgetter("eta"), attrgetter("eta_dot"), attrgetter("eta_ddot"))  # of a smoothed run
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +142,8 @@ def predict(starts: WindowStarts, model: Model) -> np.ndarray:
         x, y, psi, *_ = zip(*states, strict=True)
         s = vessel.State(*(np.stack(np.broadcast_arrays(*each)) for each in (x, y, psi)))
         pose = np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull)), axis=1)
-    return pose.reshape(*pose.shape[:2], *(pose.shape[2:] or (1, 1)))
+        pose = pose.reshape(*pose.shape[:2], *(pose.shape[2:] or (1, 1)))
+        return filtered(pose, model, starts, starts.h)
 
 
 def _states_of_one(
@@ -182,7 +185,7 @@ def propagate(
     power = starts.power(model.clock)
     thrusters, beside, air = drive, starts.given(model), starts.air(model)
     # The smoothed motion, seen through the model's measurement effects.
-    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), body)
+    pose, nu = true_motion(*map(starts.first, MOTION), model)
     s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
     steps: Sequence[Any] = thrust
     if single:
@@ -213,15 +216,16 @@ def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
     return law
 
 
-def by_clock(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:
-    """Models of one ship that are predicted at once, those with the same clock; which, and in one."""
-    for clock in sorted({m.clock for m in models}):
-        chosen = [k for k, m in enumerate(models) if m.clock == clock]
+def by_measurement(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:
+    """Models of one ship that are predicted at once, those measured alike; which, and in one."""
+    measurements = [(m.clock, *m.lags) for m in models]
+    for measurement in sorted({*measurements}):
+        chosen = [k for k, m in enumerate(measurements) if m == measurement]
         yield chosen, stacked([models[k] for k in chosen])
 
 
 def stacked(models: Sequence[Model]) -> Model:
-    """Several models with the same clock as one whose parameters are arrays (p, 1) where they differ."""
+    """Several models, measured alike, as one whose parameters are arrays (p, 1) where they differ."""
 
     def together(part: str) -> dict[str, Any]:
         values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
@@ -249,17 +253,51 @@ def moved(s: vessel.State, tau: Force, b: vessel.PreparedVessel, h: float) -> ve
     )
 
 
-def true_motion(eta: Any, eta_dot: Any, b: vessel.PreparedVessel) -> tuple[list[Any], list[Any]]:
-    """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
-    x, y, psi = true_pose(eta, b)
-    ahead, astern = (true_pose(eta + h * eta_dot, b) for h in (LONGEST_STEP, -LONGEST_STEP))
-    x_dot, y_dot, r = ((a - b) / (2.0 * LONGEST_STEP) for a, b in zip(ahead, astern, strict=True))
+def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) -> np.ndarray:
+    """Poses (n, 3, p, w) behind a model's low-pass filters, which are exact for straight lines between.
+
+    Args:
+        poses: of windows, at their start and at equal intervals from there.
+        model: whose measurement it is.
+        starts: the windows, which begin with the measured pose.
+        h: interval [s].
+    """
+    if not any(np.any(lag) for lag in model.lags):
+        return poses
+    first = starts.first(lambda s: s.eta)
+    poses = np.stack([*poses.transpose(1, 0, 2, 3)[:2], np.unwrap(poses[:, 2], axis=0)], axis=1)
+    found = np.array(poses)
+    for k, lag in enumerate(model.lags):
+        p, kept = poses[:, k], np.exp(-h / np.maximum(lag, np.finfo(float).tiny))
+        behind = p[0] - first[k]
+        behind = np.where(np.equal(lag, 0.0), 0.0, wrap(behind) if k == 2 else behind)
+        for n, slope in enumerate(np.diff(p, axis=0) / h):
+            found[n, k] = p[n] - behind
+            behind = lag * slope + kept * (behind - lag * slope)
+        found[-1, k] = p[-1] - behind
+    return found
+
+
+def true_motion(eta: Any, eta_dot: Any, eta_ddot: Any, model: Model) -> tuple[list[Any], list[Any]]:
+    """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,).
+
+    A low-pass filter of first order with the time constant T is undone by y + T dy/dt.
+    """
+    b, step = model.hull, LONGEST_STEP
+    if any(np.any(lag) for lag in model.lags):
+        eta, eta_dot = (
+            [y + lag * y_dot for y, y_dot, lag in zip(a, a_dot, model.lags, strict=True)]
+            for a, a_dot in ((eta, eta_dot), (eta_dot, eta_ddot))
+        )
+    poses = ([y + h * y_dot for y, y_dot in zip(eta, eta_dot, strict=True)] for h in (0.0, step, -step))
+    (x, y, psi), ahead, astern = (true_pose(pose, b) for pose in poses)
+    x_dot, y_dot, r = ((a - b) / (2.0 * step) for a, b in zip(ahead, astern, strict=True))
     return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 
 
 def true_pose(measured: Any, b: vessel.PreparedVessel) -> list[Any]:
     """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
-    pose = [m[None] for m in measured]
+    pose = [np.atleast_2d(m) for m in measured]
     for _ in range(8):
         x, y, psi = vessel.measured(vessel.State(*pose), b)
         off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))

@@ -11,7 +11,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
 from fmus.effects.linear_map import AXES, parameter
-from fmus.effects.measurement import CLOCK_OFFSET
+from fmus.effects.measurement import CLOCK_OFFSET, HEADING_LAG, POSITION_LAG
 from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
 from fmus.vessel.vessel import PreparedVessel
@@ -189,6 +189,12 @@ class Model:
     def clock(self) -> float:
         """Time [s] by which a pose is older than its stamp."""
         return self.measurement.get(CLOCK_OFFSET.id, 0.0)
+
+    @property
+    def lags(self) -> tuple[Any, Any, Any]:
+        """Time constants [s] of the low-pass filters behind which x, y and psi are measured."""
+        position, heading = (self.measurement.get(e.id, 0.0) for e in (POSITION_LAG, HEADING_LAG))
+        return position, position, heading
 
     @cached_property
     def hull(self) -> PreparedVessel:

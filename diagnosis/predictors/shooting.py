@@ -15,7 +15,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from .prediction import WindowStarts, arriving, propagate
+from .prediction import WindowStarts, arriving, filtered, propagate
 from .ship_model import Model
 from .thrust import Response
 from .windows import usable_windows
@@ -112,7 +112,7 @@ class Shooting:
 
     def residuals(self, model: Model) -> np.ndarray:
         """(w, T, 3): measured minus predicted pose [m, m, rad], heading wrapped."""
-        return _off(self.measured, _poses(self._states(model)[1:], model)[0])
+        return _off(self.measured, self._poses(self._states(model), model)[0])
 
     def around(self, model: Model, steps: Mapping[str, float]) -> Around:
         """A model's predictions and what changes them.
@@ -126,12 +126,22 @@ class Shooting:
         same = {n: steps[n] for n, m in changed.items() if Response.key(m) == key}
         together = _together(model, same)
         states = self._states(together, model)
-        base, *others = _poses(states[1:], together)
+        base, *others = self._poses(states, together)
         found = dict(zip(same, others, strict=True))
-        found |= {n: _poses(self._states(m)[1:], m)[0] for n, m in changed.items() if n not in found}
+        found |= {n: self._poses(self._states(m), m)[0] for n, m in changed.items() if n not in found}
         slopes = [_off(found[n], base) / h for n, h in steps.items()]
         stacked = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
         return Around(_off(self.measured, base), stacked, self._linear(states, model))
+
+    def _poses(self, states: Sequence[vessel.State], model: Model) -> np.ndarray:
+        """(p, w, T, 3): measured pose at the instants; parameters of the model may be arrays (p, 1)."""
+        with np.errstate(all="ignore"):
+            poses = np.stack(
+                np.broadcast_arrays(*(x for s in states for x in vessel.measured(s, model.hull)))
+            )
+            poses = poses.reshape(len(states), 3, *poses.shape[1:])
+            found = filtered(poses, model, self.starts, self.every)
+        return np.ascontiguousarray(found[1:].transpose(2, 3, 0, 1))
 
     def _linear(self, states: Sequence[vessel.State], model: Model) -> Linear:
         with np.errstate(all="ignore"):
@@ -165,13 +175,6 @@ def _beside(states: Sequence[vessel.State]) -> vessel.State:
     models = max(np.broadcast_shapes(*map(np.shape, s))[0] for s in states)
     whole = [[np.broadcast_to(x, (models, s.u.shape[-1])) for x in s] for s in states]
     return vessel.State._make(np.concatenate(x, axis=-1) for x in zip(*whole, strict=True))
-
-
-def _poses(states: Sequence[vessel.State], model: Model) -> np.ndarray:
-    """(p, w, T, 3): measured pose of states (p, w) of a model whose parameters may be arrays (p, 1)."""
-    with np.errstate(all="ignore"):
-        poses = [np.broadcast_arrays(*vessel.measured(s, model.hull)) for s in states]
-    return np.stack([np.stack(pose, axis=-1) for pose in poses], axis=-2)
 
 
 def _off(pose: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -214,7 +214,7 @@ def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
-    measured = tuple((name, model.vessel.get(name, 0.0)) for name in names)
+    measured = (*((name, model.vessel.get(name, 0.0)) for name in names), *model.lags)
     ship = (measured, tuple(sorted(model.vessel.items())))
     water = model.hull.params.water
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
@@ -329,6 +329,7 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
 
 def _motion(w: WeakWindows, model: Model) -> np.ndarray:
     """True pose and velocity (2, n, 3) behind the measured ones."""
-    motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
+    smoothed = w.smoothed
+    motion = true_motion(smoothed.eta.T, smoothed.eta_dot.T, smoothed.eta_ddot.T, model)
     # Columns in one piece each: all that is computed of them goes along time.
     return np.array([np.where(w.known, np.concatenate(part), 0.0) for part in motion]).swapaxes(1, 2)

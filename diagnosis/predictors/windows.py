@@ -17,7 +17,7 @@ from fmus.ops import wrap
 
 from ..runs import Smoothed
 from ..runs.cleaning import BRIEF
-from .prediction import WindowStarts, by_clock, predict
+from .prediction import WindowStarts, by_measurement, predict
 from .ship_model import Model
 from .thrust import LONGEST_STEP
 from .weak_form import BLOCK, BLOCKS, HORIZON
@@ -187,7 +187,7 @@ class Windows:
     def residuals_of_each(self, models: Sequence[Model]) -> list[np.ndarray]:
         """Residuals (samples, 3) of some models, many predicted at once."""
         found: dict[int, np.ndarray] = {}
-        for chosen, together in by_clock(models):
+        for chosen, together in by_measurement(models):
             each = np.broadcast_to(self.residuals(together), (len(chosen), *self.measured.shape))
             found |= zip(chosen, each, strict=True)
         return [found[k] for k in range(len(models))]

@@ -101,6 +101,9 @@ EARTH_FIXED = Family(
     },
 )
 BODY_FIXED = Family("body-fixed", "legs ahead and astern on at least two opposite headings")
+FILTER = Family(
+    "filter", "a second sensor of the same channel without a filter, or this one with it off"
+)
 MEASUREMENT = Family(
     "measurement", "turning on the spot both ways, and straight legs on opposite headings"
 )

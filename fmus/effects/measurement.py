@@ -7,11 +7,14 @@ from ..declare import Range, Variable
 from ..frames import rotate_to_earth
 from ..ops import Number
 from .effect import Effect, Search, Wording, effect
-from .families import CLOCK, MEASUREMENT
+from .families import CLOCK, FILTER, MEASUREMENT
 from .text import Found, number, offset, towards
 
 Pose = tuple[Number, Number, Number]
 ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
+LAGS = Range(
+    0.0, 3.0
+)  # s, of a filter; receivers smooth over some samples, a chart plotter over seconds
 # Offsets of the clock to try [s]: some samples, and what a slow network gives.
 OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)
 
@@ -89,3 +92,33 @@ CLOCK_OFFSET = Effect(
     search=Search(tries=[{"clock_offset": d} for d in OFFSETS]),
     wording=Wording(clock_sentence, CLOCK),
 )
+
+
+def low_pass(channel: str, symbol: str, coordinates: str) -> Effect:
+    """The effect that a channel is measured behind a low-pass filter of first order."""
+    name = f"{channel}_lag"
+    return Effect(
+        id=name,
+        kind="measurement",
+        axis="XYN",
+        description=f"the measured {channel} is low-pass filtered (first order)",
+        formula=f"T d({coordinates})_m/dt = ({coordinates}) - ({coordinates})_m",
+        symbol=symbol,
+        sign="0: none",
+        source="first-order lag of an instrument",
+        linear=False,
+        parameters=(
+            Variable(name, "s", f"time constant of the filter of the {channel}", 0.0, LAGS, False),
+        ),
+        function=None,
+        search=Search(differentiable=True),
+        wording=Wording(
+            lambda f: f"The {channel} is measured behind a low-pass filter of {number(f[name])} s.",
+            FILTER,
+        ),
+    )
+
+
+# No FMU has the receiver's filter, as none has its clock.
+POSITION_LAG = low_pass("position", "T_p", "x, y")
+HEADING_LAG = low_pass("heading", "T_ψ", "psi")
