@@ -44,7 +44,6 @@ LATER = {
     "benchmarks/README.md",
     "docs/checks.md",
     "docs/constants.md",
-    "docs/diagnosis.md",
     "docs/effects.md",
     "docs/foreign_models.md",
     "docs/interface.md",
