@@ -47,7 +47,6 @@ LATER = {
     "docs/effects.md",
     "docs/foreign_models.md",
     "docs/interface.md",
-    "docs/measurements.md",
     "docs/sensors.md",
     "docs/ship.md",
     "docs/ships.md",
