@@ -52,7 +52,6 @@ LATER = {
     "docs/ships.md",
     "docs/trials.md",
     "docs/trust.md",
-    "docs/validation.md",
 }
 
 FOLDERS = ("*.md", "benchmarks/*.md", "studies/*.md", "docs/*.md", "docs/notebooks/*.md")
