@@ -45,13 +45,11 @@ LATER = {
     "docs/checks.md",
     "docs/constants.md",
     "docs/effects.md",
-    "docs/foreign_models.md",
     "docs/interface.md",
     "docs/sensors.md",
     "docs/ship.md",
     "docs/ships.md",
     "docs/trials.md",
-    "docs/trust.md",
 }
 
 FOLDERS = ("*.md", "benchmarks/*.md", "studies/*.md", "docs/*.md", "docs/notebooks/*.md")
