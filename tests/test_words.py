@@ -48,7 +48,6 @@ LATER = {
     "docs/interface.md",
     "docs/sensors.md",
     "docs/ship.md",
-    "docs/ships.md",
     "docs/trials.md",
 }
 
