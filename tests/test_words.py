@@ -48,7 +48,6 @@ LATER = {
     "docs/interface.md",
     "docs/sensors.md",
     "docs/ship.md",
-    "docs/trials.md",
 }
 
 FOLDERS = ("*.md", "benchmarks/*.md", "studies/*.md", "docs/*.md", "docs/notebooks/*.md")
