@@ -46,7 +46,6 @@ LATER = {
     "docs/constants.md",
     "docs/effects.md",
     "docs/interface.md",
-    "docs/sensors.md",
     "docs/ship.md",
 }
 
