@@ -315,7 +315,7 @@ def test_shipped_ships_say_where_their_numbers_come_from(name: str) -> None:
         assert v.value == 0.0 or v.name in limits or v.origin != "guessed", v.name
 
 
-PAGE = (ROOT / "docs" / "ship.md").read_text(encoding="utf-8")
+PAGE = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("ship.md", "actuators.md"))
 
 
 def test_published_schema_is_that_of_the_code() -> None:

@@ -46,7 +46,6 @@ LATER = {
     "docs/constants.md",
     "docs/effects.md",
     "docs/interface.md",
-    "docs/ship.md",
 }
 
 FOLDERS = ("*.md", "benchmarks/*.md", "studies/*.md", "docs/*.md", "docs/notebooks/*.md")
