@@ -41,7 +41,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {}
 
 # Pages that are not rewritten yet, or are printed by commands whose texts are not.
 LATER = {
-    "benchmarks/README.md",
     "docs/checks.md",
     "docs/constants.md",
     "docs/effects.md",
