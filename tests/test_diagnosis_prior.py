@@ -160,6 +160,6 @@ def test_the_command_refuses_it_before_it_reads_a_run(text, said, tmp_path):
 
 
 def test_docs_tell_the_origin_of_each_group():
-    text = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
     for known in set(KNOWN.values()):
         assert f"| `{known.group}` | {known.origin} | {100.0 * known.share:g} %" in text

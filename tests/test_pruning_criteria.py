@@ -21,8 +21,8 @@ def losses(size=1.0, seed=0):
 
 @pytest.fixture
 def own(tmp_path):
-    """The criterion that docs/diagnosis.md shows, as a file."""
-    page = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    """The criterion that docs/evidence.md shows, as a file."""
+    page = (ROOT / "docs" / "evidence.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```python\n(\"\"\"Rejects.*?)```", page, re.DOTALL)
     (tmp_path / "own.py").write_text(text)
     return str(tmp_path / "own.py")

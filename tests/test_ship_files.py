@@ -315,7 +315,8 @@ def test_shipped_ships_say_where_their_numbers_come_from(name: str) -> None:
         assert v.value == 0.0 or v.name in limits or v.origin != "guessed", v.name
 
 
-PAGE = (ROOT / "docs" / "ship.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "docs" / name for name in ("ship.md", "actuators.md")]
+PAGE = "".join(page.read_text(encoding="utf-8") for page in PAGES)
 
 
 def test_published_schema_is_that_of_the_code() -> None:
