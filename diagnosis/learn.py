@@ -93,7 +93,7 @@ def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
 
     origin = {name: str(value) for name, value in _origin(options).items()}
     work = learn_system if is_system(options.train, options.map) else learn_ship
-    return Done(0, work(options, advance, origin).shown(str(options.out)))
+    return Done(0, work(options, advance, origin, execution_of(options)).shown(str(options.out)))
 
 
 def _begun(options: argparse.Namespace, advance: Advance) -> "Session":

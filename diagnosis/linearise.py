@@ -18,7 +18,15 @@ from cosim.command import command_parser, run_command
 from cosim.errors import nearest
 from cybership.message_text import quoted
 
-from .commands.command_line import Done, anyway_option, out_options, run, ship_option
+from .commands.command_line import (
+    Done,
+    anyway_option,
+    confinement_options,
+    execution_of,
+    out_options,
+    run,
+    ship_option,
+)
 from .execution.progress import Advance
 from .execution.result_folder import together
 
@@ -61,7 +69,7 @@ def linearise(options: argparse.Namespace, advance: Advance) -> Done:
         at = _of_run(options, model, given)
     outputs = [v.name for v in model.variables.values() if v.causality == "output" and v.type == "Real"]
     advance("slopes")
-    found = linearised(model, states, at, outputs)
+    found = linearised(model, states, at, outputs, execution_of(options))
     names = (*found.states, *found.inputs, *found.outputs)
     units = {n: "1" if (u := model.variables[n].unit) is None else u.name for n in names}
     with together(options.out, FILES) as new:
@@ -122,7 +130,8 @@ def _of_ship(options: argparse.Namespace, advance: Advance) -> Mapping[str, floa
     """The smoothed state and the commands at a time of a run of a ship."""
     from .fmu_parameters.ship_task import ship_task
 
-    return ship_task(options, {"train": [options.run]}, advance).state_at(options.time)
+    task = ship_task(options, {"train": [options.run]}, advance, execution_of(options))
+    return task.state_at(options.time)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -150,6 +159,7 @@ def _parser() -> argparse.ArgumentParser:
         help="which variables of the FMU are which columns, and its start values (as names say)",
     )
     ship_option(made)
+    confinement_options(made)
     anyway_option(made)
     out_options(made, Path("results", "linear"))
     made.set_defaults(effects=[], horizon=None)

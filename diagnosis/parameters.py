@@ -17,7 +17,14 @@ from rich.text import Text
 from cosim import InputError
 from cosim.command import command_parser, printable, run_command
 
-from .commands.command_line import Done, anyway_option, run, ship_option
+from .commands.command_line import (
+    Done,
+    anyway_option,
+    confinement_options,
+    execution_of,
+    run,
+    ship_option,
+)
 from .execution.progress import Advance
 
 if TYPE_CHECKING:
@@ -42,18 +49,19 @@ def parameters(options: argparse.Namespace, advance: Advance) -> Done:
         raise InputError(
             f"'{options.write}' exists; --overwrite replaces it, --write names another file"
         )
+    execution = execution_of(options)
     if options.runs and not is_system(options.runs, options.map):
         from .fmu_parameters.ship_task import ship_task
 
-        task = ship_task(options, {"train": options.runs}, advance)
+        task = ship_task(options, {"train": options.runs}, advance, execution)
     else:
-        task = system_task(options.fmu, options.map, {"train": options.runs}, None)
+        task = system_task(options.fmu, options.map, {"train": options.runs}, None, execution=execution)
     shown: list[RenderableType]
     try:
         if options.runs:
             found = sensitivities(task.residuals()["train"], advance)
             chosen = [s.parameter for s in found.each if s.known]
-            shown = [*_told(found)]
+            shown = [*_told(found), *map(printable, task.confined.sentences())]
         else:
             chosen = task.parameters
             shown = [_of_all(chosen)]
@@ -140,6 +148,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--overwrite", action="store_true", help="replace a file that is there")
     ship_option(made)
+    confinement_options(made)
     anyway_option(made)
     made.set_defaults(effects=[], horizon=None)
     return made

@@ -129,6 +129,52 @@ def test_an_instance_knows_nothing_of_another_one(tmp_path):
         confined.close()
 
 
+@pytest.mark.parametrize(("means", "more"), [(("landlock",), "setsid();"), ((), "")])
+def test_what_it_has_started_ends_with_it(tmp_path, means, more):
+    """Else that could tell other instances what this one was given."""
+    habit = f"int p = fork(); if (!p) {{ {more} for (;;) pause(); }} m->y = p; return 0;"
+    confined = opened(build_lag(tmp_path, habit=habit), means=means)
+    try:
+        if confined.confinement.startswith("unconfined") and means:
+            pytest.skip(confined.confinement)
+        started, until = Path(f"/proc/{int(stepped(confined)[0])}/stat"), time.monotonic() + 10.0
+        while (
+            runs := started.exists() and ") Z" not in started.read_text()
+        ) and time.monotonic() < until:
+            time.sleep(0.05)
+        assert not runs
+    finally:
+        confined.close()
+
+
+SHARED = {
+    "memory by a key": """#include <sys/shm.h>
+        static int other(void) { int there = shmget(7531, 8, 0) >= 0; shmget(7531, 8, IPC_CREAT | 0600); return there; }""",
+    "a key ring": """#include <sys/syscall.h>
+        static int other(void) { int there = syscall(SYS_keyctl, 10, -4, "user", "cybership", 0) >= 0;
+            syscall(SYS_add_key, "user", "cybership", "x", 1, -4); return there; }""",
+    "a socket": """#include <sys/socket.h>
+        #include <netinet/in.h>
+        #include <arpa/inet.h>
+        static int other(void) { int s = socket(AF_INET, SOCK_DGRAM, 0); return s >= 0; }""",
+}
+
+
+@pytest.mark.parametrize("means", MEANS[:2])
+@pytest.mark.parametrize("by", SHARED)
+def test_an_instance_tells_another_one_nothing_but_by_files(tmp_path, by, means):
+    """Of what processes of one user share; Landlock alone hides none of it."""
+    fmu = build_lag(tmp_path, habit="m->y = other(); return 0;", before=SHARED[by])
+    confined = opened(fmu, means=means)
+    try:
+        if confined.confinement.startswith("unconfined"):
+            pytest.skip(confined.confinement)
+        assert [stepped(confined), stepped(confined)] == [[0.0], [0.0]]
+    finally:
+        confined.close()
+        subprocess.run(["ipcrm", "-M", "7531"], capture_output=True, check=False)
+
+
 @pytest.mark.parametrize(
     ("habit", "message"),
     [

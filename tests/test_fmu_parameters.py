@@ -1,6 +1,7 @@
 """An FMU's own parameters on data: what is read, how sure values are, and the verdict."""
 
 import json
+import sys
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,7 @@ from support.oscillator import build_oscillator
 
 import cosim
 from cosim import InputError, Unit
-from cosim.fmu import FmuModel
+from cosim.fmu import ConfinedFmu, FmuModel
 from diagnosis import learn, linearise, parameters
 from diagnosis.fmu_parameters.additional_force import AdditionalForce
 from diagnosis.fmu_parameters.fmu_playback import InputCourse, Playback, PlaybackRequest, Processes
@@ -51,9 +52,11 @@ def measured(fmu, folder, name, values, forces=(), seed=1, seconds=30.0):
     rng = np.random.default_rng(seed)
     t = H * np.arange(round(seconds / H) + 1)
     force = 2.0 * np.sin(0.7 * t + seed) + 1.5 * rng.uniform(-1.0, 1.0, t.size)[(t / 3.0).astype(int)]
-    playback = Playback(fmu, ["f"], ["x", "v"], [InputCourse(H, {}, force[:-1, None])])
+    playback = Playback(
+        ConfinedFmu(FmuModel(fmu)), ["f"], ["x", "v"], [InputCourse(H, {}, force[:-1, None])]
+    )
     x = playback.run(PlaybackRequest(0, values, forces)).outputs[:, 0]
-    playback.close()
+    playback._fmu.close()
     table = {"time": t, "force": force, "position": x + NOISE * rng.standard_normal(t.size)}
     path = folder / f"{name}.csv"
     pd.DataFrame(table).to_csv(path, index=False)
@@ -194,11 +197,11 @@ def test_start_values_are_those_of_the_motion(fmu):
 def test_playback_adds_a_force_as_the_fmu_has_it(fmu):
     """A spring beside the FMU is its own spring, but for what a step is late."""
     force = np.sin(0.5 * np.arange(2000) * 0.01)[:, None]
-    playback = Playback(fmu, ["f"], ["x", "v"], [InputCourse(0.01, {}, force)])
+    playback = Playback(ConfinedFmu(FmuModel(fmu)), ["f"], ["x", "v"], [InputCourse(0.01, {}, force)])
     own = playback.run(PlaybackRequest(0, {"c": 11.0})).outputs
     beside = playback.run(PlaybackRequest(0, {}, [AdditionalForce("f", "x", 0, False, -1.0)])).outputs
     plain = playback.run(PlaybackRequest(0, {})).outputs
-    playback.close()
+    playback._fmu.close()
     assert np.abs(own - beside).max() < 0.05 * np.abs(own - plain).max()
 
 
@@ -376,13 +379,40 @@ def test_range_in_which_the_fmu_fails_is_said_and_the_rest_goes_on(work, capsys)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("unconfined", [False, True])
+def test_fmu_cannot_read_the_run_unless_it_may(work, capsys, unconfined):
+    """An FMU that plays the run back is found to agree with it; else the run does not exist for it."""
+    path = work / "run.csv"
+    habit = f"""static double y[2000]; static int rows = -1;
+    if (rows < 0) {{ FILE *file = fopen("{path}", "r"); char line[200]; rows = 0;
+        while (file && fgets(line, sizeof line, file))
+            if (sscanf(line, "%*[^,],%*[^,],%lf", y + rows) == 1) rows++; }}
+    if (rows) {{ p[V_x] = y[(int)((t + h) / {H} + 0.5)]; return 0; }}"""
+    fmu = build_oscillator(work, "thief", habit=habit)
+    measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0})
+    own = written(work / "parameters.json", some())
+    options = ["--model", str(fmu), "--map", written(work / "map.json", MAP), "--parameters", own]
+    assert learn.main([str(path), *options, "--out", "out", *["--unconfined"] * unconfined]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["fmu"]["confinement"].startswith("unconfined") == unconfined
+    if sys.platform == "linux":
+        assert str(path) in found["fmu"]["outside"]
+        assert str(path) in " ".join(capsys.readouterr().out.split()).replace(" ", "")
+    (run,) = found["errors"]
+    assert (run["outputs"]["x"]["before"] < 0.1 * NOISE) == unconfined
+
+
+@pytest.mark.slow
 def test_fmu_that_ends_its_process_is_said(work, capsys):
     fmu = build_oscillator(work, "fatal", habit="if (t > 1.0) abort();")
     with Processes(
-        fmu, ["f"], ["x"], [InputCourse(H, {}, np.zeros((40, 1))), InputCourse(H, {}, np.zeros((10, 1)))]
+        ConfinedFmu(FmuModel(fmu)),
+        ["f"],
+        ["x"],
+        [InputCourse(H, {}, np.zeros((40, 1))), InputCourse(H, {}, np.zeros((10, 1)))],
     ) as p:
         first, second = p.run([PlaybackRequest(0, {}), PlaybackRequest(1, {})])
-    assert "ends the process" in first.fault
+    assert "SIGABRT" in first.fault
     assert np.isnan(first.outputs).all()
     assert not second.fault
     assert np.isfinite(second.outputs).all()

@@ -235,7 +235,7 @@ def test_outputs_that_are_zero_until_the_first_step_are_told_and_left_out(made, 
     """As of an FMU that computes its outputs in its steps only; the right model is not condemned."""
     from diagnosis.predictors.fmu import instances
 
-    whole, short = instances.FmuRun.initialise, instances.FmuRun.short_run
+    whole, short = instances.FmuRun.initialise, instances.FmuRun.whole_run
     monkeypatch.setattr(instances.FmuRun, "initialise", lambda *a: 0.0 * whole(*a))
 
     def late(*arguments):
@@ -243,7 +243,7 @@ def test_outputs_that_are_zero_until_the_first_step_are_told_and_left_out(made, 
         told[0] = 0.0
         return told
 
-    monkeypatch.setattr(instances.FmuRun, "short_run", late)
+    monkeypatch.setattr(instances.FmuRun, "whole_run", late)
     run = turned(0.1, 60.0, offset=200.0)
     found = diagnosis.evaluate(loaded(run), made)
     (e,) = found.evaluations

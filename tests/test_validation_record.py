@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.measured import jumps, sail
+from test_own_effects import LINEAR
 
 import diagnosis
 from cosim import InputError
@@ -20,7 +21,7 @@ from diagnosis.acceptance.criterion import Criterion, InputStd, now
 from diagnosis.acceptance.judged_criterion import Predicted, judge
 from diagnosis.acceptance.predictions import Predictions
 from diagnosis.acceptance.record.provenance import files_of
-from diagnosis.predictors import Model, write_model
+from diagnosis.predictors import Model, ship_with, write_model
 from diagnosis.predictors.described_ship import DescribedShip
 from diagnosis.predictors.fmu.lineage import remember
 from diagnosis.runs import Fingerprint
@@ -161,6 +162,18 @@ def test_code_and_confinement_are_told(comparison, tmp_path):
     assert len(content.code.sha256) == 64
     assert content.code.libraries["numpy"] == np.__version__
     assert content.confinement.startswith("none needed")
+
+
+def test_effects_of_a_user_are_code_that_nothing_confines(folder, tmp_path):
+    """It runs in this process, where it may read the run and play it back."""
+    (tmp_path / "own.py").write_text(LINEAR)
+    craft = ship_with([tmp_path / "own.py"])
+    c = diagnosis.compare(folder / "a.csv", model=DescribedShip(Model(ship=craft)))
+    content = validated(c, tmp_path, {"tolerance": 50.0}).content
+    assert content.confinement.startswith("unconfined: effects of the user")
+    (j,) = content.judgements
+    assert j.outcome == "met"
+    assert any("may have read the measurement" in flag for flag in j.flags)
 
 
 def test_falsified_data_next_to_an_original_does_not_hold(folder, tmp_path, monkeypatch):

@@ -14,6 +14,7 @@ import fmpy
 SOURCE = r"""
 #include <math.h>
 #include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 enum { NAMES, COUNT };
 typedef struct { double v[COUNT]; } Instance;

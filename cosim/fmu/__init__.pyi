@@ -1,6 +1,7 @@
 from .fmu_model import FmuModel as FmuModel
 from .fmu_model import FmuVariable as FmuVariable
 from .instance import Instance as Instance
+from .isolation.channel import FeedbackTerm as FeedbackTerm
 from .isolation.confined import ConfinedFmu as ConfinedFmu
 from .isolation.confinement import MEANS as MEANS
 from .isolation.isolated import IsolatedInstance as IsolatedInstance

@@ -268,7 +268,6 @@ class FmuComponent:
 
 def _tool_hint(model: FmuModel, folder: Path) -> str:
     """A possible reason why an FMU does not start; a Python FMU's tool is Python, which is there."""
-    cs = model.description.coSimulation
-    if cs is None or not cs.needsExecutionTool or (folder / SLAVE_MODULE).is_file():
+    if not model.needs_tool or (folder / SLAVE_MODULE).is_file():
         return ""
     return "; it needs the tool that it was made with to be installed"

@@ -198,6 +198,12 @@ class FmuModel:
             return False
         return PYTHON_SYMBOL.encode() not in content
 
+    @property
+    def needs_tool(self) -> bool:
+        """Whether it needs the tool that it was made with (``needsExecutionTool``)."""
+        told = self.description.coSimulation
+        return bool(told is not None and told.needsExecutionTool)
+
     def unpack(self) -> Path:
         """Folder with the unpacked archive; made at the first call."""
         if self._folder is None:

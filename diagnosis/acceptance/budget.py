@@ -35,6 +35,7 @@ CURRENT, WIND = ("V_n", "V_e"), ("F_n", "F_e")
 SAME = 1e-6  # of a value or its standard deviation: rounding in files; chosen
 ROUNDING = 1e-9  # of the motion: a change that is none, but of the last digits of a log; chosen
 SLOWEST = 0.5  # order of convergence below which there is none; chosen, an explicit Euler method has 1
+HIGHEST = 5.0  # and above which halving did not act on each step; chosen, that of Runge and Kutta has 4
 # Quantity -> variance in each window (w,); None: not known.
 Variances = Mapping[str, np.ndarray] | None
 
@@ -254,7 +255,7 @@ def _numerical(p: Predictions, base: np.ndarray) -> Variances:
         if one <= ROUNDING * all_:
             if p.predictor.parametric:
                 found[q] = d**2
-        elif isfinite(one) and two * 2.0**SLOWEST <= one:
+        elif isfinite(one) and two * 2.0**SLOWEST <= one <= two * 2.0**HIGHEST + ROUNDING * all_:
             found[q] = (d * one / (one - two)) ** 2
     if not found:
         raise InputError(

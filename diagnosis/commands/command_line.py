@@ -118,6 +118,11 @@ def fmu_options(made: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="length of the FMU's steps (its stepSize if it takes no other, else as predictions need)",
     )
+    confinement_options(made)
+
+
+def confinement_options(made: argparse.ArgumentParser) -> None:
+    """Add ``--timeout`` and ``--unconfined``."""
     made.add_argument(
         "--timeout",
         type=positive,
@@ -136,7 +141,7 @@ def execution_of(options: argparse.Namespace) -> "Execution":
     """How the options have an FMU run."""
     from ..predictors import Execution  # only now: it takes a while to import
 
-    return Execution(options.timeout, options.step, not options.unconfined)
+    return Execution(options.timeout, getattr(options, "step", None), not options.unconfined)
 
 
 def ship_option(made: argparse.ArgumentParser) -> None:

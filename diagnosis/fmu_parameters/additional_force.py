@@ -1,10 +1,10 @@
 """What may act in addition, on a force input of an FMU: a coefficient times a function of one output."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
+from cosim.fmu import FeedbackTerm
 
 
 class Shape(NamedTuple):
@@ -12,15 +12,14 @@ class Shape(NamedTuple):
 
     symbol: str
     power: int
-    of: Callable[[float], float]
 
 
 SHAPES = (
-    Shape("{y}", 1, lambda y: y),
-    Shape("|{y}|{y}", 2, lambda y: abs(y) * y),
-    Shape("{y}³", 3, lambda y: y * y * y),
+    Shape("{y}", 1),
+    Shape("|{y}|{y}", 2),
+    Shape("{y}³", 3),
 )
-CONSTANT = Shape("1", 0, lambda _: 1.0)
+CONSTANT = Shape("1", 0)
 
 
 @dataclass(frozen=True)
@@ -58,18 +57,8 @@ class AdditionalForce:
         y = f"{of_output}/s" if self.rate else of_output
         return f"{of_input}/({y})" + (f"^{self._shape.power}" if self._shape.power > 1 else "")
 
-    def acting(self, inputs: Sequence[str], outputs: Sequence[str], h: float) -> Callable[..., None]:
-        """What adds the force to the values of a step, by the outputs so far and the step's number."""
-        slot, function, coefficient = inputs.index(self.input), self._shape.of, self.coefficient
-        place = outputs.index(self.output) if self.output else -1
-
-        def act(values: Any, known: np.ndarray, k: int) -> None:
-            if place < 0:
-                y = 0.0
-            elif self.rate:
-                y = float(known[k, place] - known[max(k - 1, 0), place]) / h
-            else:
-                y = float(known[k, place])
-            values[slot] += coefficient * function(y)
-
-        return act
+    def term(self, inputs: Sequence[str], outputs: Sequence[str]) -> FeedbackTerm:
+        """The force by the numbers of its variables."""
+        place = outputs.index(self.output) if self.output else 0
+        slot = inputs.index(self.input)
+        return FeedbackTerm(slot, place, self._shape.power, self.rate, self.coefficient)

@@ -10,10 +10,12 @@ import numpy as np
 from scipy.io import savemat
 
 from cosim import InputError
-from cosim.fmu import ConfinedFmu, FmuModel
+from cosim.fmu import FmuModel
 from cybership.message_text import quoted
 
+from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, TAU
+from ..predictors.fmu.instances import confined
 from ..predictors.fmu.short_steps import ShortSteps
 from ..predictors.fmu.variable_map import VariableMap, propose
 from ..report.document import write_json
@@ -145,7 +147,11 @@ def _of_ship(found: VariableMap) -> list[LinearState]:
 
 
 def linearised(
-    model: FmuModel, states: Sequence[LinearState], at: Mapping[str, float], outputs: Sequence[str]
+    model: FmuModel,
+    states: Sequence[LinearState],
+    at: Mapping[str, float],
+    outputs: Sequence[str],
+    execution: Execution = DEFAULT_EXECUTION,
 ) -> LinearModel:
     """The linear model about a state.
 
@@ -154,6 +160,7 @@ def linearised(
         states: that are set.
         at: variable -> value; what it does not name has its start value.
         outputs: of the linear model.
+        execution: how the FMU is run.
 
     Raises:
         InputError: the FMU refuses the state, or fails; a name that cannot be set.
@@ -166,7 +173,10 @@ def linearised(
     suggested = model.description.defaultExperiment
     h = float(suggested.stepSize) if suggested is not None and suggested.stepSize else STEP
     seen = [*outputs, *(s.seen for s in states)]
-    with closing(ConfinedFmu(model)) as fmu, closing(ShortSteps(fmu, inputs, seen, h, False)) as steps:
+    with (
+        closing(confined(model, execution)) as fmu,
+        closing(ShortSteps(fmu, inputs, seen, h, False)) as steps,
+    ):
 
         def answer(start: Mapping[str, float], driven: Mapping[str, float]) -> np.ndarray:
             found = steps.run(start, driven)

@@ -173,7 +173,7 @@ class WindowResiduals:
         for w in self.windows:
             here = next(found)
             if here.fault:
-                raise InputError(f"'{self.processes.path.name}' fails on run '{w.run}': {here.fault}")
+                raise InputError(f"'{self.processes.name}' fails on run '{w.run}': {here.fault}")
             base = self._off(w, here)
             slopes = [(self._off(w, next(found)) - base) / START_STEP for _ in w.start_std]
             S = np.column_stack([*slopes, np.zeros((base.size, 0))])

@@ -10,15 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
+from cosim.fmu import ConfinedFmu
 
 from ..execution.progress import Advance
-from ..predictors import Fmu, WeakWindows
+from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
 from ..predictors.fmu.fmu_predictor import FmuPredictor
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed
 from .additional_force import AdditionalForce
-from .fmu_playback import InputCourse
+from .fmu_playback import InputCourse, of_predictions
 from .force_search import candidates
 from .measured_system import FEWEST, Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
@@ -52,6 +53,11 @@ class ShipTask:
     _open: ExitStack = field(default_factory=ExitStack)
 
     names = POSE
+
+    @property
+    def confined(self) -> ConfinedFmu:
+        """The FMU in its processes."""
+        return self.predictor.confined
 
     @property
     def units(self) -> list[str]:
@@ -102,7 +108,7 @@ class ShipTask:
             names = ", ".join(w.run.name for w in self.runs["train"])
             raise InputError(f"no window of {names} has enough samples")
         driven = [c.name for c in self.predictor.map.told("inputs").values()]
-        processes = processes_of(self, [*chain(*windows.values())], self.fmu.model, driven)
+        processes = processes_of(self, [*chain(*windows.values())], self.confined, driven)
         self._open.enter_context(processes)
         lines = [self.predictor.lines["outputs"][s] for s in POSE]
         gains = np.array([[line.gain for line in lines], [line.offset for line in lines]])
@@ -124,7 +130,8 @@ class ShipTask:
 
     def _window(self, s: Smoothed, row: int, length: float) -> Window | None:
         """The window of a run that begins in a row; None: it has too few samples."""
-        p, run, begin, h = self.predictor, s.track.run, s.time[row], step_of(s)
+        p, run, begin = self.predictor, s.track.run, s.time[row]
+        h = p.fmu.fixed_step or step_of(s)
         since = s.time - begin
         rows = np.flatnonzero((since >= p.run_in(s)) & (since <= length + 1e-9) & s.used)
         if rows.size < FEWEST // 2:
@@ -173,7 +180,10 @@ class ShipTask:
 
 
 def ship_task(
-    options: argparse.Namespace, paths: Mapping[str, Sequence[Path]], advance: Advance
+    options: argparse.Namespace,
+    paths: Mapping[str, Sequence[Path]],
+    advance: Advance,
+    execution: Execution,
 ) -> ShipTask:
     """Read the FMU of a ship, its map, its parameters and measured runs.
 
@@ -181,6 +191,7 @@ def ship_task(
         options: of the command.
         paths: use -> files of the runs.
         advance: receives the name of each step.
+        execution: how the FMU is run.
 
     Raises:
         InputError: one of them is not as it should be.
@@ -190,7 +201,7 @@ def ship_task(
 
     craft = ship_with(options.effects, options.ship)
     path = getattr(options, "model", None) or options.fmu
-    fmu = Fmu(path, options.map, craft)
+    fmu = Fmu(path, options.map, craft, of_predictions(execution))
     every = [p for each in paths.values() for p in each]
     gathered = gather(every, advance, options.anyway, fmu.start, options.horizon)
     ends = np.cumsum([0, *(len(each) for each in paths.values())])

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Protocol
@@ -11,13 +12,15 @@ from typing import Protocol
 import numpy as np
 
 from cosim import InputError
-from cosim.fmu import FmuModel
+from cosim.fmu import ConfinedFmu, FmuModel
 from cybership.message_text import quoted
 
+from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, POSE
+from ..predictors.fmu.instances import confined
 from ..runs import stated_layout
 from .additional_force import AdditionalForce
-from .fmu_playback import InputCourse, Processes
+from .fmu_playback import InputCourse, Processes, of_predictions
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters
@@ -60,6 +63,8 @@ class SystemTask:
         parameters: that are calibrated.
         notes: what a reader should know of the choice of these.
         runs: of each use.
+        window: length of the windows [s]; None: as the map says.
+        execution: how the FMU is run.
     """
 
     model: FmuModel
@@ -68,7 +73,17 @@ class SystemTask:
     notes: list[str]
     runs: dict[str, list[MeasuredRun]]
     window: float | None = None
+    execution: Execution = DEFAULT_EXECUTION
     _open: ExitStack = field(default_factory=ExitStack)
+
+    @cached_property
+    def confined(self) -> ConfinedFmu:
+        """The FMU in its processes.
+
+        Raises:
+            InputError: there is no process for it.
+        """
+        return confined(self.model, of_predictions(self.execution))
 
     @property
     def names(self) -> list[str]:
@@ -128,7 +143,7 @@ class SystemTask:
             for use, runs in self.runs.items()
         }
         driven = [c.name for c in self.map.inputs.values()]
-        processes = processes_of(self, [*chain(*windows.values())], self.model, driven)
+        processes = processes_of(self, [*chain(*windows.values())], self.confined, driven)
         self._open.enter_context(processes)
         return {
             use: WindowResiduals(processes, own, first, noise, self.parameters)
@@ -152,7 +167,7 @@ class _Task(Protocol):
 
 
 def processes_of(
-    task: _Task, windows: Sequence[Window], model: FmuModel, driven: Sequence[str]
+    task: _Task, windows: Sequence[Window], fmu: ConfinedFmu, driven: Sequence[str]
 ) -> Processes:
     """Processes that run an FMU along windows.
 
@@ -161,10 +176,10 @@ def processes_of(
     Args:
         task: of a system or a ship.
         windows: whose courses have the inputs in ``driven``.
-        model: the FMU.
+        fmu: the FMU.
         driven: inputs that the runs drive.
     """
-    every = model.variables
+    every = fmu.model.variables
     set_once = [p.name for p in task.parameters if every[p.name].causality == "input"]
     extra = [n for n in dict.fromkeys([*task.forces_on, *set_once]) if n not in driven]
     starts = np.array([float(every[n].start or 0.0) for n in extra])
@@ -173,7 +188,7 @@ def processes_of(
         still = np.broadcast_to(starts, (len(course.inputs), starts.size))
         return course._replace(inputs=np.column_stack([course.inputs, still]))
 
-    return Processes(model.path, [*driven, *extra], task.outputs, [whole(w.course) for w in windows])
+    return Processes(fmu, [*driven, *extra], task.outputs, [whole(w.course) for w in windows])
 
 
 def numbered(
@@ -193,6 +208,7 @@ def system_task(
     runs: dict[str, Sequence[Path]],
     parameters: Path | None,
     window: float | None = None,
+    execution: Execution = DEFAULT_EXECUTION,
 ) -> SystemTask:
     """Read an FMU, its map, its parameters and measured runs.
 
@@ -201,6 +217,7 @@ def system_task(
             priors by their kind.
         runs: use -> files; those of ``train`` say which columns there are.
         window: length of the windows [s]; None: as the map says.
+        execution: how the FMU is run.
 
     Raises:
         InputError: one of them is not as it should be.
@@ -233,4 +250,4 @@ def system_task(
     if TIME in columns:
         raise InputError(f"'{map}': {TIME} is the time of the samples, and no column of the map")
     read = {use: read_runs(paths, columns) for use, paths in runs.items()}
-    return SystemTask(model, found, chosen, notes, read, window)
+    return SystemTask(model, found, chosen, notes, read, window, execution)

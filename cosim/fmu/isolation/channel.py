@@ -6,7 +6,7 @@ Frames hold numbers and JSON, never code, because the process runs an untrusted 
 import json
 import struct
 import threading
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 # Requests: a call as JSON [name, arguments...], or an exchange of values, see MOVE_HEAD.
 CALL, MOVE = 0, 1
@@ -18,6 +18,24 @@ PUT, STEP, GET = 1, 2, 4
 
 _FRAME = struct.Struct("<BI")
 LONGEST = 2**28  # bytes of a frame; chosen: 33 million doubles, beyond any FMU
+
+
+class FeedbackTerm(NamedTuple):
+    """What is added to an input before each step: ``coefficient`` times ``y |y|^(power - 1)``.
+
+    Attributes:
+        input: its number.
+        output: number of the output y.
+        power: 0: the term is constant.
+        rate: whether y is the output's derivative by time, from the last two steps.
+        coefficient: in units of the input and of y.
+    """
+
+    input: int
+    output: int
+    power: int
+    rate: bool
+    coefficient: float
 
 
 class GarbledError(Exception):

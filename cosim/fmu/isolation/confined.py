@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -58,7 +58,7 @@ class ConfinedFmu:
         self.model, self._timeout = model, timeout
         self.printed: dict[str, None] = {}
         self.outside: dict[str, None] = {}
-        self._owner = os.getpid()
+        self._owner, self._closed = os.getpid(), False
         self._scratch = Scratch()
         self._archive = self._scratch.path / model.path.name
         self._folders = self._scratch.path / "folders"
@@ -100,6 +100,17 @@ class ConfinedFmu:
         self._server.sendall(json.dumps(first).encode())
         return self._server.recv(4096).decode()
 
+    def sentences(self) -> Iterator[str]:
+        """What a reader should know of how instances have run so far."""
+        if self.model.needs_tool:
+            yield "It needs the tool that it was made with (needsExecutionTool)."
+        if lines := [*self.printed]:
+            yield f"It printed {len(lines)} different lines, the first: {lines[0]}"
+        yield f"Its processes: {self.confinement}."
+        if outside := [*self.outside]:
+            named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
+            yield f"It opened, or tried to open, {len(outside)} files that are not its own: {named}."
+
     def told(self, error: Exception) -> str:
         """What an error says, with the file of the FMU in place of its copy."""
         return str(error).replace(str(self._archive), str(self.model.path))
@@ -113,6 +124,8 @@ class ConfinedFmu:
         Raises:
             SimulationError: its process cannot be started.
         """
+        if self._closed:
+            raise SimulationError(f"{NAME}: its process cannot be started: it has been closed")
         return IsolatedInstance(NAME, self._model, on_message, self._timeout, self._fork, self._keep)
 
     def _fork(self) -> ForkedProcess | StartedProcess:
@@ -137,6 +150,7 @@ class ConfinedFmu:
         """End all processes, and remove their folders."""
         if os.getpid() != self._owner:  # a copy of the process that has begun them
             return
+        self._closed = True
         with suppress(AttributeError):  # it has not begun
             self._server.close()
             with suppress(subprocess.TimeoutExpired):

@@ -27,6 +27,7 @@ from .confinement import (
     unshare,
 )
 from .opened_files import install
+from .system_calls import refuse_sharing
 from .worker import serve
 
 MESSAGE = 2**16  # most bytes of a request; chosen: far above a few paths
@@ -106,17 +107,18 @@ class _ForkServer:
             os._exit(1)
         second = os.fork()
         if not second:
-            self._run(folder, pipes)
+            self._run(folder, pipes, own)
         for pipe in (*pipes[:3], pipes[4], 2):
             os.close(pipe)
-        while True:  # orphans in new namespaces are children of this process, too
-            pid, status = os.wait()
-            if pid == second:
-                os.write(pipes[3], b"%d" % os.waitstatus_to_exitcode(status))
-                os._exit(0)
+        while (ended := os.wait())[0] != second:
+            pass  # orphans in new namespaces are children of this process, too
+        os.write(pipes[3], b"%d" % os.waitstatus_to_exitcode(ended[1]))
+        if not own:  # what it has started; in new namespaces that ends with this process
+            os.killpg(0, signal.SIGKILL)
+        os._exit(0)
 
-    def _run(self, folder: str, pipes: list[int]) -> None:
-        """The process that runs the FMU."""
+    def _run(self, folder: str, pipes: list[int], own: bool) -> None:
+        """The process that runs the FMU; ``own``: whether in namespaces of its own."""
         die_with_parent()
         code = 1
         try:
@@ -131,6 +133,8 @@ class _ForkServer:
                 restrict(self._found, self._readable, [folder])
                 with opened, suppress(OSError):  # an old kernel
                     install(opened)
+                if own or self._found.version:
+                    refuse_sharing()
             serve(self._model)
             code = 0
         except OSError as error:

@@ -20,7 +20,20 @@ from ..component import WARNING
 from ..fmu_model import FmuModel, FmuVariable, Value
 from ..instance import Access, OnMessage
 from ..memory import DoubleMemory, Port
-from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
+from .channel import (
+    CALL,
+    DONE,
+    GET,
+    LOG,
+    MOVE,
+    MOVE_HEAD,
+    PUT,
+    REFUSED,
+    STEP,
+    Channel,
+    FeedbackTerm,
+    GarbledError,
+)
 from .worker_process import Printed, StartedProcess, WorkerProcess
 
 # Longest wall time of instantiation where none is given, for which a process is started [s]; chosen:
@@ -191,11 +204,18 @@ class IsolatedInstance:
         self._call("fmi2ExitInitializationMode", "exit_initialization")
 
     def bind(
-        self, inputs: Sequence[Port], outputs: Sequence[Port], memory: DoubleMemory, h: float
+        self,
+        inputs: Sequence[Port],
+        outputs: Sequence[Port],
+        memory: DoubleMemory,
+        h: float,
+        redo: bool = True,
     ) -> Access:
+        """See :class:`cosim.fmu.instance.Instance`; ``redo``: whether discarded steps are repeated."""
         names = [[port.variable.name for port in ports] for ports in (inputs, outputs)]
-        self._call("the choice of its variables", "bind", *names, h)
+        self._call("the choice of its variables", "bind", *names, h, redo)
         own_inputs, own_outputs = _part(inputs, memory), _part(outputs, memory)
+        self._width = len(own_outputs)
         pending = 0
 
         def move(what: str, actions: int, t: float) -> None:
@@ -224,23 +244,40 @@ class IsolatedInstance:
 
         return Access(put, get, step, begin)
 
-    def short_run(
-        self, start: Mapping[str, Value], inputs: Sequence[float], steps: int, h: float
-    ) -> list[list[float]]:
-        """A whole run of a few steps, from its set-up to its termination, as one request.
+    def whole_run(
+        self,
+        start: Mapping[str, Value],
+        inputs: bytes,
+        steps: int,
+        h: float,
+        terms: Sequence[FeedbackTerm] = (),
+    ) -> bytes:
+        """A run from its set-up to its termination, as one request, for which the timeout counts.
 
         Args:
             start: start value -> number.
-            inputs: of the variables that are bound, which stay the same.
+            inputs: in each step those that are bound, doubles.
             steps, h: how many steps, and of what length [s].
+            terms: what is added to the inputs.
 
         Returns:
-            The outputs that are bound, at the start and after each step.
+            The outputs that are bound, at least one, doubles: at the start and after each step, up to
+            one that is not finite.
 
         Raises:
             SimulationError: the FMU refuses or fails.
         """
-        return self._call("a short run", "short_run", dict(start), [*inputs], steps, h)
+        what = "a run"
+        told = self._call(what, "whole_run", dict(start), inputs.hex(), [*terms], steps, h)
+        try:
+            found = bytes.fromhex(told)
+        except (TypeError, ValueError):
+            found = b""
+        rows, rest = divmod(len(found), self._width)
+        if rest or not 0 < rows <= steps + 1:
+            self._asked = what
+            self._give_up(is_garbled=True)
+        return found
 
     def reset(self) -> None:
         """Return to the state after instantiation, for another run (fmi2Reset).

@@ -6,9 +6,7 @@ They refuse nothing, that is for :mod:`.confinement`: they show what was tried, 
 from __future__ import annotations
 
 import array
-import ctypes
 import os
-import platform
 import posixpath
 import socket
 import struct
@@ -16,16 +14,22 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-MACHINE = platform.machine()
-# Of linux/seccomp.h and linux/audit.h; numbers of open (-1: there is none), openat, openat2 and seccomp.
-ARCH, (OPEN, OPENAT, OPENAT2, SECCOMP) = (
-    (0xC000003E, (2, 257, 437, 317)) if MACHINE == "x86_64" else (0xC00000B7, (-1, 56, 437, 277))
+from .system_calls import (
+    ALLOW,
+    ARCH,
+    ARCHITECTURE,
+    JUMP_IF_EQUAL,
+    LOAD,
+    NOTIFY,
+    NUMBER,
+    OPENING,
+    RETURN,
+    set_filter,
 )
-SET_FILTER, NEW_LISTENER, CONTINUE = 1, 1 << 3, 1
-ALLOW, NOTIFY = 0x7FFF0000, 0x7FC00000
+
+NEW_LISTENER, CONTINUE = 1 << 3, 1  # of linux/seccomp.h
 RECEIVE, ANSWER = 0xC0502100, 0xC0182101
 NOTICE, REPLY = struct.Struct("=QIIiIQ6Q"), struct.Struct("=QqiI")
-LOAD, JUMP_IF_EQUAL, RETURN = 0x20, 0x15, 0x06  # instructions of the filter
 LONGEST = 4096  # bytes of a path
 USUAL = (
     "/dev",
@@ -45,16 +49,10 @@ def install(to: socket.socket) -> None:
     Raises:
         OSError: the system refuses.
     """
-    calls = [n for n in (OPEN, OPENAT, OPENAT2) if n >= 0]
-    lines = [(LOAD, 0, 0, 4), (JUMP_IF_EQUAL, 0, len(calls) + 1, ARCH), (LOAD, 0, 0, 0)]
+    calls = [n for n in OPENING if n >= 0]
+    lines = [(LOAD, 0, 0, ARCHITECTURE), (JUMP_IF_EQUAL, 0, len(calls) + 1, ARCH), (LOAD, 0, 0, NUMBER)]
     lines += [(JUMP_IF_EQUAL, len(calls) - k, 0, n) for k, n in enumerate(calls)]
-    lines += [(RETURN, 0, 0, ALLOW), (RETURN, 0, 0, NOTIFY)]
-    code = ctypes.create_string_buffer(b"".join(struct.pack("=HBBI", *line) for line in lines))
-    program = struct.pack("@HxxxxxxQ", len(lines), ctypes.addressof(code))
-    libc = ctypes.CDLL(None, use_errno=True)
-    listener = libc.syscall(SECCOMP, SET_FILTER, NEW_LISTENER, program)
-    if listener < 0:
-        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    listener = set_filter([*lines, (RETURN, 0, 0, ALLOW), (RETURN, 0, 0, NOTIFY)], NEW_LISTENER)
     socket.send_fds(to, [b"l"], [listener])
     os.close(listener)
 
@@ -96,7 +94,7 @@ class OpenedFiles:
                     return
                 continue
             identity, pid, _, number, _, _, *arguments = NOTICE.unpack(notice)
-            path = _text(pid, arguments[0 if number == OPEN else 1])
+            path = _text(pid, arguments[0 if number == OPENING[0] else 1])
             self._look(path)
             with suppress(FileNotFoundError):
                 fcntl.ioctl(listener, ANSWER, REPLY.pack(identity, 0, 0, CONTINUE))

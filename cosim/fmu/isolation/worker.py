@@ -12,7 +12,7 @@ import json
 import os
 import signal
 import sys
-from array import array
+from math import isfinite
 from pathlib import Path
 
 from ...errors import InputError, SimulationError
@@ -20,7 +20,7 @@ from ...process.spawned import end_with_parent
 from ..fmu_model import FmuModel, Value
 from ..local import LocalInstance
 from ..memory import DoubleMemory, Port
-from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
+from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, FeedbackTerm
 
 
 class Worker:
@@ -36,7 +36,7 @@ class Worker:
             "get_value": self._get_value,
             "free": self._free,
             "reset": self._reset,
-            "short_run": self._short_run,
+            "whole_run": self._whole_run,
         }
 
     def serve(self) -> None:
@@ -73,8 +73,9 @@ class Worker:
     def _get_value(self, name: str) -> float:
         return self._instance.get_value(self._model.variables[name])
 
-    def _bind(self, inputs: list[str], outputs: list[str], h: float) -> None:
+    def _bind(self, inputs: list[str], outputs: list[str], h: float, redo: bool) -> None:
         """Lay out a memory: the inputs, then the outputs."""
+        self._instance.component.can_redo &= redo
         known = self._model.variables
         ports = [Port(known[name], k) for k, name in enumerate([*inputs, *outputs])]
         memory, middle = DoubleMemory(len(ports)), len(inputs)
@@ -93,24 +94,34 @@ class Worker:
             self._access.get()
         return bytes(self._outputs)
 
-    def _short_run(
-        self, start: dict[str, Value], inputs: list[float], steps: int, h: float
-    ) -> list[list[float]]:
-        """A whole run with inputs that stay the same: the outputs at its start and after each step."""
+    def _whole_run(
+        self, start: dict[str, Value], inputs: str, terms: list[FeedbackTerm], steps: int, h: float
+    ) -> str:
+        """The outputs at the start of a run and after each step, up to one that is not finite."""
         self._instance.set_up(steps * h)
         for name, value in start.items():
             self._set_value(name, value)
         self._instance.enter_initialization()
-        self._inputs[:] = array("d", inputs).tobytes()
+        rows, width = bytes.fromhex(inputs), len(self._inputs)
+        self._inputs[:] = rows[:width]
         self._access.put()
         self._instance.exit_initialization()
         self._access.get()
-        told = [[*self._outputs.cast("d")]]
+        driven, seen = self._inputs.cast("d"), self._outputs.cast("d")
+        told, before = bytearray(self._outputs), [*seen]
         for k in range(steps):
+            self._inputs[:] = rows[k * width : (k + 1) * width]
+            for slot, place, power, rate, coefficient in terms:
+                y = (seen[place] - before[place]) / h if rate else seen[place] if power else 1.0
+                driven[slot] += coefficient * y * abs(y) ** max(0, power - 1)
+            before = [*seen]
+            self._access.put()
             self._access.step(k * h)
-            told.append([*self._outputs.cast("d")])
+            told += self._outputs
+            if not all(map(isfinite, seen)):
+                return told.hex()
         self._instance.terminate()
-        return told
+        return told.hex()
 
     def _reset(self) -> None:
         self._instance.reset(self._log)

@@ -136,6 +136,10 @@ def validate(
     judgements = [
         judge(c, given, predicted[c.horizon], runs.short.get(c.horizon)) for c in read.content.criteria
     ]
+    judgements = [
+        j._replace(flags=[*j.flags, *_of_code(comparison)]) if j.outcome == "met" else j
+        for j in judgements
+    ]
     fmu = fmu_result(comparison)
     evaluations = {e.name: e for e in comparison.evaluations}
     content = {
@@ -244,9 +248,21 @@ def _model_name(comparison: Comparison) -> str:
 def _confinement(comparison: Comparison) -> str:
     """What keeps the model's code from the data."""
     predictor = comparison.predictor
-    if predictor.parametric and not foreign(predictor):
+    own = any(e.model.ship.effects.files for e in comparison.evaluations)
+    if predictor.parametric and not own and not foreign(predictor):
         return "none needed: the model is parameters of this program"
-    return getattr(predictor, "confinement", "") or "unconfined"
+    found = getattr(predictor, "confinement", "") or "unconfined"
+    return f"unconfined: effects of the user ({found})" if own else found
+
+
+def _of_code(comparison: Comparison) -> Iterator[str]:
+    """What a reader must know of the model's code where a criterion is met, a sentence each."""
+    if (found := _confinement(comparison)).startswith("unconfined"):
+        yield f"The model's code may have read the measurement: it ran {found}."
+    description = comparison.predictor.description()
+    if outside := () if description is None else description.outside:
+        named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
+        yield f"The model opened, or tried to open, files that are not its own: {named}."
 
 
 def _result(j: Judgement) -> dict[str, Any]:

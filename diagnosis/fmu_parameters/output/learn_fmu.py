@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...execution.progress import Advance
 from ...execution.result_folder import together
-from ...predictors import WRITTEN
+from ...predictors import WRITTEN, Execution
 from ..residuals import WindowResiduals
 from ..sensitivity import refuse_unknown, sensitivities
 from ..ship_task import ship_task
@@ -20,7 +20,7 @@ OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.
 
 
 def learn_system(
-    options: argparse.Namespace, advance: Advance, origin: dict[str, str]
+    options: argparse.Namespace, advance: Advance, origin: dict[str, str], execution: Execution
 ) -> CalibrationReport:
     """Calibrate the FMU of any system, and write the result.
 
@@ -28,12 +28,13 @@ def learn_system(
         options: of the command.
         advance: receives the name of each step.
         origin: what the result was made with.
+        execution: how the FMU is run.
 
     Raises:
         InputError: FMU, map, parameters or runs are not as they should be.
     """
     runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
-    task = system_task(options.model, options.map, runs, options.parameters, options.horizon)
+    task = system_task(options.model, options.map, runs, options.parameters, options.horizon, execution)
     try:
         parts = task.residuals()
         train = parts["train"]
@@ -43,7 +44,7 @@ def learn_system(
         use = {r.name: u for u, every in task.runs.items() for r in every}
         content = task.map.model_dump(exclude_none=True)
         units = dict(zip(task.names, task.units, strict=True))
-        report = CalibrationReport(result, task.model, content, use, train.samples, units, task.notes)
+        report = CalibrationReport(result, task.confined, content, use, train.samples, units, task.notes)
         return written(report, options.out, origin, parts, task.names, advance)
     finally:
         task.close()
@@ -81,19 +82,19 @@ def _only_known(task: SystemTask, parts: Mapping[str, WindowResiduals], advance:
 
 
 def learn_ship(
-    options: argparse.Namespace, advance: Advance, origin: dict[str, str]
+    options: argparse.Namespace, advance: Advance, origin: dict[str, str], execution: Execution
 ) -> CalibrationReport:
     """Calibrate the FMU of a ship, and write the result; arguments as of :func:`learn_system`."""
     runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
-    task = ship_task(options, runs, advance)
+    task = ship_task(options, runs, advance, execution)
     try:
         parts = task.residuals()
         train = parts["train"]
         result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
         use = {w.run.name: u for u, every in task.runs.items() for w in every}
         content, units = task.predictor.given.content(), dict(zip(task.names, task.units, strict=True))
-        model, notes = task.fmu.model, task.notes
-        report = CalibrationReport(result, model, content, use, train.samples, units, notes)
+        confined, notes = task.confined, task.notes
+        report = CalibrationReport(result, confined, content, use, train.samples, units, notes)
         return written(report, options.out, origin, parts, task.names, advance)
     finally:
         task.close()

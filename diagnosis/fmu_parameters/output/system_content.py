@@ -12,7 +12,7 @@ from rich.text import Text
 from scipy.stats import norm
 
 import cosim
-from cosim.fmu import FmuModel
+from cosim.fmu import ConfinedFmu, FmuModel
 
 from ...report.document import Document, Plot, ReportSection, numbers, write_document, write_json
 from ...report.document import Table as PageTable
@@ -35,7 +35,7 @@ class CalibrationReport:
 
     Attributes:
         result: the calibration.
-        model: the FMU.
+        fmu: the FMU, as it was run.
         map: which variable is what, as JSON has it.
         use: run -> train, validate or test.
         samples: number of measured values that were learned from.
@@ -44,12 +44,21 @@ class CalibrationReport:
     """
 
     result: SystemCalibration
-    model: FmuModel
+    fmu: ConfinedFmu
     map: Mapping[str, Any]
     use: Mapping[str, str]
     samples: int
     units: Mapping[str, str]
     notes: Sequence[str] = ()
+
+    @property
+    def model(self) -> FmuModel:
+        """The FMU."""
+        return self.fmu.model
+
+    @property
+    def _notes(self) -> list[str]:
+        return [*self.result.faults, *self.notes, *self.fmu.sentences()]
 
     def unit(self, variable: str) -> str:
         """Unit of a variable of the FMU, 1 where it states none."""
@@ -128,6 +137,8 @@ class CalibrationReport:
                 "map": self.map,
                 "faults": list(r.faults),
                 "notes": list(self.notes),
+                "confinement": self.fmu.confinement,
+                "outside": list(self.fmu.outside),
             },
         }
 
@@ -252,8 +263,7 @@ class CalibrationReport:
         for f in self.result.forces:
             if text := advice(f):
                 yield text
-        yield from self.result.faults
-        yield from self.notes
+        yield from self._notes
         yield f"Files in {out}: diagnosis.json, model.ssv, posterior.json, report.html"
 
     def _document(self, origin: Mapping[str, str], plots: Sequence[Plot]) -> Document:
@@ -271,8 +281,7 @@ class CalibrationReport:
                 "Errors", [r.remainder.sentence], [PageTable(ERRORS, [*self.error_rows()], True)], plots
             )
         )
-        if r.faults or self.notes:
-            sections.append(ReportSection("Notes", [*r.faults, *self.notes]))
+        sections.append(ReportSection("Notes", self._notes))
         return Document("Calibration of an FMU", self.sentence, sections, origin)
 
 

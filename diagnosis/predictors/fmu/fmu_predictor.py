@@ -53,7 +53,6 @@ class FmuUse(NamedTuple):
         confined: makes its processes.
         step: the step that is asked for or that it suggests [s]; None: neither.
         fixed_step: the only step that it takes, or that is asked for [s]; None: it takes any.
-        needs_tool: whether it needs the tool that it was made with.
         given: which of its variables is which signal, as a file or its names tell.
         map: the same with the units that it declares.
         learned_from: runs of which it was learned, as far as it tells.
@@ -65,7 +64,6 @@ class FmuUse(NamedTuple):
     confined: ConfinedFmu
     step: float | None
     fixed_step: float | None
-    needs_tool: bool
     given: VariableMap
     map: VariableMap
     learned_from: tuple[Fingerprint, ...]
@@ -200,14 +198,7 @@ class FmuPredictor(BlackBox):
                 f"Its outputs {', '.join(self.late)} are zero until the first step, against their start "
                 "values: the samples of each window's first step are left out."
             )
-        if self.fmu.needs_tool:
-            yield "It needs the tool that it was made with (needsExecutionTool)."
-        if lines := [*self.confined.printed]:
-            yield f"It printed {len(lines)} different lines, the first: {lines[0]}"
-        yield f"Its processes: {self.confinement}."
-        if outside := [*self.confined.outside]:
-            named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
-            yield f"It opened, or tried to open, {len(outside)} files that are not its own: {named}."
+        yield from self.confined.sentences()
 
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()

@@ -11,7 +11,6 @@ from typing_extensions import deprecated
 
 import cosim
 from cosim.export import export_fmu
-from cosim.fmu import MEANS, ConfinedFmu
 from cosim.fmu import FmuModel as FmuModel
 from cosim.system import prepare
 from cybership.scratch_folder import Scratch
@@ -29,6 +28,7 @@ from ..predictor import (
 from ..ship_model import Model
 from ..weak_form import WeakWindows
 from .fmu_predictor import FmuPredictor, FmuUse, commands_of
+from .instances import confined
 from .lineage import learned_from, parts_of
 from .ship_of_fmu import SYSTEMS
 from .variable_map import VariableMap, completed, propose, read_map, unmatched
@@ -119,8 +119,7 @@ class Fmu:
     @property
     def needs_tool(self) -> bool:
         """Whether it needs the tool that it was made with (``needsExecutionTool``)."""
-        told = self.model.description.coSimulation
-        return bool(told is not None and told.needsExecutionTool)
+        return self.model.needs_tool
 
     def given(self, runs: Sequence[Run]) -> VariableMap:
         """The map of the file, else the one that names and units tell, for some runs."""
@@ -160,16 +159,11 @@ class Fmu:
         """
         measured = [w.run for w in runs]
         maps = self.given(measured), self.variables(measured)  # before a process is started
-        means = MEANS if self.execution.confined else ()
-        try:
-            confined = ConfinedFmu(self.model, means, self.execution.timeout)
-        except cosim.SimulationError as error:
-            raise cosim.InputError(str(error)) from None
-        steps = self.step, self.fixed_step, self.needs_tool
+        process, steps = confined(self.model, self.execution), (self.step, self.fixed_step)
         files = [(role, path, sha256(path)) for role, path in self.files]
-        use = FmuUse(self.name, self.sha256, confined, *steps, *maps, self.learned_from, files)
+        use = FmuUse(self.name, self.sha256, process, *steps, *maps, self.learned_from, files)
         predictor = FmuPredictor(use, runs, self.start or nominal(runs))
-        finalize(predictor, confined.close)
+        finalize(predictor, process.close)
         return predictor
 
 

@@ -6,9 +6,23 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim import InputError, SimulationError
-from cosim.fmu import ConfinedFmu, DoubleMemory, Port
+from cosim.fmu import MEANS, ConfinedFmu, DoubleMemory, FmuModel, Port
+
+from ..predictor import Execution
 
 TOGETHER = 8  # instances that step at the same time; chosen: as processes that a computer has cores for
+
+
+def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
+    """An FMU, and the process that makes those of its instances.
+
+    Raises:
+        InputError: there is no process for it.
+    """
+    try:
+        return ConfinedFmu(model, MEANS if execution.confined else (), execution.timeout)
+    except SimulationError as error:
+        raise InputError(str(error)) from None
 
 
 class Begun(NamedTuple):
@@ -68,10 +82,12 @@ class FmuRun:
         self._access.step(k * self._h)
         return self._told(k + 1)
 
-    def short_run(self, start: Mapping[str, float], inputs: Sequence[float], steps: int) -> np.ndarray:
+    def whole_run(self, start: Mapping[str, float], inputs: Sequence[float], steps: int) -> np.ndarray:
         """Outputs (steps + 1, m) of a whole run with inputs that stay the same."""
-        told = self._instance.short_run(start, inputs, steps, self._h)
-        return np.array([self._finite(np.array(row), k) for k, row in enumerate(told)])
+        held = np.tile(np.array(inputs, float), steps).tobytes()
+        told = self._instance.whole_run(start, held, steps, self._h)
+        rows = np.frombuffer(told).reshape(-1, len(self.outputs))
+        return np.array([self._finite(row, k) for k, row in enumerate(rows)])
 
     def _told(self, k: int) -> np.ndarray:
         told = np.array(self._memory.values[self._count : self._count + len(self.outputs)])
