@@ -119,7 +119,7 @@ def test_known_pairs():
     assert "turn on the spot" in apart("N_ur", "N_r")
     assert advice("X_u", [], EFFECTS) == separation_note("X_u", []) == ""
     said = advice("lag", ["delay", "clock_offset"], EFFECTS)
-    assert said.count("To tell lag from") == 2
+    assert said.count("To discriminate lag from") == 2
     assert separation_note("lag", ["delay", "mass", "X_u"]).endswith("from delay, mass or X_u.")
 
 
@@ -127,5 +127,5 @@ def test_of_many_others_the_likeliest_are_told():
     others = [name for name in EFFECTS if name != "X_u"]
     assert separation_note("X_u", others).endswith(f"or {len(others) - 4} others.")
     said = advice("X_u", others, EFFECTS)
-    assert said.count("To tell") <= 4
+    assert said.count("To discriminate") <= 4
     assert said.endswith("vary speed, turn and drift more.")

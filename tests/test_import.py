@@ -228,7 +228,7 @@ Y, U = '<Variable simulator="ramp" name="y"/>', '<Variable simulator="gain" name
          "'f' has no signal 'o'; there are in, out"),
         (("<Connections>", f'{FUNCTION}<SignalConnection>{U}<Signal function="g" name="out"/></SignalConnection>'),
          "no function 'g'"),
-        (("<Connections>", FUNCTION.replace("</F", '<LinearTransformation name="f"/></F')), "'f' stands there twice"),
+        (("<Connections>", FUNCTION.replace("</F", '<LinearTransformation name="f"/></F')), "'f' occurs twice"),
     ],
 )  # fmt: skip
 def test_what_osp_directories_may_not_hold(chain, tmp_path, edit, message):

@@ -194,20 +194,20 @@ class FmuPredictor(BlackBox):
             f"({description.title}); --ship NAME|FILE.toml selects another."
         )
         if (step := self.fmu.fixed_step) is not None:
-            yield f"It takes steps of {step:.6g} s, with a cubic spline through its outputs."
+            yield f"It is stepped every {step:.6g} s, with a cubic spline through its outputs."
         if self.late:
             yield (
-                f"Its outputs {', '.join(self.late)} are zero until the first step, against their start "
-                "values: the samples of each window's first step are left out."
+                f"Its outputs {', '.join(self.late)} are zero until the first step, contrary to "
+                "their start values: samples of the first step of each window are left out."
             )
         if self.fmu.needs_tool:
-            yield "It needs the tool that it was made with (needsExecutionTool)."
+            yield "It needs the tool that exported it (needsExecutionTool)."
         if lines := [*self.confined.printed]:
             yield f"It printed {len(lines)} different lines, the first: {lines[0]}"
         yield f"Its processes: {self.confinement}."
         if outside := [*self.confined.outside]:
             named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
-            yield f"It opened, or tried to open, {len(outside)} files that are not its own: {named}."
+            yield f"It opened, or tried to open, {len(outside)} files outside of its own: {named}."
 
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
