@@ -493,7 +493,7 @@ class TestColumns:
         with_tau().to_csv(tmp_path / "a.csv", index=False)
         assert propose(tmp_path / "a.csv").needed == {}
         done = command(propose_columns.main, tmp_path / "a.csv", "--write", "--anyway")
-        assert "needs no entries" in done.stdout
+        assert "no side-car is needed" in done.stdout
         assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
 
     @pytest.mark.parametrize(

@@ -271,4 +271,4 @@ def _tool_hint(model: FmuModel, folder: Path) -> str:
     cs = model.description.coSimulation
     if cs is None or not cs.needsExecutionTool or (folder / SLAVE_MODULE).is_file():
         return ""
-    return "; it needs the tool that it was made with to be installed"
+    return "; it needs an installation of the tool that exported it"

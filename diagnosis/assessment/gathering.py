@@ -73,8 +73,8 @@ def motion(prepared: PreparedRun) -> Smoothed:
     width = WIDTH * track.scale.time
     if track.period > width and not prepared.anyway:
         raise InputError(
-            f"run '{track.run.name}': the interval of {track.period:.3g} s between measurements is "
-            f"too long to average forces over {width:.3g} s; {GO_ON}"
+            f"run '{track.run.name}': a measurement every {track.period:.3g} s is too rare "
+            f"to average forces over {width:.3g} s; {GO_ON}"
         )
     return prepared.smoothed
 
