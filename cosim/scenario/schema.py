@@ -106,8 +106,8 @@ class LogOptions(StrictModel):
 
     signals: Literal["all", "compact"] | list[str] = Field(
         "all",
-        description="all inputs and outputs; those that metrics, pictures and the diagnosis need; or names as "
-        "instance.variable, * as wildcard",
+        description="all inputs and outputs; those that metrics, pictures and the diagnosis need; or "
+        "names as instance.variable, * as wildcard",
     )
     every: PositiveInt = Field(1, description="log every n-th base step")
     format: Literal["csv", "parquet"] = "csv"
@@ -128,8 +128,8 @@ class Recording(StrictModel):
     )
     inputs: dict[str, str] = Field(
         min_length=1,
-        description="input as instance.variable -> column; an empty cell leaves the value of its connection, "
-        "or its start value",
+        description="input as instance.variable -> column; an empty cell leaves the value of its "
+        "connection, or its start value",
     )
 
 
@@ -156,20 +156,20 @@ class Scenario(StrictModel):
     seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of all random faults")
     algorithm: Literal["gauss_seidel", "jacobi"] = Field(
         "gauss_seidel",
-        description="one after the other with the newest values, or all together with the previous values",
+        description="one after the other with the newest values, or all with the previous values",
     )
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
     ship: Annotated[str, AfterValidator(_ship_name)] | None = Field(
         None,
-        description="ship of the FMUs with a bare name: a shipped ship, or its .toml file, relative to the "
-        "scenario (the default ship)",
+        description="ship of the FMUs with a bare name: a shipped ship, or its .toml file, relative to "
+        "the scenario (the default ship)",
     )
     native: bool | Literal["auto"] = Field(
         "auto",
-        description="auto: compile the project's own FMUs, those with a bare name, and the step loop, if the "
-        "system has a C compiler; true: also with zig; false: neither; results are the same",
+        description="auto: compile the project's own FMUs, those with a bare name, and the step loop, "
+        "if the system has a C compiler; true: also with zig; false: neither; results are the same",
     )
     connections: list[tuple[str, str]] = Field(
         default_factory=list,
