@@ -197,7 +197,7 @@ def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     assert found.withdrawn == []
     content = diagnosis_content(found, None, [])
     (told,) = content.effects
-    assert told.sentence.startswith("Run run0: The bow thruster is dead from 1")
+    assert told.sentence.startswith("Run run0: The bow thruster fails from 1")
     assert "Run run1: The bow" in told.sentence
     runs = {name: c.run for name, c in told.coefficients.items()}
     assert runs["bow_outage_start_1"] == "run0"

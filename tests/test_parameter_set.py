@@ -93,7 +93,7 @@ def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
     for runs, told in (
         (
             {"a": {"bow_failure_time": 40.0}},
-            "bow_failure_time was found in run 'a' and holds for that run alone",
+            "bow_failure_time was found in run 'a' and holds for that run only",
         ),
         (
             FAILS,
@@ -244,8 +244,8 @@ def test_names_choose_and_what_is_not_used_is_told(learned, tmp_path):
         ("<a", "is not an SSP 1.0 parameter set"),
         ("<a/>", "is not an SSP 1.0 parameter set"),
         (SSV.format(parameter("vessel.m", "much")), "'much' is not a valid value"),
-        (SSV.format(parameter("vessel.m", "NaN")), "has no number as its value"),
-        (SSV.format('<ssv:Parameter name="vessel.m"><ssv:Boolean value="true"/></ssv:Parameter>'), "has no number"),
+        (SSV.format(parameter("vessel.m", "NaN")), "its value is not a number"),
+        (SSV.format('<ssv:Parameter name="vessel.m"><ssv:Boolean value="true"/></ssv:Parameter>'), "its value is not a number"),
         (SSV.format(2 * parameter("vessel.m", 1.0)), "occurs twice"),
         (SSV.format(parameter("m", 1.0)), "is not of the form model.parameter"),
         (SSV.format(parameter("vesel.m", 1.0)), "did you mean 'vessel'"),
