@@ -22,8 +22,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = command_parser(
         "cosim.interface",
-        "Tables of what each FMU of a scenario gets and gives: names, units, descriptions, "
-        "and where values come from and go to.",
+        "Print tables of inputs and outputs of each FMU of a scenario: names, units, "
+        "descriptions, sources and targets of values.",
         "examples:  %(prog)s scenarios/ellipse.json\n           %(prog)s system.ssp > interface.md",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="JSON file, SSP archive or OSP directory")
@@ -66,7 +66,7 @@ def _section(system: System, name: str) -> str:
         lines += _table("output", "goes to", rows)
     spare = [v for v in groups["output"] if v not in used]
     if spare:
-        lines += [f"Further outputs, which go to the log only: {_names(spare)}.", ""]
+        lines += [f"Further outputs, which are logged only: {_names(spare)}.", ""]
     if "parameter" in groups:
         lines += [f"It has {len(groups['parameter'])} parameters.", ""]
     return "\n".join(lines)
@@ -74,7 +74,7 @@ def _section(system: System, name: str) -> str:
 
 def _table(kind: str, way: str, rows: Iterable[tuple[FmuVariable, str]]) -> list[str]:
     """Lines of a table, and an empty one."""
-    lines = [f"| {kind} | unit | what it is | {way} |", "|---|---|---|---|"]
+    lines = [f"| {kind} | unit | description | {way} |", "|---|---|---|---|"]
     for v, ends in rows:
         unit = v.unit.name if v.unit is not None else ""
         lines.append(f"| `{v.name}` | {unit} | {v.description.replace('|', '/')} | {ends} |")

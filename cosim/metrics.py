@@ -40,7 +40,7 @@ def _write_csv(file: Path, columns: Mapping[str, np.ndarray]) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "cosim.metrics",
-        "Performance metrics of a finished run.",
+        "Compute the performance metrics of a finished run.",
         """\
 examples:
   %(prog)s results/ellipse
@@ -50,13 +50,23 @@ examples:
     )
     parser.add_argument("folder", metavar="DIR", type=Path, help="results of a run: holds log.csv")
     parser.add_argument(
-        "--from", dest="start", metavar="T", type=float, help="first time used [s] (as in the scenario)"
+        "--from",
+        dest="start",
+        metavar="T",
+        type=float,
+        help="first time that is used [s] (as in the scenario)",
     )
     parser.add_argument(
-        "--to", dest="stop", metavar="T", type=float, help="last time used [s] (as in the scenario)"
+        "--to",
+        dest="stop",
+        metavar="T",
+        type=float,
+        help="last time that is used [s] (as in the scenario)",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
-    parser.add_argument("--out", metavar="FILE.csv", type=Path, help="write the metrics over time")
+    parser.add_argument("--json", action="store_true", help="print JSON only")
+    parser.add_argument(
+        "--out", metavar="FILE.csv", type=Path, help="also write the metrics over time to this file"
+    )
     return parser
 
 
@@ -83,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metrics = compute(log, start, stop, run.roles)
         if options.out is not None:
             if options.out.resolve().parent == options.folder.resolve() and options.out.name == CSV:
-                raise InputError(f"'{options.out}' is the log itself")
+                raise InputError(f"'{options.out}' is the log itself; name another file")
             _write_csv(options.out, over_time(log, start, stop, run.roles))
     except (InputError, MetricsError) as error:
         complain(error)

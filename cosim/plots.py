@@ -21,13 +21,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 2 bad input."""
     parser = command_parser(
         "cosim.plots",
-        "Draw the pictures of finished runs, laid over each other.",
+        "Draw the pictures of finished runs, all runs in the same axes.",
         "examples:  %(prog)s results/ellipse results/ellipse_bs --out results/both\n"
         "           %(prog)s results/ellipse --format pdf --width 3.5 --out figures\n"
         "           %(prog)s results/ellipse --format svg --style ggplot --out figures",
     )
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="results of a run")
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="where they go (.)")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, default=Path(), help="folder of the pictures (.)"
+    )
     usual = PictureOptions()
     parser.add_argument("--format", choices=FORMATS, default=usual.format, help="(png)")
     parser.add_argument(
@@ -36,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--dpi", type=_positive, metavar="N", default=usual.dpi, help=f"pixels per inch ({usual.dpi:g})"
     )
-    parser.add_argument("--style", metavar="NAME", help="style of matplotlib, or a file of one")
+    parser.add_argument("--style", metavar="NAME", help="style of matplotlib, or a style file")
     options = parser.parse_args(arguments)
     look = PictureOptions(options.format, options.dpi, options.width, options.style)
     try:

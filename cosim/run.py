@@ -99,7 +99,7 @@ def _ensemble(
     if options.ensemble is None or options.posterior is None:
         raise InputError("--ensemble N and --posterior FILE go together")
     if options.realtime is not None:
-        raise InputError("an ensemble keeps to no wall clock: leave --realtime out")
+        raise InputError("an ensemble does not run in real time: leave --realtime out")
     from .campaign.ensemble import run_ensemble, spread  # only now: pandas takes a second to import
     from .campaign.shown_progress import shown_progress
 
@@ -126,7 +126,7 @@ def _ensemble(
         return FAILED
     except KeyboardInterrupt:
         kept = (
-            [f"what has finished is in '{folder}'; the same command goes on"] if folder.exists() else []
+            [f"finished runs are in '{folder}'; the same command continues"] if folder.exists() else []
         )
         raise KeyboardInterrupt(*kept) from None
     failed = made.query("status == 'failed'")
@@ -219,40 +219,48 @@ def _parser() -> argparse.ArgumentParser:
         "OspSystemStructure.xml",
     )
     parser.add_argument("--stop", type=positive, metavar="SECONDS", help="another end")
-    parser.add_argument("--step", type=positive, metavar="SECONDS", help="another base step")
+    parser.add_argument(
+        "--step",
+        type=positive,
+        metavar="SECONDS",
+        help="base step that replaces that of the scenario [s]",
+    )
     parser.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="another ship for FMUs with a bare name: a shipped one, or a description of your own",
+        help="another ship for FMUs with a bare name: a shipped one, or a file of your own",
     )
     parser.add_argument(
-        "--seed", type=whole_number(0), metavar="N", help="another seed of noise and faults"
+        "--seed",
+        type=whole_number(0),
+        metavar="N",
+        help="seed of noise and faults that replaces that of the scenario",
     )
     parser.add_argument(
         "--set",
         metavar="PATH=VALUE",
         action="append",
         default=[],
-        help="one value of the scenario, such as vessel.m=15 (a parameter), controller=./mine.fmu, "
+        help="a value of the scenario, such as vessel.m=15 (a parameter), controller=./mine.fmu, "
         "faults.0.std=0.001; may be given several times",
     )
     parser.add_argument(
         "--out",
         type=folder_name,
         metavar="DIR",
-        help="result folder (results/<name>; where another run is there, results/<name>_2, ...)",
+        help="result folder (results/<name>; if it holds another run, results/<name>_2, ...)",
     )
     parser.add_argument(
         "--overwrite",
         action="store_true",
-        help="use results/<name>, whatever run is there; replace a log that is of no run",
+        help="use results/<name> even if it holds another run, and replace a log without a run",
     )
     parser.add_argument(
         "--log",
         choices=("all", "compact"),
-        help="signals in the log: all, or what metrics, pictures and the diagnosis need",
+        help="signals in the log: all, or those that metrics, pictures and the diagnosis need",
     )
-    parser.add_argument("--parquet", action="store_true", help="log.parquet in place of log.csv")
+    parser.add_argument("--parquet", action="store_true", help="write log.parquet in place of log.csv")
     parser.add_argument(
         "--parameters",
         metavar="FILE.ssv",
@@ -266,14 +274,14 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.ssv",
         action="append",
         default=[],
-        help="SSP parameter set of the plant that controllers and observers believe; may be given "
-        "several times",
+        help="SSP parameter set of the plant for the controller models in controllers and observers; "
+        "may be given several times",
     )
     parser.add_argument(
         "--ensemble",
         type=whole_number(2),
         metavar="N",
-        help="run N ships whose parameters are drawn from --posterior; bands of track and heading",
+        help="run N ships with parameters drawn from --posterior; draw bands of track and heading",
     )
     parser.add_argument(
         "--posterior",
@@ -285,10 +293,12 @@ def _parser() -> argparse.ArgumentParser:
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to an FMU (100 times that of its usual step, 30 s at the least)",
+        help="longest time of a call to an FMU [s] (100 times its usual step, at least 30 s)",
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
-    parser.add_argument("--verbose", action="store_true", help="also which step loop ran, and why")
+    parser.add_argument(
+        "--verbose", action="store_true", help="also print which step loop ran, and the reason"
+    )
     parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
     parser.add_argument(
@@ -302,7 +312,7 @@ def _parser() -> argparse.ArgumentParser:
         type=positive,
         const=1.0,
         metavar="FACTOR",
-        help="keep to the wall clock, FACTOR times as fast (1)",
+        help="run in real time, FACTOR times as fast (1)",
     )
     return parser
 

@@ -34,7 +34,7 @@ def _one_at_a_time() -> Iterator[None]:
     """
     global _running
     if _running is threading.current_thread():
-        raise InputError("a run cannot begin another one in its own process: use processes")
+        raise InputError("a run cannot start another one in its own process: use processes")
     with _alone:
         _running = threading.current_thread()
         try:

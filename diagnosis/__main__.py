@@ -7,12 +7,12 @@ if __name__ == "__main__":
 
 from cosim.command import run_command
 
-COMMANDS = """Compares a ship model with measurements, and learns what it lacks.
+COMMANDS = """Compare a ship model with measurements, and learn which effect it lacks.
 
-  python -m diagnosis.compare RUN...                  where does the model fail?
+  python -m diagnosis.compare RUN...                  where is the model wrong?
   python -m diagnosis.learn TRAIN... [--test RUN...]  which physical effect is missing?
 
-Each tells more with --help; docs/diagnosis.md tells what the numbers mean."""
+--help of each describes its options; docs/diagnosis.md explains the numbers."""
 
 
 def main() -> int:

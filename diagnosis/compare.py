@@ -48,7 +48,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     from .report.document import write_json
 
     if options.criteria is None and (options.sign or options.learned):
-        raise InputError("--sign and --learned are of a record: --criteria FILE.json is missing")
+        raise InputError("--sign and --learned belong to a record: --criteria FILE.json is missing")
     criteria = None if options.criteria is None else read_criteria(options.criteria)
     with together(options.out, (*FILES, MAP, *RECORD)) as new:
         craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
@@ -82,7 +82,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
 def _parser() -> argparse.ArgumentParser:
     made = parser(
         "compare",
-        "Compare a model with measured runs: how large its error is, and where.",
+        "Compare a model with measured runs: size and location of its error.",
         "examples:  %(prog)s run1.csv run2.csv\n"
         "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
         "           %(prog)s trial.csv --model vendor.fmu --map map.json\n"
@@ -97,13 +97,13 @@ def _parser() -> argparse.ArgumentParser:
         "--criteria",
         type=Path,
         metavar="FILE.json",
-        help="what counts as agreement: judged, and kept in a validation record",
+        help="criteria of agreement: judge them, and write a validation record",
     )
     made.add_argument(
         "--learned",
         type=Path,
         metavar="DIR",
-        help="result folder of learn that made the model, for the uncertainty in the record",
+        help="result folder of the learn command that made the model, for the uncertainty in the record",
     )
     made.add_argument(
         "--sign", type=Path, metavar="KEY.pem", help="private key (Ed25519) that signs the record"

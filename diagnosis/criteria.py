@@ -11,10 +11,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print it; returns the exit code."""
     made = argparse.ArgumentParser(
         prog=program("diagnosis.criteria"),
-        description="Print a first file of criteria for compare --criteria, or the JSON Schema of such.",
+        description="Print a template of criteria for compare --criteria, or their JSON Schema.",
         epilog="example:  %(prog)s > criteria.json",
     )
-    made.add_argument("--schema", action="store_true", help="the JSON Schema")
+    made.add_argument("--schema", action="store_true", help="print the JSON Schema")
     options = made.parse_args(arguments)
     from .acceptance import json_schema, template  # only now: it takes a second to import
 

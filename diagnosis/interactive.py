@@ -107,7 +107,7 @@ def _model_of(
             whose ship nobody names.
     """
     if model is not None and name is not None:
-        raise InputError("a model has its ship: give model or ship, not both")
+        raise InputError("model already has a ship: give model or ship, not both")
     if model is not None:
         return model
     loaded = [w for w in runs if isinstance(w, WeakWindows)]
@@ -199,7 +199,7 @@ class ShownDiagnosis(session.Diagnosis):
             InputError: the model is not sound, or no FMU would take it.
         """
         if not (self.sound or anyway):
-            raise InputError("the learned model is not sound, see .stability; anyway=True writes it")
+            raise InputError("the learned model is not stable, see .stability; anyway=True writes it")
         write_model(Path(path), self.model)
         return Path(path)
 
@@ -320,5 +320,5 @@ def calibrate(
     """
     found = _begun(runs, validate, held_out, prior, model, ship, advance).calibrate()
     if found is None:
-        raise InputError("there is no coefficient to calibrate, or the runs do not determine them")
+        raise InputError("there is no coefficient to calibrate, or the runs do not identify them")
     return found

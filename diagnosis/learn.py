@@ -49,7 +49,7 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
 )
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
 FMUS = (".fmu", ".ssp", ".json")
-UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
+UNSOUND = "the learned model is not stable, see Stability; --allow-unstable writes it anyway"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,7 +78,7 @@ def _calibrates_fmu(options: argparse.Namespace) -> bool:
     """Whether parameters of an FMU are calibrated: they are named, or the FMU is not of a ship."""
     model = options.model
     if options.parameters is not None and (model is None or model.suffix not in FMUS):
-        raise InputError("--parameters are those of an FMU: --model NAME.fmu is missing")
+        raise InputError("--parameters belongs to an FMU: --model NAME.fmu is missing")
     if model is None or model.suffix not in FMUS:
         return False
     from .fmu_parameters.system_task import is_system
@@ -109,7 +109,7 @@ def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
     model = initial_model(options.model, options.map, craft, execution_of(options))
     start = model.start
     if options.fit and not model.parametric:
-        raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
+        raise InputError(f"--fit needs a model with parameters; {model.name} has none")
     shares(craft, options.prior)
     paths = [*options.train, *options.validate, *options.test]
     runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
@@ -206,18 +206,18 @@ FIRST = "Answer 1 of 3: the initial model compared with the runs\n"
 SECOND = "Answer 2 of 3: the coefficients calibrated, without an effect\n"
 THIRD = "Answer 3 of 3: the missing effect\n"
 NOTHING_TO_FIT = (
-    "Answer 2 of 3: the model has no coefficient to calibrate, or the runs do not determine them."
+    "Answer 2 of 3: the model has no coefficient to calibrate, or the runs do not identify them."
 )
 LEFT_OUT = (
-    "Left out by --quick: the search for a missing effect, its confidence, and the stability of the "
-    f"learned model ({DIAGNOSIS}, {MODEL})."
+    "Not computed with --quick: the search for a missing effect, its confidence, and the "
+    f"stability of the learned model ({DIAGNOSIS}, {MODEL})."
 )
 
 
 def _parser() -> argparse.ArgumentParser:
     made = parser(
         "learn",
-        "Learn from measured runs which physical effect a model lacks, and how sure that is.",
+        "Learn from measured runs which physical effect a model lacks, and with what confidence.",
         "examples:  %(prog)s run1.csv run2.csv --test run3.csv\n"
         "           %(prog)s run1.csv run2.csv --quick\n"
         "           %(prog)s run1.csv run2.csv --validate run3.csv --test run4.csv\n"
@@ -233,11 +233,14 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         nargs="+",
         metavar="TRAIN",
-        help="measured run to learn from, or folder of a log",
+        help="measured training run, or folder of a log",
     )
     for option, what in (
-        ("--validate", "decide what is kept and how sure it is (training data left out in turn)"),
-        ("--test", "are predicted and decide nothing, to see the error fall"),
+        (
+            "--validate",
+            "decide which effects are kept, and their confidence (folds of the training data)",
+        ),
+        ("--test", "are predicted and decide nothing; they show how much the error falls"),
     ):
         made.add_argument(
             option,
@@ -251,29 +254,29 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--quick",
         action="store_true",
-        help="stop after the comparison and the calibration of the coefficients, without a search for "
+        help="stop after the comparison and the calibration of the coefficients; do not search for "
         "effects",
     )
     made.add_argument(
         "--prior",
         type=prior,
         metavar="SHARE",
-        help="relative standard deviation of every nominal coefficient, or, as in mass=0.01,thrust=0.5, "
-        "of groups and single ones; 0: exact (by where each value comes from)",
+        help="relative standard deviation of every nominal coefficient, or, as in "
+        "mass=0.01,thrust=0.5, of groups and single ones; 0: exact (by the source of each value)",
     )
     made.add_argument(
         "--fit",
         action="append",
         metavar="OUTPUT",
         default=[],
-        help="a measured output of an actuator, as propeller.thrust, to fit that actuator to before "
-        "anything else (default: such a measurement judges, and is not fitted)",
+        help="a measured output of an actuator, as propeller.thrust; the actuator is fitted to it "
+        "first (default: the measurement is compared, not fitted)",
     )
     made.add_argument(
         "--method",
         metavar="NAME",
         default=DEFAULT,
-        help=f"of identification: {', '.join(METHODS)}, or a FILE.py of your own ({DEFAULT})",
+        help=f"method of identification: {', '.join(METHODS)}, or a FILE.py of your own ({DEFAULT})",
     )
     made.add_argument(
         "--pruning",
@@ -286,11 +289,13 @@ def _parser() -> argparse.ArgumentParser:
         "--parameters",
         type=Path,
         metavar="FILE.json",
-        help="parameters of an FMU given by --model to calibrate; cybership parameters proposes the "
-        "file (none for a ship, else those that the runs determine)",
+        help="file of the parameters to calibrate, of an FMU given by --model; cybership parameters "
+        "proposes it (a ship: none; else all that the runs identify)",
     )
     made.add_argument(
-        "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"
+        "--allow-unstable",
+        action="store_true",
+        help="write model.ssv even if the learned model is not stable",
     )
     fmu_options(made)
     out_options(made, Path("results", "diagnosis"))

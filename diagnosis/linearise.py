@@ -148,15 +148,15 @@ def _parser() -> argparse.ArgumentParser:
         "--at",
         type=Path,
         metavar="STATE.json",
-        help="start values, parameters and inputs by their names (the FMU's start values)",
+        help="start values, parameters and inputs by their names (start values of the FMU)",
     )
-    where.add_argument("--run", type=Path, metavar="RUN", help="measured run, in which the state is")
+    where.add_argument("--run", type=Path, metavar="RUN", help="measured run that contains the state")
     made.add_argument("--time", type=float, metavar="SECONDS", help="time in that run [s]")
     made.add_argument(
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="which variables of the FMU are which columns, and its start values (as names say)",
+        help="map of the FMU's variables to the columns, and its start values (guessed from names)",
     )
     ship_option(made)
     confinement_options(made)

@@ -65,8 +65,8 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutco
     kind = options.trial or whole.trial
     if kind is None:
         raise InputError(
-            f"'{options.run}' does not state which trial it is: give --trial, or put "
-            f'{{"trial": "zigzag"}} into \'{options.run}.json\''
+            f"'{options.run}' does not state its trial: give --trial, or put {{\"trial\": "
+            f"\"zigzag\"}} into '{options.run}.json'"
         )
     low, high = options.start or -np.inf, np.inf if options.stop is None else options.stop
     inside = ((whole.time >= low) & (whole.time <= high)).astype(float)
@@ -81,7 +81,7 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutco
     way = passage.along(passage.time[0], executes(passage)[0])
     if way < length:
         notes.append(
-            f"only {way:.3g} m before the first execute: heading and speed there are of the last ship's "
+            f"only {way:.3g} m before the first execute: initial heading and speed need one ship "
             f"length, {length:.3g} m; begin the trial earlier"
         )
     return outcome(kind, passage, length), notes
@@ -90,8 +90,8 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutco
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.measure_trial",
-        "Measure a manoeuvring trial by the definitions of IMO and ISO: a turning circle, a "
-        "zig-zag, a stop, a spiral; measured, or a run of cosim.",
+        "Measure a manoeuvring trial by the definitions of IMO and ISO: a turning circle, "
+        "zig-zag, stop or spiral, from a measurement or a run of cosim.",
         "examples:  %(prog)s results/otter_circle\n"
         "           %(prog)s sea_trial.csv --ship my_ship.toml --trial circle --from 470 --to 684\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
@@ -99,7 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     ship_option(made)
     made.add_argument(
-        "--trial", choices=KINDS, help="which it is (as the file beside it, or the log, says)"
+        "--trial", choices=KINDS, help="kind of the trial (as the side-car or the log states)"
     )
     made.add_argument(
         "--from", dest="start", metavar="T", type=float, help="first time of the file that is used [s]"

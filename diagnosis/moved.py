@@ -47,7 +47,7 @@ class MovedModules:
 def _new(name: str) -> str:
     new = f"thesis.{name.partition('.')[2]}"
     if name.count(".") == 1:  # once for a package
-        sys.stderr.write(f"note: {name} is now {new}; the old name goes with the next release\n")
+        sys.stderr.write(f"note: {name} has the new name {new}; the next release removes the old name\n")
     return new
 
 

@@ -69,7 +69,7 @@ def parameters(options: argparse.Namespace, advance: Advance) -> Done:
         task.close()
     shown += map(printable, task.notes)
     if not chosen:
-        return Done(0, [*shown, "The runs determine none of them; no file is written."])
+        return Done(0, [*shown, "The runs identify none of them; no file is written."])
     options.write.parent.mkdir(parents=True, exist_ok=True)
     write_parameters(options.write, chosen)
     return Done(0, [*shown, printable(f"'{options.write}' has {len(chosen)} of them: check the priors")])
@@ -94,7 +94,7 @@ def _told(found: "Sensitivities") -> Iterator[RenderableType]:
         made.add_row(*map(Text, (*row, share, "yes" if s.known else "no")))
     yield made
     for group in found.together:
-        yield printable(f"known only together: {', '.join(group)}")
+        yield printable(f"identifiable only together: {', '.join(group)}")
     for s in found.each:
         if s.fault:
             yield printable(s.fault)
@@ -119,7 +119,7 @@ def _prior(p: "CalibratedParameter") -> str:
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.parameters",
-        "List the parameters of an FMU that can be calibrated, and write a file of them.",
+        "List the parameters of an FMU that can be calibrated, and write them to a file.",
         "examples:  %(prog)s vendor.fmu\n"
         "           %(prog)s vendor.fmu --map map.json --runs run1.csv run2.csv\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
@@ -129,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="which variables of the FMU are which columns (as their names say)",
+        help="map of the FMU's variables to the columns (guessed from names)",
     )
     made.add_argument(
         "--runs",
@@ -137,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
         nargs="+",
         metavar="RUN",
         default=[],
-        help="measured runs: the file has the parameters that they determine (all)",
+        help="measured runs: only parameters that they identify are written (all)",
     )
     made.add_argument(
         "--write",
@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
         default=Path("parameters.json"),
         help="file that is written (parameters.json)",
     )
-    made.add_argument("--overwrite", action="store_true", help="replace a file that is there")
+    made.add_argument("--overwrite", action="store_true", help="replace an existing file")
     ship_option(made)
     confinement_options(made)
     anyway_option(made)

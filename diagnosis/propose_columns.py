@@ -71,9 +71,9 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
         shown.append(f"not used: {', '.join(found.unused)}")
     shown = list(map(printable, [*shown, *_blanks([found])]))
     if not found.needed:
-        return Done(0, [*shown, printable(f"nothing needs to be stated next to '{path}'")])
+        return Done(0, [*shown, printable(f"no side-car is needed for '{path}'")])
     if found.layout == stated_layout(path):
-        return Done(0, [*shown, printable(f"what is stated next to '{path}' is all that it needs")])
+        return Done(0, [*shown, printable(f"the side-car of '{path}' is complete")])
     return Done(0, [*shown, *_stated(target, found.needed, options.write)])
 
 
@@ -83,17 +83,17 @@ def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> 
 
     tables = [path for path in options.file if path.suffix in TABLES or not path.exists()]
     if not tables:
-        raise InputError("none of the files is a CSV or Parquet file")
+        raise InputError("none of these files is a CSV or Parquet file")
     if len(folders := {path.parent for path in tables}) > 1:
         each = ", ".join(f"'{folder}'" for folder in sorted(folders))
-        raise InputError(f"each folder has a file of its own, and these are of several: {each}")
+        raise InputError(f"a side-car belongs to one folder, and these files are in several: {each}")
     target = tables[0].with_name(FOLDER_FILE)
     _refuse_there(options, target)
     proposals = {path: propose(path, craft) for path in tables}
     common, others = common_layout(proposals)
     shown: list[RenderableType] = []
     if left := [path.name for path in options.file if path not in proposals]:
-        shown.append(printable(f"no tables: {', '.join(left)}"))
+        shown.append(printable(f"not tables: {', '.join(left)}"))
     runs = {
         path: read(path, common.model_copy(update={"columns": {**common.columns, **own}}), craft)
         for path, own in others.items()
@@ -117,7 +117,7 @@ def _own_entries(others: Mapping[Path, Mapping[str, "Column"]]) -> Iterator[str]
         there = (stated_layout(path) or Layout()).columns
         if more := {s: c for s, c in own.items() if c != there.get(s)}:
             text = json.dumps(as_json(Layout(columns=more)), ensure_ascii=False)
-            yield printable(f"'{path}' needs in addition, in '{beside(path)}': {text}")
+            yield printable(f"'{path}' also needs, in '{beside(path)}': {text}")
 
 
 def _tabulated(
@@ -138,14 +138,14 @@ def _tabulated(
                 cells = [f"{_seconds(s):.4g} s", f"{s.track.period:.3g} s", *map(str, s.counts)]
                 channels.append((s.track.run.name, [*channels_of(s)]))
         except InputError as error:
-            refused.append(f"not usable as it is: {error}")
+            refused.append(f"not usable yet: {error}")
         table.add_row(Text(printable(path.name)), *cells)
     return [table, *channel_table(channels), *map(printable, refused)]
 
 
 def _refuse_there(options: argparse.Namespace, target: Path) -> None:
     if options.write and not options.overwrite and target.exists():
-        raise InputError(f"'{target}' is there already; --overwrite replaces it, and keeps its entries")
+        raise InputError(f"'{target}' exists; --overwrite replaces it and keeps its entries")
 
 
 def _smoothed(found: "Run", craft: "Ship", anyway: bool, advance: Advance) -> "Smoothed":
@@ -180,16 +180,16 @@ def _stated(target: Path, content: Mapping[str, Any], write: bool) -> list[Rende
     if write:
         with together(target.parent, (target.name,)) as new:
             (new / target.name).write_text(f"{text}\n", encoding="utf-8")
-    head = f"written into '{target}':" if write else f"--write puts this into '{target}':"
+    head = f"written into '{target}':" if write else f"--write writes this into '{target}':"
     return [printable(head), text]
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "diagnosis.propose_columns",
-        "Look at measurements, and propose the JSON file beside them: names, units, "
-        "separator, decimal mark, lines before the names, encoding. What a JSON file there states is "
-        "kept. A signal of which no column is known gets a blank name, and likely columns are listed.",
+        "Inspect measurements, and propose their side-car, a JSON file: names, units, separator, "
+        "decimal mark, lines before the names, encoding. Entries of an existing side-car are "
+        "kept. A signal without a column gets a blank name, and likely columns are listed.",
         "examples:  %(prog)s my.csv\n"
         "           %(prog)s my.csv --ship otter --write\n"
         "           %(prog)s folder/* --ship my_ship.toml --write\n"
@@ -200,13 +200,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE",
         type=Path,
         nargs="+",
-        help="CSV or Parquet file; for several of a folder one JSON file holds, and they are tabulated",
+        help="CSV or Parquet file; several of one folder get one JSON file, and a table",
     )
     ship_option(parser)
     parser.add_argument(
-        "--write", action="store_true", help="write it, as FILE.json; for several, as columns.json"
+        "--write", action="store_true", help="write FILE.json, or columns.json for several files"
     )
-    parser.add_argument("--overwrite", action="store_true", help="also over one that is there")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file too")
     anyway_option(parser)
     return parser
 

@@ -39,11 +39,11 @@ def repair(options: argparse.Namespace, advance: Advance) -> Done:
 
     out = options.out
     if out.suffix not in KINDS:
-        raise InputError(f"'{out}' is neither .csv nor .parquet")
+        raise InputError(f"'{out}' ends neither in .csv nor in .parquet")
     if out.exists() and not options.overwrite:
-        raise InputError(f"'{out}' is there already; --overwrite replaces it")
+        raise InputError(f"'{out}' exists; --overwrite replaces it")
     craft = ship_with((), options.ship)
-    advance("reading, and comparing channels")
+    advance("reading and comparing channels")
     prepared = prepare(options.run, craft, anyway=True)  # what cannot be repaired is reported
     repaired = prepared.sensors.run
     side_car = f"{out.name}.json"
@@ -65,10 +65,10 @@ def _found(sensors: "Examined") -> list[str]:
 
     others = ", ".join(sensors.run.measured)
     if not others:
-        return ["the pose is all that is measured: no other channel can be compared with it"]
+        return ["only the pose is measured: no redundant channel for a comparison"]
     lines = [*sensor_lines(sensors.findings), *sensors.notes]
     if not sensors.findings:
-        lines.append("no fault: redundant channels agree")
+        lines.append("no fault detected: redundant channels agree")
     return [f"measured in addition to the pose: {others}", *lines]
 
 
@@ -96,7 +96,7 @@ def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.repair",
-        "Compare the redundant channels of a measurement, and repair the faults that they show: clock, "
+        "Compare the redundant channels of a measurement, and repair the detected faults: clock, "
         "scale, offset, place, delay, wraps, units. No model of the ship is used.",
         "examples:  %(prog)s trial.csv --ship my_ship.toml --out repaired.csv\n"
         "exit codes: 0 done, nothing may be wrong; 2 bad input; 130 interrupted (nothing written)",
@@ -110,7 +110,7 @@ def _parser() -> argparse.ArgumentParser:
         help="CSV or Parquet file; FILE.json next to it has the noise",
     )
     ship_option(made)
-    made.add_argument("--overwrite", action="store_true", help="also over a file that is there")
+    made.add_argument("--overwrite", action="store_true", help="replace an existing file too")
     return made
 
 

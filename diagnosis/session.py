@@ -145,7 +145,7 @@ def well_posed() -> Iterator[None]:
     try:
         yield
     except LinAlgError as error:
-        raise InputError(f"these runs do not determine what is asked of them: {error}") from None
+        raise InputError(f"these runs do not determine the requested values: {error}") from None
 
 
 @well_posed()
@@ -285,7 +285,7 @@ class Session:
 
     def _gained(self, verdict: DecidedFindings, data: ValidationData) -> PredictionGain | None:
         """What the search for effects gained over calibration alone."""
-        self.advance("what the search gained over calibration")
+        self.advance("gain of the search over calibration")
         calibrated = None if self.calibration is None else self.calibration.findings
         learned = verdict.learned.model if verdict.changed else self.start
         return gain_of_search(data, self.start, calibrated, verdict.learned, learned)
@@ -347,8 +347,8 @@ def begin(
     blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
     if blocks < PARTS:
         raise InputError(
-            f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
-            f"at least {PARTS * block:.3g} s are needed"
+            f"too little data to learn from: {blocks * block:.3g} s with thrusters at work; at "
+            f"least {PARTS * block:.3g} s are needed"
         )
     first, last = len(train), len(runs) - len(held_out)
     parts = runs[:first], runs[first:last], runs[last:]

@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     elif unchecked:
         code, verdict = (
             UNCHECKED,
-            f"The record could not be checked: {unchecked} of {len(checks)} points are open.",
+            f"The record is not fully checked: {unchecked} of {len(checks)} points are open.",
         )
     else:
         rest = sum(check.allowed for check in checks)
@@ -57,15 +57,16 @@ def _parser() -> argparse.ArgumentParser:
         "--key",
         type=Path,
         metavar="FILE.pem",
-        help="public key (Ed25519) of who must have signed (that of the record, of nobody known)",
+        help="public key (Ed25519) of the required signer (the key in the record, whose owner is not "
+        "known)",
     )
     made.add_argument(
         "--allow-missing",
         action="append",
         default=[],
         metavar="NAME",
-        help="accept that this cannot be checked: signature, key, code, or a file by its name, its path "
-        "or what it is for, such as data; may be repeated",
+        help="accept that an item cannot be checked: signature, key, code, or a file by its name, its "
+        "path or its role, such as data; may be repeated",
     )
     return made
 

@@ -137,7 +137,7 @@ def addition(
 
     return Component(
         name="found",
-        description="What was found beside an FMU",
+        description="Findings added to an FMU",
         params=Params,
         state=state,
         inputs=inputs,

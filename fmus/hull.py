@@ -170,7 +170,7 @@ def term(name: str) -> tuple[int, tuple[tuple[bool, int], ...]]:
     found = re.fullmatch(r"([XYN])_((?:abs[uvr]_?)*[uvr]*)", name)
     factors = re.findall(r"(abs)?([uvr])_?", found[2]) if found else ()
     if found is None or not factors:
-        raise ValueError(f"'{name}' is no product of u, v, r and their absolute values")
+        raise ValueError(f"'{name}' is not a product of u, v, r and their absolute values")
     return "XYN".index(found[1]), tuple([(bool(sign), "uvr".index(speed)) for sign, speed in factors])
 
 

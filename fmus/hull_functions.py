@@ -89,8 +89,8 @@ def cross_flow_along(
     section_length: Annotated[float, "m", "length of the hull, about the origin", POSITIVE] = 1.0,
     section_draft: Annotated[float, "m", "draft of the hull", POSITIVE] = 0.1,
     section_drag: Annotated[float, "1", "drag coefficient of a section"] = 1.0,
-    section_tilt: Annotated[float, "1", "share by which it is more forward, less aft"] = 0.0,
-    section_ends: Annotated[float, "1", "share by which it is more at both ends, less amidships"] = 0.0,
+    section_tilt: Annotated[float, "1", "relative increase at the bow, decrease at the stern"] = 0.0,
+    section_ends: Annotated[float, "1", "relative increase at both ends, decrease amidships"] = 0.0,
 ) -> tuple[Number, Number, Number]:
     """Drag of the cross-flow at points from end to end, unevenly spread along the hull.
 
@@ -187,7 +187,7 @@ def low_speed(
 @hull_function(
     Change("resistance", ("R_0_prime",), "resistance ahead"),
     Change("resistance_in_drift", ("X_vv_prime", "X_vr_prime"), "surge force by drift"),
-    Change("asymmetry", ("Y_0_prime", "N_0_prime"), "difference of port and starboard"),
+    Change("asymmetry", ("Y_0_prime", "N_0_prime"), "asymmetry of port and starboard"),
     Change("sway_by_drift", ("Y_v_prime", "Y_vvv_prime"), "sway force by drift"),
     Change("yaw_by_drift", ("N_v_prime", "N_vvv_prime"), "yaw moment by drift"),
     Change("sway_by_yaw", ("Y_r_prime", "Y_rrr_prime"), "sway force by the yaw rate"),
@@ -205,14 +205,14 @@ def drift_polynomial(
     X_vr_prime: Annotated[float, "1", "surge force, v' r'"] = 0.0,
     X_rr_prime: Annotated[float, "1", "surge force, r'^2"] = 0.0,
     X_vvvv_prime: Annotated[float, "1", "surge force, v'^4"] = 0.0,
-    Y_0_prime: Annotated[float, "1", "sway force ahead, of a hull that is not symmetric"] = 0.0,
+    Y_0_prime: Annotated[float, "1", "sway force ahead, of an asymmetric hull"] = 0.0,
     Y_v_prime: Annotated[float, "1", "sway force, v'"] = 0.0,
     Y_r_prime: Annotated[float, "1", "sway force, r'"] = 0.0,
     Y_vvv_prime: Annotated[float, "1", "sway force, v'^3"] = 0.0,
     Y_vvr_prime: Annotated[float, "1", "sway force, v'^2 r'"] = 0.0,
     Y_vrr_prime: Annotated[float, "1", "sway force, v' r'^2"] = 0.0,
     Y_rrr_prime: Annotated[float, "1", "sway force, r'^3"] = 0.0,
-    N_0_prime: Annotated[float, "1", "yaw moment ahead, of a hull that is not symmetric"] = 0.0,
+    N_0_prime: Annotated[float, "1", "yaw moment ahead, of an asymmetric hull"] = 0.0,
     N_v_prime: Annotated[float, "1", "yaw moment, v'"] = 0.0,
     N_r_prime: Annotated[float, "1", "yaw moment, r'"] = 0.0,
     N_vvv_prime: Annotated[float, "1", "yaw moment, v'^3"] = 0.0,

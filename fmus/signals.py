@@ -31,7 +31,7 @@ class ForceInWind(NamedTuple):
     tau_N: Annotated[float, "N.m", "yaw moment, bow to starboard"] = 0.0
     wind_speed: Annotated[float, "m/s", "optional: speed of the true wind"] = 0.0
     wind_direction: Annotated[
-        float, "rad", "optional: where the true wind blows from, from north towards east"
+        float, "rad", "optional: direction that the true wind blows from, from north towards east"
     ] = 0.0
 
 

@@ -87,16 +87,16 @@ def test_latin_and_sobol_fill_every_stratum(base):
         ({"m": {"set": "faults.9.std", "values": [1]}}, {}, "there is no entry '9' in the list"),
         ({"m": {"set": "faults.0.sdt", "values": [1]}}, {}, "unknown key; did you mean 'std'?"),
         ({"m": {"set": "vessel.m", "value": [1]}}, {}, "unknown key; did you mean 'values'?"),
-        ({"m": {"set": "vessel.m", "uniform": [1, 2]}}, {}, "uniform cannot be in a grid"),
+        ({"m": {"set": "vessel.m", "uniform": [1, 2]}}, {}, "uniform is not possible in a grid"),
         (
             {"m": {"set": "vessel.m", "uniform": [2, 1]}},
             {"design": {"latin": 4}},
-            "the lowest comes first",
+            "the lower value comes first",
         ),
         (
             {"m": {"set": "vessel.m", "normal": [2, -1]}},
             {"design": {"latin": 4}},
-            "has to be above zero",
+            "must be above zero",
         ),
         ({"m": {"set": "vessel.m", "log_uniform": [0, 1]}}, {"design": {"latin": 4}}, "above zero"),
         ({"m": {"set": "vessel.m", "values": [14, "x"]}}, {}, "needs a value of type Real"),
@@ -116,7 +116,7 @@ def test_latin_and_sobol_fill_every_stratum(base):
         (
             {"m": {"set": "vessel.m", "values": [14]}, "s": {"set": "seed", "values": [1, 2]}},
             {"design": "list"},
-            "as many values in each axis",
+            "the same number of values in each axis",
         ),
     ],
 )
@@ -317,7 +317,7 @@ def test_differences_and_the_best_are_tables(base, monkeypatch):
     assert done.returncode == 0, done.stderr
     text = " ".join(done.stdout.split())
     assert "6 runs in" in text
-    assert "not beaten in both W and IAE" in text
+    assert "not dominated in both W and IAE" in text
     assert "m against metric unit pairs difference percent better" in re.sub(r"\W+", " ", text)
     found = pandas.read_csv(base / "out" / "differences.csv")
     assert found["pairs"].tolist() == [3]
@@ -329,7 +329,7 @@ def test_the_campaign_file_is_not_overwritten(base):
     path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0]}}).rename(base / "campaign.json")
     done = command(main, path, "--workers", 0, "--out", base)
     assert done.returncode == 2
-    assert "would be overwritten" in done.stderr
+    assert "would overwrite" in done.stderr
 
 
 def test_the_missing_extra_is_named(base, monkeypatch):

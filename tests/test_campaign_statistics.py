@@ -89,11 +89,11 @@ def test_shares_are_of_the_ratio_and_failed_pairs_are_left_out():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("c W", "is no rule"),
+        ("c W", "is not a rule"),
         ("d W 1", "no axis 'd'"),
         ("c w 1", "no metric 'w'"),
-        ("c W x", "is no width"),
-        ("c W -1%", "is no width"),
+        ("c W x", "is not a width"),
+        ("c W -1%", "is not a width"),
     ],
 )
 def test_a_rule_that_is_none_is_refused(text, message):
@@ -102,7 +102,7 @@ def test_a_rule_that_is_none_is_refused(text, message):
 
 
 def test_a_rule_needs_partners():
-    with pytest.raises(InputError, match="nothing to compare"):
+    with pytest.raises(InputError, match="no pairs to compare"):
         StopRule("c W 1", grid("ab", [0, 1])[:3], 0)
 
 

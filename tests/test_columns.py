@@ -158,7 +158,7 @@ def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([*(p.name for p in files), FOLDER_FILE])
     assert json.loads((tmp_path / FOLDER_FILE).read_text()) == {"columns": NAMES}
-    assert "no tables: README.md" in done.stdout
+    assert "not tables: README.md" in done.stdout
     rows = [
         line.split() for line in done.stdout.splitlines() if line.startswith(("a.csv", "b.csv", "c.csv"))
     ]
@@ -169,7 +169,7 @@ def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     for name in "abc":
         assert read(tmp_path / f"{name}.csv", of=TANKER).signals == ("propeller.n", "rudder.delta")
     again = command(propose_columns.main, *files, "--ship", "kvlcc2", "--write", "--anyway")
-    assert (again.returncode, "columns.json' is there already" in again.stderr) == (2, True)
+    assert (again.returncode, "columns.json' exists" in again.stderr) == (2, True)
 
 
 def test_the_file_beside_a_measurement_goes_over_that_of_its_folder(tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_what_only_one_has_stands_beside_it(tmp_path: Path) -> None:
     )
     assert json.loads((tmp_path / FOLDER_FILE).read_text()) == {"columns": NAMES}
     told = " ".join(done.stdout.split())
-    assert "b.csv' needs in addition" in told
+    assert "b.csv' also needs" in told
     assert '{"columns": {"r": "r_angvelo [rad/s]"}}' in told
 
 
@@ -219,9 +219,11 @@ def test_a_unit_that_one_shows_is_that_of_all(tmp_path: Path) -> None:
 def test_folders_and_texts_that_differ_are_refused(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     files = written(tmp_path / "a.csv", zigzag()), written(tmp_path / "other" / "b.csv", zigzag())
-    assert "are of several" in command(propose_columns.main, *files, "--ship", "kvlcc2").stderr
+    assert (
+        "these files are in several" in command(propose_columns.main, *files, "--ship", "kvlcc2").stderr
+    )
     (tmp_path / "b.csv").write_text(zigzag().to_csv(index=False, sep=";"))
     done = command(propose_columns.main, files[0], tmp_path / "b.csv", "--ship", "kvlcc2", "--write")
     assert done.returncode == 2
-    assert "b.csv' is laid out otherwise than" in done.stderr
+    assert "b.csv' differs from that of" in done.stderr
     assert not (tmp_path / FOLDER_FILE).exists()

@@ -52,7 +52,7 @@ EVENTS = [
     [
         ("sys.exit('a note\\nloop.c:3: error: no such thing')", "fails: loop.c:3: error: no such thing"),
         ("sys.exit(1)", "fails: no message"),
-        ("open(sys.argv[sys.argv.index('-o') + 1], 'w').close()", "made nothing to load: "),
+        ("open(sys.argv[sys.argv.index('-o') + 1], 'w').close()", "wrote no library: "),
     ],
 )
 def test_a_compiler_that_fails_is_told_with_what_it_says(does, why, tmp_path, monkeypatch):

@@ -102,5 +102,5 @@ def test_a_worker_of_another_version_runs_nothing(monkeypatch, tmp_path):
     monkeypatch.setattr(task, "_folder", lambda worker: tmp_path)
     monkeypatch.setattr(task, "get_worker", lambda: None)
     assert task.run_on_worker(task.Request([], (), frozenset(), own_version())) == []
-    with pytest.raises(InputError, match=r"a worker has cybership .*, and here it is 0\.0$"):
+    with pytest.raises(InputError, match=r"a worker has cybership .*, and this computer has 0\.0$"):
         task.run_on_worker(task.Request([], (), frozenset(), "0.0"))

@@ -84,7 +84,7 @@ def test_rows_that_straight_lines_have_filled_are_no_measurements(every):
     assert (track.between == ~track.valid).all()
     assert tuple(track.counts()) == (rows.size, 0, 0, 0, rows.size)
     assert track.period == pytest.approx(every * 0.02)
-    assert "filled by straight lines" in track.notes[0]
+    assert "linearly interpolated" in track.notes[0]
     assert np.isnan(track.pose[track.between, :2]).all()
     assert track.fresh[:, 2].all()
 
@@ -152,12 +152,12 @@ def twice(run):
     [
         (lambda r: r.rows(np.arange(399)), "run 'made' is too short: 7.98 s, at least 8 s"),
         (lambda r: r.rows(np.arange(0)), "too short"),
-        (shuffled, "time does not grow"),
-        (twice, "time does not grow in 600 of 1200 rows"),
+        (shuffled, "time does not increase"),
+        (twice, "time does not increase in 600 of 1200 rows"),
         (lambda r: replace(r, time=1e3 * r.time), "a sample each 20 s is too rare; is the time in another unit?"),
         (lambda r: changed(r, slice(0, N), (5.0, 2.0, 1.0)), "does not move: its pose is frozen"),
         (lambda r: changed(r, slice(0, N), np.nan), "does not move: its pose is frozen or missing"),
-        (lambda r: replace(r, pose=np.random.default_rng(0).normal(1.0, 1e-3, (N, 3))), "noise around a place"),
+        (lambda r: replace(r, pose=np.random.default_rng(0).normal(1.0, 1e-3, (N, 3))), "noise about a fixed position"),
         (lambda r: replace(r, pose=1e3 * r.pose * [1, 1, 1e-3]), "is its position in mm or cm or in?"),
         (lambda r: replace(r, pose=r.pose * [1, 1, np.degrees(1.0)]), "is its heading in deg?"),
     ],

@@ -251,7 +251,7 @@ def test_terminal_tells_what_the_file_tells_within_80_columns(learned):
         *content["where"]["sentences"],
     ):
         assert " ".join(part.split()) in flat
-    assert "b (seen only now)" in flat
+    assert "b (test)" in flat
     assert flat.endswith(f"report.html, coefficients.csv, coefficients.tex in {out}")
 
 
@@ -315,7 +315,7 @@ def test_nothing_is_found_where_nothing_is_missing(runs, tmp_path):
         assert sentence in " ".join(text.split())
     for key in ("window_position_rmse", "window_heading_rmse", "omega_rms"):
         assert content["errors"][0][key]["after"] == content["errors"][0][key]["before"]
-    assert all("no error seen" in s for s in content["where"]["sentences"])
+    assert all("no model error detected" in s for s in content["where"]["sentences"])
     empty = model(tmp_path)
     assert (dict(empty.vessel), dict(empty.thrusters), empty.clock) == ({}, {}, 0.0)
 
@@ -393,7 +393,7 @@ UGLY = {
     "an empty file": (["empty.csv"], "cannot be read"),
     "only a header": (["header.csv"], "too short"),
     "too short": (["short.csv"], "too short"),
-    "too short to learn": (["little.csv"], "too little to learn from"),
+    "too short to learn": (["little.csv"], "too little data to learn from"),
     "no motion": (["still.csv"], "does not move"),
     "no thrust": (["idle.csv"], "commands are zero throughout"),
     "the same run twice": (["a.csv", "a.csv"], "is given twice"),
@@ -744,7 +744,7 @@ def test_the_search_gains_nothing_where_no_effect_is_hidden(runs, tmp_path):
     assert code == 0
     assert not content["gain"]["gained"]
     assert content["sentence"].startswith(SEARCH_GAINED_NOTHING)
-    assert third.startswith(f"{learn.THIRD.strip()} What the search gained {SEARCH_GAINED_NOTHING}")
+    assert third.startswith(f"{learn.THIRD.strip()} Gain of the search {SEARCH_GAINED_NOTHING}")
     assert f'<p class="lead">{SEARCH_GAINED_NOTHING}' in page.read_text(encoding="utf-8")
 
 

@@ -169,18 +169,18 @@ def repeats(best=None, lasts=10.0, in_part=False):
 @pytest.mark.parametrize(
     ("how", "scale", "comes", "cause"),
     [
-        (repeats("place"), 1.0, "repeats with the place", "a bank"),
-        (repeats("place", in_part=True), 1.0, "repeats with the place", "a bank"),
-        (repeats("motion"), 1.0, "speed, drift and turn", "a force on the hull"),
-        (repeats("motion", in_part=True), 1.0, "in proportion to the command", "fails and comes back"),
-        (repeats("command"), 1.0, "with the commands", "another force than the model"),
-        (repeats("time"), 1.0, "since a run began", "a drift"),
+        (repeats("place"), 1.0, "depends on the position", "a bank"),
+        (repeats("place", in_part=True), 1.0, "depends on the position", "a bank"),
+        (repeats("motion"), 1.0, "speed, drift and yaw rate", "a force on the hull"),
+        (repeats("motion", in_part=True), 1.0, "proportional to the command", "fails and recovers"),
+        (repeats("command"), 1.0, "on the commands", "differs from the thruster model"),
+        (repeats("time"), 1.0, "since the start of a run", "a drift"),
         (repeats(lasts=3.1), 1.0, "lasts for about 3 s", "gusts"),
-        (repeats(lasts=2.9), 1.0, "soon over", "waves"),
+        (repeats(lasts=2.9), 1.0, "and is short", "waves"),
         (
             repeats(lasts=5.9),
             4.0,
-            "soon over",
+            "and is short",
             "waves",
         ),  # a ship of four times the length, twice the time
         (repeats(lasts=6.1), 4.0, "lasts for about 6 s", "gusts"),
@@ -190,7 +190,7 @@ def test_what_a_remainder_repeats_with_suggests_its_cause(how, scale, comes, cau
     axes = {"X": LEFT, "Y": NOTHING, "N": replace(LEFT, share=1.0)}
     place = SimpleNamespace(axis="N", phrase="in the north")
     text = remainder.remainder_sentence(axes, [how] * 3, [place], False, Scale(scale))
-    assert text.startswith("Surge: 0.5 N (uncertainty 0.1, 20 % of the first error) and Yaw: 0.5 N m (uncertainty 0.1)")  # fmt: skip
+    assert text.startswith("Surge: 0.5 N (uncertainty 0.1, 20 % of the initial model error) and Yaw: 0.5 N m (uncertainty 0.1)")  # fmt: skip
     assert "not explained, most in the north. It " in text
     assert "Sway" not in text
     assert comes in text
@@ -198,7 +198,7 @@ def test_what_a_remainder_repeats_with_suggests_its_cause(how, scale, comes, cau
     apart = remainder.remainder_sentence(axes, [how, how, repeats("time")], [], True, Scale(scale))
     assert ("and Yaw" in apart) == (how.best == "time")
     assert ", most" not in apart
-    assert apart.endswith("which no model can foretell.")
+    assert apart.endswith("whose timing is not predictable.")
 
 
 def test_little_and_nothing_are_left():

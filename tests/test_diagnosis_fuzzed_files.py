@@ -191,7 +191,7 @@ def test_constant_speed_is_a_result(tmp_path, noise):
 
 @pytest.mark.parametrize("size", [1e9 + 1.0, 1e150, 1e308])
 def test_commands_beyond_any_thruster_are_refused(tmp_path, size):
-    with pytest.raises(InputError, match=r"commands reach .* N, as no thruster does"):
+    with pytest.raises(InputError, match=r"commands reach .* N, more than any thruster gives"):
         diagnosis.gather([run(tmp_path, tau_X=size * COLUMNS["tau_X"] / COLUMNS["tau_X"].max())])
 
 
@@ -223,7 +223,7 @@ def test_deeply_nested_layout_is_refused(tmp_path):
     ("time", "message"),
     [
         (1e-6 * np.arange(10_000_000, 10_000_000 + N * 100_000, 100_000) ** 1.0 * 1e9, "too rare"),
-        (np.append(TIME[:-1], 1e300), "a time stamp cannot be right"),
+        (np.append(TIME[:-1], 1e300), "a time stamp is wrong"),
         (np.cumsum(np.where(np.arange(N) % 10 == 0, 2.9, 2e-4)), "come in bursts"),
         (np.append(np.arange(N - 1) * 1e-6, 10.0), "too frequent"),
     ],
@@ -250,7 +250,7 @@ def test_singular_equations_are_told_as_a_matter_of_the_data(tmp_path, monkeypat
         raise np.linalg.LinAlgError("Singular matrix")
 
     monkeypatch.setattr("diagnosis.session.evaluate_run", singular)
-    with pytest.raises(InputError, match="do not determine what is asked of them: Singular matrix"):
+    with pytest.raises(InputError, match="do not determine the requested values: Singular matrix"):
         diagnosis.evaluate(runs)
 
 

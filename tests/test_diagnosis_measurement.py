@@ -140,7 +140,7 @@ def test_first_stamp_that_is_none_is_told(tmp_path):
     with_tau().assign(time=np.where(np.arange(N) == 7, "noon", stamps)).to_csv(
         tmp_path / "a.csv", index=False
     )
-    refused(tmp_path / "a.csv", "time = 'noon' is not a date stamp of ISO 8601")
+    refused(tmp_path / "a.csv", "time = 'noon' is not a time stamp of ISO 8601")
 
 
 def test_unit_that_cannot_be_is_told_with_the_own_name_of_the_column(tmp_path):
@@ -204,7 +204,7 @@ def test_lost_poses_are_kept_as_they_are(tmp_path):
         (lambda t: t.rename(columns={"tau_Y": "Tau_y"}), "no column 'tau_Y'; did you mean 'Tau_y'?"),
         (lambda t: t.drop(columns=list(TAU)), "has no commands: tau_X, tau_Y, tau_N, or u_vsp_x"),
         (lambda t: t.assign(x="north"), "x = 'north' is not a number"),
-        (lambda t: t.assign(u1=50.0, u2=0.0, u3=0.0, u4=0.0, u5=0.0), 'commands reach 50, not -1 to 1; are they of "unit": "%"?'),
+        (lambda t: t.assign(u1=50.0, u2=0.0, u3=0.0, u4=0.0, u5=0.0), 'commands reach 50; allowed is -1 to 1; is their unit "unit": "%"?'),
     ],
 )  # fmt: skip
 def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
@@ -473,7 +473,7 @@ class TestColumns:
         beside.write_text("{}")
         done = command(propose_columns.main, path, "--write", "--anyway")
         assert done.returncode == 2
-        assert "is there already; --overwrite replaces it" in done.stderr
+        assert "exists; --overwrite replaces it" in done.stderr
         assert beside.read_text() == "{}"
         assert command(propose_columns.main, path, "--write", "--overwrite", "--anyway").returncode == 0
         assert json.loads(beside.read_text())["skip"] == 3
@@ -493,7 +493,7 @@ class TestColumns:
         with_tau().to_csv(tmp_path / "a.csv", index=False)
         assert propose(tmp_path / "a.csv").needed == {}
         done = command(propose_columns.main, tmp_path / "a.csv", "--write", "--anyway")
-        assert "nothing needs to be stated" in done.stdout
+        assert "no side-car is needed" in done.stdout
         assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
 
     @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def test_a_force_where_no_actuator_pushes_is_a_question():
     assert pushed_aside(w, model) is None
     said = pushed_aside(reread(w, of_pose("", (100.0, 100.0, 1.0)), model), model)
     assert said is not None
-    assert " sideways, where no actuator pushes, and the ship can do 239 N at all" in said
+    assert " sideways, where no actuator acts, and all actuators together give 239 N" in said
 
 
 def test_a_propeller_that_cannot_reverse_gives_no_force():

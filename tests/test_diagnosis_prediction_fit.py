@@ -353,7 +353,7 @@ def test_run_without_a_push_tells_of_none():
         unrecorded([hidden()], DRAGGED, NO_PUSH, {}),
     ]
     assert not any(f.stretches for f in found)
-    assert "No unrecorded force" in found[0].sentence
+    assert "No disturbance" in found[0].sentence
 
 
 def test_states_of_runs_stand_side_by_side_though_parameters_move_one_of_them_alone():

@@ -133,11 +133,11 @@ def test_the_same_is_found_in_own_units(scale):
 def test_texts_say_the_seconds_of_the_ship(scale, tmp_path):
     found = learned(scale)
     seconds = f"{8.0 * scale.time:.3g} s"
-    assert f"predictions over {seconds} miss" in repr(found)
+    assert f"prediction error over {seconds}" in repr(found)
     assert f"over {seconds} [mm]" in found._repr_html_()
     page = found.write_report(tmp_path / "report.html").read_text(encoding="utf-8")
     for text in (
-        f"within windows of {seconds}",
+        f"in windows of {seconds}",
         f"error of {seconds} predictions",
         f"of ω: {3.0 * scale.time:.3g} s",
     ):

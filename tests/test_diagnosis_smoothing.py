@@ -230,7 +230,7 @@ def test_run_of_crumbs_is_refused():
     crumbs = np.full_like(base().pose, np.nan)
     for k in range(0, N, 400):
         crumbs[k : k + 10] = base().pose[k : k + 10]
-    with pytest.raises(InputError, match="nowhere 20 samples without a long gap"):
+    with pytest.raises(InputError, match="fewer than 20 samples between long gaps"):
         smooth(clean(replace(base(), pose=crumbs)))
 
 

@@ -66,8 +66,8 @@ TOLD = [
     ("tau_percent", "times the 1.165 N that the thrusters give"),
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
     ("psi_180", column(psi={"offset": 3.142})),
-    ("const_tau", "none of its commands ever varies"),
-    ("const_x", "x is the same number in all rows"),
+    ("const_tau", "all its commands are constant"),
+    ("const_x", "x is constant in all rows"),
     ("outliers_tau", "leave false cells empty"),
     ("commands_zero_half", "all commands are zero for 2"),
 ]
@@ -105,7 +105,7 @@ def test_line_that_is_told_mends_the_file(tmp_path):
             lambda t: t.iloc[np.arange(len(t)) // 70 * 70].assign(time=t["time"].to_numpy()),
             "every 3.5 s is",
         ),
-        (lambda t: t.assign(psi=0.3), "psi never changes while the ship goes on"),
+        (lambda t: t.assign(psi=0.3), "psi is constant while the ship moves"),
     ],
 )
 def test_pose_that_gives_no_velocity_is_refused(table, message, tmp_path):
@@ -224,7 +224,7 @@ def test_constant_force_against_the_motion_is_refused(tmp_path):
 def test_column_of_an_axis_without_commands_may_be_absent(tmp_path):
     (w,) = diagnosis.load(written(tmp_path, good(steady).drop(columns="tau_Y")))
     assert (w.run.tau_cmd[:, 1] == 0.0).all()
-    assert "no column tau_Y: it is taken as zero" in w.run.notes
+    assert "no column tau_Y: zero is used" in w.run.notes
 
 
 def test_column_of_an_axis_with_commands_may_not_be_absent(tmp_path):

@@ -103,7 +103,7 @@ def test_error_that_is_large_in_one_part_of_the_basin_is_said_to_be_there(lap):
     noise = 0.01 * np.random.default_rng(2).standard_normal((w.middle.size, 3))
     north = w.smooth @ np.nan_to_num(w.smoothed.eta[:, 0])
     found = find_regions(lap, [np.where(north > 1.0, 8.0, 1.0)[:, None] * noise], [0.2 * np.abs(noise)])
-    assert all("worst north of 0.9" in sentence for sentence in found.sentences)
+    assert all("largest north of 0.9" in sentence for sentence in found.sentences)
 
 
 def test_force_that_depends_on_the_place_is_a_remainder():
@@ -143,7 +143,7 @@ def test_cause_that_no_candidate_has_is_unexplained():
     assert found.learned.model.values == Model().values
     content = diagnosis_content(found, None, [])
     assert "gusts" in content.remainder.sentence
-    assert "Nothing is missing" not in content.sentence
+    assert "no missing effect" not in content.sentence
     assert content.remainder.axes["X"].rms > 20.0 * content.remainder.axes["X"].uncertainty
 
 
@@ -197,7 +197,7 @@ def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     assert found.withdrawn == []
     content = diagnosis_content(found, None, [])
     (told,) = content.effects
-    assert told.sentence.startswith("Run run0: The bow thruster is dead from 1")
+    assert told.sentence.startswith("Run run0: The bow thruster fails from 1")
     assert "Run run1: The bow" in told.sentence
     runs = {name: c.run for name, c in told.coefficients.items()}
     assert runs["bow_outage_start_1"] == "run0"
@@ -242,7 +242,7 @@ def test_what_is_at_the_limit_of_what_was_looked_for_is_withdrawn_and_a_whole_sh
     )
     assert bool(kept.effects) == stays
     assert [w.id for w in gone] == ([] if stays else ["mass"])
-    text = "mass = 99 kg is at the upper limit of what was looked for, 100 kg (a ship of 113.8 kg: weigh it)"
+    text = "mass = 99 kg is at the upper limit of the search, 100 kg (a ship of 113.8 kg: weigh it)"
     assert stays or gone[0].reason == text
 
 
@@ -431,16 +431,16 @@ def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     f = Finding("mass", {"mass": kilograms}, {}, 0.99, [], 0.9, 0.9, together=0.99)
     seen = confidence_of(f, start)
     assert (seen.own == 0.99) == is_finding
-    assert ("limit of what was looked for" in seen.doubt) != is_finding
+    assert ("limit of the search" in seen.doubt) != is_finding
 
 
 @pytest.mark.parametrize(
     ("effect", "value", "text"),
     [
-        ("mass", -9.8, "mass = -9.8 kg is at the lower limit of what was looked for, -10 kg (a ship of 4.99 kg: weigh it)"),
-        ("mass", 99.0, "mass = 99 kg is at the upper limit of what was looked for, 100 kg (a ship of 113.8 kg: weigh it)"),
-        ("loss_surge", 0.98, "loss_surge = 0.98 is at the upper limit of what was looked for, 1"),
-        ("added_mass_Y", -9.8, "added_mass_Y = -9.8 kg is at the lower limit of what was looked for, -10 kg"),
+        ("mass", -9.8, "mass = -9.8 kg is at the lower limit of the search, -10 kg (a ship of 4.99 kg: weigh it)"),
+        ("mass", 99.0, "mass = 99 kg is at the upper limit of the search, 100 kg (a ship of 113.8 kg: weigh it)"),
+        ("loss_surge", 0.98, "loss_surge = 0.98 is at the upper limit of the search, 1"),
+        ("added_mass_Y", -9.8, "added_mass_Y = -9.8 kg is at the lower limit of the search, -10 kg"),
         ("mass", 90.0, ""),
     ],
 )  # fmt: skip
@@ -453,7 +453,7 @@ def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
     f = Finding("lag", {"lag": 0.02}, {"lag": interval}, 0.94, [], 0.9, 0.9, together=0.94)
     seen = confidence_of(f, Model())
     assert seen.own == (0.94 if sure else 0.5)
-    assert ("may be nothing" in seen.doubt) != sure
+    assert ("include zero" in seen.doubt) != sure
 
 
 @pytest.mark.parametrize(("second", "sure"), [((-0.02, 0.005), False), ((0.01, 0.05), True)])
@@ -463,7 +463,7 @@ def test_an_effect_of_two_values_that_may_both_be_nothing_is_no_sure_finding(sec
     f = Finding("attack_point", values, intervals, 0.93, [], 0.9, 0.9, together=0.93)
     seen = confidence_of(f, Model())
     assert seen.own == (0.93 if sure else 0.5)
-    assert ("may be nothing" in seen.doubt) != sure
+    assert ("include zero" in seen.doubt) != sure
 
 
 @pytest.mark.parametrize(
@@ -475,7 +475,7 @@ def test_pose_younger_than_its_stamp_is_not_told_from_lags_that_are_too_long(nam
     f = Finding("clock_offset", {"clock_offset": offset}, {}, 0.99, [], 0.9, 0.9, together=0.99)
     seen = confidence_of(f, start)
     assert seen.own == (0.99 if sure else 0.5)
-    assert ("look the same" in seen.doubt) != sure
+    assert ("the same effect" in seen.doubt) != sure
 
 
 def test_axis_that_is_never_commanded_has_the_force_of_the_ships_inertia():

@@ -92,7 +92,7 @@ def test_uncertainty_grows_with_the_noise_and_where_samples_are_missing():
 def test_noise_alone_has_no_region(noise):
     result = found(120.0, noise=noise)
     assert result.regions == []
-    assert all("no error seen" in s for s in result.sentences)
+    assert all("no model error detected" in s for s in result.sentences)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_the_region_is_where_the_hidden_effect_acts(hidden, axis, covariate):
 def test_an_error_that_is_the_same_everywhere_has_no_region():
     result = found(ship={"body_bias_X": 0.1})
     assert result.regions == []
-    assert "nowhere clearly worse" in result.sentences[0]
+    assert "no region is significantly worse" in result.sentences[0]
     assert "0.1 N" in result.sentences[0]
 
 
@@ -202,7 +202,8 @@ def test_a_region_in_words(covariate, low, high, phrase):
     region = Region("N", covariate, None, low, high, 0.31, 0.122, 0.25, 1e-3, 1.0)
     assert region.phrase == phrase
     assert (
-        region.sentence == f"Yaw: worst {phrase}: 0.31 N m against 0.12 N m elsewhere, 25 % of the time."
+        region.sentence
+        == f"Yaw: the error is largest {phrase}: 0.31 N m, compared with 0.12 N m elsewhere, for 25 % of the time."
     )
     assert replace(region, run="b").phrase == f"in run b {phrase}"
 

@@ -100,7 +100,7 @@ def test_values_beyond_a_range_are_its_end_and_the_set_gives_the_others(base):
         show=told.append,
     )
     assert (made["thrusters.plant_F_vsp"] >= 0.0).all()
-    assert any("plant_F_vsp are set to the end of its range" in line for line in told)
+    assert any("plant_F_vsp are clipped to its range" in line for line in told)
     ran = json.loads((base / "out" / "campaign.json").read_text())["scenario"]
     assert ran["fmus"]["vessel"]["parameters"]["m"] == 20.0
 
@@ -140,7 +140,7 @@ def test_posterior_that_is_none_is_refused_in_one_line(base, changes, message):
         (("--ensemble", 1, "--posterior", "posterior.json"), "from two on"),
         (("--ensemble", 3, "--posterior", "none.json"), "no such posterior"),
         (("--ensemble", 3, "--posterior", "base.json"), "names: is missing"),
-        (("--ensemble", 3, "--posterior", "posterior.json", "--realtime"), "no wall clock"),
+        (("--ensemble", 3, "--posterior", "posterior.json", "--realtime"), "does not run in real time"),
     ],
 )
 def test_options_that_cannot_be_are_refused(base, options, message):

@@ -120,7 +120,7 @@ def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
     (tmp_path / "osp" / "thesis.txt").write_text("mine")
     command = [str(tmp_path / "s.json"), "--osp", str(tmp_path / "osp")]
     assert export(command) == 2
-    assert "no OSP directory" in capsys.readouterr().err
+    assert "not an OSP directory" in capsys.readouterr().err
     assert [p.name for p in (tmp_path / "osp").iterdir()] == ["thesis.txt"]
     (tmp_path / "osp" / "thesis.txt").unlink()
     assert export(command) == 0

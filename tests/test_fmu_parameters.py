@@ -287,7 +287,7 @@ def test_values_known_only_together_are_said(work, capsys):
     )
     run = measured(fmu, work, "run", {})
     assert parameters.main([str(fmu), "--map", written(work / "map.json", MAP), "--runs", run]) == 0
-    assert "known only together: c, unused" in " ".join(capsys.readouterr().out.split())
+    assert "identifiable only together: c, unused" in " ".join(capsys.readouterr().out.split())
 
 
 CASES = {
@@ -423,7 +423,7 @@ def test_interrupted_or_refused_calls_leave_nothing(fmu, work, capsys):
     run = measured(fmu, work, "run", {})
     for arguments, message in (
         ([run, "--parameters", "p.json"], "--model NAME.fmu is missing"),
-        ([run, "--model", str(fmu)], "no column is called as an output"),
+        ([run, "--model", str(fmu)], "no column has the name of an output"),
         ([run, "--model", str(fmu), "--map", written(work / "m.json", {"outputs": {"y": "x"}})], "'y'"),
     ):
         assert learn.main([*arguments, "--out", "out"]) == 2

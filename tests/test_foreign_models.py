@@ -228,10 +228,10 @@ def test_a_first_call_proposes_a_map(folder, csv, tmp_path, capsys):
 WRONG = {
     "no JSON": ("{", "cannot be read"),
     "no such key": ('{"input": {}}', "did you mean 'inputs'"),
-    "no such signal": ('{"inputs": {"tau_Z": "tau_X"}}', "is no signal"),
+    "no such signal": ('{"inputs": {"tau_Z": "tau_X"}}', "is not a signal"),
     "no such variable": ('{"inputs": {"tau_X": "tau_XX"}}', "did you mean 'tau_X'"),
-    "no such unit": ('{"inputs": {"tau_X": {"name": "tau_X", "unit": "kg"}}}', "is no unit"),
-    "other quantity": ('{"outputs": {"x": "u"}}', "which is no unit of length"),
+    "no such unit": ('{"inputs": {"tau_X": {"name": "tau_X", "unit": "kg"}}}', "is not a unit"),
+    "other quantity": ('{"outputs": {"x": "u"}}', "which is not a unit of length"),
     "factor zero": ('{"inputs": {"tau_X": {"name": "tau_X", "factor": 0}}}', "is not zero"),
     "list": ("[]", "'"),
     "group is a list": ('{"inputs": ["tau_X"]}', "inputs"),

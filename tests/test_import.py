@@ -130,7 +130,7 @@ def test_values_of_another_unit_are_refused(angles, tmp_path, name):
         ([('startElement="ramp"', 'startElement="rump"')], "there is no 'rump'; did you mean 'ramp'"),
         ([("x-fmu-sharedlibrary", "x-ssp-package")], "type 'application/x-ssp-package' is not supported"),
         ([('startTime="0.0"', 'startTime="5.0"')], "starts at 5.0 s"),
-        ([(' stopTime="1.0"', "")], "does not say its stop; give it by --stop"),
+        ([(' stopTime="1.0"', "")], "does not state its stop; give --stop"),
         ([('version="1.0" name="chain"', 'version="2.0" name="chain"')], "is of SSP 2.0"),
         ([('<ssv:Real value="3.0"', '<ssv:Real value="three"')], "gain.*k = 'three' is not a number"),
         ([('<ssv:Real value="3.0"', '<ssv:Binary value="00"')], "values of type Binary are not supported"),
@@ -228,7 +228,7 @@ Y, U = '<Variable simulator="ramp" name="y"/>', '<Variable simulator="gain" name
          "'f' has no signal 'o'; there are in, out"),
         (("<Connections>", f'{FUNCTION}<SignalConnection>{U}<Signal function="g" name="out"/></SignalConnection>'),
          "no function 'g'"),
-        (("<Connections>", FUNCTION.replace("</F", '<LinearTransformation name="f"/></F')), "'f' stands there twice"),
+        (("<Connections>", FUNCTION.replace("</F", '<LinearTransformation name="f"/></F')), "'f' occurs twice"),
     ],
 )  # fmt: skip
 def test_what_osp_directories_may_not_hold(chain, tmp_path, edit, message):
@@ -305,7 +305,7 @@ def test_several_osp_scenarios_leave_the_choice(chain, tmp_path):
     with pytest.raises(InputError, match="does not say its stop"):
         load_scenario(tmp_path / "osp")
     scenario = load_scenario(tmp_path / "osp", {"stop": 2.0})
-    assert "none of several scenarios" in scenario.notes[0]
+    assert "one of several scenarios" in scenario.notes[0]
 
 
 def test_unpacked_archives_are_removed_after_their_last_use(chain, tmp_path):

@@ -97,7 +97,7 @@ def test_a_model_remembers_its_runs(run, tmp_path):
     assert found.plus({"X_u": 0.1}).learned_from == found.learned_from
     assert "learned_from" not in _written(tmp_path / "none.ssv", Model({"X_u": -1.0}))
     path.write_text(path.read_text().replace('"period"', '"perod"'))
-    with pytest.raises(InputError, match="of the runs that it was learned from is broken"):
+    with pytest.raises(InputError, match="its list of training runs is damaged"):
         read_model(path)
 
 

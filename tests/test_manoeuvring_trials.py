@@ -255,8 +255,8 @@ ONES = np.ones(5)
     ("kind", "columns", "message"),
     [
         ("zig-zag", (range(5), ONES, ONES, ONES, range(5)), "no trial 'zig-zag'; did you mean 'zigzag'"),
-        ("circle", (range(5), ONES, ONES, ONES, ONES), "never changes"),
-        ("circle", (ONES, ONES, ONES, ONES, ONES), "do not grow"),
+        ("circle", (range(5), ONES, ONES, ONES, ONES), "is constant"),
+        ("circle", (ONES, ONES, ONES, ONES, ONES), "do not increase"),
         ("circle", (range(5), np.nan * ONES, ONES, ONES, ONES), "at least two samples"),
     ],
 )
@@ -403,7 +403,7 @@ def test_a_run_too_short_for_an_order_says_so(tmp_path):
     notes = []
     result = cosim.simulate("cse1_circle", tmp_path, stop=5.0, show=notes.append)
     assert (result.status, result.metrics) == ("done", {})
-    assert any("never changes" in note for note in notes)
+    assert any("is constant" in note for note in notes)
 
 
 def test_without_a_length_there_are_no_limits():

@@ -480,7 +480,7 @@ def test_log_does_not_write_into_a_file_that_took_its_place(tmp_path):
     other = os.open(tmp_path / "other", os.O_CREAT | os.O_WRONLY)
     os.dup2(other, writer._file.fileno())
     for _ in range(2):
-        with pytest.raises(OSError, match="closed by something else") as told:
+        with pytest.raises(OSError, match="another part of the program closed its file") as told:
             writer.write(rows)
         assert told.value.errno == errno.EBADF
     assert writer.rows == 1

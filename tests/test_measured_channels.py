@@ -75,7 +75,7 @@ def test_a_noise_that_the_samples_contradict_is_doubted(factor, doubted):
     s = prepare(replace(sailed(), noise=given)).smoothed
     lines = [note for note in s.notes if "is given as" in note]
     assert [line.split()[3] for line in lines] == ["x"] * doubted
-    assert all("leave it out" in line for line in lines)
+    assert all("remove the noise of the side-car" in line for line in lines)
     found = {c.name: c for c in channels_of(s)}
     assert (found["x"].noise, found["x"].noise_from) == (given["x"], "given")
     assert found["y"].noise_from == "estimated"

@@ -83,7 +83,7 @@ def test_a_part_without_an_approach_says_so(sailed, tmp_path):
     for start in (0, 19.5):
         done = command(trial_main, file, "--ship", "otter", "--from", start, "--out", tmp_path / "out")
         assert done.returncode == 0, done.stderr
-        told.append("before the first execute: heading and speed there are of the" in done.stdout)
+        told.append("before the first execute: initial heading and speed need one" in done.stdout)
     assert told == [False, True]
 
 
@@ -91,15 +91,15 @@ def test_a_part_without_an_approach_says_so(sailed, tmp_path):
 def test_a_trial_that_measures_nothing_says_so(sailed, tmp_path, stop, said):
     done = command(trial_main, sailed / "zigzag", "--to", stop, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert ("nothing more to measure" in done.stdout) == said
+    assert ("no further measures" in done.stdout) == said
 
 
 @pytest.mark.parametrize(
     ("trial", "others", "arguments", "message"),
     [
-        (None, {}, (), "does not state which trial it is"),
+        (None, {}, (), "does not state its trial"),
         ("zig-zag", {}, (), "is not a manoeuvring trial; did you mean 'zigzag'?"),
-        ("same", {"tau_N": 1.0}, (), "never changes"),
+        ("same", {"tau_N": 1.0}, (), "is constant"),
         ("same", {}, ("--from", 1e6), "too short"),
     ],
 )

@@ -137,7 +137,7 @@ def test_state_of_another_fmu_is_refused(native, opened_here):
     observer.fmu.freeFMUstate(state)
     with pytest.raises(Exception, match="error"):
         vessel.fmu.deSerializeFMUstate(saved)
-    assert "no state of this FMU" in vessel.messages[-1][1]
+    assert "not a state of this FMU" in vessel.messages[-1][1]
 
 
 LAST_SUCCESSFUL_TIME = 2  # of fmi2StatusKind
@@ -168,9 +168,9 @@ def test_serialised_state_that_was_changed_anywhere_is_refused(native, opened_he
         with pytest.raises(FMICallException):
             vessel.fmu.deSerializeFMUstate(changed)
     assert {text for _, text in vessel.messages} == {
-        "these bytes are no state of this FMU",
-        "this state is of another version",
-        "this state was changed: its checksum is another one",
+        "these bytes are not a state of this FMU",
+        "this state belongs to another version",
+        "this state was changed: its checksum differs",
     }
 
 

@@ -132,7 +132,7 @@ def test_a_function_that_is_none_is_refused_in_one_line(runs, tmp_path, content,
 
 
 def test_a_map_is_of_fmus_only(file):
-    with pytest.raises(InputError, match="--map tells the variables of an FMU"):
+    with pytest.raises(InputError, match="--map belongs to an FMU"):
         open_model(file, file)
 
 

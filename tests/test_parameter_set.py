@@ -93,12 +93,12 @@ def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
     for runs, told in (
         (
             {"a": {"bow_failure_time": 40.0}},
-            "bow_failure_time was found in run 'a' and holds for that run alone",
+            "bow_failure_time was found in run 'a' and holds for that run only",
         ),
         (
             FAILS,
-            "bow_outage_start_1 … bow_outage_end_1 were found in run 'a' and hold for that run alone; "
-            "what was found in 'of b' is not used",
+            "bow_outage_start_1 … bow_outage_end_1 were found in run 'a' and hold for that run only; "
+            "values that were found in 'of b' are not used",
         ),
         ({}, ""),
     ):
@@ -185,7 +185,7 @@ def run(content, folder, *parameters):
 def test_a_baked_fmu_runs_as_a_plain_one_with_the_set(ellipse, learned, tmp_path):
     plain, _ = run(ellipse, tmp_path / "plain")
     bound, warnings = run(ellipse, tmp_path / "bound", learned)
-    assert any("clock_offset = 0.2 s is no parameter of an FMU" in text for text in warnings)
+    assert any("clock_offset = 0.2 s is not a parameter of an FMU" in text for text in warnings)
     fmus = build([], tmp_path / "fmu", read_starts(learned))
     assert [fmu.name for fmu in fmus] == ["vessel.fmu", "thrusters.fmu"]
     for name in ("vessel", "thrusters"):
@@ -244,13 +244,13 @@ def test_names_choose_and_what_is_not_used_is_told(learned, tmp_path):
         ("<a", "is not an SSP 1.0 parameter set"),
         ("<a/>", "is not an SSP 1.0 parameter set"),
         (SSV.format(parameter("vessel.m", "much")), "'much' is not a valid value"),
-        (SSV.format(parameter("vessel.m", "NaN")), "has no number as its value"),
-        (SSV.format('<ssv:Parameter name="vessel.m"><ssv:Boolean value="true"/></ssv:Parameter>'), "has no number"),
-        (SSV.format(2 * parameter("vessel.m", 1.0)), "stands there twice"),
+        (SSV.format(parameter("vessel.m", "NaN")), "its value is not a number"),
+        (SSV.format('<ssv:Parameter name="vessel.m"><ssv:Boolean value="true"/></ssv:Parameter>'), "its value is not a number"),
+        (SSV.format(2 * parameter("vessel.m", 1.0)), "occurs twice"),
         (SSV.format(parameter("m", 1.0)), "is not of the form model.parameter"),
         (SSV.format(parameter("vesel.m", 1.0)), "did you mean 'vessel'"),
         (SSV.format(parameter("vessel.delta_X_uu_", 1.0)), "did you mean 'delta_X_uu'"),
-        (SSV.format(parameter("vessel.x", 1.0)), "vessel.x is no parameter"),
+        (SSV.format(parameter("vessel.x", 1.0)), "vessel.x is not a parameter"),
         (SSV.format(parameter("vessel.m", -1.0)), "below its minimum 0"),
         (SSV.format(parameter("thrusters.loss_bow", 2.0)), "above its maximum 1"),
     ],

@@ -25,7 +25,7 @@ SEARCH = [
     "effects without which validation data are predicted better",
     "fit to predictions",
     "residual",
-    "what the search gained over calibration",
+    "gain of the search over calibration",
     "predicting a",
     "stability",
     "report: figures",

@@ -181,8 +181,8 @@ def test_page_says_what_the_result_says(report, evaluations):
         assert f"{1e3 * e.before.position:.3g} → {1e3 * e.after.position:.3g}" in text
     assert "curve_vsp_x(c)" in text
     assert "97 %" in text
-    assert "more than one cause" in text
-    assert "8 s of a run, predicted from where the ship was at first; of ω: 3 s" in text
+    assert "several candidates" in text
+    assert "8 s of a run, predicted from its measured state at the start; of ω: 3 s" in text
     assert "−4.2" in text
 
 
@@ -214,7 +214,7 @@ def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
     evaluations = [replace(e, before=replace(e.before, errors=None), after=e.before)]
     r = reported.report_data(compared(evaluations), reported.diagnosis())
     text = " ".join(Page(write_report(tmp_path / "report.html", r)).text)
-    assert "Nothing is missing" in text
+    assert "no missing effect" in text
     assert "None" not in text
     assert "nan" not in text
 
@@ -359,13 +359,13 @@ def test_runs_say_what_their_data_were_used_for(evaluations, tmp_path):
     """In tables and below pictures; the main numbers are those of the runs that nothing has used."""
     uses = [replace(evaluations[0], use=use) for use in ("train", "validate")]
     r = found([*uses, evaluations[1]])
-    assert [r.use(e) for e in r.evaluations] == ["learned from", "decided by", "seen only now"]
+    assert [r.use(e) for e in r.evaluations] == ["training", "validation", "test"]
     text = " ".join("".join(Page(write_report(tmp_path / "report.html", r)).text).split())
     for e in r.evaluations:
         assert f"{e.name} {r.use(e)}" in text, "a row of a table"
         assert f"{e.name} ({r.use(e)}): the worst window." in text
-        assert f"Error of prediction over time, runs {r.use(e)}" in text
-    assert [remark.partition(",")[0] for *_, remark in page._tiles(r)] == 2 * ["runs seen only now"]
+        assert f"Prediction error over time, {r.use(e)} runs" in text
+    assert [remark.partition(",")[0] for *_, remark in page._tiles(r)] == 2 * ["test runs"]
 
 
 def test_pictures_of_a_run_name_their_lines(data):
@@ -383,14 +383,14 @@ def test_pictures_of_a_run_name_their_lines(data):
 @pytest.mark.parametrize(
     ("after", "shown", "remark"),
     [
-        ([0.01, 0.03], "50 → 22.4 mm", "runs seen only now, 2.2× less"),
-        ([0.1, 0.0], "50 → 70.7 mm", "runs seen only now, more than before"),
-        ([0.01, np.nan], "50 mm", "runs seen only now"),
+        ([0.01, 0.03], "50 → 22.4 mm", "test runs, 2.2× less"),
+        ([0.1, 0.0], "50 → 70.7 mm", "test runs, more than before"),
+        ([0.01, np.nan], "50 mm", "test runs"),
     ],
 )
 def test_errors_of_runs_are_told_as_their_root_mean_square(after, shown, remark):
     pairs = [*zip((0.01, 0.07), after, strict=True)]  # sqrt((1 + 49) / 2) = 5
-    (tile,) = page._tile("error", pairs, 1e3, "mm", "runs seen only now")
+    (tile,) = page._tile("error", pairs, 1e3, "mm", "test runs")
     assert tile == ("error", shown, remark)
     assert not list(page._tile("error", [(np.nan, np.nan)], 1.0, "mm", ""))
 

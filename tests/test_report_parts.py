@@ -92,8 +92,8 @@ def test_what_is_sure_is_a_fact_and_comes_first():
     assert not headline.is_sure(effect("lag", np.nan))
     assert headline.told(sure) == "There is lag."
     assert headline.told(unsure) == (
-        "Possibly delay or lag or deadband (50 % for delay): There is delay. But it is at its limit. "
-        "The learned model does not have it."
+        "Possibly delay or lag or deadband (50 % for delay): There is delay. "
+        "However, it is at its limit. It is not in the learned model."
     )
     assert headline.told(effect("lag", np.nan)) == "Possibly lag: There is lag."
     both = report_data(None, diagnosis(verdict="found"), [unsure, sure])
@@ -113,10 +113,10 @@ def test_headline_of_each_verdict():
     assert said("unexplained") == headline.UNEXPLAINED
     assert said("unexplained", calibrated=True) != headline.UNEXPLAINED
     assert said("unexplained", [effect("lag", 0.1)]) == headline.NOT_BELIEVED
-    assert ", above all a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
-    assert ", above all b; no effect" in said("coefficients", suspects=suspects[1:2])
+    assert ", mainly a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
+    assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])
     assert "a (mass), b, c, d and 2 others; no" in said("coefficients", suspects=suspects)
-    assert "above all" not in said("coefficients")
+    assert "mainly" not in said("coefficients")
 
 
 def test_names_in_a_row():

@@ -120,23 +120,23 @@ channel rate held noise outliers used
 x 15 Hz 25 % 0.003 m given 3: a 1.5 s yes
 Found in the data
 a: a gap
-What channels say of each other
+Faults that redundant channels show
 a: r reads too much (not repaired)
 a: its clock is fast, 0.0 to 9.0 s
 b: r reads too much (not repaired)
-Where the model fails
+Location of the model error
 Surge: worst when fast."""
 
-COMPARISON = """Predictions over 8 s miss by
+COMPARISON = """Prediction error over 8 s
 run position [mm] heading [°]
 a 126 0.27
 b 252 0.54
-Force that the model lacks
+Model error
 run X [N] Y [N] N [N m]
 a 0.24 0.005 0.001
 b 0.24 0.01 0.001
-Measured outputs of actuators and the model's
-run what is measured off by [SI]
+Measured and predicted outputs of actuators
+run measured output error [SI]
 b port.thrust 12
 Manoeuvring trials, from just before the first execute
 run measure measured predicted unit
@@ -145,55 +145,54 @@ b overshoot_1 11.5 5.7 °
 b overshoot_2 17.2 - °
 one.json, two.html in out/folder"""
 
-DIAGNOSIS = """What is left without an explanation
+DIAGNOSIS = """Residual without explanation
 Little is left.
 Finding 1: sure
 There is sure.
 X = sure
-confidence 99 %, takes away 90 % of the squared error
+confidence 99 %, explains 90 % of the squared error
 They differ.
 Run astern.
 Finding 2: doubtful
 Possibly doubtful or other (60 % for doubtful): There is doubtful.
 X = doubtful
-confidence 60 %, takes away 90 % of the squared error, 25 % that nothing else
-does
+confidence 60 %, explains 90 % of the squared error, unique contribution 25 %
 Possibility: unlikely
-Possibly unlikely (20 % for unlikely): There is unlikely. But something acts.
-The learned model does not have it.
+Possibly unlikely (20 % for unlikely): There is unlikely. However, something
+acts. It is not in the learned model.
 X = unlikely
-confidence 20 %, takes away 90 % of the squared error
-Withdrawn
+confidence 20 %, explains 90 % of the squared error
+Rejected
 gone: worse on held-out runs
 Suspect coefficients
-N_r is rather -2.35 (-4.2 standard deviations of the prior)
-m is rather 15.3 (3.5 standard deviations of the prior), in kg: weigh the ship
-How sure the values are
-No unrecorded force.
-Known only together: N_r, Y_r.
-Known only together: m, X_u.
+N_r: probably -2.35 (-4.2 standard deviations of the prior)
+m: probably 15.3 (3.5 standard deviations of the prior), in kg: weigh the ship
+Uncertainty of the values
+No disturbance.
+Identifiable only together: N_r, Y_r.
+Identifiable only together: m, X_u.
 Warning: One shaft speed.
-Best candidates, by how much worse than the first
+Best candidates, with the score difference to the first
 sure, b +12.3 (± 3.1), c +24.7 (± 3.1), d +37 (± 3.1), e +49.4 (± 3.1)
-Predictions over 8 s miss by, before -> after
+Prediction error over 8 s, before -> after
 run position [mm] heading [°]
-a (learned from) 126 -> 0.73 0.27 -> -
-b (seen only now) 252 -> 1.5 0.54 -> -
-Force that the model lacks, before -> after
+a (training) 126 -> 0.73 0.27 -> -
+b (test) 252 -> 1.5 0.54 -> -
+Model error, before -> after
 run X [N] Y [N] N [N m]
-a (learned from) 0.24 -> 0.0029 0.005 -> 0.0049 0.001 -> 0.0012
-b (seen only now) 0.24 -> 0.0029 0.01 -> 0.0049 0.001 -> 0.0012
-Measured outputs of actuators and the model's, before -> after
-run what is measured off by [SI]
-b (seen only now) port.thrust 12 -> 3
+a (training) 0.24 -> 0.0029 0.005 -> 0.0049 0.001 -> 0.0012
+b (test) 0.24 -> 0.0029 0.01 -> 0.0049 0.001 -> 0.0012
+Measured and predicted outputs of actuators, before -> after
+run measured output error [SI]
+b (test) port.thrust 12 -> 3
 Manoeuvring trials, from just before the first execute, before -> after
 run measure measured predicted unit
-b (seen only now) tactical_diameter 3.4 3 -> 3.4 m
-b (seen only now) overshoot_1 11.5 5.7 -> 11 °
-b (seen only now) overshoot_2 17.2 - -> 18 °
+b (test) tactical_diameter 3.4 3 -> 3.4 m
+b (test) overshoot_1 11.5 5.7 -> 11 °
+b (test) overshoot_2 17.2 - -> 18 °
 Stability
 In closed loop the learned model stays bounded on the reference paths.
-smallest dissipation - 1/s, of the model at first 0.6 1/s
+smallest dissipation - 1/s, of the initial model 0.6 1/s
 a note
 one.json, two.html in out/folder"""
 
@@ -215,7 +214,7 @@ def test_what_the_search_gained_is_the_first_sentence(gained):
     made = found(gain=gain)
     shown = lines(show_diagnosis(made, "out"))
     first = SEARCH_GAINED if gained else SEARCH_GAINED_NOTHING
-    assert shown[:2] == ["What the search gained", first]
+    assert shown[:2] == ["Gain of the search", first]
     assert "mean square falls by 940 ± 110 mm²" in " ".join(shown)
     assert first_sentences(made).startswith(SEARCH_GAINED_NOTHING) is not gained
     assert gain_content(gain, ["One.", "Two."]) == {
@@ -230,16 +229,16 @@ def test_what_the_search_gained_is_the_first_sentence(gained):
 
 
 def test_without_a_gain_nothing_is_said_of_it():
-    assert "What the search gained" not in lines(show_diagnosis(found(), "out"))
+    assert "Gain of the search" not in lines(show_diagnosis(found(), "out"))
     assert gain_content(None, []) is None
 
 
 def test_where_nothing_is_found_the_sentence_is_the_finding():
     shown = lines(show_diagnosis(nothing(compared(False, (), ())), "out"))
     assert shown[shown.index("Finding") + 1] == NOTHING_FOUND
-    absent = ("Found in the data", "What channels say", "Withdrawn", "Suspect", "Best")
+    absent = ("Found in the data", "Faults", "Rejected", "Suspect", "Best")
     assert not [line for line in shown if line.startswith(absent)]
-    assert "Predictions over 8 s miss by" in shown
+    assert "Prediction error over 8 s" in shown
     assert "Finding" in lines(show_diagnosis(found(effects=EFFECTS[1:]), "out"))
 
 
@@ -252,10 +251,10 @@ def test_where_nothing_is_found_the_sentence_is_the_finding():
         ),
         ({"closed_loop": False}, "Without thrust the learned model stays bounded."),
         ({"mass_definite": False}, "The mass matrix of the learned model is not positive definite."),
-        ({"region": "|u| < 1"}, "warning: less dissipation than at first: |u| < 1"),
+        ({"region": "|u| < 1"}, "warning: less dissipation than the initial model: |u| < 1"),
         (
             {"learned_min_dissipation": 0.5},
-            "smallest dissipation 0.5 1/s, of the model at first 0.6 1/s",
+            "smallest dissipation 0.5 1/s, of the initial model 0.6 1/s",
         ),
     ],
 )
@@ -267,14 +266,14 @@ def test_stability_in_words(changes, told):
 
 def test_a_summary_has_ten_lines_at_the_most():
     title, *rest = summary(found()).splitlines()
-    assert title == "ambiguous: Something is missing, and more than one cause fits"
+    assert title == "ambiguous: An effect is missing, and several candidates explain it"
     assert rest[0] == "  There is sure. [99 %]"
     assert rest[1].startswith("  Possibly doubtful or other")
     assert rest[2].endswith("[20 %]")
     assert rest[3:] == [
         "  Little is left.",
-        "  a (learned from): predictions over 8 s miss by 126 -> 0.73 mm",
-        "  b (seen only now): predictions over 8 s miss by 252 -> 1.5 mm",
+        "  a (training): prediction error over 8 s 126 -> 0.73 mm",
+        "  b (test): prediction error over 8 s 252 -> 1.5 mm",
     ]
     many = compared(True)
     many.evaluations = [run(n, "train") for n in "abcde"]
@@ -344,11 +343,13 @@ def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
     given = compared(True)
     given.before.profiles, given.after = "first", SimpleNamespace(profiles="last")
     text = notebook.as_html(found(given, [effect("a<b", 0.6), EFFECTS[1]])).replace("\n", "")
-    assert "<b>Something is missing, and what it is, is not sure</b></p><p>There is sure." in text
+    assert (
+        "<b>An effect is missing, and its identification is uncertain</b></p><p>There is sure." in text
+    )
     assert "There is a&lt;b.</p><p>Little is left.</p>" in text
     assert "<tr><td>a&lt;b</td><td>X = a&lt;b</td></tr><tr><td>sure</td><td>X = sure</td></tr>" in text
     assert "<th>position over 8 s [mm]</th><th>heading over 8 s [°]</th>" in text
-    assert "<tr><td>a (learned from)</td><td>126 → 0.73</td>" in text
-    assert "<tr><td>b (seen only now)</td><td>252 → 1.46</td>" in text
+    assert "<tr><td>a (training)</td><td>126 → 0.73</td>" in text
+    assert "<tr><td>b (test)</td><td>252 → 1.46</td>" in text
     assert [name for name, *_ in drawn] == ["profile", "model_error"]
     assert text.count("<svg") == 2

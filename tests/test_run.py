@@ -332,7 +332,7 @@ def test_parameter_set_beats_the_scenario_with_a_notice(scenario, ellipse, tmp_p
     done = command(scenario(), "--out", tmp_path / "out", "--no-plots", "--parameters", learned)
     assert done.returncode == 0
     assert "vessel.delta_X_u = -4.0" in done.stderr
-    assert "beats -1.0" in done.stderr
+    assert "overrides -1.0" in done.stderr
     assert "has values for a model 'other', which does not run here" in done.stderr
     log = cosim.read_log(tmp_path / "out")
     assert log["vessel.omega_X"] == pytest.approx(-4.0 * log["vessel.u"])
@@ -352,12 +352,12 @@ def test_empty_parameter_set_is_valid(scenario, tmp_path):
         ("<a/>", "is not an SSP 1.0 parameter set"),
         ("<a", "cannot be read as a parameter set"),
         (SSV.format(parameter("delta_X_u", 1.0)), "is not of the form model.parameter"),
-        (SSV.format(parameter("vessel.delta_X_u", "much")), "has no number"),
+        (SSV.format(parameter("vessel.delta_X_u", "much")), "its value is not a number"),
         (SSV.format(parameter("vessel.delta_X_uu_", 1.0)), "does not exist; did you mean"),
         (SSV.format(parameter("vessel.m", -1.0)), "is below its minimum"),
-        (SSV.format(parameter("vessel.delta_X_u", "nan")), "has no number"),
-        (SSV.format(parameter("vessel.delta_X_u", "1_000")), "has no number"),
-        (SSV.format(2 * parameter("vessel.delta_X_u", 1.0)), "stands there twice"),
+        (SSV.format(parameter("vessel.delta_X_u", "nan")), "its value is not a number"),
+        (SSV.format(parameter("vessel.delta_X_u", "1_000")), "its value is not a number"),
+        (SSV.format(2 * parameter("vessel.delta_X_u", 1.0)), "occurs twice"),
         (SSV.format(parameter("vessel.X_u", '1.0" unit="kN.s/m')), "but the FMU's unit is 'N.s/m'"),
         (SSV.format("").replace("UTF-8", "foo"), "cannot be read as a parameter set"),
     ],

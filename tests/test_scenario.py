@@ -91,7 +91,7 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
         ),
         (
             {"events": [{"time": 1.0, "model": "vessel", "variable": "X_u", "action": "hold"}]},
-            "holds its value anyway",
+            "is held in any case",
         ),
         (
             {"events": [{"time": 1.0, "model": "vessel", "variable": "m", "action": "override", "value": -1}]},
@@ -336,7 +336,7 @@ def test_own_name_wins_over_a_file_beside_and_other_files_are_found(ellipse, tmp
     system = prepare(load_scenario(path))
     assert system.models["vessel"].name == "vessel"
     assert system.models["extra"].name == "Other"
-    assert "'./vessel.fmu' would mean that file" in system.warnings[0]
+    assert "'./vessel.fmu' names that file" in system.warnings[0]
     ellipse["fmus"]["vessel"] = {"path": "./Other.fmu"}
     ellipse["connections"] = ellipse["events"] = ellipse["faults"] = []
     path.write_text(json.dumps(ellipse))
@@ -357,7 +357,7 @@ def test_metrics_of_a_run_that_is_cut_short_are_from_its_start(ellipse, tmp_path
     assert changed.metrics.start == 0.0
     assert changed.notes == [
         "read elsewhere",
-        "metrics are from 0 s on: the run ends before their window begins, at 5 s",
+        "the window of the metrics begins at 5 s, after the end of the run: metrics are from 0 s on",
     ]
     assert changed.folder == tmp_path
     assert changed.unpacked is scenario.unpacked, "whose files would go with the last reference"

@@ -440,7 +440,7 @@ def test_of_a_pose_alone_nothing_can_be_said(tmp_path, capsys):
     )
     pd.DataFrame({"time": run.time, **columns}).to_csv(tmp_path / "a.csv", index=False)
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 0
-    assert "no other channel can be compared with it" in capsys.readouterr().out
+    assert "no redundant channel for a comparison" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -199,5 +199,5 @@ def test_analyses_without_a_model_of_their_own_take_any_ship(
 def test_analyses_of_the_thesis_model_refuse_another_ship(otter_log, tmp_path, capsys, name, more):
     command = importlib.import_module(f"diagnosis.{name}").main
     assert command([str(otter_log), "--out", str(tmp_path / "out"), *more]) == 2
-    assert "is of otter; this analysis knows cse1 alone" in capsys.readouterr().err
+    assert "is of otter; this analysis supports cse1 only" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

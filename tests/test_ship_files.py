@@ -91,19 +91,19 @@ CHANGES = [
     ("std = 0.5", "std = -0.5", "inertia.m.std: Input should be greater than 0"),
     ("X_udot = -5.0", "X_udot = 60.0", "mass matrix of these numbers is not positive definite"),
     ("X_udot = -5.0", "x_g = 2.0", "mass matrix of these numbers is not positive definite"),
-    ('product = "u"', 'product = "u^2"', "'u^2' is no product of u, v, r, |u|, |v| and |r|"),
-    ('product = "u"', 'product = "|u"', "'|u' is no product"),
-    ('product = "u"', 'product = ""', "'' is no product"),
+    ('product = "u"', 'product = "u^2"', "'u^2' is not a product of u, v, r, |u|, |v| and |r|"),
+    ('product = "u"', 'product = "|u"', "'|u' is not a product"),
+    ('product = "u"', 'product = ""', "'' is not a product"),
     ('axis = "X"', 'axis = "Z"', "hull.terms[0].axis: "),
     ('axis = "X"', 'axes = "X"', "hull.terms[0].axes: unknown key; did you mean 'axis'?"),
-    ("share = 0.2 }", 'share = 0.2 }, { axis = "X", product = "u", value = 1.0 }', "X_u stands there twice"),
+    ("share = 0.2 }", 'share = 0.2 }, { axis = "X", product = "u", value = 1.0 }', "X_u occurs twice"),
     ("terms =", "termes =", "hull.termes: unknown key; did you mean 'terms'?"),
     ("cross_flow]", "crossflow]", "there is no 'crossflow'; did you mean 'cross_flow'?"),
     ("cross_flow_length", "cross_length", "unknown key 'cross_length'; did you mean 'cross_flow_length'?"),
     ('law = "fixed_propeller"', 'law = "propeler"', "no law 'propeler'; did you mean 'fixed_propeller'?"),
     ('law = "fixed_propeller"', "", "actuators[0].law: is missing"),
-    ('name = "starboard"', 'name = "port"', "actuators: port stands there twice"),
-    ('name = "port"', 'name = "for"', "actuator 'for': a word of Python's own is no name"),
+    ('name = "starboard"', 'name = "port"', "actuators: port occurs twice"),
+    ('name = "port"', 'name = "for"', "actuator 'for': a keyword of Python cannot be a name"),
     ("n_max = 10.0", "n_mx = 10.0", "actuator 'port': unknown key 'n_mx'; did you mean 'n_max'?"),
     ("n_max = 10.0", "n_max = -10.0", "n_max = -10 1/s is out of its range"),
     ("n_max = 10.0", "n_min = 10.0", "n_min = 10 1/s is out of its range"),
@@ -127,22 +127,22 @@ CHANGES = [
 
 # What is changed in the file -> line and beginning of the warning.
 DOUBTS = [
-    ("value = -10.0", "value = 10.0", 13, "X_u = 10 N.s/m drives the ship on at 0.0044 m/s in surge"),
+    ("value = -10.0", "value = 10.0", 13, "X_u = 10 N.s/m adds energy at 0.0044 m/s in surge"),
     (
         "share = 0.2 }]", 'share = 0.2 },\n  { axis = "X", product = "|u|u", value = 1.0 }]', 14,
-        "X_absu_u = 1 N.s2/m2 drives the ship on at 14 m/s in surge",
+        "X_absu_u = 1 N.s2/m2 adds energy at 14 m/s in surge",
     ),
     (
         "share = 0.2 }]", 'share = 0.2 },\n  { axis = "N", product = "r", value = 1.0 }]', 14,
-        "N_r = 1 N.m.s/rad drives the ship on at 0.0022 rad/s in yaw",
+        "N_r = 1 N.m.s/rad adds energy at 0.0022 rad/s in yaw",
     ),
     (
         "share = 0.2 }]", 'share = 0.2 }, { axis = "Y", product = "vvv", value = 1.0 }]', 13,
-        "Y_vvv = 1 N.s3/m3 drives the ship on at 0.0044 m/s in sway",
+        "Y_vvv = 1 N.s3/m3 adds energy at 0.0044 m/s in sway",
     ),
     (
         "share = 0.2 }]", 'share = 0.2 }]\n[hull.functions.resistance]\ndrag_ahead = -0.1', 14,
-        "resistance drives the ship on at 0.89 m/s in surge",
+        "resistance adds energy at 0.89 m/s in surge",
     ),
     ("X_udot = -5.0", "X_udot = 5.0", 10, "X_udot = 5 kg is positive"),
     ("X_udot = -5.0", "Y_vdot = 5.0", 10, "Y_vdot = 5 kg is positive"),
@@ -265,7 +265,7 @@ def test_what_is_no_description_is_told_in_one_line(text: str | bytes, tmp_path:
     [
         ("oter", "no ship 'oter'; did you mean 'otter'?"),
         ("../ships/otter", "no ship '../ships/otter'"),
-        ("nowhere.toml", "no such description of a ship: 'nowhere.toml'"),
+        ("nowhere.toml", "no such ship file: 'nowhere.toml'"),
         ("", "no ship ''"),
     ],
 )

@@ -45,21 +45,21 @@ def renamed(path, old, new):
 @pytest.mark.parametrize(
     ("entries", "message"),
     [
-        (["/etc/passwd"], "is no path inside"),
-        (["C:/windows"], "is no path inside"),
+        (["/etc/passwd"], "is not a path inside"),
+        (["C:/windows"], "is not a path inside"),
         (["../../evil"], "leaves the folder"),
         (["resources/../../evil"], "leaves the folder"),
-        (["a/./b"], "not every computer"),
-        (["a//b"], "not every computer"),
-        (["resources/line\nbreak"], "not every computer"),
-        (["resources/point."], "not every computer"),
+        (["a/./b"], "some operating systems"),
+        (["a//b"], "some operating systems"),
+        (["resources/line\nbreak"], "some operating systems"),
+        (["resources/point."], "some operating systems"),
         (["resources/aux.txt"], "device of Windows"),
         (["NUL"], "device of Windows"),
         (["resources/com1/x"], "device of Windows"),
         ([special(stat.S_IFLNK)], "is a link or a device"),
         ([special(stat.S_IFIFO)], "is a link or a device"),
-        (["resources/a", "resources/A"], "one file on some computers"),
-        (["resources/caf\u00e9", "resources/cafe\u0301"], "one file on some computers"),
+        (["resources/a", "resources/A"], "same file on some operating systems"),
+        (["resources/caf\u00e9", "resources/cafe\u0301"], "same file on some operating systems"),
         (["resources", "resources/a"], "is a file, and the folder of"),
         (["Resources", "resources/a"], "is a file, and the folder of"),
     ],
@@ -79,7 +79,7 @@ def test_archive_that_leaves_its_folder_or_means_two_things_is_refused(tmp_path,
 
 def test_duplicates_backslashes_and_encryption_are_refused(tmp_path):
     path = archive(tmp_path / "a.fmu", "first", "other")
-    with pytest.raises(InputError, match="one file on some computers"):
+    with pytest.raises(InputError, match="same file on some operating systems"):
         check_archive(renamed(path, "other", "first"))
     path = archive(tmp_path / "b.fmu", "a/b")
     with pytest.raises(InputError, match="backslash"):
@@ -258,7 +258,7 @@ def test_library_is_never_looked_for_elsewhere(fmus, tmp_path, library):
 
     done = only_own(tmp_path, edited(fmus["vessel"], tmp_path / "other.fmu", edit))
     assert done.returncode == 2
-    assert "is no identifier" in done.stderr
+    assert "is not an identifier" in done.stderr
 
 
 def test_only_own_refuses_a_python_fmu_of_others(plain_fmu, tmp_path):

@@ -259,16 +259,16 @@ def test_only_windows_within_count(comparison, predictions):
         ('{"criteria": []}', "criteria: List should have at least 1 item"),
         ('{"criterai": []}', r"criteri.*(did you mean 'criteria'|is missing)"),
         ({"quantity": "headin"}, r"'headin' cannot be judged; did you mean 'heading'"),
-        ({"unit": "deg"}, "'deg' is no unit of position; there are m, mm"),
+        ({"unit": "deg"}, "'deg' is not a unit of position; there are m, mm"),
         ({"tolerance": -1.0}, r"criteria\[0\].tolerance: Input should be greater than 0"),
         ({"tolerence": 1.0}, r"criteria\[0\].tolerence: unknown key; did you mean 'tolerance'"),
         ({"horizon": 1e400}, r"criteria\[0\].horizon"),
-        ({"statistic": "rms", "coverage": 0.5}, "coverage is of the statistic 'share'"),
+        ({"statistic": "rms", "coverage": 0.5}, "coverage belongs to the statistic 'share'"),
         ({"within": {"u": [2, 1]}}, "within.u: 2 is not below 1"),
         ({"tolerance": True}, r"criteria\[0\].tolerance: Input should be a valid number"),
         ({"tolerance": "1"}, r"criteria\[0\].tolerance: Input should be a valid number"),
         ({"training_runs": 1}, r"criteria\[0\].training_runs: Input should be a valid boolean"),
-        ('{"purpose": "a", "purpose": "b", "criteria": []}', "key 'purpose' stands twice"),
+        ('{"purpose": "a", "purpose": "b", "criteria": []}', "key 'purpose' occurs twice"),
         ('{"particulars": {"klient": "a"}, "criteria": []}', "particulars.klient.*did you mean 'client'"),
         ('{"input_std": {"current": -1.0}, "criteria": []}', "input_std.current"),
     ],
@@ -299,7 +299,7 @@ def test_a_record_of_both_verdicts_and_what_shows_a_change(comparison, tmp_path,
     map_.write_text("a file")
     v = diagnosis.validate(comparison, criteria, files={"notes": map_})
     assert [j.outcome for j in v.content.judgements] == ["met", "cannot be judged"]
-    assert "within the validation uncertainty" in v.content.judgements[1].reason
+    assert "smaller than the validation uncertainty" in v.content.judgements[1].reason
     out = tmp_path / "out"
     assert set(v.write(out, key)) == set(FILES) == {p.name for p in out.iterdir()}
     record, public = out / FILES[0], public_of(key, tmp_path / "public.pem")

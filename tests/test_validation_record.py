@@ -104,8 +104,8 @@ def test_runs_that_a_model_was_learned_from_do_not_count_without_a_word(folder, 
     assert (alone.outcome, alone.windows) == ("cannot be judged", 0)
     assert "training_runs" in alone.reason
     assert lenient.runs == ["again", "b"]
-    assert lenient.requirement.endswith("runs that the model was learned from count")
-    assert lenient.flags == ["Runs that the model was learned from count, as the criterion says."]
+    assert lenient.requirement.endswith("training runs of the model count")
+    assert lenient.flags == ["Training runs of the model count, as the criterion states."]
     assert [f["name"] for f in v.content.learned_from] == ["a"]
 
 
@@ -132,7 +132,7 @@ def test_what_decides_is_hashed_and_a_change_since_is_refused(folder, tmp_path):
     roles = {f["role"]: f["path"] for f in files_of(c, {})}
     assert roles == {"data": str(data), "model": str(model)}
     write_model(model, Model({"X_u": -2.0}))
-    with pytest.raises(InputError, match=r"model\.ssv' has changed since it was compared"):
+    with pytest.raises(InputError, match=r"model\.ssv' has changed since the comparison"):
         validated(c, tmp_path, {})
     write_model(model, Model({"X_u": -1.0}))
     other = tmp_path / "other.ssv"
@@ -266,7 +266,7 @@ def test_u_num_is_the_error_itself_where_steps_converge(comparison, order):
 
 def test_u_num_is_not_known_where_steps_do_not_act(comparison):
     for order in (None, -1.0, 0.1):
-        with pytest.raises(InputError, match="does not make the predictions of box converge"):
+        with pytest.raises(InputError, match="the predictions of box do not converge"):
             _numerical(*stepped(comparison, order, 0.01))
     assert _numerical(*stepped(comparison, None, 0.0, parametric=True))["u"] == pytest.approx(0.0)
 

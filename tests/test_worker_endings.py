@@ -45,7 +45,7 @@ def test_workers_that_are_interrupted_while_they_start_are_no_traceback(tmp_path
     done = ran(
         INTERRUPTED_START, tmp_path / "c.json", "--workers", 2, "--quiet", "--out", tmp_path / "out"
     )
-    line = f"what has finished is in '{tmp_path / 'out'}'; the same command goes on"
+    line = f"finished runs are in '{tmp_path / 'out'}'; the same command continues"
     assert (done.returncode, done.stderr) == (130, f"interrupted: {line}\n")
 
 

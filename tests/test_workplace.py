@@ -129,7 +129,7 @@ def test_a_run_that_is_refused_has_no_note_on_its_folder(tmp_path, monkeypatch):
     assert not any("another run" in note for note in heard)
     assert not Path("results/ellipse_2").exists()
     cosim.simulate("ellipse", set=SHORT, show=heard.append)
-    told = f"note: another run is in '{Path('results/ellipse')}'; this one goes to"
+    told = f"note: another run is in '{Path('results/ellipse')}'; this one is written to"
     assert f"{told} '{Path('results/ellipse_2')}'" in heard
 
 

@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(error)
         return FAILED
     except KeyboardInterrupt:
-        kept = [f"what has finished is in '{out}'; the same command goes on"] if out.exists() else []
+        kept = [f"finished runs are in '{out}'; the same command continues"] if out.exists() else []
         raise KeyboardInterrupt(*kept) from None
     return 0
 
@@ -122,7 +122,7 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
         found = pareto(made, axes, options.pareto, over)
         _write(found, out / "pareto.csv")
         rows = [[_number(x) for x in row] for row in found.itertuples(index=False)]
-        _print(f"not beaten in both {' and '.join(options.pareto)}", [*found.columns], rows)
+        _print(f"not dominated in both {' and '.join(options.pareto)}", [*found.columns], rows)
     if options.compare:
         found = differences(made, axes, options.compare, metrics)
         units = {metric.name: metric.unit for metric in EVERY}
@@ -139,7 +139,7 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
             for row in found.to_dict("records")
         ]
         header = ["against", "metric", "unit", "pairs", "difference", "percent", "better"]
-        title = "paired differences with 95 % intervals; of all metrics less is better"
+        title = "paired differences with 95 % intervals; less is better for all metrics"
         _print(title, [options.compare, *header], rows)
     if options.plot:
         from .charts import axis_units, draw_campaign
@@ -202,7 +202,7 @@ def _parser() -> argparse.ArgumentParser:
         "--workers",
         type=whole_number(0),
         metavar="N",
-        help=f"processes on this computer ({os.cpu_count()}); 0: all in this one, without Dask",
+        help=f"processes on this computer ({os.cpu_count()}); 0: run all in this process, without Dask",
     )
     parser.add_argument(
         "--scheduler", metavar="tcp://HOST:PORT", help="run on the workers of this Dask scheduler"
@@ -210,31 +210,39 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--overwrite",
         action="store_true",
-        help="also where runs of another campaign would vanish from DIR/runs.parquet",
+        help="allow the loss of runs of another campaign in DIR/runs.parquet",
     )
     parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
     parser.add_argument(
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to an FMU (100 times that of its usual step, 30 s at the least)",
+        help="longest time of a call to an FMU [s] (100 times its usual step, at least 30 s)",
     )
     parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
     parser.add_argument(
         "--stop-when",
         metavar="'AXIS METRIC WIDTH'",
-        help="stop when the paired differences of a metric between the first and each other value of an "
-        "axis are known to +- WIDTH, in its unit or in percent",
+        help="stop when the half width of the paired difference between the first and each other value "
+        "of an axis is at most WIDTH, in the unit of the metric or in percent",
     )
     parser.add_argument(
-        "--compare", metavar="AXIS", help="paired differences between its values, with intervals"
+        "--compare",
+        metavar="AXIS",
+        help="paired differences between the values of this axis, with intervals",
     )
     parser.add_argument(
-        "--pareto", type=_names, metavar="M1,M2", help="the choices that none beats in all of these"
+        "--pareto",
+        type=_names,
+        metavar="M1,M2",
+        help="the choices that are not dominated in these metrics",
     )
-    parser.add_argument("--plot", action="store_true", help="pictures of metrics against axes")
+    parser.add_argument("--plot", action="store_true", help="pictures of metrics over axes")
     parser.add_argument(
-        "--metrics", type=_names, metavar="M1,M2", help=f"for pictures and --compare ({','.join(USUAL)})"
+        "--metrics",
+        type=_names,
+        metavar="M1,M2",
+        help=f"metrics for pictures and --compare ({','.join(USUAL)})",
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
     return parser

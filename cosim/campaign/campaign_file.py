@@ -30,17 +30,19 @@ class CampaignAxis(StrictModel):
     """One quantity that differs from run to run: where it is set, and which values it takes."""
 
     set: str | Annotated[list[str], Field(min_length=1)] = Field(
-        description="path of a value in the scenario, or several that get the same value"
+        description="path of a value in the scenario, or several paths that get the same value"
     )
     values: Annotated[list[Any], Field(min_length=1)] | None = Field(
-        None, description="one after the other"
+        None, description="values in their order"
     )
-    labels: list[str] | None = Field(None, description="what the table shows in place of the values")
+    labels: list[str] | None = Field(None, description="labels of the table, one for each of the values")
     uniform: Pair | None = Field(None, description="lowest and highest")
     normal: Pair | None = Field(None, description="mean and standard deviation")
-    log_uniform: Pair | None = Field(None, description="lowest and highest; its logarithm is uniform")
+    log_uniform: Pair | None = Field(
+        None, description="lowest and highest value; the logarithm is uniform"
+    )
     cross: bool = Field(
-        False, description="under latin and sobol: every sample runs with each of the values"
+        False, description="under latin and sobol: combine every sample with each of the values"
     )
 
     @model_validator(mode="after")
@@ -52,17 +54,21 @@ class CampaignAxis(StrictModel):
         for kind in ("uniform", "log_uniform"):
             pair = getattr(self, kind)
             if pair is not None and not pair[0] < pair[1]:
-                raise ValueError(f"{kind} [{pair[0]:g}, {pair[1]:g}]: the lowest comes first")
+                raise ValueError(f"{kind} [{pair[0]:g}, {pair[1]:g}]: the lower value comes first")
         if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
-            raise ValueError(f"log_uniform [{self.log_uniform[0]:g}, ...]: has to be above zero")
+            raise ValueError(
+                f"log_uniform [{self.log_uniform[0]:g}, ...]: the lower value must be above zero"
+            )
         if self.normal is not None and self.normal[1] <= 0.0:
-            raise ValueError(f"normal: a standard deviation of {self.normal[1]:g} has to be above zero")
+            raise ValueError(
+                f"normal: the standard deviation must be above zero; got {self.normal[1]:g}"
+            )
         if self.labels is not None and len(self.labels) != len(self.values or ()):
-            raise ValueError("labels needs one for each of the values")
+            raise ValueError("'labels' needs one label for each of the values")
         if self.labels is not None and len(set(self.labels)) != len(self.labels):
-            raise ValueError("labels: two are the same")
+            raise ValueError("'labels' has a label twice")
         if self.cross and self.values is None:
-            raise ValueError("cross needs values")
+            raise ValueError("'cross' needs 'values'")
         return self
 
     @property
@@ -85,7 +91,7 @@ class Latin(StrictModel):
 class Sobol(StrictModel):
     """A scrambled Sobol sequence."""
 
-    sobol: PositiveInt = Field(le=MOST_RUNS, description="number of samples, best a power of two")
+    sobol: PositiveInt = Field(le=MOST_RUNS, description="number of samples; a power of two is best")
 
 
 class Campaign(StrictModel):
@@ -96,19 +102,21 @@ class Campaign(StrictModel):
         description="path, relative to the campaign file, or the name of a shipped scenario",
     )
     axes: dict[str, CampaignAxis] = Field(
-        min_length=1, description="by the name of their column in the table"
+        min_length=1, description="axes by the names of their columns in the table"
     )
     design: Literal["grid", "list"] | Latin | Sobol = Field(
         "grid", description="all combinations, the k-th value of each axis together, or a sample"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(0, description="of samples and of their order")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the samples and of their order")
 
     @field_validator("axes")
     @classmethod
     def _free_names(cls, axes: dict[str, CampaignAxis]) -> dict[str, CampaignAxis]:
         for name in axes:
             if name in TAKEN or not name.strip() or not name.isprintable():
-                raise ValueError(f"'{name}' cannot be an axis: the table has a column of that name")
+                raise ValueError(
+                    f"'{name}' cannot be an axis: the table already has a column of this name"
+                )
         return axes
 
     @model_validator(mode="after")
@@ -117,8 +125,8 @@ class Campaign(StrictModel):
         for name, axis in self.axes.items():
             if axis.distribution and not sampled:
                 raise ValueError(
-                    f"axes.{name}: {axis.distribution} cannot be in a {self.design}; "
-                    'give it values, or "design": {"latin": 100}'
+                    f"axes.{name}: {axis.distribution} is not possible in a {self.design}; give it "
+                    'values, or "design": {"latin": 100}'
                 )
             if axis.cross and not sampled:
                 raise ValueError(
@@ -127,9 +135,9 @@ class Campaign(StrictModel):
         lengths = {name: len(axis.values or ()) for name, axis in self.axes.items()}
         if self.design == "list" and len(set(lengths.values())) > 1:
             told = ", ".join(f"{name} has {count}" for name, count in lengths.items())
-            raise ValueError(f"a list needs as many values in each axis: {told}")
+            raise ValueError(f"a list needs the same number of values in each axis: {told}")
         if sampled and all(axis.cross for axis in self.axes.values()):
-            raise ValueError("all axes are crossed, so that none is left to sample")
+            raise ValueError("all axes are crossed, so no axis is left to sample")
         return self
 
 
@@ -170,7 +178,9 @@ class LoadedCampaign:
                 except InputError as error:
                     raise InputError(f"{shown}: axes.{name}.set: {error}") from None
                 if place in taken:
-                    raise InputError(f"{shown}: axes {taken[place]} and {name} set the same, {path}")
+                    raise InputError(
+                        f"{shown}: axes {taken[place]} and {name} set the same value, {path}"
+                    )
                 taken[place] = name
 
 

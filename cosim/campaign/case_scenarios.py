@@ -82,7 +82,7 @@ class CaseScenarios:
                 raise InputError(f"{error} (in the run {told(case)})") from None
         axes = self._loaded.campaign.axes
         if not self._loaded.base.faults and any("seed" in axis.paths for axis in axes.values()):
-            notes["the scenario has no faults, so that another seed changes nothing"] = None
+            notes["the scenario has no faults, so the seed has no effect"] = None
         return [*notes]
 
 

@@ -21,7 +21,7 @@ LEVEL = 0.95  # of all intervals; the custom of the field
 # Pairs before a sequential rule may stop; with 10 the coverage is within 2 % of LEVEL for normal
 # differences (tests/test_campaign_statistics.py simulates it), with 2 it is not.
 FEWEST_PAIRS = 10
-UNPAIRED = "no two runs differ in '{}' alone, so that nothing can be compared"
+UNPAIRED = "no two runs differ in '{}' only, so a comparison is not possible"
 
 
 class MeanInterval(NamedTuple):
@@ -111,7 +111,7 @@ class StopRule:
         words = text.split()
         if len(words) != 3:
             raise InputError(
-                f"'{text}' is no rule: it takes the form 'axis metric width', as in 'K e_pos_rms 2%'"
+                f"'{text}' is not a rule: it takes the form 'axis metric width', as in 'K e_pos_rms 2%'"
             )
         self.axis, self.metric, width = words
         axes = list(cases[0].shown)
@@ -126,7 +126,9 @@ class StopRule:
         except ValueError:
             self.width = math.nan
         if not 0.0 < self.width < math.inf:
-            raise InputError(f"'{text}': '{width}' is no width: a positive number, or a share as in 2%")
+            raise InputError(
+                f"'{text}': '{width}' is not a width: a positive number, or a share as in 2%"
+            )
         self._blocks = self._order(text, cases, seed)
         self.ordered = [case for block in self._blocks for case in block.values()]
         self._differences: dict[str, list[float]] = {name: [] for name in list(self._blocks[0])[1:]}
@@ -139,7 +141,7 @@ class StopRule:
         values = dict.fromkeys(_shown(case.shown[self.axis]) for case in cases)
         if len(values) < 2 or any(len(block) < len(values) for block in blocks):
             raise InputError(
-                f"'{text}': nothing to compare: each value of '{self.axis}' has to meet the same values "
+                f"'{text}': no pairs to compare: each value of '{self.axis}' needs the same values "
                 'of the other axes, in a grid, or with "cross": true in a sample'
             )
         order = np.random.default_rng(seed).permutation(len(blocks))
@@ -173,7 +175,8 @@ class StopRule:
             return other - first
         if min(first, other) <= 0.0:
             raise InputError(
-                f"{self.metric} is not positive, so that a share has no meaning; give a width"
+                f"{self.metric} is not positive, so a relative width is undefined; give a width in "
+                "its unit"
             )
         return math.log(other / first)
 
@@ -245,7 +248,7 @@ def differences(
             rows.append(row)
     if not any(row["pairs"] for row in rows):
         failed = int((made["status"] != "done").sum())
-        why = f"{failed} of {len(made)} runs failed, and of no pair both went well"
+        why = f"{failed} of {len(made)} runs failed, and no pair is complete"
         raise InputError(f"--compare {axis}: {why}" if failed else UNPAIRED.format(axis))
     return pandas.DataFrame(rows)
 
@@ -271,13 +274,13 @@ def pareto(
     _demand_metrics(metrics)
     by = [name for name in axes if name not in over]
     if not by:
-        raise InputError("there is one choice only: all axes are averaged over")
+        raise InputError("there is only one choice, because all axes are averaged")
     groups = made.assign(done=made["status"] == "done").groupby(by, sort=False)
     means = groups.agg(dict.fromkeys(metrics, "mean") | {"done": "all", "hash": "size"})
     means = means.rename(columns={"hash": "runs"}).reset_index().query("done").dropna()
     points = means.loc[:, list(metrics)].to_numpy(float)
     kept = [not ((points <= p).all(axis=1) & (points < p).any(axis=1)).any() for p in points]
     if not any(kept):
-        raise InputError("no choice is left: of each a run failed")
+        raise InputError("no choice is left: each has a failed run")
     best = means.iloc[np.flatnonzero(kept)].drop(columns="done")
     return best.sort_values(by=metrics[0]).reset_index(drop=True)

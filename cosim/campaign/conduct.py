@@ -99,7 +99,7 @@ def run_campaign(
         loaded.base = with_settings(loaded.base, [("native", native)], Path.cwd())
     folder = Path(os.path.abspath(result_folder(campaign, out)))
     if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
-        raise InputError(f"'{campaign}' would be overwritten by the results; give another --out")
+        raise InputError(f"the results would overwrite '{campaign}'; give another --out")
     sweep()
     files = Files()
     try:
@@ -115,7 +115,10 @@ def run_campaign(
             show(f"note: {note}")
         with _only_one(folder), closing(Journal(folder)) as journal:
             if journal.unread:
-                show(f"note: {journal.unread} lines of '{JOURNAL}' tell of no run: those are made again")
+                show(
+                    f"note: {journal.unread} lines of '{JOURNAL}' do not describe a run: those "
+                    "runs are repeated"
+                )
             work = _Work(scenarios, journal, rule.ordered if rule else every, rule, folder)
             work.recall(overwrite)
             told = {
@@ -148,7 +151,7 @@ def result_folder(campaign: str | Path | dict[str, Any], out: str | Path | None)
         InputError: ``out`` is empty.
     """
     if out is not None and not str(out).strip():
-        raise InputError("out is the name of a folder, and is empty")
+        raise InputError("out must be the name of a folder; got an empty text")
     name = "campaign" if isinstance(campaign, dict) else Path(campaign).stem.removesuffix(".campaign")
     return Path(out) if out is not None else Path("results") / name
 
@@ -194,8 +197,8 @@ class _Work:
         gone = self.earlier.difference(hash_ for _, hash_ in pairs)
         if gone and not overwrite:
             raise InputError(
-                f"'{self.folder / TABLE}' has {len(self.earlier)} runs, of which this campaign lacks "
-                f"{len(gone)}: they would vanish; give another --out, or --overwrite"
+                f"'{self.folder / TABLE}' has {len(self.earlier)} runs, and {len(gone)} of them "
+                "are not in this campaign: they would be lost; give another --out, or --overwrite"
             )
         self.known |= {case.number: (case, h) for case, h in pairs if h in self.journal.rows}
 

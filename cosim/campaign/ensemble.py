@@ -80,7 +80,7 @@ def run_ensemble(
         SimulationError: no member went through, or the workers were lost.
     """
     if members < 2:
-        raise InputError(f"an ensemble has two members or more, not {members}")
+        raise InputError(f"an ensemble needs two members or more; got {members}")
     demand_packages()
     given = read_posterior(posterior)
     overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(believe))
@@ -107,7 +107,7 @@ def run_ensemble(
     )
     done = table.query("status == 'done'")
     if not len(done):
-        raise SimulationError(f"no member went through: {table['message'].iloc[0]}")
+        raise SimulationError(f"every member failed: {table['message'].iloc[0]}")
     logs = [
         read_log(folder / LOGS / name[:DIGITS], scenario.roles.pose) for name in done["hash"].tolist()
     ]
@@ -142,7 +142,7 @@ def _axes(
     for name, unit, drawn in zip(given.names, given.units, values.T, strict=True):
         model, _, parameter = name.partition(".")
         if name in beside:
-            show(f"note: '{path}': {name} is no parameter of an FMU and has no effect here")
+            show(f"note: '{path}': {name} is not a parameter of an FMU and has no effect here")
             continue
         instances = [n for n, m in system.models.items() if m.name == model]
         if not instances:
@@ -161,7 +161,7 @@ def _axes(
             )
         within = np.clip(drawn, variable.min, variable.max)
         if outside := int((within != drawn).sum()):
-            show(f"note: {outside} of {members} values drawn for {name} are set to the end of its range")
+            show(f"note: {outside} of {members} values drawn for {name} are clipped to its range")
         places = [f"fmus.{instance}.parameters.{parameter}" for instance in instances]
         axes[name] = {"set": places, "values": within.tolist()}
     if not axes:

@@ -19,17 +19,19 @@ class Posterior(BaseModel):
 
     model_config = ConfigDict(allow_inf_nan=False)
 
-    names: Annotated[list[str], Field(min_length=1, description="as in model.ssv: vessel.X_u")]
-    units: Annotated[list[str], Field(description="of each, that of the FMU")]
+    names: Annotated[list[str], Field(min_length=1, description="names as in model.ssv: vessel.X_u")]
+    units: Annotated[list[str], Field(description="unit of each value, that of the FMU")]
     mean: Annotated[list[float], Field(description="of each")]
-    covariance: Annotated[list[list[float]], Field(description="row by row, in products of the units")]
+    covariance: Annotated[
+        list[list[float]], Field(description="rows of the covariance, in products of the units")
+    ]
 
     @model_validator(mode="after")
     def _check(self) -> "Posterior":
         n = len(self.names)
         for name in self.names:
             if self.names.count(name) > 1:
-                raise ValueError(f"'{name}' stands twice among the names")
+                raise ValueError(f"'{name}' occurs twice in the names")
         for key, count in (("units", len(self.units)), ("mean", len(self.mean))):
             if count != n:
                 raise ValueError(f"{key} has {count} entries for {n} names")

@@ -62,5 +62,5 @@ def refusal(path: Path) -> str:
         if info.st_uid not in (os.getuid(), 0):
             return f"'{place}' belongs to another user, and is not loaded"
         if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return f"'{place}' may be written to by others, and is not loaded (chmod go-w)"
+            return f"other users may write to '{place}', so it is not loaded (chmod go-w)"
     return ""

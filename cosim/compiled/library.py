@@ -45,8 +45,8 @@ def asks_for_plain_loop() -> bool:
 
 
 NATIVE = (
-    "compile the project's own FMUs and the step loop, or neither: the numbers are the same (where the "
-    "system has a C compiler)"
+    "compile the FMUs of the project and the step loop, or neither; results are the same "
+    "(compiled, if the system has a C compiler)"
 )
 
 
@@ -138,7 +138,7 @@ def _found(with_zig: bool) -> FoundLibrary:
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     if (folder := _cache_folder()) is None:
         return FoundLibrary(
-            None, "this user has no home folder; CYBERSHIP_CACHE may name one for the loop"
+            None, "this user has no home folder; set CYBERSHIP_CACHE to a folder for the loop"
         )
     path = folder / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
     note = ""
@@ -184,7 +184,7 @@ def _compile(path: Path, with_zig: bool) -> None:
         try:
             ctypes.CDLL(str(built))
         except OSError as error:
-            raise NoLibraryError(f"compiler '{command[0]}' made nothing to load: {error}") from None
+            raise NoLibraryError(f"compiler '{command[0]}' wrote no library: {error}") from None
         store(built, path)
 
 
@@ -200,7 +200,7 @@ def _compiler(with_zig: bool) -> list[str]:
         )
     if not with_zig:
         raise NoLibraryError(
-            'there is no C compiler of the system (gcc, cc or clang); "native": true lets zig compile, '
+            'the system has no C compiler (gcc, cc or clang); "native": true lets zig compile, '
             "which takes minutes the first time"
         )
     return [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline", "-fno-sanitize=all"]

@@ -73,7 +73,7 @@ _making = threading.Lock()
 def run_on_worker(request: Request) -> list[RunRow]:
     """A task on a worker."""
     if request.version != (own := own_version()):
-        raise InputError(f"a worker has cybership {own}, and here it is {request.version}")
+        raise InputError(f"a worker has cybership {own}, and this computer has {request.version}")
     if (nanny := parent_process()) and nanny.pid:
         end_with_parent(nanny.pid)  # which Dask sees to only where no FMU hangs
     folder = _folder(get_worker())

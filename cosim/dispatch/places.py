@@ -55,7 +55,7 @@ def check_address(scheduler: str | None) -> None:
     """
     if scheduler is not None and not ADDRESS.fullmatch(scheduler):
         raise InputError(
-            f"'{scheduler}' is no address of a scheduler: it takes the form tcp://HOST:PORT"
+            f"'{scheduler}' is not an address of a scheduler: it takes the form tcp://HOST:PORT"
         )
 
 

@@ -109,7 +109,7 @@ def put(folder: Path, name: str, content: bytes) -> None:
     if (folder / name).is_file():
         return
     if hashlib.sha256(content).hexdigest() != PurePath(name).stem:
-        raise InputError(f"'{name}' was changed on its way, or while the campaign ran")
+        raise InputError(f"'{name}' was changed during its transfer, or during the campaign")
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_write(folder / name) as scratch:
         scratch.write_bytes(content)

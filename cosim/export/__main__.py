@@ -60,8 +60,8 @@ def _export(system: System, options: argparse.Namespace) -> list[str]:
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "cosim.export",
-        "Write a scenario as other tools read it: an SSP archive, an OSP directory, or one "
-        "FMU of the whole system. Parameters are baked into the project's own FMUs.",
+        "Write a scenario for other tools: an SSP archive, an OSP directory, or one FMU of the "
+        "whole system. Parameters become start values of the project's own FMUs.",
         "examples:  %(prog)s scenarios/setpoint.json --ssp setpoint.ssp\n"
         "           %(prog)s scenarios/hidden_drag.json --osp hidden_drag --drop-faults\n"
         "           %(prog)s scenarios/ellipse.json --fmu ellipse.fmu --drop-faults\n"
@@ -74,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     target.add_argument(
         "--osp", type=Path, metavar="DIR", help="for libcosim, cosim-cli and the OSP demo app"
     )
-    target.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="for whatever runs FMUs")
+    target.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="for any tool that runs FMUs")
     parser.add_argument(
         "--parameters",
         type=Path,
@@ -86,13 +86,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="another ship for FMUs with a bare name: a shipped one, or a description of your own",
+        help="another ship for FMUs with a bare name: a shipped one, or a file of your own",
     )
-    parser.add_argument("--overwrite", action="store_true", help="replace a file that is there")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     parser.add_argument(
         "--drop-faults",
         action="store_true",
-        help="leave out what the format cannot hold: faults, isolation, events (OSP keeps them)",
+        help="leave out parts that the format cannot hold: faults, isolation, events (OSP keeps events)",
     )
     return parser
 

@@ -78,15 +78,17 @@ def check(system: System, target: Format, drop: bool) -> list[str]:
     _check_texts(system)
     left = _left_behind(system, target)
     if left and not drop:
-        raise InputError(f"{target.name} cannot hold {'; '.join(left)}; --drop-faults leaves that out")
+        raise InputError(f"{target.name} cannot hold {'; '.join(left)}; --drop-faults leaves this out")
     notes = [f"left out: {what}" for what in left]
     if system.scenario.algorithm == "gauss_seidel" and not target.order:
         notes.append(
-            "other tools step all FMUs at once ('jacobi'), this scenario one after the other: "
-            "their values arrive a step later"
+            "other tools step all FMUs together ('jacobi'), this scenario one after the other: "
+            "there, values arrive one step later"
         )
     if any(every > 1 for every in system.every.values()):
-        notes.append("an instance with a longer step gets its inputs at the start of that step there")
+        notes.append(
+            "in other tools an instance with a longer step gets its inputs at the start of that step"
+        )
     return notes
 
 
@@ -114,18 +116,18 @@ def _check_shape(system: System, target: Format) -> None:
     for name, every in system.every.items():
         if every > 1 and not target.own_steps:
             raise InputError(
-                f"fmus.{name}: {target.name} cannot hold a step of {every * system.scenario.step:g} s "
-                f"beside that of {system.scenario.step:g} s"
+                f"fmus.{name}: {target.name} cannot hold a step of "
+                f"{every * system.scenario.step:g} s next to that of {system.scenario.step:g} s"
             )
     if system.recordings:
-        raise InputError(f"recordings: {target.name} cannot hold inputs that are given by files")
+        raise InputError(f"recordings: {target.name} cannot hold inputs from files")
     for c in system.connections:
         ends = f"{c.source.name} -> {c.target.name}"
         kinds = (c.source.variable.type, c.target.variable.type)
         if kinds[0] != kinds[1] or "Enumeration" in kinds:
             raise InputError(
-                f"{ends}: {kinds[0]} to {kinds[1]}: other tools connect Real, Integer and Boolean, "
-                "each with its like"
+                f"{ends}: {kinds[0]} to {kinds[1]}: other tools connect Real, Integer and Boolean "
+                "to the same type only"
             )
         if converts(c) and not target.conversions:
             units = [v.unit.name if v.unit else "" for v in (c.source.variable, c.target.variable)]
@@ -178,9 +180,9 @@ def pack(system: System, folder: Path) -> tuple[list[ExportedInstance], list[str
             shutil.copyfile(model.path, folder / part.file)
         if values and not baked:
             notes.append(
-                f"{name}: {', '.join(v.name for v, _ in values)} cannot be baked into "
-                f"'{model.path.name}'; they travel beside it, and a tool that ignores such values "
-                "(FMPy) starts from the FMU's own"
+                f"{name}: {', '.join((v.name for v, _ in values))} cannot become start values of "
+                f"'{model.path.name}'; they are written next to it, and a tool that ignores such "
+                "values (FMPy) uses the start values of the FMU"
             )
         parts.append(part)
     return parts, notes

@@ -64,7 +64,7 @@ def export_osp(system: System, folder: Path, drop: bool = False, overwrite: bool
     notes = portable.check(system, portable.OSP, drop)
     with _beside(folder) as (work, target):
         if target.exists() and not _is_replaceable(target):
-            raise InputError(f"'{folder}' is there already, and is no OSP directory to replace")
+            raise InputError(f"'{folder}' exists, and is not an OSP directory that can be replaced")
         if Path.cwd().is_relative_to(target):
             raise InputError(f"'{folder}' is the working directory, which cannot be replaced")
         new = work / "new"
@@ -73,11 +73,11 @@ def export_osp(system: System, folder: Path, drop: bool = False, overwrite: bool
         more += write_osp(system, parts, new)
         if foreign := sorted(_inside(target) - _inside(new)):
             raise InputError(
-                f"'{folder}' also holds {', '.join(foreign[:3])}{', ...' if foreign[3:] else ''}, which "
-                "this export does not write; take it out, or choose another folder"
+                f"'{folder}' also holds {', '.join(foreign[:3])}{', ...' if foreign[3:] else ''}, "
+                "which this export does not write; remove this, or choose another folder"
             )
         if _inside(target) and not overwrite:
-            raise InputError(f"'{folder}' is there already; --overwrite replaces it")
+            raise InputError(f"'{folder}' exists; --overwrite replaces it")
         _replace(target, new, work / "old")
     return notes + more
 
@@ -114,7 +114,7 @@ def _file(
         if resolved.is_dir():
             raise InputError(f"'{path}' is a folder")
         if resolved.exists() and not overwrite:
-            raise InputError(f"'{path}' is there already; --overwrite replaces it")
+            raise InputError(f"'{path}' exists; --overwrite replaces it")
         parts, more = portable.pack(system, work)
         (work / "out").mkdir()
         new = work / "out" / path.name

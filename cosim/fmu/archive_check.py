@@ -87,8 +87,8 @@ def check_archive(path: Path, limits: ArchiveLimits = LIMITS) -> list[zipfile.Zi
     # Entries may share their bytes: only the size of the whole file is certain.
     if size > limits.size or (size > limits.always and size > limits.ratio * packed):
         raise InputError(
-            f"'{path}' is refused: {packed} bytes would become {size} (at most {limits.size}, "
-            f"and {limits.ratio:g} times the size of the archive)"
+            f"'{path}' is refused: {packed} bytes unpack to {size} (at most {limits.size}, and "
+            f"{limits.ratio:g} times the size of the archive)"
         )
     for entry in entries:
         if entry.file_size > limits.xml and entry.filename.lower().endswith(XML):
@@ -108,17 +108,17 @@ def _fault(entry: zipfile.ZipInfo) -> str:
     parts = name.removesuffix("/").split("/")
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if name.startswith("/") or ":" in name:
-        return "is no path inside the archive"
+        return "is not a path inside the archive"
     if "\\" in name:
         return "has a backslash in its name"
     if ".." in parts:
-        return "leaves the folder"
+        return "leads out of the folder"
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is a link or a device, not a file"
     if entry.flag_bits & ENCRYPTED:
         return "is encrypted"
     if any(ord(c) < 32 for c in name) or any(p in ("", ".") or p[-1] in ". " for p in parts):
-        return "has a name that not every computer can write"
+        return "has a name that some operating systems cannot write"
     if any(DEVICE.match(part) for part in parts):
         return "has the name of a device of Windows"
     return ""
@@ -131,7 +131,7 @@ def _clash(names: list[str]) -> str:
         if not name.endswith("/"):
             key = _key(name)
             if key in files:
-                return f"its entries {files[key]!r} and {name!r} are one file on some computers"
+                return f"its entries {files[key]} and {name} are the same file on some operating systems"
             files[key] = name
     for name in names:
         parents = _key(name.removesuffix("/")).split("/")[: None if name.endswith("/") else -1]

@@ -270,4 +270,4 @@ def _tool_hint(model: FmuModel, folder: Path) -> str:
     """A possible reason why an FMU does not start; a Python FMU's tool is Python, which is there."""
     if not model.needs_tool or (folder / SLAVE_MODULE).is_file():
         return ""
-    return "; it needs the tool that it was made with to be installed"
+    return "; it needs an installation of the tool that exported it"

@@ -102,7 +102,9 @@ class FmuModel:
             raise InputError(f"'{path}' is for model exchange only; this master runs co-simulation")
         library = self.description.coSimulation.modelIdentifier
         if not library or any(c in "/\\:" or not c.isprintable() for c in library):
-            raise InputError(f"'{path}' is refused: its modelIdentifier {library!r} is no identifier")
+            raise InputError(
+                f"'{path}' is refused: its modelIdentifier {library!r} is not an identifier"
+            )
         self.name: str = self.description.modelName or path.stem
         try:
             self.variables = self._read_variables()

@@ -119,9 +119,11 @@ def _refuse(component: FmuComponent, t: float, status: int) -> None:
     if status == DISCARD and not component.is_python:  # pythonfmu cannot report more, and logs so
         last, done = _progress(component)
         if done:
-            note = "; it asks to end the simulation" + ("" if last is None else f" at t = {last:.12g} s")
+            note = "; it requests the end of the simulation" + (
+                "" if last is None else f" at t = {last:.12g} s"
+            )
         elif last is not None:
-            note = f"; it got to t = {last:.12g} s"
+            note = f"; it stopped at t = {last:.12g} s"
     component.complaint = complaint
     component.check(f"the step from t = {t} s", status, note)
 

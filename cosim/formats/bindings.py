@@ -83,8 +83,7 @@ class Bindings:
             given = values.get(name)
             if given is None:
                 self.notes.append(
-                    f"{where}: no parameter '{name}' is there to be mapped to '{target}'"
-                    f"{nearest(name, values)}"
+                    f"{where}: no parameter '{name}' exists to map to '{target}'{nearest(name, values)}"
                 )
                 continue
             how = linear(entry, f"{where}: mapping of '{name}'")

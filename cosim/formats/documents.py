@@ -33,7 +33,7 @@ def parse(text: bytes, path: Path | str, tag: str, namespace: str = "") -> Eleme
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as {tag}: {error}") from None
     if local(root) != tag or (namespace and root.tag != f"{{{namespace}}}{tag}"):
-        raise InputError(f"'{path}' is no {tag} that this reader knows, but '{root.tag}'")
+        raise InputError(f"'{path}' is not a supported {tag}; its root element is '{root.tag}'")
     return root
 
 

@@ -77,7 +77,7 @@ class _OspReader:
         if end:
             content["stop"] = number(end, f"'{self.file}': EndTime")
         content |= self.scenario()
-        self.notes.append("all FMUs step at once (jacobi), as in other tools")
+        self.notes.append("all FMUs step together (jacobi), as in other tools")
         return Imported(content, self.folder, self.notes)
 
     def text(self, name: str, default: str) -> str:
@@ -90,7 +90,7 @@ class _OspReader:
             name = need(simulator, "name", f"'{self.file}'")
             where = f"'{self.file}': simulator '{name}'"
             if name in fmus:
-                raise InputError(f"{where} stands there twice")
+                raise InputError(f"{where} occurs twice")
             path = self.folder / file_of(need(simulator, "source", where), where)
             fmus[name] = {"path": str(path), "parameters": {}}
             self.models[name] = FmuModel(path)
@@ -119,7 +119,10 @@ class _OspReader:
                 if signal == "out":
                     out_of.append((function, name))
                 elif into.setdefault(function, name) != name:
-                    raise InputError(f"'{self.file}': two variables feed the function '{function}'")
+                    raise InputError(
+                        f"'{self.file}': two variables are connected to the input of the function "
+                        f"'{function}'"
+                    )
             else:
                 pairs = [(self.end(first), self.end(second))]
                 if kind == "VariableGroupConnection":
@@ -131,7 +134,9 @@ class _OspReader:
                         transformations[target] = {"factor": 1.0, "offset": 0.0}
         for function, target in out_of:
             if function not in into:
-                raise InputError(f"'{self.file}': nothing feeds the function '{function}'")
+                raise InputError(
+                    f"'{self.file}': the input of the function '{function}' is not connected"
+                )
             found.append([into[function], target])
             factor, offset = functions[function]
             transformations[target] = {"factor": factor, "offset": offset}
@@ -186,7 +191,7 @@ class _OspReader:
             if local(function) != "LinearTransformation":
                 raise InputError(f"{where}: {local(function)} is not supported")
             if name in found:
-                raise InputError(f"{where} stands there twice")
+                raise InputError(f"{where} occurs twice")
             found[name] = (
                 number(function.get("factor", "1"), f"{where}: factor"),
                 number(function.get("offset", "0"), f"{where}: offset"),
@@ -228,7 +233,7 @@ class _OspReader:
         files = sorted((self.folder / OSP_SCENARIOS).glob("*.json"))
         if len(files) > 1:
             names = ", ".join(file.name for file in files)
-            self.notes.append(f"none of several scenarios is used: {names}")
+            self.notes.append(f"only one of several scenarios can be used, so none is: {names}")
         if len(files) != 1:
             return {}
         try:

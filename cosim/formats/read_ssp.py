@@ -43,7 +43,7 @@ class _SspReader:
         text = self.archive.read(SSP_STRUCTURE)
         root = parse(text, self.path, "SystemStructureDescription", SSP_SPACES["ssd"])
         if (version := root.get("version", "")) not in ("1.0", "1.0.1"):
-            raise InputError(f"'{self.path}' is of SSP {name_of(version)}; this reader knows 1.0")
+            raise InputError(f"'{self.path}' is of SSP {name_of(version)}; SSP 1.0 is supported")
         system = root.find("ssd:System", NAMES)
         if system is None:
             raise InputError(f"'{self.path}' has no system")
@@ -68,7 +68,7 @@ class _SspReader:
             "transformations": transformations,
             **self.experiment(root, system),
         }
-        self.notes.append("all FMUs step at once (jacobi), as in other tools")
+        self.notes.append("all FMUs step together (jacobi), as in other tools")
         return Imported(content, self.unpacked.path, self.notes, self.unpacked)
 
     def components(self, system: Element) -> dict[str, dict[str, Any]]:
@@ -88,7 +88,7 @@ class _SspReader:
         for name, stem, element in zip(names, file_stems(names), elements, strict=True):
             where = f"'{self.path}': component '{name}'"
             if name in fmus:
-                raise InputError(f"{where} stands there twice")
+                raise InputError(f"{where} occurs twice")
             if element.get("type", FMU_TYPE) != FMU_TYPE:
                 raise InputError(f"{where}: type '{element.get('type')}' is not supported")
             if element.get("implementation", "any") not in ("any", "CoSimulation"):
@@ -135,7 +135,7 @@ class _SspReader:
             names = need(wire, "startConnector", where), need(wire, "endConnector", where)
             if start is None or end is None:
                 face = names[0] if start is None else names[1]
-                self.notes.append(f"'{face}' of the whole system is connected to nothing here")
+                self.notes.append(f"'{face}' of the whole system is not connected here")
                 continue
             output, target = f"{start}.{names[0]}", f"{end}.{names[1]}"
             where = f"'{self.path}': {output} -> {target}"
@@ -156,7 +156,9 @@ class _SspReader:
         """The conversion of units that precedes a transformation."""
         how = conversion(a.unit, b.unit, where)
         if how is None:
-            self.notes.append(f"{where}: the units cannot be compared; only the transformation acts")
+            self.notes.append(
+                f"{where}: the units cannot be compared; only the transformation is applied"
+            )
         return how or SAME
 
     def experiment(self, root: Element, system: Element) -> dict[str, float]:
@@ -180,5 +182,5 @@ class _SspReader:
             steps = [float(e.stepSize) for e in experiments if e is not None and e.stepSize]
             if steps:
                 found["step"] = min(steps)
-                self.notes.append(f"no step is given; the FMUs themselves suggest {min(steps):g} s")
+                self.notes.append(f"no step is given; the FMUs suggest {min(steps):g} s")
         return found

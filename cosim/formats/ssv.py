@@ -86,8 +86,8 @@ class ParameterSet:
         how = conversion(self.unit(given.unit), unit, where)
         if how is None:
             raise InputError(
-                f"{where} is in '{given.unit}', but the FMU's unit is '{unit.name}', "
-                "and what is between them is not defined"
+                f"{where} is in '{given.unit}', but the FMU's unit is '{unit.name}', and the "
+                "conversion is not defined"
             )
         return how.factor * given.value + how.offset
 
@@ -145,7 +145,7 @@ def _values(root: Element, path: Path) -> dict[str, dict[str, Parameter]]:
         if not dot:
             raise InputError(f"'{path}': '{name}' is not of the form model.parameter")
         if parameter in values.setdefault(model, {}):
-            raise InputError(f"'{path}': {name} stands there twice")
+            raise InputError(f"'{path}': {name} occurs twice")
         values[model][parameter] = _parameter(entry, f"'{path}': {name}")
     return values
 
@@ -155,11 +155,11 @@ def _parameter(entry: Element, where: str) -> Parameter:
         child = entry.find(f"{{{SSV}}}{kind}")
         if child is not None:
             return Parameter(
-                _number(child.get("value", ""), f"{where} has no number as its value"),
+                _number(child.get("value", ""), f"{where}: its value is not a number"),
                 child.get("unit"),
                 entry.get("description", ""),
             )
-    raise InputError(f"{where} has no number as its value")
+    raise InputError(f"{where}: its value is not a number")
 
 
 def _number(text: str, message: str) -> float:
@@ -170,7 +170,7 @@ def _number(text: str, message: str) -> float:
 
 
 def _exponents(base: Element, where: str) -> dict[str, float]:
-    found = {key: _number(text, f"{where}: {key} is no number") for key, text in base.items()}
+    found = {key: _number(text, f"{where}: {key} is not a number") for key, text in base.items()}
     if found.get("factor") == 0.0:
         raise InputError(f"{where}: its factor is zero")
     return found

@@ -26,8 +26,8 @@ def demand_memory(system: System, pictures: bool) -> None:
     octets = 8 * (1 + len(names)) * (1 + system.steps)
     if hasattr(os, "sysconf") and octets > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
         raise InputError(
-            f"{system.steps} steps are too many: metrics and pictures would need "
-            f"{octets / 2**30:.3g} GiB of memory; a longer step or an earlier stop needs less"
+            f"{system.steps} steps are too many: metrics and pictures need {octets / 2**30:.3g} "
+            "GiB of memory; use a longer step or an earlier stop"
         )
 
 

@@ -77,9 +77,9 @@ def simulate(
         InputError: the scenario cannot be run; nothing has been written.
     """
     if out is not None and not str(out).strip():
-        raise InputError("out is the name of a folder, and is empty")
+        raise InputError("out must be the name of a folder; got an empty text")
     if realtime is not None and not 0.0 < realtime < math.inf:
-        raise InputError(f"realtime is a positive factor, not {realtime:g}")
+        raise InputError(f"realtime must be a positive factor; got {realtime:g}")
     overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(believe))
     if native is not None:
         scenario = with_settings(scenario, [("native", native)], Path.cwd())
@@ -98,12 +98,13 @@ def simulate(
             folder = Path(os.path.abspath(given))
             if (theirs := others_file(folder)) and not overwrite:
                 raise InputError(
-                    f"'{theirs}' is of no run (there is no {logs.SIDECAR}); --overwrite replaces it"
+                    f"'{theirs}' does not belong to a run (there is no {logs.SIDECAR}); "
+                    "--overwrite replaces it"
                 )
             moved = ""
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)
-                moved = f"note: another run is in '{first}'; this one goes to '{given}'"
+                moved = f"note: another run is in '{first}'; this one is written to '{given}'"
             result, recorder = _run(
                 system, folder, moved, description, realtime, show, progress, pool, pictures
             )

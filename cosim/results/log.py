@@ -83,7 +83,7 @@ class LogWriter:
         lines, ends = self._lines(rows)
         try:
             if self._identify() != self._identity:
-                raise OSError(errno.EBADF, "its file was closed by something else")
+                raise OSError(errno.EBADF, "another part of the program closed its file")
             begun = self._file.tell()
             try:
                 write_all(self._file, lines)

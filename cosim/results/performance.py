@@ -36,11 +36,11 @@ METRICS = (
     Metric("IAEW", "m.s.J", "IAE times W"),
     Metric("IAEWWT", "m.s.J.N", "IAE times W times I_tau_dot"),
     Metric("IWWT", "J.N", "W times I_tau_dot"),
-    Metric("from", "s", "first time used"),
-    Metric("to", "s", "last time used"),
+    Metric("from", "s", "first time that is used"),
+    Metric("to", "s", "last time that is used"),
 )
 # Where the scenario states the role power.
-ENERGY = Metric("energy", "J", "energy that actuators take: integral of their power")
+ENERGY = Metric("energy", "J", "energy of the actuators: integral of their power")
 OVER_TIME = ("ISE", "IAE", "W", "I_tau_dot", "IAEW", "IAEWWT", "IWWT")
 
 # Rounding that the ends of a window may have [s]; steps are at least 1e-6 s.
@@ -262,7 +262,7 @@ def compute(
     found["to"] = float(part["time"][-1])
     infinite = [name for name, value in found.items() if not np.isfinite(value)]
     if infinite:
-        raise MetricsError(f"the run grows without bound: {', '.join(infinite)} too large to compute")
+        raise MetricsError(f"the run diverges: {', '.join(infinite)} too large to compute")
     return {metric.name: found[metric.name] for metric in (*METRICS, ENERGY) if metric.name in found}
 
 

@@ -68,9 +68,9 @@ class Timed(Fault):
     """A fault that acts at times, given or random."""
 
     at: list[Times] | None = Field(None, description="times at which it starts [s]")
-    rate: PositiveFloat | None = Field(None, description="how often it starts at random [1/s]")
+    rate: PositiveFloat | None = Field(None, description="mean rate of random starts [1/s]")
     duration: Times | Span | None = Field(
-        None, description="how long it lasts [s], or [shortest, longest]; one sample if not given"
+        None, description="duration [s], or [shortest, longest]; one sample if not given"
     )
 
     @model_validator(mode="after")
@@ -78,7 +78,7 @@ class Timed(Fault):
         if (self.at is None) == (self.rate is None):
             raise ValueError("give either 'at' (times) or 'rate' (random)")
         if isinstance(self.duration, tuple) and self.duration[0] > self.duration[1]:
-            raise ValueError("the shortest duration comes first")
+            raise ValueError("the shorter duration comes first")
         return self
 
     def windows(self, step: float, rng: np.random.Generator) -> TimeSpans:
@@ -102,7 +102,7 @@ class Bias(Fault):
     kind: Literal["bias"]
     stage = 1
     by_signal = "value"
-    value: float | list[float] = Field(description="what is added, in the signal's unit")
+    value: float | list[float] = Field(description="offset, in the signal's unit")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         return Add(slots, _each(self.value, len(slots)))
@@ -128,7 +128,7 @@ class Spikes(Timed):
     kind: Literal["spikes"]
     stage = 3
     by_signal = "size"
-    size: float | list[float] = Field(description="how far off, in the signal's unit")
+    size: float | list[float] = Field(description="amplitude, in the signal's unit")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         sizes = _each(self.size, len(slots))
@@ -154,7 +154,7 @@ class Delay(Fault):
 
     kind: Literal["delay"]
     stage = 5
-    time: float = Field(ge=0.0, le=1e6, description="how late [s], rounded to samples")
+    time: float = Field(ge=0.0, le=1e6, description="delay [s], rounded to samples")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         return operations.DelayOperation(slots, int(self.time / step + 0.5))
@@ -175,7 +175,7 @@ class Dropout(Timed):
 
     kind: Literal["dropout"]
     stage = 7
-    value: Literal["nan", "zero"] = Field("nan", description="what is reported instead")
+    value: Literal["nan", "zero"] = Field("nan", description="reported value")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         lost = [math.nan if self.value == "nan" else 0.0] * len(slots)

@@ -44,7 +44,7 @@ def load_scenario(
         system = read_system(path)
         for key in ("step", "stop"):
             if key not in system.content | chosen:
-                raise InputError(f"'{path}' does not say its {key}; give it by --{key} SECONDS")
+                raise InputError(f"'{path}' does not state its {key}; give --{key} SECONDS")
         scenario = _validate(system.content | chosen, f"'{path}'", system.folder)
         scenario.set_origin(system.folder, system.notes, system.unpacked)
         return scenario
@@ -98,7 +98,10 @@ def cut_short(scenario: Scenario) -> Scenario:
     if not scenario.stop <= first < last:
         return scenario
     changed = with_settings(scenario, [("metrics.from", 0.0)], Path.cwd())
-    note = f"metrics are from 0 s on: the run ends before their window begins, at {first:g} s"
+    note = (
+        f"the window of the metrics begins at {first:g} s, after the end of the run: metrics are "
+        "from 0 s on"
+    )
     changed.set_origin(scenario.folder, [*scenario.notes, note], scenario.unpacked)
     return changed
 
@@ -108,7 +111,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     names = [name for name, _ in pairs]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"the key '{name}' stands twice in one object")
+            raise InputError(f"the key '{name}' occurs twice in one object")
     return dict(pairs)
 
 

@@ -30,7 +30,7 @@ class Roles(StrictModel):
     )
     target: Columns = Field(
         default=("guidance.x_t", "guidance.y_t", "guidance.psi_t"),
-        description="north, east [m] and heading [rad] that the ship should have",
+        description="target: north, east [m] and heading [rad]",
     )
     force: Columns = Field(
         default=_axes("thrusters.tau_cmd_"),
@@ -38,7 +38,7 @@ class Roles(StrictModel):
     )
     requested_force: Columns = Field(
         default=_axes("controller.tau_"),
-        description="force that the controller requests; in place of 'force' where that is missing",
+        description="force that the controller requests; used for 'force' if that is missing",
     )
     linear_force: Columns = Field(
         default=_axes("controller.tau_lin_"), description="linear part of the requested force"
@@ -48,7 +48,7 @@ class Roles(StrictModel):
     )
     acting_force: Columns = Field(
         default=_axes("thrusters.tau_act_"),
-        description="force that acts: what it lacks of 'force' counts as model error",
+        description="acting force; its difference to 'force' is a model error",
     )
     model_error: Columns = Field(
         default=_axes("vessel.omega_star_"), description="true model error of the hull"
@@ -58,7 +58,7 @@ class Roles(StrictModel):
     )
 
     power: tuple[str, ...] = Field(
-        default=(), description="power [W] that each actuator takes, such as thrusters.NAME_power"
+        default=(), description="power [W] of each actuator, such as thrusters.NAME_power"
     )
 
     def of(self, *roles: str) -> tuple[str, ...]:

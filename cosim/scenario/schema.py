@@ -96,7 +96,7 @@ class Event(StrictModel):
     model: str = Field(description="instance")
     variable: str
     action: Literal["override", "bias", "reset", "hold"] = Field(
-        description="give it a value, add to it, end all that, or keep the value it has"
+        description="override the value, add to it (bias), end all changes, or freeze the present value"
     )
     value: bool | ExactInt | float | None = Field(None, description="for override and bias")
 
@@ -106,8 +106,8 @@ class LogOptions(StrictModel):
 
     signals: Literal["all", "compact"] | list[str] = Field(
         "all",
-        description="all inputs and outputs; what metrics, pictures and the diagnosis need; or names as "
-        "instance.variable, * as wildcard",
+        description="all inputs and outputs; those that metrics, pictures and the diagnosis need; or "
+        "names as instance.variable, * as wildcard",
     )
     every: PositiveInt = Field(1, description="log every n-th base step")
     format: Literal["csv", "parquet"] = "csv"
@@ -128,8 +128,8 @@ class Recording(StrictModel):
     )
     inputs: dict[str, str] = Field(
         min_length=1,
-        description="input as instance.variable -> column; where a cell is empty, the input has the "
-        "value of its connection, or its start value",
+        description="input as instance.variable -> column; an empty cell leaves the value of its "
+        "connection, or its start value",
     )
 
 
@@ -153,23 +153,23 @@ class Scenario(StrictModel):
     stop: PositiveFloat = Field(
         le=1e9, description="end of the simulation [s], a multiple of the base step"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(0, description="of all random faults")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of all random faults")
     algorithm: Literal["gauss_seidel", "jacobi"] = Field(
         "gauss_seidel",
-        description="one after the other with the newest values, or all at once with those of before",
+        description="one after the other with the newest values, or all with the previous values",
     )
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
     ship: Annotated[str, AfterValidator(_ship_name)] | None = Field(
         None,
-        description="whose FMUs those with a bare name are: a shipped ship, or the .toml file that "
-        "describes one, relative to the scenario (the usual one)",
+        description="ship of the FMUs with a bare name: a shipped ship, or its .toml file, relative to "
+        "the scenario (the default ship)",
     )
     native: bool | Literal["auto"] = Field(
         "auto",
         description="auto: compile the project's own FMUs, those with a bare name, and the step loop, "
-        "where the system has a C compiler; true: by zig, too; false: neither; the numbers are the same",
+        "if the system has a C compiler; true: also with zig; false: neither; results are the same",
     )
     connections: list[tuple[str, str]] = Field(
         default_factory=list,
@@ -182,11 +182,10 @@ class Scenario(StrictModel):
     )
     transformations: dict[str, Transformation] = Field(
         default_factory=dict,
-        description="connected input -> what becomes of values on their way there, in place of a "
-        "conversion of units",
+        description="connected input -> transformation of its values, in place of a conversion of units",
     )
     recordings: list[Recording] = Field(
-        default_factory=list, description="inputs that are given by files, before faults act on them"
+        default_factory=list, description="inputs from files, before faults act on them"
     )
     faults: list[AnyFault] = Field(default_factory=list)
     events: list[Event] = Field(default_factory=list)

@@ -59,7 +59,7 @@ def place_of(content: Mapping[str, Any], path: str) -> tuple[str, ...]:
         if len(parts) > 1 and parts[1] not in instances:
             raise InputError(f"'{path}': no instance '{parts[1]}'{nearest(parts[1], instances)}")
         if len(parts) == 1 or parts[2:] == ["parameters"]:
-            raise InputError(f"'{path}' is a group: name the one value in it that is to be set")
+            raise InputError(f"'{path}' is a group: name one of the values in it")
         if parts[2:3] == ["parameters"]:
             return (*parts[:3], ".".join(parts[3:]))  # names of variables may hold dots
     return tuple(parts)
@@ -91,7 +91,7 @@ def set_value(content: dict[str, Any], path: str, value: Any, folder: Path) -> N
     if isinstance(node, list) or place[:-1] == ("transformations",):
         last = _known(node, last, path)
     elif not isinstance(node, dict):
-        raise InputError(f"'{path}': '{place[-2]}' is a value, and has no '{last}' in it")
+        raise InputError(f"'{path}': '{place[-2]}' is a value, and has no member '{last}'")
     node[last] = _located(place, value, folder)
 
 

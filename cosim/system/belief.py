@@ -34,13 +34,13 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
         InputError: the plant is not here, or nothing believes in it.
     """
     if not given.values:
-        system.warnings.append(f"'{path}' is the nominal model: beliefs stay as they are")
+        system.warnings.append(f"'{path}' is the nominal model: the controller models do not change")
         return
     believers, used = set(), set()
     for model_name in given.values:
         plant = next((m for m in system.models.values() if m.name == model_name), None)
         if plant is None:
-            raise InputError(f"'{path}' tells of a model '{model_name}', which does not run here")
+            raise InputError(f"'{path}' has values for a model '{model_name}', which does not run here")
         model = _Believed(plant, path, given)
         for name, fmu in system.models.items():
             if fmu is plant:
@@ -50,10 +50,10 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
                 believers.add(name)
                 used.update((model_name, used_name) for used_name in names)
     if not believers:
-        raise InputError(f"'{path}': no FMU here believes anything of {', '.join(given.values)}")
+        raise InputError(f"'{path}': no controller model here has a parameter {', '.join(given.values)}")
     unused = [f"{m}.{n}" for m, values in given.values.items() for n in values if (m, n) not in used]
     if unused:
-        system.warnings.append(f"'{path}': nothing here can believe {', '.join(unused)}")
+        system.warnings.append(f"'{path}': no controller model here has {', '.join(unused)}")
 
 
 class _Believed:

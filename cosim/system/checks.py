@@ -83,9 +83,7 @@ def check_faults(system: System) -> None:
                     f"{where}: {signal.name} is {causality_of(signal)}, not an input or output"
                 )
             if signal.variable.causality == "input" and signal.name not in fed:
-                raise InputError(
-                    f"{where}: {signal.name} is not connected, so nothing can go wrong there"
-                )
+                raise InputError(f"{where}: {signal.name} is not connected, so a fault has no effect")
             if signal.variable.type != "Real":
                 raise InputError(f"{where}: {signal.name} is of type {signal.variable.type}, not Real")
         if len({(s.instance, s.variable.causality) for s in found}) > 1:
@@ -117,7 +115,7 @@ def _check_event_value(system: System, event: Event, signal: Signal, where: str)
             raise InputError(f"{where}: {event.action} takes no 'value'")
         if event.action == "hold" and not flowing:
             raise InputError(
-                f"{where}: {signal.name} is {causality_of(signal)}, which holds its value anyway"
+                f"{where}: {signal.name} is {causality_of(signal)}, which is held in any case"
             )
         return
     value = event.value

@@ -99,7 +99,7 @@ def _explain(
         variables.prepare()
     except CycleError as error:
         loop = " -> ".join(f"{instance}.{name}" for instance, name in error.args[1])
-        return f"algebraic loop {loop}; cut at {where}, where the value is one step late"
+        return f"algebraic loop {loop}; opened at {where}, where the value is one step late"
     return (
         f"no order of {', '.join(sorted(inside))} gives every input the newest value; "
         f"{where} is one step late"

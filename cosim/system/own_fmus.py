@@ -30,7 +30,7 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, FmuModel]:
     for name in beside:
         try:
             paths |= _own_fmus([name], scenario, warnings)
-            warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
+            warnings.append(f"'{name}' next to the scenario is not used; './{name}' names that file")
         except InputError:
             paths[name] = scenario.folder / name
     models: dict[Path, FmuModel] = {}

@@ -35,7 +35,7 @@ def read_table(path: Path) -> dict[str, list[float]]:
     names = [name.strip() for name in lines[0][1]]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"'{path}': the column {name!r} stands there twice")
+            raise InputError(f"'{path}': the column {name} occurs twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for line, cells in lines[1:]:
         where = f"'{path}', line {line}"
@@ -70,18 +70,18 @@ def table_parameters(
         InputError: the FMU takes no table, not this column, or not so many rows; a column is missing.
     """
     if "count" not in known:
-        raise InputError(f"{where}: this FMU takes no table, as it has no parameter 'count'")
+        raise InputError(f"{where}: this FMU takes no table, because it has no parameter 'count'")
     takes = [name.removesuffix("_1") for name in known if name.endswith("_1")]
     for name in columns:
         if name not in takes:
-            raise InputError(f"{where}: no column {name!r} is wanted{nearest(name, takes)}")
+            raise InputError(f"{where}: the FMU takes no column {name}{nearest(name, takes)}")
     for name in takes:
         if name not in columns and f"{name}_given" not in known:
             raise InputError(f"{where}: the column '{name}' is missing")
     rows = max(map(len, columns.values()))
     most = sum(f"{takes[0]}_{k}" in known for k in range(1, rows + 1))
     if rows > most:
-        raise InputError(f"{where}: {rows} rows are too many, at most {most} are taken")
+        raise InputError(f"{where}: {rows} rows are too many; at most {most} are allowed")
     found = {f"{name}_{k}": x for name, column in columns.items() for k, x in enumerate(column, 1)}
     given = {f"{name}_given": 1.0 for name in columns if f"{name}_given" in known}
     return {"count": float(rows), **given, **found}

@@ -79,5 +79,5 @@ def read_recording(
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(f"'{path}' cannot be read as a recording: {error}") from None
     if not time or not all(a < b for a, b in zip(time, [*time[1:], math.inf], strict=True)):
-        raise InputError(f"'{path}' cannot be read as a recording: it needs rows whose time grows")
+        raise InputError(f"'{path}' cannot be read as a recording: it needs rows with increasing time")
     return time, columns

@@ -55,8 +55,8 @@ def _merge_parameters(system: System, overrides: Overrides) -> Chosen:
     for path, given in overrides:
         for name, beside in given.beside.items():
             system.warnings.append(
-                f"'{path}': {name} = {beside.value} {beside.unit or ''} is no parameter of an FMU "
-                f"and has no effect here: {beside.description}"
+                f"'{path}': {name} = {beside.value} {beside.unit or ''} is not a parameter of an "
+                f"FMU and has no effect here: {beside.description}"
             )
         system.warnings += [f"'{path}': {text}" for text in _of_one_run(given)]
         for model_name in given.values:
@@ -71,7 +71,8 @@ def _merge_parameters(system: System, overrides: Overrides) -> Chosen:
                     old = chosen[name].get(parameter)
                     if old is not None and old[0] != value:
                         system.warnings.append(
-                            f"{name}.{parameter} = {value} from '{path}' beats {old[0]} from {old[1]}"
+                            f"{name}.{parameter} = {value} from '{path}' overrides {old[0]} from "
+                            f"{old[1]}"
                         )
                     chosen[name][parameter] = (value, f"'{path}'")
     return chosen
@@ -82,11 +83,11 @@ def _of_one_run(given: ParameterSet) -> Iterator[str]:
     for model, names in given.of_one_run.items():
         if names:
             first, *others = (f"'{run}'" for run in given.runs)
-            more = f"; what was found in {', '.join(others)} is not used" if others else ""
+            more = f"; values that were found in {', '.join(others)} are not used" if others else ""
             called = " … ".join(dict.fromkeys((names[0], names[-1])))
             verb = "was" if len(names) == 1 else "were"
             holds = "holds" if len(names) == 1 else "hold"
-            yield f"{model}.{called} {verb} found in run {first} and {holds} for that run alone{more}"
+            yield f"{model}.{called} {verb} found in run {first} and {holds} for that run only{more}"
 
 
 def _from_table(system: System, name: str) -> dict[str, tuple[Value, str]]:

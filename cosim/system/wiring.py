@@ -109,7 +109,7 @@ def _present(system: System, output: str, input_: str, where: str) -> list[tuple
     ends = [end.partition(".") for end in (output, input_)]
     for instance, _, _ in ends:
         if instance not in system.models:
-            system.warnings.append(f"{where}: left out, as there is no instance '{instance}'")
+            system.warnings.append(f"{where}: left out, because there is no instance '{instance}'")
             return []
     if "*" in output + input_:
         return _group(system, output, input_, where)

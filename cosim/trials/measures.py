@@ -25,10 +25,14 @@ MEASURES = (
     Metric("circle_diameter", "m", "diameter of the steady turn"),
     Metric("residual_rate", "rad/s", "rate of turn at the end of the pull-out"),
     Metric("check_angle", "rad", "change of heading at the second execute"),
-    Metric("initial_turning", "m", "way from the first to the second execute"),
+    Metric("initial_turning", "m", "distance from the first to the second execute"),
     Metric("initial_turning_time", "s", "from the first to the second execute"),
     *(
-        Metric(f"overshoot_{k + 1}", "rad", f"{NTH[k]} overshoot: heading that goes on after a reversal")
+        Metric(
+            f"overshoot_{k + 1}",
+            "rad",
+            f"{NTH[k]} overshoot: further change of heading after a reversal",
+        )
         for k in range(MOST_OVERSHOOTS)
     ),
     *(
@@ -37,7 +41,7 @@ MEASURES = (
     ),
     Metric("reach", "s", "from the first execute until the ship is back on its first heading"),
     Metric("period", "s", "from a reversal to the next one of the same side, mean"),
-    Metric("track_reach", "m", "way until the ship stops"),
+    Metric("track_reach", "m", "distance until the ship stops"),
     Metric("head_reach", "m", "along the first heading, until the ship stops"),
     Metric("side_reach", "m", "to starboard of the first heading, until the ship stops"),
     Metric("stop_time", "s", "from the order until the ship stops"),

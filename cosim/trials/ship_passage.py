@@ -60,7 +60,7 @@ def passage(
     if time.size < 2:
         raise InputError("a trial has at least two samples")
     if not (np.diff(time) > 0.0).all():
-        raise InputError("the times of a trial do not grow")
+        raise InputError("the times of a trial do not increase")
     return Passage(time, x, y, np.unwrap(psi), order)
 
 
@@ -75,7 +75,7 @@ def executes(p: Passage) -> list[float]:
     off = p.order - p.order[0]
     largest = float(np.abs(off).max())
     if largest == 0.0:
-        raise InputError("the order under trial never changes: this is no trial")
+        raise InputError("the order under trial is constant: this is not a trial")
     off = p.order - np.median(p.order[: int(np.argmax(np.abs(off) > OVER * largest))])
     side = np.sign(off) * (np.abs(off) > OVER * largest)
     over = np.flatnonzero(side)

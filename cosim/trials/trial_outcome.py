@@ -18,7 +18,9 @@ from .measures import MEASURES, limits, measure
 from .ship_passage import Passage, executes, passage
 
 APPROACH = {"approach_speed"}  # what is measured before the order does anything
-NOTHING = "nothing more to measure: the run is too short, or the order does not do what the trial is of"
+NOTHING = (
+    "no further measures: the run is too short, or the order does not make the manoeuvre of this trial"
+)
 DEGREES = {"rad": "°", "rad/s": "°/s"}  # how angles are shown
 
 
@@ -109,7 +111,7 @@ def simulated_trial(folder: Path, start: float | None = None, stop: float | None
     """
     run = read_options(folder)
     if run.trial is None:
-        raise InputError(f"'{folder}' is no run of a manoeuvring trial")
+        raise InputError(f"'{folder}' is not a run of a manoeuvring trial")
     start, stop = (run.start if start is None else start), (run.stop if stop is None else stop)
     log = read_log(folder, [*run.roles.pose, run.trial.order])
     length = 0.0 if run.outline is None else run.outline.length

@@ -81,9 +81,11 @@ def read_learned(folder: str | Path) -> Learned:
     except OSError as error:
         raise InputError(f"'{error.filename}' cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise InputError(f"'{folder}' does not say what 'learn' has left") from None
+        raise InputError(
+            f"'{folder}' does not state the disturbance that 'learn' has estimated"
+        ) from None
     if not (np.isfinite([size, time]).all() and (size >= 0.0).all() and (time > 0.0).all()):
-        raise InputError(f"'{path}': the unrecorded force has no size and time")
+        raise InputError(f"'{path}': the disturbance has no size and no correlation time")
     posterior = read_posterior(other) if some else None
     files = (path, *([other] if other.exists() else []))
     return Learned(posterior, ForceDisturbance(size, time), files, learned_from)
@@ -205,7 +207,8 @@ def _initial(p: Predictions, base: np.ndarray) -> Variances:
     """By the smoother's standard deviation of each part of pose and rates, as if independent."""
     if p.predictor.whole:
         raise InputError(
-            f"the velocity of {p.predictor.name} cannot be set: its own start is part of what is judged"
+            f"the velocity of {p.predictor.name} cannot be set: the error of its initial state is "
+            "part of the judged error"
         )
     s, states = p.smoothed, []
     for name in ("eta", "eta_dot"):
@@ -225,7 +228,7 @@ def _in_body(s: Smoothed) -> Smoothed:
 
 def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Variances:
     if not p.predictor.parametric:
-        raise InputError(f"how uncertain the parameters inside {p.predictor.name} are is not known")
+        raise InputError(f"the uncertainty of the parameters of {p.predictor.name} is not known")
     if learned is None or learned.posterior is None:
         raise InputError("no posterior was given (--learned)")
     names = [name.partition(".")[2] for name in learned.posterior.names]
@@ -259,9 +262,8 @@ def _numerical(p: Predictions, base: np.ndarray) -> Variances:
             found[q] = (d * one / (one - two)) ** 2
     if not found:
         raise InputError(
-            f"halving the step does not make the predictions of {p.predictor.name} converge: its own "
-            "step "
-            "is out of reach, or acts otherwise"
+            f"the predictions of {p.predictor.name} do not converge if the step is halved: the "
+            "model has a step of its own, or reacts to it"
         )
     return found
 
@@ -271,7 +273,7 @@ def _process_noise(p: Predictions, learned: Learned | None) -> Variances:
     if p.predictor.whole:
         raise InputError(f"the velocity of {p.predictor.name} cannot be set")
     if learned is None:
-        raise InputError("no diagnosis says which unrecorded force is left (--learned)")
+        raise InputError("no diagnosis states the disturbance (--learned)")
     shots = Shooting([p.smoothed], p.windows.length)
     motion = shots.around(p.model, {}).motion
     later = covariance(motion, np.zeros_like(shots.at_start), learned.push)[:, -1, :, -1]

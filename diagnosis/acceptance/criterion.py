@@ -40,29 +40,32 @@ class Criterion(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = (
-        Field(None, description="in the record; else made of the rest")
+        Field(None, description="title in the record (made of the other keys)")
     )
     quantity: Quantity = Field(description="distance, heading, or velocity of the body over ground")
-    horizon: Positive = Field(description="time of prediction after which the error is judged [s]")
-    tolerance: Positive = Field(description="largest error, in the unit")
+    horizon: Positive = Field(description="time of prediction at which the error is judged [s]")
+    tolerance: Positive = Field(description="largest error, in 'unit'")
     unit: str = Field(description="of the tolerance, such as m, deg, m/s, kn, deg/s")
     statistic: Literal["share", "median", "rms"] = Field(
         "share",
-        description="of the windows' errors: share within the tolerance, median or RMS within it",
+        description="statistic of the errors: share within the tolerance, or median or RMS within it",
     )
-    coverage: float = Field(0.9, gt=0.0, lt=1.0, description="smallest share that is within")
+    coverage: float = Field(0.9, gt=0.0, lt=1.0, description="smallest share within the tolerance")
     confidence: float = Field(
-        0.95, gt=0.5, lt=1.0, description="of the one-sided bound that decides, and of its interval"
+        0.95,
+        gt=0.5,
+        lt=1.0,
+        description="confidence of the one-sided bound that decides, and of its interval",
     )
     runs: Annotated[list[str], Field(min_length=1)] | None = Field(
-        None, description="names of the runs that count; all"
+        None, description="names of the runs that count (all)"
     )
     within: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
-        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in windows [SI]"
+        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in a window [SI]"
     )
 
     training_runs: bool = Field(
-        False, description="count runs that the model was learned from, too, which else do not count"
+        False, description="count training runs of the model too, which are not counted otherwise"
     )
 
     @model_validator(mode="after")
@@ -70,9 +73,9 @@ class Criterion(BaseModel):
         units = UNITS[JUDGED[self.quantity]]
         if self.unit not in units:
             hint = nearest(self.unit, units)
-            raise ValueError(f"{quoted(self.unit)} is no unit of {self.quantity}{hint}")
+            raise ValueError(f"{quoted(self.unit)} is not a unit of {self.quantity}{hint}")
         if self.statistic != "share" and "coverage" in self.model_fields_set:
-            raise ValueError(f"coverage is of the statistic 'share', not of '{self.statistic}'")
+            raise ValueError(f"coverage belongs to the statistic 'share', not to '{self.statistic}'")
         for signal, (low, high) in self.within.items():
             if not low < high:
                 raise ValueError(f"within.{signal}: {low:g} is not below {high:g}")
@@ -119,7 +122,7 @@ class Criterion(BaseModel):
         ]
         told = [] if self.runs is None else [f"only runs {', '.join(self.runs)}"]
         told += [f"only windows with a mean of {' and '.join(limits)}"] if limits else []
-        return told + ["runs that the model was learned from count"] * self.training_runs
+        return told + ["training runs of the model count"] * self.training_runs
 
 
 Text = Annotated[str, Field(min_length=1, max_length=1000)]  # chosen: a paragraph
@@ -131,17 +134,21 @@ class Particulars(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     document: Text | None = Field(None, description="number of the document")
-    client: Text | None = Field(None, description="for whom the model is judged")
-    assessor: Text | None = Field(None, description="who judges it")
-    model: Text | None = Field(None, description="what the model is called")
+    client: Text | None = Field(None, description="reader of the record")
+    assessor: Text | None = Field(None, description="author of the judgement")
+    model: Text | None = Field(None, description="name of the model")
     model_version: Text | None = Field(None, description="its version")
-    lineage: Text | None = Field(None, description="by whom and from what data it was made")
-    ship: Text | None = Field(None, description="name, type and main dimensions of what was measured")
+    lineage: Text | None = Field(
+        None, description="author of the model, and the data that it was made from"
+    )
+    ship: Text | None = Field(None, description="name, type and main dimensions of the ship")
     loading: Text | None = Field(None, description="mass, centre of gravity, radius of gyration")
-    draught: Text | None = Field(None, description="fore and aft")
+    draught: Text | None = Field(None, description="forward and aft")
     depth: Text | None = Field(None, description="of the water")
     sea: Text | None = Field(None, description="wind, waves and current during the runs")
-    calibration: Text | None = Field(None, description="of the sensors: when, by whom, to what")
+    calibration: Text | None = Field(
+        None, description="calibration of the sensors: date, author, reference"
+    )
 
     @property
     def lines(self) -> dict[str, str]:
@@ -155,10 +162,10 @@ class InputStd(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     current: Annotated[NonNegativeFloat, Field(allow_inf_nan=False)] | None = Field(
-        None, description="of its speed north, and of that east [m/s]"
+        None, description="standard deviations of its north and its east velocity [m/s]"
     )
     wind: Annotated[NonNegativeFloat, Field(allow_inf_nan=False)] | None = Field(
-        None, description="of its force north, and of that east [N]"
+        None, description="standard deviations of its north and its east force [N]"
     )
 
 
@@ -167,12 +174,13 @@ class Criteria(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    purpose: str | None = Field(None, description="what the model is to be used for")
+    purpose: str | None = Field(None, description="intended use of the model")
     particulars: Particulars = Field(
-        default_factory=lambda: Particulars.model_validate({}), description="for the head of the record"
+        default_factory=lambda: Particulars.model_validate({}), description="head of the record"
     )
     input_std: InputStd = Field(
-        default_factory=lambda: InputStd.model_validate({}), description="for u_input of the record"
+        default_factory=lambda: InputStd.model_validate({}),
+        description="standard deviations of the inputs, for u_input of the record",
     )
     criteria: Annotated[list[Criterion], Field(min_length=1)]
 
@@ -211,7 +219,7 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     except ValidationError as error:
         raise InputError(f"'{path}': {first_fault(error, _nearest_key, special=_special)}") from None
     except FileNotFoundError:
-        raise InputError(f"no such criteria: '{path}'; cybership criteria prints some") from None
+        raise InputError(f"no such criteria: '{path}'; cybership criteria prints a template") from None
     except RecursionError:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
@@ -230,7 +238,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
         twice = next(n for n, (name, _) in enumerate(pairs) if name in dict(pairs[:n]))
-        raise InputError(f"the key {quoted(pairs[twice][0])} stands twice in one object")
+        raise InputError(f"the key {quoted(pairs[twice][0])} occurs twice in one object")
     return found
 
 
@@ -256,7 +264,7 @@ def template() -> dict[str, Any]:
     second = {"quantity": "heading", "horizon": 8.0, "tolerance": 5.0, "unit": "deg", "coverage": 0.9}
     given = dict.fromkeys(Particulars.model_fields)
     return {
-        "purpose": "what the model is to be used for",
+        "purpose": "intended use of the model",
         "particulars": given,
         "criteria": [first, second],
     }

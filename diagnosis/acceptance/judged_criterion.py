@@ -130,7 +130,7 @@ def judge(
         _too_good(q, judged(q, every), n, budget(q, sources, masks)) for q in ("position", "heading")
     ]
     if any(p.learned for p, _ in chosen):
-        flags.append("Runs that the model was learned from count, as the criterion says.")
+        flags.append("Training runs of the model count, as the criterion states.")
     return Judgement(
         c,
         outcome,
@@ -161,28 +161,28 @@ def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Ou
         u_val: their standard validation uncertainty [SI].
     """
     size, reach = np.abs(np.nan_to_num(errors, nan=np.inf)), EXPANDED * u_val
-    sure, more = f"{100.0 * c.confidence:g} % sure", "too few independent windows"
+    sure, more = f"{100.0 * c.confidence:g} % confidence", "too few independent windows"
     uncertain = f"the validation uncertainty, 2 u_val = {reach / c.factor:.3g} {c.unit}"
     if c.statistic == "rms":
         found = root_mean_square(size, n, c.confidence)
         least = root_mean_square(np.maximum(size - reach, 0.0), n, c.confidence)
         met, refused, open_ = found.high <= c.limit, least.low > c.limit, found.low <= c.limit
-        bound = f"the RMS is {found.high / c.factor:.3g} {c.unit} at the most, {sure}"
-        floor = f"the RMS is {found.low / c.factor:.3g} {c.unit} at least, {sure}"
+        bound = f"the RMS is at most {found.high / c.factor:.3g} {c.unit}, {sure}"
+        floor = f"the RMS is at least {found.low / c.factor:.3g} {c.unit}, {sure}"
     else:
         found = share(size <= c.limit, n, c.confidence)
         least = share(size <= c.limit + reach, n, c.confidence)
         met, refused, open_ = found.low >= c.wanted, least.high < c.wanted, found.high >= c.wanted
-        bound = f"{100.0 * found.low:.3g} % at least are within, {sure}"
-        floor = f"{100.0 * found.high:.3g} % at the most are within, {sure}"
+        bound = f"at least {100.0 * found.low:.3g} % are within, {sure}"
+        floor = f"at most {100.0 * found.high:.3g} % are within, {sure}"
         fewest = needed(c.wanted, c.confidence)
-        more += f": {fewest} would be needed if all are within" if n < fewest else ""
+        more += f": {fewest} windows are needed, if all are within" if n < fewest else ""
     if reach > c.limit:
-        return "cannot be judged", f"the tolerance is within {uncertain}", found
+        return "cannot be judged", f"the tolerance is smaller than {uncertain}", found
     if met or refused:
         return ("met", bound, found) if met else ("not met", floor, found)
-    beyond = f"what is beyond the tolerance lies within {uncertain}"
-    left = f"{more} ({n:.3g} independent of {size.size} leave it open)"
+    beyond = f"the excess over the tolerance is smaller than {uncertain}"
+    left = f"{more} ({n:.3g} independent windows of {size.size} do not decide)"
     return "cannot be judged", left if open_ else beyond, found
 
 
@@ -242,7 +242,7 @@ def _why_nothing(c: Criterion, counts: WindowCounts) -> str:
     )
 
 
-LEARNED_ONLY = "no run is left that the model was not learned from (training_runs lets those count)"
+LEARNED_ONLY = "every run was used to learn the model (training_runs lets such runs count)"
 
 
 def _limits(c: Criterion) -> str:
@@ -257,7 +257,5 @@ def _too_good(quantity: str, errors: np.ndarray, n: float, b: Budget) -> str:
         return ""
     return (
         f"The error of {quantity} (RMS {rms:.3g}) is far below the uncertainty of its measurement "
-        "(u_D = "
-        f"{u_D:.3g}, SI), which no prediction can be: the model may have had the measurement, or u_D "
-        "is too large."
+        f"(u_D = {u_D:.3g}, SI). Either the model used the measurement, or u_D is too large."
     )

@@ -49,9 +49,9 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
         first = float(run.time[int(np.argmax(beyond))])
         rows = f"{int(beyond.sum())} of {len(size)} rows"
         return (
-            f"{name} reaches {size.max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times its "
-            f"limit, {most:.4g} {unit}, in {rows}, from {first:.4g} s on: "
-            "it seems to be in another unit there"
+            f"{name} reaches {size.max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times "
+            f"its limit, {most:.4g} {unit}, in {rows}, from {first:.4g} s on; probably its unit "
+            "changes there"
         )
     return None
 
@@ -68,7 +68,8 @@ def without_force(run: Run, model: Model) -> str:
         return "its commands are zero throughout"
     flipped = {name: ColumnChange(name, -1.0) for name in beyond}
     clause = (
-        f"its commands give no force: {', '.join(beyond.values())}, in all rows; has it the wrong sign?"
+        f"its commands give no force: {', '.join(beyond.values())}, in all rows; check the sign of "
+        "the command"
     )
     return clause + line_beside(run.file, flipped)
 
@@ -79,7 +80,9 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     largest = np.abs(tau).max()
     varies = np.ptp(tau, axis=0) > FUZZ * largest
     if not varies.any():
-        return "none of its commands ever varies, which tells nothing of what the ship does with them"
+        return (
+            "all its commands are constant, so the response of the ship to commands cannot be estimated"
+        )
     z = needed(w, model)
     size = np.sqrt((z**2).mean(axis=0))
     for k in np.flatnonzero(~varies):
@@ -88,8 +91,9 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
         opposed = not follows and size[k] > SETTINGS.least_gain * abs(given)
         if opposed and abs(given) > FUZZ * largest:
             return (
-                f"{name} is {given:.3g} {unit} in all rows, and the motion needs {z[:, k].mean():.3g} "
-                f"{unit} all the time: another column is meant, or it was not logged"
+                f"{name} is {given:.3g} {unit} in all rows, and the motion needs "
+                f"{z[:, k].mean():.3g} {unit} on average: it is another column, or it was not "
+                "logged"
             )
         inertia = inertial(w, model)[:, k]
         parts = inertia**2 + (z[:, k] - inertia) ** 2
@@ -118,6 +122,6 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
         return None
     return (
         f"all commands are zero for {w.every * idle.sum():.0f} s, and the motion needs "
-        f"{still[0]:.3g} N, {still[1]:.3g} N, {still[2]:.3g} N.m there, as before: "
-        "leave the cells of commands that were not logged empty"
+        f"{still[0]:.3g} N, {still[1]:.3g} N, {still[2]:.3g} N.m there, as before: leave the cells "
+        "of commands empty that were not logged"
     )

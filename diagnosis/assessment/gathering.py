@@ -73,8 +73,8 @@ def motion(prepared: PreparedRun) -> Smoothed:
     width = WIDTH * track.scale.time
     if track.period > width and not prepared.anyway:
         raise InputError(
-            f"run '{track.run.name}': a measurement every {track.period:.3g} s is too rare where forces "
-            f"are averaged over {width:.3g} s; {GO_ON}"
+            f"run '{track.run.name}': a measurement every {track.period:.3g} s is too rare "
+            f"to average forces over {width:.3g} s; {GO_ON}"
         )
     return prepared.smoothed
 
@@ -95,7 +95,7 @@ def usable(
             raise InputError(f"run '{name}': {without_force(s.track.run, model)}")
         windows.append(weak_windows(s, horizon))
         if not windows[-1].middle.size:
-            raise InputError(f"run '{name}': too much is missing while the thrusters are at work")
+            raise InputError(f"run '{name}': too many samples are missing while the thrusters act")
         if s.track.run.trial is not None:
             measured_passage(s, model.ship)  # refuses what is no trial
     if not anyway:

@@ -54,9 +54,9 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
 def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChange], str | None] | None:
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
     twice, wrong_one = same_columns(w.run), still_column(w.run)
-    seen = f"{wrong_one} is the same number in all rows, while the rest of the pose changes"
+    seen = f"{wrong_one} is constant in all rows, while the other channels of the pose change"
     if twice:
-        wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} are the same numbers"
+        wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} have the same values"
     if wrong_one:
         return seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column"
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
@@ -85,8 +85,8 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     unit = "N.m" if k == 2 else "N"
     return (
         f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no "
-        f"actuator pushes, and the ship can do {full[k]:.3g} {unit} at all: are columns swapped, or in "
-        "other units or axes?"
+        f"actuator acts, and all actuators together give {full[k]:.3g} {unit}: check columns, "
+        "units and axes"
     )
 
 
@@ -120,7 +120,7 @@ class Mistake(NamedTuple):
         """What seems to be wrong, and how sure that is."""
         ten = self.log_odds / np.log(10.0)
         odds = f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
-        return f"it seems that {', or that '.join(r.mistake for r in self.readings)} (odds {odds})"
+        return f"probably {', or '.join(r.mistake for r in self.readings)} (odds {odds})"
 
 
 def likeliest_mistake(

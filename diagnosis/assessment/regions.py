@@ -86,8 +86,9 @@ class Region:
     def sentence(self) -> str:
         unit = UNITS[self.axis]
         return (
-            f"{NAMES[self.axis]}: worst {self.phrase}: {self.rms:.2g} {unit} against "
-            f"{self.elsewhere:.2g} {unit} elsewhere, {100.0 * self.share:.0f} % of the time."
+            f"{NAMES[self.axis]}: the error is largest {self.phrase}: {self.rms:.2g} {unit}, "
+            f"compared with {self.elsewhere:.2g} {unit} elsewhere, for {100.0 * self.share:.0f} % "
+            "of the time."
         )
 
 
@@ -130,11 +131,11 @@ def find_regions(
         if _exceeds_noise(s, n, cluster):
             clearest = filter(None, (d.clearest_region() for d in designs))
             found = sorted(clearest, key=lambda r: -r.contrast)
-            where = f"{measured}, nowhere clearly worse than elsewhere"
+            where = f"{measured}, no region is significantly worse than the others"
         elif rms <= NOISE_TOLERANCE * uncertainty:
-            where = f"no error seen, {measured} is within the noise"
+            where = f"no model error detected, {measured} is within the noise"
         else:
-            where = f"{measured}, too seldom to say where"
+            where = f"{measured}, too rare to locate"
         regions += found
         sentences.append(found[0].sentence if found else f"{NAMES[axis]}: {where}.")
     return ErrorRegions(sentences, regions, profiles)

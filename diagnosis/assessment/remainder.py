@@ -28,41 +28,41 @@ from .recurrence import Recurrence
 from .regions import NAMES, UNITS, Region
 from .settings import SETTINGS
 
-NOTHING_LEFT = "What the model leaves is within the uncertainty of the measurement."
+NOTHING_LEFT = "The residual of the model is within the uncertainty of the measurement."
 LITTLE_LEFT = (
-    "What the model leaves is beyond the noise of the measurement, but less than 5 % of the first error "
-    "or 2 % of the commanded force."
+    "The residual of the model exceeds the noise of the measurement, but is less than 5 % of the "
+    "initial model error or 2 % of the commanded force."
 )
 # Space in which most repeats -> how, and what kind of cause does so.
 REPEATS = {
     "place": (
-        "repeats with the place",
-        "a cause that stands in the basin, such as a bank, shallow water or a current",
+        "depends on the position",
+        "a cause that is fixed in the basin, such as a bank, shallow water or a current",
     ),
     "motion": (
-        "repeats with speed, drift and turn",
-        "a force on the hull that no effect of the list has the shape of",
+        "depends on speed, drift and yaw rate",
+        "a force on the hull whose shape no known effect has",
     ),
     "command": (
-        "repeats with the commands",
-        "thrusters that give another force than the model of them, in a shape that no effect has",
+        "depends on the commands",
+        "a thruster force that differs from the thruster model in a shape that no effect has",
     ),
     "time": (
-        "repeats with the time since a run began",
-        "something that happens at the same time of each run, or a drift",
+        "depends on the time since the start of a run",
+        "an event at the same time of each run, or a drift",
     ),
 }
 IN_PART = (
-    "is in proportion to the command of its axis for a while and then not",
-    "a thruster that fails and comes back, or whose power changes",
+    "is proportional to the command of its axis for some time only",
+    "a thruster that fails and recovers, or whose power changes",
 )
 LASTS = (
-    "repeats with neither place, motion, command nor time, but lasts for about {0:.0f} s at a time",
-    "something that comes and goes, such as gusts, a changing current, or a towed cable",
+    ("depends on neither position, motion, command nor time, but lasts for about {0:.0f} s at a time"),
+    "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
 )
 BRIEF = (
-    "repeats with neither place, motion, command nor time, and is soon over",
-    "waves, a disturbance of the measurement, or commands other than those recorded",
+    "depends on neither position, motion, command nor time, and is short",
+    "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 
 
@@ -218,15 +218,15 @@ def remainder_sentence(
         amounts = " and ".join(_amount(axis, axes[axis]) for axis in group)
         where = [r for axis in group for r in regions if r.axis == axis][:1]
         place = f", most {where[0].phrase}" if where else ""
-        texts.append(f"{amounts} not explained{place}. It {comes}: that suggests {cause}.")
+        texts.append(f"{amounts} not explained{place}. It {comes}: this suggests {cause}.")
     if waves:
-        texts.append("A part of it are the waves that were found, which no model can foretell.")
+        texts.append("Part of it is the detected waves, whose timing is not predictable.")
     return " ".join(texts)
 
 
 def _amount(axis: str, r: AxisRemainder) -> str:
     share = 100.0 * np.sqrt(r.share)
-    of_first = f", {share:.2g} % of the first error" if share < 99.5 else ""
+    of_first = f", {share:.2g} % of the initial model error" if share < 99.5 else ""
     return f"{NAMES[axis]}: {r.rms:.2g} {UNITS[axis]} (uncertainty {r.uncertainty:.1g}{of_first})"
 
 

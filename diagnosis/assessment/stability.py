@@ -54,7 +54,7 @@ class OperatingRegion(NamedTuple):
 
 
 OPERATING = OperatingRegion()
-NOR_NOMINAL = "the nominal model is not held there either"
+NOR_NOMINAL = "nor is the nominal model held there"
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,10 @@ def check_stability(
     everywhere = sampled_motions(region)
     before = dissipation(nominal, everywhere, metric)
     after = dissipation(model, everywhere, metric)
-    indefinite = "the mass matrix is not positive definite: some force would push backwards"
+    indefinite = (
+        "the mass matrix is not positive definite: in some direction a force would accelerate the "
+        "ship backwards"
+    )
     notes = [] if mass_definite else [indefinite]
     worse = [*filter(None, (_compare(k, model, nominal, metric, region) for k in range(3)))]
     if not worse and _less(after.min(), before.min()):
@@ -126,7 +129,7 @@ def check_stability(
             f"{after.min():.3g} 1/s (nominal at least {before.min():.3g})"
         ]
     if not model.ship.fully_actuated:
-        advance("coming to rest without thrust")
+        advance("the decay of the motion without thrust")
         fastest = np.split(everywhere, SETTINGS.directions)[-1]
         bounded = mass_definite and comes_to_rest(model, fastest, region, notes)
         both = not (bounded or comes_to_rest(nominal, fastest, region, []))
@@ -150,7 +153,7 @@ def mass(model: Model) -> np.ndarray:
     try:
         M = model.mass
     except ZeroDivisionError:
-        raise InputError("a mass matrix has no inverse: no force would move the ship") from None
+        raise InputError("a mass matrix is singular: no force can accelerate the ship") from None
     return 0.5 * (M + M.T)
 
 
@@ -232,7 +235,7 @@ def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: O
         return ""
     speeds = nu[:, k]
     worse = speeds[_less(after, before)]
-    how = "is driven on" if after.min() < 0.0 else "is braked less"
+    how = "gains energy" if after.min() < 0.0 else "is damped less"
     return (
         f"{name} from {worse.min():.2g} to {worse.max():.2g} {unit}: the hull {how}, {after.min():.3g} "
         f"1/s at {speeds[np.argmin(after)]:.2g} {unit} (nominal at least {before.min():.3g})"
@@ -258,8 +261,8 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     kept = most <= SETTINGS.runaway
     what = f"{'stays below' if kept else 'exceeds'} {SETTINGS.runaway:g} times"
     notes.append(
-        "its thrusters give no force on some axis, so that no reference controller holds it: judged is "
-        f"how it moves without thrust, where it {what} the speeds of its region"
+        "its thrusters give no force on some axis, so no reference controller can hold it: the "
+        f"motion without thrust is checked, and {what} the speeds of its region"
     )
     return kept
 
@@ -282,7 +285,7 @@ def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -
         notes.append(f"{reference.name}: more than {bound:.3g} m from the target")
         if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < bound:
             notes.append(
-                "it holds without wind, waves and current: they are too strong for the thrusters"
+                "checked without wind, waves and current, which are too strong for the thrusters"
             )
             both = False
         elif largest_distance(reference, nominal) >= bound:

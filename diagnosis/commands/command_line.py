@@ -50,7 +50,7 @@ def prior(text: str) -> Prior:
         pairs = [part.split("=") for part in text.split(",")]
         return {name.strip(): _share(share) for name, share in pairs}
     except ValueError:
-        form = "a number of zero or more, or names with such numbers as in mass=0.01,thrust=0.5"
+        form = "a number of zero or more, or names with numbers as in mass=0.01,thrust=0.5"
         raise argparse.ArgumentTypeError(f"needs {form}, not '{text}'") from None
 
 
@@ -82,8 +82,8 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         "--model",
         type=Path,
         metavar="FILE",
-        help="model to begin with: a parameter set .ssv, an .fmu, a system, .ssp or scenario .json, or "
-        "a Python function .py (the nominal one)",
+        help="initial model: a parameter set .ssv, an .fmu, a system, .ssp or scenario .json, or a "
+        "Python function .py (the nominal model)",
     )
     made.add_argument(
         "--effects",
@@ -91,7 +91,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own, or one of an installed package; may be repeated",
+        help="a file of your own model effects, or one of an installed package; may be repeated",
     )
     ship_option(made)
     anyway_option(made)
@@ -99,7 +99,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         "--horizon",
         type=float,
         metavar="SECONDS",
-        help="length of the windows in which models predict the runs (8 s, times the scale of the ship)",
+        help="length of the prediction windows [s] (8 s, times the time scale of the ship)",
     )
     return made
 
@@ -110,13 +110,14 @@ def fmu_options(made: argparse.ArgumentParser) -> None:
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="which variables of an FMU given by --model are which signals (as names and units tell)",
+        help="map of the FMU's variables to the signals (guessed from names and units)",
     )
     made.add_argument(
         "--step",
         type=positive,
         metavar="SECONDS",
-        help="length of the FMU's steps (its stepSize if it takes no other, else as predictions need)",
+        help="step of the FMU [s] (its stepSize if it accepts no other, else the step that predictions "
+        "need)",
     )
     confinement_options(made)
 
@@ -127,13 +128,13 @@ def confinement_options(made: argparse.ArgumentParser) -> None:
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to the FMU (100 times that of its usual step, 30 s at the least)",
+        help="longest time of a call to the FMU [s] (100 times its usual step, at least 30 s)",
     )
     made.add_argument(
         "--unconfined",
         action="store_true",
-        help="run the FMU with access to files, network and other processes, which the result says (as "
-        "an FMU needs that is a client of a tool)",
+        help="give the FMU access to files, network and other processes; the result states it (for an "
+        "FMU that is the client of a tool)",
     )
 
 
@@ -149,8 +150,8 @@ def ship_option(made: argparse.ArgumentParser) -> None:
     made.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="the ship that was measured: a shipped one, or a description of your own (as the logs "
-        "of runs say, else cse1)",
+        help="the measured ship: a shipped one, or a file of your own (from the logs of the runs, else "
+        "cse1)",
     )
 
 
@@ -159,8 +160,8 @@ def anyway_option(made: argparse.ArgumentParser) -> None:
     made.add_argument(
         "--anyway",
         action="store_true",
-        help="use a run whose units, signs or columns seem to be other ones than stated, or whose "
-        "channels have faults that they cannot repair",
+        help="use a run although its units, signs or columns seem wrong, or although its channels have "
+        "faults that redundant channels cannot repair",
     )
 
 
@@ -170,9 +171,11 @@ def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
         "--out",
         type=folder_name,
         metavar="DIR",
-        help=f"result folder ({usual}; where the result of other inputs is, {usual}_2, ...)",
+        help=f"result folder ({usual}; if it holds the result of other inputs, {usual}_2, ...)",
     )
-    made.add_argument("--overwrite", action="store_true", help=f"use {usual}, whatever is there")
+    made.add_argument(
+        "--overwrite", action="store_true", help=f"use {usual}, and replace any result in it"
+    )
     made.set_defaults(usual=usual)
 
 
@@ -214,8 +217,8 @@ def _take_ship_of_logs(options: argparse.Namespace) -> None:
         return
     ship, path = told
     if "ship" not in options:
-        raise InputError(f"'{path}' is of {ship}; this analysis knows {DEFAULT} alone")
-    complain(f"the ship is {ship}, as '{path}' says; --ship means another one", "note: ")
+        raise InputError(f"'{path}' is of {ship}; this analysis supports {DEFAULT} only")
+    complain(f"the ship is {ship}, as '{path}' states; --ship names another one", "note: ")
     options.ship = ship
 
 

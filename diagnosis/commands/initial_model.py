@@ -48,14 +48,14 @@ def proposing() -> Iterator[None]:
     try:
         yield
     except UnmatchedError as error:
-        hint = f"'{MAP}' has what is known: complete it, and give it by --map {MAP}"
+        hint = f"'{MAP}' has the known entries: complete it, and give it by --map {MAP}"
         if Path(MAP).exists():
-            hint = f"complete '{MAP}' for --map, or remove it and another one is proposed"
+            hint = f"complete '{MAP}' for --map, or remove it to get a new proposal"
         else:
             from ..predictors import write_map  # takes a while to import, and only FMUs have maps
 
             try:
                 write_map(Path(MAP), error.proposal)
             except OSError:
-                hint = "--map FILE tells them"
+                hint = "--map FILE states them"
         raise InputError(f"{error}; {hint}") from None

@@ -102,8 +102,8 @@ def states_of(model: FmuModel, given: SystemMap | None) -> list[LinearState]:
     found = _of_ship(propose(model, commands))
     if not found:
         raise InputError(
-            f"no state of '{model.path.name}' can be set: it lists none with an exact start value, and "
-            "a --map with 'start' is missing"
+            f"no state of '{model.path.name}' can be set: it declares no state with an exact start "
+            "value, and a --map with 'start' is missing"
         )
     return found
 
@@ -133,8 +133,8 @@ def _listed(model: FmuModel) -> list[LinearState]:
             continue
         if not model.can_be_set(model.variables[state.name]):
             raise InputError(
-                f"state {quoted(state.name)} of '{model.path.name}' cannot be set; a --map with 'start' "
-                "names start values of the states to linearise in"
+                f"state {quoted(state.name)} of '{model.path.name}' cannot be set; a --map with "
+                "'start' names the start values of the states"
             )
         found.append(LinearState(state.name, rate.name, 0))
     return found
@@ -201,7 +201,7 @@ def linearised(
             columns.append((sides[1] - sides[0]) / (2.0 * d))
     J = np.column_stack([*columns, np.zeros((base.size, 0))])
     if not (np.isfinite(J).all() and np.isfinite(base).all()):
-        raise InputError(f"'{model.path.name}' has no finite slopes in this state")
+        raise InputError(f"'{model.path.name}' has no finite derivatives in this state")
     n, m = len(states), len(states)
     values = {**start, **driven, **dict(zip(outputs, base[n:].tolist(), strict=True))}
     names = [s.name for s in states]

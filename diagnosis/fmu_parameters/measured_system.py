@@ -114,7 +114,7 @@ def _read(path: Path, wanted: Sequence[str] | None) -> MeasuredRun:
     columns = {name: numbers(frame[name], table, layout) for name in names}
     time = columns.pop(TIME)
     if time.size < FEWEST or not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
-        raise InputError(f"'{path}': time must be at least {FEWEST} numbers that rise")
+        raise InputError(f"'{path}': time needs at least {FEWEST} increasing numbers")
     return MeasuredRun(path.stem if path.is_file() else path.name, time, columns)
 
 
@@ -227,7 +227,7 @@ def _window(
         std[c.name] = UNSURE * abs(c.factor / o.factor) * sure
     counts = t >= given.run_in - 1e-9
     if counts.sum() < FEWEST:
-        raise InputError(f"run '{run.name}' has no {FEWEST} samples after its run_in")
+        raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])
     return Window(run.name, begin, InputCourse(h, start, inputs), t[counts], measured[counts], std)
 

@@ -81,7 +81,7 @@ class Prior(BaseModel):
 
     std: Positive | None = Field(default=None, description="standard deviation [unit of the value]")
     rel_std: Positive | None = Field(default=None, description="the same, relative to the value [1]")
-    origin: str = Field(default="", description="where this is known from")
+    origin: str = Field(default="", description="source of this value")
 
     @model_validator(mode="after")
     def _one(self) -> "Prior":
@@ -95,12 +95,12 @@ class CalibratedParameter(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str = Field(description="variable of the FMU: a parameter, or an input that the map leaves")
-    unit: str = Field(default="1", description="the FMU's; for the reader")
-    value: FiniteFloat = Field(description="mean of the prior, where the fit begins")
+    name: str = Field(description="variable of the FMU: a parameter, or an input that is not in the map")
+    unit: str = Field(default="1", description="that of the FMU, for information only")
+    value: FiniteFloat = Field(description="mean of the prior, start of the fit")
     min: FiniteFloat | None = Field(default=None, description="lower bound")
     max: FiniteFloat | None = Field(default=None, description="upper bound")
-    log: bool = Field(default=False, description="fit the logarithm: the value is positive")
+    log: bool = Field(default=False, description="fit the logarithm of a positive value")
     prior: Prior
 
     @model_validator(mode="after")
@@ -111,7 +111,7 @@ class CalibratedParameter(BaseModel):
         if self.log and self.value <= 0.0:
             raise ValueError(f"'log' needs a positive value; got {self.value:g}")
         if self.prior.rel_std is not None and self.value == 0.0:
-            raise ValueError("'rel_std' of a value of zero says nothing; give 'std'")
+            raise ValueError("'rel_std' of a value of zero is zero; give 'std'")
         return self
 
     @property
@@ -157,7 +157,7 @@ class ParameterFile(BaseModel):
         names = [p.name for p in self.parameters]
         twice = [n for n in dict.fromkeys(names) if names.count(n) > 1]
         if twice:
-            raise ValueError(f"'{twice[0]}' stands there twice")
+            raise ValueError(f"'{twice[0]}' occurs twice")
         return self
 
 
@@ -181,7 +181,10 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
     possible = {v.name for v in model.variables.values() if can_be_calibrated(v)} - set(mapped)
     for p in found:
         if p.name in mapped:
-            raise InputError(f"'{path}': {quoted(p.name)} is a variable of the map; remove it from one")
+            raise InputError(
+                f"'{path}': {quoted(p.name)} is a variable of the map; remove it from the map or "
+                "from this file"
+            )
         if p.name not in possible:
             hint = nearest(p.name, possible)
             raise InputError(f"'{path}': {model.path.name} has no parameter {quoted(p.name)}{hint}")

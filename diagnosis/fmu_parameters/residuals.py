@@ -208,7 +208,7 @@ class WindowResiduals:
                 columns.append((r - base) / (h if r is high else -h))
             else:
                 columns.append(np.zeros_like(base))
-                faults.append(f"{name}: it fails on either side of its value")
+                faults.append(f"{name}: the FMU fails on both sides of its value")
         return np.column_stack([*columns, np.zeros((base.size, 0))]), faults
 
     def _moved(

@@ -58,7 +58,7 @@ def sensitivities(r: WindowResiduals, advance: Advance) -> Sensitivities:
     start = Setting((0.0,) * len(r.parameters))
     advance("predictions with the start values")
     r.whiten_about(start)
-    advance("ranges in which the FMU works")
+    advance("ranges in which the FMU runs")
     ranges = [_working(r, start, k) for k in range(len(r.parameters))]
     r.choose([p for p, _ in ranges])
     advance("sensitivities of the predictions")
@@ -114,4 +114,6 @@ def refuse_unknown(found: Sensitivities) -> None:
         InputError: they tell none.
     """
     if not any(s.known for s in found.each):
-        raise InputError("the runs tell no parameter: no output changes with any beyond its noise")
+        raise InputError(
+            "the runs do not identify any parameter: no output changes by more than its noise"
+        )

@@ -218,7 +218,7 @@ def _rejected(validate: WindowResiduals | None, best: ParameterFit, start: Setti
     change = blocks(validate, after) - blocks(validate, before)
     error = float(np.std(change, ddof=1) * np.sqrt(change.size)) if change.size > 1 else 0.0
     worse = float(change.sum()) > WORSE * error and change.sum() > 0.0
-    return "with it the validation runs are predicted worse" if worse else ""
+    return "with it the prediction error of the validation runs is larger" if worse else ""
 
 
 def _errors(

@@ -47,8 +47,12 @@ class MappedVariable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(description="variable of the FMU")
-    factor: FiniteFloat = Field(default=1.0, description="unit of the column in that of the variable")
-    offset: FiniteFloat = Field(default=0.0, description="what is added, in the variable's unit")
+    factor: FiniteFloat = Field(
+        default=1.0, description="factor from the unit of the column to that of the variable"
+    )
+    offset: FiniteFloat = Field(
+        default=0.0, description="offset that is added, in the unit of the variable"
+    )
 
 
 class MeasuredOutput(MappedVariable):
@@ -63,7 +67,8 @@ class DrivenInput(MappedVariable):
     """An input that a column drives."""
 
     linear: bool = Field(
-        default=False, description="straight between samples, in place of held until the next"
+        default=False,
+        description="linear interpolation between samples (each sample is held until the next)",
     )
 
 
@@ -78,11 +83,11 @@ class SystemMap(BaseModel):
         default_factory=dict, description="start values, by measured outputs or their derivatives"
     )
     beside: list[str] | None = Field(
-        default=None, description="inputs on which a force may act in addition (those in N, N.m, m/s2)"
+        default=None, description="inputs where an additional force may act (those in N, N.m, m/s2)"
     )
     window: Positive | None = Field(default=None, description="length of the windows [s] (whole runs)")
     run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] = Field(
-        default=0.0, description="time before a prediction counts [s]"
+        default=0.0, description="time before a prediction is compared [s]"
     )
 
     @field_validator("inputs", "outputs", "start", mode="before")
@@ -124,8 +129,8 @@ def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemM
     if not outputs:
         names = ", ".join(v.name for v in known.values() if v.causality == "output") or "none"
         raise InputError(
-            f"{where}: no column is called as an output of '{model.path.name}' ({names}); "
-            "--map FILE.json says which column is which variable"
+            f"{where}: no column has the name of an output of '{model.path.name}' ({names}); --map "
+            "FILE.json maps columns to variables"
         )
     return SystemMap.model_validate(
         {

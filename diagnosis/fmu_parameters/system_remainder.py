@@ -57,11 +57,11 @@ class SystemRemainder:
         """In words."""
         worst = [o for o in self.outputs if o.p < CHANCE / len(self.outputs) and o.matters]
         if not worst:
-            return "The residual is not distinguishable from noise, or too small to matter."
+            return "The residual is not distinguishable from noise, or too small to be relevant."
         each = ", ".join(
-            f"{o.name}: {o.rms:.3g} {o.unit} ({o.share:.0%} of its first squares)" for o in worst
+            f"{o.name}: {o.rms:.3g} {o.unit} ({o.share:.0%} of its initial squared error)" for o in worst
         )
-        return f"A residual beyond the noise is left in {each}."
+        return f"A residual above the noise remains in {each}."
 
 
 def remainder(

@@ -235,7 +235,7 @@ def system_task(
             if v.causality == "output" and v.type == "Real"
         }
         if not outputs:
-            raise InputError(f"'{fmu}' has no real output that could be measured")
+            raise InputError(f"'{fmu}' has no output of type Real to compare with measurements")
         found = SystemMap.model_validate({"outputs": outputs})
     check_map(found, model, f"'{map or fmu.name}'")
     notes: list[str] = []
@@ -248,6 +248,6 @@ def system_task(
         raise InputError(f"{quoted(fmu.name)} has no parameter that can be calibrated{why}")
     columns = [*found.inputs, *found.outputs]
     if TIME in columns:
-        raise InputError(f"'{map}': {TIME} is the time of the samples, and no column of the map")
+        raise InputError(f"'{map}': {TIME} is the time of the samples and cannot be a column of the map")
     read = {use: read_runs(paths, columns) for use, paths in runs.items()}
     return SystemTask(model, found, chosen, notes, read, window, execution)

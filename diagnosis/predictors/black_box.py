@@ -182,7 +182,7 @@ class BlackBox(ABC):
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
     ) -> list[str]:
         return (
-            [] if learned is None else [f"What was found is not written: {self.name} has no parameters."]
+            [] if learned is None else [f"The findings are not written: {self.name} has no parameters."]
         )
 
     def _sentences(self, wait: float) -> Iterator[str]:
@@ -192,10 +192,10 @@ class BlackBox(ABC):
             began = f"after a run-in of {wait:.3g} s" if wait else "from rest"
             yield (
                 f"Its velocity cannot be set ({', '.join(VELOCITY)} of the map's start): runs are "
-                f"predicted as a whole, {began}. The force that it lacks is that along its prediction."
+                f"predicted as a whole, {began}. Its model error is computed along its prediction."
             )
         if self.placed:
-            yield "Its pose is laid onto the measured one where a prediction begins."
+            yield "At the start of a prediction its pose is aligned with the measured pose."
 
     def _poses(self, starts: WindowStarts) -> np.ndarray:
         """The predicted pose (steps + 1, 3, 1, w) in windows."""

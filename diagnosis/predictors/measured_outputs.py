@@ -49,7 +49,7 @@ def inseparable(runs: Sequence[WeakWindows], model: Model) -> list[str]:
         if speed.std() > SHARE_OF_COMMAND * abs(speed.mean()) or not speed.any():
             continue
         told.append(
-            f"The {a.part.title} turns at {speed.mean():.3g} 1/s throughout: its thrust and the "
-            "resistance of the hull cannot be told apart by motion alone; run other shaft speeds."
+            f"The {a.part.title} turns at {speed.mean():.3g} 1/s throughout: motion alone cannot "
+            "discriminate its thrust from the resistance of the hull; run other shaft speeds."
         )
     return told

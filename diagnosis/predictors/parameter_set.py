@@ -30,7 +30,7 @@ from .ship_model import Model
 
 MEASUREMENT, THRUSTERS = "measurement", "thrusters"
 # What a tool is told of a parameter that no FMU has.
-NO_FMU = "of the measurement system, which no FMU has; in a scenario it is a fault"
+NO_FMU = "of the measurement system: no FMU has this parameter; a scenario has a fault instead"
 
 
 def write_model(path: Path, model: Model) -> None:
@@ -135,7 +135,7 @@ def read_model(path: Path, of: Ship | None = None) -> Model:
 def _find(name: str, declared: Mapping[str, Variable], where: str) -> Variable:
     if name not in declared:
         raise InputError(
-            f"{where} is no parameter{nearest(name, declared)}; one of an effect of your own "
+            f"{where} is not a parameter{nearest(name, declared)}; one of an effect of your own "
             "needs --effects FILE.py"
         )
     return declared[name]

@@ -264,7 +264,7 @@ def refuse_map(map: Path | None) -> None:  # noqa: A002
         InputError: there is one.
     """
     if map is not None:
-        raise InputError("--map tells the variables of an FMU: --model NAME.fmu is missing")
+        raise InputError("--map belongs to an FMU: --model NAME.fmu is missing")
 
 
 def refuse_execution(execution: Execution) -> None:
@@ -274,4 +274,6 @@ def refuse_execution(execution: Execution) -> None:
         InputError: something is said.
     """
     if execution != DEFAULT_EXECUTION:
-        raise InputError("--timeout, --step and --unconfined are of an FMU: --model NAME.fmu is missing")
+        raise InputError(
+            "--timeout, --step and --unconfined belong to an FMU: --model NAME.fmu is missing"
+        )

@@ -118,8 +118,8 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     linear = TIE * float(np.median(behind[:, 1]))
     # Linear below what may be a tie, logarithmic far above.
     scale = (lambda x: np.arcsinh(x / linear)) if linear else None
-    label = "score behind the first, with its standard error [1]"
-    label += "\nright: explained beyond other values of the coefficients"
+    label = "score minus the best score, with its standard error [1]"
+    label += "\nright: explained in addition to other coefficient values"
     names = ChartAxis(limits=(len(shown), -1), names=[r.id for r in shown])
     panel = Panel(ChartAxis(label, scale=scale), names)
     for k, (r, (x, std)) in enumerate(zip(shown, behind, strict=True)):

@@ -87,10 +87,11 @@ def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
     texts: dict[str, list[str]] = {}
     for other in alike[:SHOWN]:
         texts.setdefault(tell_apart(effects[name], effects[other]), []).append(other)
-    parts = [f"To tell {name} from {listed(ids)}: {text}." for text, ids in texts.items()]
+    parts = [f"To discriminate {name} from {listed(ids)}: {text}." for text, ids in texts.items()]
     if len(alike) > SHOWN:
         parts.append(
-            "So many causes fit that the data hold too little: vary speed, turn and drift more."
+            "The data do not suffice to discriminate so many candidates: vary speed, turn and "
+            "drift more."
         )
     return " ".join(parts)
 
@@ -104,4 +105,4 @@ def listed(names: Sequence[str], joined: str = "or") -> str:
 
 def separation_note(name: str, alike: Sequence[str]) -> str:
     """Which effects these data cannot tell from one; empty if none."""
-    return f"On these data {name} cannot be told apart from {listed(alike)}." if alike else ""
+    return f"These data cannot discriminate {name} from {listed(alike)}." if alike else ""

@@ -16,28 +16,28 @@ from .reported_effect import ReportedEffect
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
-NO_CALIBRATION = "The initial model stands for calibration here, which does not predict better."
-CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
-CALIBRATION_GAINED_NOTHING = "Calibration gains nothing over the initial model."
-NOTHING_FOUND = "Nothing is missing that these data show."
-TOO_LITTLE = "What is missing is more than noise, but too little to matter."
-UNEXPLAINED = "Something is missing, and no effect that is known here explains it."
-NOT_BELIEVED = (
-    "Something is missing, and no effect that is known here is likely enough to be told as its cause."
+NO_CALIBRATION = (
+    "The comparison is with the initial model, because calibration does not improve the predictions."
 )
+CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
+CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of the initial model."
+NOTHING_FOUND = "These data show no missing effect."
+TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
+UNEXPLAINED = "A model error remains that no known effect explains."
+NOT_BELIEVED = "A model error remains, and no known effect explains it with sufficient confidence."
 CALIBRATED = (
-    " The learned model is calibrated: with all coefficients fitted together, each within what is "
-    "believed of it, runs left out are predicted better. It tells no cause."
+    " The learned model is calibrated: all coefficients are fitted together within their priors, "
+    "and predictions of validation data improve. This does not identify a cause."
 )
 VERDICTS = {
-    "found": "Something is missing, and it was found",
-    "ambiguous": "Something is missing, and more than one cause fits",
-    "coefficients": "Coefficients are wrong, and nothing else is missing",
-    "unexplained": "Something is missing, and nothing known here explains it",
-    "none": "Nothing is missing that these data show",
+    "found": "An effect is missing and was identified",
+    "ambiguous": "An effect is missing, and several candidates explain it",
+    "coefficients": "Coefficients differ from their nominal values; no effect is missing",
+    "unexplained": "A model error remains that no known effect explains",
+    "none": "These data show no missing effect",
 }
 # Headings where one cause fits and is not sure, and where effects are possible and none is believed.
-UNSURE = "Something is missing, and what it is, is not sure"
+UNSURE = "An effect is missing, and its identification is uncertain"
 
 
 def is_sure(e: ReportedEffect) -> bool:
@@ -56,8 +56,8 @@ def told(e: ReportedEffect) -> str:
         return e.sentence
     others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
     sure = f" ({100.0 * e.confidence:.2g} % for {e.id})" if np.isfinite(e.confidence) else ""
-    doubt = f" But {e.doubt}." if e.doubt else ""
-    model = "" if e.in_model else " The learned model does not have it."
+    doubt = f" However, {e.doubt}." if e.doubt else ""
+    model = "" if e.in_model else " It is not in the learned model."
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
 
 
@@ -114,7 +114,7 @@ def headline(r: ReportData) -> str:
         return " ".join(map(told, surest_first(r.effects)))
     if d.verdict == "coefficients":
         names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
-        above = f", above all {listed(names, 'and')}" if names else ""
+        above = f", mainly {listed(names, 'and')}" if names else ""
         return (
             f"Other values of the nominal coefficients explain these data{above}; no effect is missing."
         )

@@ -84,7 +84,7 @@ def write_report(
         "page.html",
         r=data,
         diagnosis=data.diagnosis,
-        title="Model against measurements" if data.diagnosis is None else "Diagnosis",
+        title="Comparison of model and measurements" if data.diagnosis is None else "Diagnosis",
         verdict=verdict_title(data),
         sentence=headline(data),
         gain=gain_of_search(data),
@@ -128,7 +128,7 @@ def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:
     yield "model", r.model
     if r.diagnosis is not None:
         prior = r.diagnosis.prior
-        yield "prior of the coefficients", "by where each value comes from" if prior is None else prior
+        yield "prior of the coefficients", "from the source of each value" if prior is None else prior
         yield "seed", r.diagnosis.seed
     yield "versions", versions()
 
@@ -154,7 +154,7 @@ def _residuals(r: ReportData) -> Iterator[Drawing]:
 def _growth(r: ReportData) -> Iterator[Drawing]:
     for use, runs in _by_use(r):
         if known := [e for e in runs if e.windows is not None]:
-            caption = f"Error of prediction over time, {use}: median, and half of all samples."
+            caption = f"Prediction error over time, {use}: median, and half of all samples."
             yield drawing(tracks.error_growth(known, r.learned), f"growth-{known[0].use}", caption)
 
 
@@ -163,7 +163,7 @@ def _by_use(r: ReportData) -> Iterator[tuple[str, list[Evaluation]]]:
     for use in USES:
         if runs := [e for e in r.evaluations if e.use == use]:
             words = r.use(runs[0])
-            yield f"runs {words}" if words else "all runs", runs
+            yield f"{words} runs" if words else "all runs", runs
 
 
 def _free(r: ReportData) -> Iterator[Drawing]:
@@ -187,10 +187,10 @@ def _places(r: ReportData) -> Iterator[Drawing]:
         if not e.weak_windows.middle.size:
             continue
         if placed:
-            caption = f"{name}: the missing force along the track."
+            caption = f"{name}: the model error along the track."
             yield drawing(tracks.place(e, r.learned), f"place-{k}", caption)
         if e.name in pushes:
-            caption = f"{name}: where something pushed the ship, and the force that is left."
+            caption = f"{name}: times of disturbances, and the residual force."
             yield drawing(tracks.place(e, r.learned, pushes[e.name]), f"push-{k}", caption)
 
 

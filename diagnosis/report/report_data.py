@@ -19,7 +19,7 @@ from .reported_effect import ReportedEffect, reported_effects
 
 UNITS = {m.name.removesuffix("_1"): m.unit for m in MEASURES}
 # What the data of a run were used for.
-USES = {"train": "learned from", "validate": "decided by", "test": "seen only now"}
+USES = {"train": "training", "validate": "validation", "test": "test"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,11 +40,11 @@ def show_calibration(calibrated: CalibratedModel, r: ReportData, out: str) -> It
     """Output of the second answer of ``diagnosis.learn``."""
     gain = gain_of_calibration(calibrated, r)
     if gain:
-        yield from _lines("What calibration gained", map(_plain, gain))
+        yield from _lines("Gain of the calibration", map(_plain, gain))
     moved = calibrated.learned.moved
     furthest = sorted(moved, key=lambda name: -abs(moved[name]))[:SHOWN]
     by = (f"{n} is {_number(calibrated.model.value(n))} ({_number(moved[n], 2)})" for n in furthest)
-    yield from _lines("Coefficients that moved most, in standard deviations of the prior", by)
+    yield from _lines("Coefficients with the largest changes, in standard deviations of the prior", by)
     yield from _errors(r)
     yield from _files(r, out)
 
@@ -54,8 +54,8 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     d = r.diagnosis
     assert d is not None
     if gain := gain_of_search(r):
-        yield from _lines("What the search gained", map(_plain, gain))
-    yield from _lines("What is left without an explanation", [d.remainder.sentence])
+        yield from _lines("Gain of the search", map(_plain, gain))
+    yield from _lines("Residual without explanation", [d.remainder.sentence])
     if not r.effects:
         yield from _lines("Finding", [headline(r)])
     for k, effect in enumerate(surest_first(r.effects), 1):
@@ -64,22 +64,22 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     for effect in r.possibilities:
         yield from _lines(f"Possibility: {effect.id}", _effect(effect))
     if d.withdrawn:
-        yield from _lines("Withdrawn", [f"{w.id}: {w.reason}" for w in d.withdrawn])
+        yield from _lines("Rejected", [f"{w.id}: {w.reason}" for w in d.withdrawn])
     if d.learned.suspects:
         suspects = [
-            f"{s.name} is rather {_number(s.value)} ({_number(s.z, 2)} standard deviations of the prior)"
-            f"{WEIGH * (s.name == 'm')}"
+            f"{s.name}: probably {_number(s.value)} ({_number(s.z, 2)} standard deviations of "
+            f"the prior){WEIGH * (s.name == 'm')}"
             for s in d.learned.suspects
         ]
         yield from _lines("Suspect coefficients", suspects)
-    together = [f"Known only together: {', '.join(group)}." for group in d.posterior.together]
+    together = [f"Identifiable only together: {', '.join(group)}." for group in d.posterior.together]
     sure = [d.unrecorded.sentence, *together, *(f"Warning: {x}" for x in r.inseparable)]
-    yield from _lines("How sure the values are", sure)
+    yield from _lines("Uncertainty of the values", sure)
     if r.accepted:
         first, *others = d.learned.ranking[: SHOWN + 1]
         behind = [f"{c.id} +{_number(c.behind)} (± {_number(c.behind_std, 2)})" for c in others]
         yield from _lines(
-            "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
+            "Best candidates, with the score difference to the first", [", ".join([first.id, *behind])]
         )
     yield from _errors(r)
     yield from _lines("Stability", _stability(d.stability))
@@ -95,7 +95,7 @@ def summary(r: ReportData) -> str:
     lines = [f"{d.verdict}: {verdict_title(r)}"]
     lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in first] or [f"  {headline(r)}"]
     lines += [f"  {d.remainder.sentence}"]
-    over = f"predictions over {_number(r.lengths[0])} s miss by"
+    over = f"prediction error over {_number(r.lengths[0])} s"
     for e in runs:
         pair = " -> ".join(_number(1e3 * x, 2) for x in (e.before.position, e.after.position))
         lines.append(f"  {r.called(e)}: {over} {pair} mm")
@@ -137,11 +137,11 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     examined = [(e.name, e.smoothed.sensors) for e in r.evaluations]
     faults = [f"{run}: {line}" for run, x in examined if x for line in sensor_lines(x.findings)]
     if faults:
-        yield from _lines("What channels say of each other", faults)
+        yield from _lines("Faults that redundant channels show", faults)
     kind, sentences = r.how_it_predicts
     if kind:
-        yield from _lines(f"How the {kind} predicts", sentences)
-    yield from _lines("Where the model fails", r.comparison.before.sentences)
+        yield from _lines(f"Predictions of the {kind}", sentences)
+    yield from _lines("Location of the model error", r.comparison.before.sentences)
 
 
 def channel_table(
@@ -157,7 +157,7 @@ def channel_table(
             f"{_number(c.rate)} Hz",
             _percent(c.held),
             f"{_number(c.noise, 2)} {c.unit}",
-            c.noise_from if c.known else "hardly known",
+            c.noise_from if c.known else "uncertain",
             f"{c.outliers}{first}",
             c.why or "yes",
         )
@@ -169,8 +169,8 @@ def _effect(e: ReportedEffect) -> Iterator[str]:
     yield told(e)
     yield e.equation
     share = _percent(e.share_of_error)
-    alone = "" if e.share_unique is None else f", {_percent(e.share_unique)} that nothing else does"
-    yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error{alone}"
+    alone = "" if e.share_unique is None else f", unique contribution {_percent(e.share_unique)}"
+    yield f"confidence {_percent(e.confidence)}, explains {share} of the squared error{alone}"
     yield from filter(None, (e.separation, e.advice))
 
 
@@ -178,7 +178,7 @@ def _errors(r: ReportData) -> Iterator[RenderableType]:
     """Errors of predictions, the model error, and what is measured of actuators and of trials."""
     predictions = _table("run", "position [mm]", "heading [°]")
     forces = _table("run", "X [N]", "Y [N]", "N [N m]")
-    measured = _table("run", "what is measured", "off by [SI]")
+    measured = _table("run", "measured output", "error [SI]")
     trials = _table("run", "measure", "measured", "predicted", "unit")
 
     def cell(before: float | None, after: float | None, scale: float = 1.0) -> str:
@@ -197,9 +197,9 @@ def _errors(r: ReportData) -> Iterator[RenderableType]:
         trials.add_row(Text(row.run), row.measure, _number(row.measured), predicted, row.unit)
     when = ", before -> after" if r.learned else ""
     for title, table in (
-        (f"Predictions over {_number(r.lengths[0])} s miss by", predictions),
-        ("Force that the model lacks", forces),
-        ("Measured outputs of actuators and the model's", measured),
+        (f"Prediction error over {_number(r.lengths[0])} s", predictions),
+        ("Model error", forces),
+        ("Measured and predicted outputs of actuators", measured),
         ("Manoeuvring trials, from just before the first execute", trials),
     ):
         if table.row_count:
@@ -211,11 +211,11 @@ def _stability(s: Stability) -> Iterator[str]:
         yield "The mass matrix of the learned model is not positive definite."
     yield f"{boundedness(s)}."
     yield (
-        f"smallest dissipation {_number(s.learned_min_dissipation)} 1/s, "
-        f"of the model at first {_number(s.nominal_min_dissipation)} 1/s"
+        f"smallest dissipation {_number(s.learned_min_dissipation)} 1/s, of the initial model "
+        f"{_number(s.nominal_min_dissipation)} 1/s"
     )
     if s.region:
-        yield f"warning: less dissipation than at first: {s.region}"
+        yield f"warning: less dissipation than the initial model: {s.region}"
     yield from s.notes
 
 

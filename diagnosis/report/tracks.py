@@ -90,7 +90,7 @@ def heading_bands(e: Evaluation) -> Chart | None:
     inside = e.windows.sample_window == worst
     since, predicted = e.windows.since[inside], e.bands.predicted[worst, :, 2]
     centre = np.interp(since, e.bands.since, predicted)
-    panel = Panel(ChartAxis("time since the window began [s]"), ChartAxis("heading [°]"))
+    panel = Panel(ChartAxis("time since the start of the window [s]"), ChartAxis("heading [°]"))
     _broad(panel, since, np.degrees(centre + wrap(e.windows.measured[inside, 2] - centre)))
     panel.draw(e.bands.since, np.degrees(predicted), AFTER, "after")
     for level in LEVELS:
@@ -129,7 +129,7 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
     edges = np.linspace(0.0, windows[0].length, parts + 1)
     middle = (edges[:-1] + edges[1:]) / 2
     part = np.clip(np.digitize(since, edges) - 1, 0, parts - 1)
-    time = ChartAxis("time since the window began [s]", (0.0, edges[-1]))
+    time = ChartAxis("time since the start of the window [s]", (0.0, edges[-1]))
     position = Panel(
         ChartAxis(limits=time.limits, shown=False), ChartAxis("position [mm]", scale=np.log10)
     )

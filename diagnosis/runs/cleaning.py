@@ -135,10 +135,10 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     kept = in_order(run.time)
     out = run.time.size - kept.size
     if out > MOST_WRONG * run.time.size:
-        raise InputError(f"{where}: time does not grow in {out} of {run.time.size} rows")
+        raise InputError(f"{where}: time does not increase in {out} of {run.time.size} rows")
     notes = list(run.notes)
     if out:
-        notes.append(f"{out} rows left out: time missing, repeated or backwards")
+        notes.append(f"{out} rows left out: time missing, repeated or decreasing")
         run = run.rows(kept)
     run = replace(
         run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
@@ -154,9 +154,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
     fresh = np.flatnonzero(seen & ~dropped)
     if fresh.size < FEWEST or turned.sum() < FEWEST:
-        raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
+        raise InputError(f"{where} does not move: its pose is frozen or missing in all rows")
     if between.any() or lined.any():
-        notes.append("rows between two measurements were filled by straight lines: they do not count")
+        notes.append("rows between two measurements were linearly interpolated: they are not counted")
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
     steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
@@ -186,7 +186,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])
     if not (reach > [6.0 * noise(values[:, None])[0] for values in channels]).any():
-        raise InputError(f"{where} does not move: its pose is noise around a place")
+        raise InputError(f"{where} does not move: its pose is noise about a fixed position")
     steps = np.diff(run.time[fresh])
     if many := int((steps > gap).sum()):
         begin = run.time[fresh][steps.argmax()] - run.time[0]
@@ -202,7 +202,7 @@ def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.nda
         InputError: it is not.
     """
     if not anyway:
-        raise InputError(f"{where}: psi never changes while the ship goes on; {GO_ON}")
+        raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
     return constant
 
 

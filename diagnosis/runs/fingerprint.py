@@ -97,9 +97,7 @@ def fingerprints(told: Iterable[Mapping[str, Any]], where: Path) -> tuple[Finger
     try:
         return tuple(map(Fingerprint.read, told))
     except (ValueError, KeyError, TypeError):
-        raise InputError(
-            f"'{where}': what it tells of the runs that it was learned from is broken"
-        ) from None
+        raise InputError(f"'{where}': its list of training runs is damaged") from None
 
 
 def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:

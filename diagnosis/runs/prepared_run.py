@@ -27,7 +27,9 @@ from .smoothing.smoother import Smoothed, smooth
 from .thinning import spaced
 
 # A part of a log contains less information on its clock than the whole.
-WHOLE_FIRST = "repair the whole log by its other channels (cybership repair) and take the part of that"
+WHOLE_FIRST = (
+    "repair the whole log by its redundant channels (cybership repair) and use the part of the result"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +59,10 @@ class PreparedRun:
         fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
         if 2 * spikes > fresh and not self.anyway:
             raise InputError(
-                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
-                "than five standard deviations from where all others say the ship is: something is "
-                "wrong with the pose or its time; leave the cells of false samples empty, or, of a part "
-                f"of a log, {WHOLE_FIRST}; {GO_ON}"
+                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are "
+                "more than five standard deviations from the track of all others. The pose or its "
+                "time is wrong. Leave the cells of false samples empty, or, of a part of a log, "
+                f"{WHOLE_FIRST}; {GO_ON}"
             )
         return replace(found, sensors=self.sensors)
 
@@ -102,8 +104,8 @@ def prepare(
     in_doubt = next((finding for finding in unrepaired if not finding.aside), None)
     if in_doubt and not anyway:
         raise InputError(
-            f"run '{raw.name}': {in_doubt.sentence}; no other channel shows how to repair that; "
-            f"if it is a part of a log, {WHOLE_FIRST}; {GO_ON}"
+            f"run '{raw.name}': {in_doubt.sentence}; no other channel shows how to repair this; if "
+            f"the run is a part of a log, {WHOLE_FIRST}; {GO_ON}"
         )
     sensors = sensors.without({name for finding in unrepaired for name in finding.aside})
     repaired = replace(sensors.run, notes=(*sensors.run.notes, *sensors.notes))

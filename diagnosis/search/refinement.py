@@ -146,7 +146,7 @@ class ValueAtLimit(NamedTuple):
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit != "1" else ""
-        end = f"{'upper' if self.is_upper else 'lower'} limit of what was looked for"
+        end = f"{'upper' if self.is_upper else 'lower'} limit of the search"
         measured = f" ({self.measured})" if self.measured else ""
         return f"{self.name} = {self.value:.4g}{unit} is at the {end}, {self.limit:.4g}{unit}{measured}"
 

@@ -27,13 +27,11 @@ FOUND = 0.8  # confidence from which on an effect is found; contract
 # Confidence at the most where an unknown alternative is as likely as the effect; that of a set of
 # effects from which on the set is a finding, and not only a possibility; contract.
 EVEN_ODDS = 0.5
-MAY_BE_NONE = "by the intervals of its values it may be nothing"
-MAY_BE_LAGS = (
-    "actuators that are faster than described, or commands that are measured states, look the same"
-)
-MAY_BE_CLOCK = "a channel was set aside that tells of a clock at another rate, which may look the same"
-RARE = "samples are too rare for quick forces: fewer than six in the time over which these are averaged"
-RESIDUAL = "something that it does not explain acts on the same axis"
+MAY_BE_NONE = "the intervals of all its values include zero"
+MAY_BE_LAGS = "faster actuators than described, or measured states as commands, have the same effect"
+MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
+RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
+RESIDUAL = "a residual that it does not explain acts on the same axis"
 
 
 class Confidence(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 
 from .validation_data import Losses
 
-CHARGED = "the model fits {where} worse, or not better by what its parameters cost (BIC)"
+CHARGED = "the model fits {where} worse, or not better by the cost of its parameters (BIC)"
 
 
 def harm(its: Losses, others: Losses, more: int) -> str:

@@ -16,10 +16,10 @@ from .paired_errors import gain
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
 
-ALONE = "with it {harm}"
-WHOLE_SET = "with it and what was found before it {harm} than at first"
-NOTHING = "fitted to predictions it is nothing"
-DRIVES = "with it the hull drives the ship on, and {where} do not show that it does"
+ALONE = "with this effect {harm}"
+WHOLE_SET = "with this effect and the earlier ones {harm} than with the initial model"
+NOTHING = "its value is zero after the fit to predictions"
+DRIVES = "with this effect the hull gains energy, and {where} do not confirm that"
 
 
 class Withdrawn(NamedTuple):

@@ -34,7 +34,9 @@ def failings(a: Actuator) -> list[Effect]:
     lagging = slow(
         d._replace(label=f"the {d.title}"),
         lag,
-        lambda f: f"{d.does('follow')} its command with a time constant {number(f[lag])} s longer.",
+        lambda f: (
+            f"{d.does('follow')} its command with a time constant that is {number(f[lag])} s longer."
+        ),
         a.commands,
         a.round,
     )
@@ -66,7 +68,7 @@ def by_axis(d: Devices) -> Effect:
         )
         for axis, way in ALONG.items()
     ]
-    apart = {"X_u": "coast, and drive at the same speed", "Y_v": "drift freely"}
+    apart = {"X_u": "coast, and run under thrust at the same speed", "Y_v": "drift freely"}
     return inflow(d._replace(apart=True), slopes, apart)
 
 

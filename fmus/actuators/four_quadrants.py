@@ -129,7 +129,9 @@ class FourQuadrantPropeller(OpenWaterPropeller):
 class ReversedFoil(NamedTuple):
     """What a rudder needs behind a shaft that turns astern."""
 
-    race_astern: Annotated[float, "1", "k_xR, share of the race astern that meets the rudder"] = 0.0
+    race_astern: Annotated[float, "1", "k_xR, share of the astern slipstream that meets the rudder"] = (
+        0.0
+    )
     pressure_astern: Annotated[float, "1", "C_pr, change of u_R^2 by the shaft astern, over u^2"] = 0.0
 
 
@@ -144,7 +146,11 @@ class FourQuadrantRudder(RudderInRace):
     name = "four_quadrant_rudder"
     changes = (
         *RudderInRace.changes,
-        Change("race_astern", ("race_astern", "pressure_astern"), "flow behind the shaft astern"),
+        Change(
+            "race_astern",
+            ("race_astern", "pressure_astern"),
+            "flow downstream of the shaft running astern",
+        ),
     )
     Parameters = group_of("FourQuadrantFoil", [*variables(RaceFoil), *variables(ReversedFoil)])
 

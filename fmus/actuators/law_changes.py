@@ -36,7 +36,7 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
 
     def sentence(f: Found) -> str:
         told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
-        return f"The {title}: {change.text} is another than the model believes, by {', '.join(told)}."
+        return f"The {title}: {change.text} differs from the model by {', '.join(told)}."
 
     @effect(
         name,

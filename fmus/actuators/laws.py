@@ -302,8 +302,12 @@ class Foil(NamedTuple):
     lift: Annotated[float, "1/rad", "slope of the normal force's coefficient, f_alpha", DIVISOR] = 2.5
     delta_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 0.61
     wake: Annotated[float, "1", "wake fraction at the rudder", Range(-0.5, 0.9)] = 0.0
-    steering_deduction: Annotated[float, "1", "t_R, share of resistance that is not felt"] = 0.0
-    hull_force: Annotated[float, "1", "a_H, force on the hull by the rudder, as a share"] = 0.0
+    steering_deduction: Annotated[float, "1", "t_R, reduction of the rudder resistance by the hull"] = (
+        0.0
+    )
+    hull_force: Annotated[
+        float, "1", "a_H, force of the rudder on the hull, relative to its normal force"
+    ] = 0.0
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
 
 

@@ -17,9 +17,11 @@ from .laws import DIVISOR, SMALL, OpenWater, OpenWaterPropeller
 class DriftWake(NamedTuple):
     """How drift takes the wake away."""
 
-    C_1: Annotated[float, "1", "how fast drift at the propeller takes the wake away", POSITIVE] = 2.0
-    C_2_plus: Annotated[float, "1", "1 - w in much drift over that in none, drift to port"] = 1.0
-    C_2_minus: Annotated[float, "1", "1 - w in much drift over that in none, drift to starboard"] = 1.0
+    C_1: Annotated[float, "1", "rate at which drift at the propeller reduces the wake", POSITIVE] = 2.0
+    C_2_plus: Annotated[float, "1", "1 - w in large drift over that without drift, drift to port"] = 1.0
+    C_2_minus: Annotated[
+        float, "1", "1 - w in large drift over that without drift, drift to starboard"
+    ] = 1.0
 
 
 class PropellerBehindHull(OpenWaterPropeller):
@@ -53,13 +55,19 @@ class RaceFoil(NamedTuple):
     span: Annotated[float, "m", "height of the rudder, H_R", DIVISOR] = 0.1
     lift: Annotated[float, "1", "slope of the normal force's coefficient, f_alpha", DIVISOR] = 2.5
     delta_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 0.61
-    steering_deduction: Annotated[float, "1", "t_R, share of resistance that is not felt"] = 0.0
-    hull_force: Annotated[float, "1", "a_H, force on the hull by the rudder, as a share"] = 0.0
+    steering_deduction: Annotated[float, "1", "t_R, reduction of the rudder resistance by the hull"] = (
+        0.0
+    )
+    hull_force: Annotated[
+        float, "1", "a_H, force of the rudder on the hull, relative to its normal force"
+    ] = 0.0
     hull_force_place: Annotated[float, "m", "x_H, where the force on the hull acts"] = 0.0
     inflow: Annotated[float, "1", "epsilon, 1 - w at the rudder over that at the propeller", DIVISOR] = (
         1.0
     )
-    race: Annotated[float, "1", "kappa, how far the race has got its speed", Range(-1.0, 2.0)] = 0.5
+    race: Annotated[
+        float, "1", "kappa, share of its final speed that the slipstream has reached", Range(-1.0, 2.0)
+    ] = 0.5
     gamma_plus: Annotated[float, "1", "gamma_R, flow straightening, drift at the rudder to port"] = 1.0
     gamma_minus: Annotated[float, "1", "gamma_R, flow straightening, drift to starboard"] = 1.0
     inflow_lever: Annotated[float, "m", "l_R, lever of the yaw rate in the flow across the rudder"] = 0.0
@@ -83,7 +91,7 @@ class RudderInRace(Law[RaceFoil]):
     in_race = True
     changes = (
         Change("inflow_speed", ("inflow",), "wake at the rudder"),
-        Change("race", ("race",), "speed of the race at the rudder"),
+        Change("race", ("race",), "speed of the slipstream at the rudder"),
         Change("straightening", ("gamma_plus", "gamma_minus"), "flow straightening at the rudder"),
         Change("inflow_lever", ("inflow_lever",), "cross-flow by the yaw rate at the rudder"),
         Change("bias", ("bias",), "angle at the command 0"),

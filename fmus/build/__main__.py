@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; prints the path of each FMU, one a line, in the order asked for."""
     parser = argparse.ArgumentParser(
         prog=program("fmus.build"),
-        description="Build the project's FMUs, or an FMU from a component file of your own.",
+        description="Build the FMUs of the project, or an FMU from a component file of your own.",
         epilog="examples:  %(prog)s\n"
         "           %(prog)s vessel controller_abs --out fmu\n"
         "           %(prog)s my_controller.py --out fmu\n"
@@ -50,21 +50,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="copy the FMUs here (user's cache)")
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="copy the FMUs to this folder (cache of the user)")
     parser.add_argument(
         "--overwrite",
         action="store_true",
-        help="with --out or --source: replace other files of these names",
+        help="with --out or --source: replace existing files of these names",
     )
     parser.add_argument(
         "--list",
         action="store_true",
-        help="list the FMUs (with --native: those that came compiled), or the variables of those named",
+        help="list the FMUs (with --native: the precompiled ones), or the variables of the named FMUs",
     )
     parser.add_argument(
         "--verify",
         action="store_true",
-        help="build nothing; tell whether all programs in these .fmu files were built on this computer",
+        help="build nothing; check whether all programs in these .fmu files were built on this computer",
     )
     parser.add_argument(
         "--effects",
@@ -72,32 +72,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own, or one of an installed package, for vessel and "
-        "thrusters; may be repeated",
+        help="a file of your own model effects, or one of an installed package, for vessel and "
+"thrusters; may be repeated",
     )
     parser.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="make the FMUs for this ship: a shipped one, or a description of your own (cse1)",
+        help="ship of the FMUs: a shipped one, or a file of your own (cse1)",
     )
     parser.add_argument(
         "--parameters",
         type=Path,
         metavar="FILE.ssv",
-        help="SSP parameter set whose values become start values (without NAME: of the FMUs it names)",
+        help="SSP parameter set whose values become start values (without NAME: of the FMUs in the set)",
     )
     parser.add_argument(
         "--native",
         action="store_true",
-        help="compile the FMUs, which then need no Python",
+        help="compile the FMUs, which need no Python then",
     )
     parser.add_argument(
         "--target",
         metavar="PLATFORM,...",
-        help="with --native: linux64, win64, darwin64 (this computer); python: all others run in Python",
+        help="with --native: linux64, win64, darwin64 (this computer); python: run all others in Python",
     )
     parser.add_argument(
-        "--source", type=_folder, metavar="DIR", help="with --native: write plain C there, build no FMU"
+        "--source", type=_folder, metavar="DIR", help="with --native: write plain C to this folder, build no FMU"
     )
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):

@@ -120,7 +120,7 @@ def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
     for file in made if not overwrite else ():
         there = folder / file.name
         if there.is_dir() or (there.exists() and there.read_bytes() != file.read_bytes()):
-            raise BuildError(f"'{there}' is there already, and is another file; --overwrite replaces it")
+            raise BuildError(f"'{there}' exists and is another file; --overwrite replaces it")
     folder.mkdir(parents=True, exist_ok=True)
     return [place(file, folder / file.name) for file in made]
 
@@ -152,11 +152,12 @@ def _tell_unused(starts: StartValues, built: Sequence[str], of: Ship, note: Call
             load(name, None, of)
             note(f"'{starts.path}' has values for {name}, which is not built")
     for text in starts.beside:
-        note(f"'{starts.path}' has what no FMU can hold, {text}")
+        note(f"'{starts.path}' has values that no FMU can hold, {text}")
     for run in starts.runs[:1]:
-        note(f"'{starts.path}' has times that were found in run '{run}' and hold for that run alone")
+        note(f"'{starts.path}' has times that were found in run '{run}' and are valid for that run "
+"only")
     if not starts.values:
-        note(f"'{starts.path}' holds no values: no FMU is changed by it")
+        note(f"'{starts.path}' holds no values, so no FMU is changed")
 
 
 def _cached(

@@ -31,7 +31,7 @@ def cache_folder() -> Path:
     with suppress(RuntimeError):  # of newer versions; older ones give a relative path
         if (folder := user_cache_path("cybership")).is_absolute():
             return folder
-    raise BuildError("this user has no home folder: let CYBERSHIP_CACHE name one for built FMUs")
+    raise BuildError("this user has no home folder: set CYBERSHIP_CACHE to a folder for built FMUs")
 
 
 def is_whole(fmu: Path) -> bool:
@@ -54,9 +54,9 @@ def _refuse_foreign(place: Path) -> None:
         return
     info = place.stat()
     if info.st_uid not in (os.getuid(), 0):
-        raise BuildError(f"'{place}' belongs to another user; CYBERSHIP_CACHE may name another folder")
+        raise BuildError(f"'{place}' belongs to another user; set CYBERSHIP_CACHE to another folder")
     if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise BuildError(f"'{place}' may be written to by others (chmod go-w), and is not used")
+        raise BuildError(f"other users may write to '{place}', so it is not used (chmod go-w)")
 
 
 def _seal(fmu: Path) -> str:
@@ -79,7 +79,8 @@ def make_folder(folder: Path) -> None:
         sweep_parts(cache_folder().glob("**/.*.part"))
     except OSError as error:
         raise BuildError(
-            f"cannot keep FMUs in '{folder}' ({error.strerror}); CYBERSHIP_CACHE may name another folder"
+            f"cannot keep FMUs in '{folder}' ({error.strerror}); set CYBERSHIP_CACHE to another "
+"folder"
         ) from None
 
 

@@ -49,8 +49,8 @@ class StartValues:
             where = f"'{self.path}': {component.name}.{name_of(name)}"
             if name not in settable:
                 raise DeclarationError(
-                    f"{where} is no parameter{nearest(name, settable)}; "
-                    "one of an effect of your own needs --effects FILE.py"
+                    f"{where} is not a parameter{nearest(name, settable)}; one of an effect of "
+"your own needs --effects FILE.py"
                 )
             _check(value, unit, settable[name], where)
         starts = {name: value for name, (value, _) in given.items() if value != settable[name].start}
@@ -84,10 +84,10 @@ def read_starts(path: Path) -> StartValues:
         if not dot:
             raise DeclarationError(f"'{path}': '{called}' is not of the form model.parameter")
         if name in found.setdefault(model, {}):
-            raise DeclarationError(f"'{path}': {called} stands there twice")
+            raise DeclarationError(f"'{path}': {called} occurs twice")
         value = float(entry.value) if entry.type in ("Real", "Integer") else math.nan
         if not math.isfinite(value):
-            raise DeclarationError(f"'{path}': {called} has no number as its value")
+            raise DeclarationError(f"'{path}': the value of {called} is not a number")
         found[model][name] = value, entry.unit
     root = ElementTree.fromstring(content)
     notes = [f"{e.get('name')}: {e.get('description')}" for e in root.iterfind(BESIDE)]

@@ -18,10 +18,12 @@ class BlockerOptions(NamedTuple):
     scenarios, else the force that is asked for, which may be more than thrusters give.
     """
 
-    nu_dot_max: Annotated[float, "1", "norm of the acceleration that blocks", POSITIVE] = OFF
-    nu_max: Annotated[float, "1", "norm of the velocity that blocks", POSITIVE] = OFF
-    tau_max: Annotated[float, "1", "norm of the force that blocks", POSITIVE] = 2.0
-    block_time: Annotated[float, "s", "quiet time until learning goes on", POSITIVE] = 1.0
+    nu_dot_max: Annotated[
+        float, "1", "norm of the acceleration above which learning is blocked", POSITIVE
+    ] = OFF
+    nu_max: Annotated[float, "1", "norm of the velocity above which learning is blocked", POSITIVE] = OFF
+    tau_max: Annotated[float, "1", "norm of the force above which learning is blocked", POSITIVE] = 2.0
+    block_time: Annotated[float, "s", "quiet time before learning resumes", POSITIVE] = 1.0
 
 
 class Blocker(NamedTuple):

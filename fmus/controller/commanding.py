@@ -20,7 +20,7 @@ HARD_OVER = 0.6108652381980153  # 35 degrees [rad], to which rudders are put ove
 
 class HelmLimit(NamedTuple):
     angle_max: Annotated[
-        float, "rad", "largest angle of rudder or azimuth that the controller takes", Range(0.01, 1.5)
+        float, "rad", "largest angle of rudder or azimuth that the controller commands", Range(0.01, 1.5)
     ] = HARD_OVER
 
 
@@ -40,9 +40,9 @@ class Inputs(NamedTuple):
 class CommandedForce(NamedTuple):
     """The force of the commands."""
 
-    tau_cmd_X: Annotated[float, "N", "surge force of the commands, as believed"] = 0.0
-    tau_cmd_Y: Annotated[float, "N", "sway force of the commands, as believed"] = 0.0
-    tau_cmd_N: Annotated[float, "N.m", "yaw moment of the commands, as believed"] = 0.0
+    tau_cmd_X: Annotated[float, "N", "surge force of the commands, by the controller model"] = 0.0
+    tau_cmd_Y: Annotated[float, "N", "sway force of the commands, by the controller model"] = 0.0
+    tau_cmd_N: Annotated[float, "N.m", "yaw moment of the commands, by the controller model"] = 0.0
 
 
 def commanding(controller: Component, ship: Description) -> Component:

@@ -29,7 +29,7 @@ class SampleOptions(NamedTuple):
     rho: Annotated[float, "1/s", "omega_n by the integral (4.35); 0: by the store", POSITIVE] = 0.1
     smoothing: Annotated[float, "s", "samples are smoothed over this span; 0: off", POSITIVE] = 0.0
     fixed_point: Annotated[
-        float, "s", "stored samples are smoothed by what follows within this time; 0: off", POSITIVE
+        float, "s", "stored samples are smoothed with later data within this time; 0: off", POSITIVE
     ] = 0.0
 
 
@@ -113,7 +113,9 @@ def concurrent(
     groups = {name: starting(group, starts) for name, group in options.items()}
     unknown = starts.keys() - {field for group in groups.values() for field in group._fields}
     if unknown:
-        raise DeclarationError(f"{name} has no {', '.join(sorted(unknown))} to start differently")
+        raise DeclarationError(
+            f"{name} has no {', '.join(sorted(unknown))} with a start value to change"
+        )
     # With z2 the law adds forces to a velocity: the gain has the unit for z2, store_weight the rest.
     Params = parameters(model, disturbance=DisturbanceByError() if by_eps else Disturbance(), **groups)
     Outputs = outputs(model, LearningOutputs())

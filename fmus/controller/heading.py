@@ -73,11 +73,13 @@ class Params(NamedTuple):
     length: Annotated[float, "m", "length between perpendiculars, of prime units", Range(0.1)] = (
         REFERENCE_LENGTH
     )
-    u_least: Annotated[float, "m/s", "least speed of prime units", Range(0.001, 10.0)] = 0.1
+    u_least: Annotated[float, "m/s", "lower limit of the speed in prime units", Range(0.001, 10.0)] = 0.1
     inertia: Inertia = Inertia()
     damping: Fields = KnownDamping()
-    omega_wave: Annotated[float, "rad/s", "frequency of the waves as met; 0: no filter", POSITIVE] = 0.0
-    zeta_wave: Annotated[float, "1", "share of the waves that the filter leaves", Range(0.0, 1.0)] = 0.1
+    omega_wave: Annotated[float, "rad/s", "encounter frequency of the waves; 0: no filter", POSITIVE] = (
+        0.0
+    )
+    zeta_wave: Annotated[float, "1", "share of the waves that passes the filter", Range(0.0, 1.0)] = 0.1
 
 
 class Tuning(NamedTuple):

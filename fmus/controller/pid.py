@@ -56,8 +56,8 @@ class Params(NamedTuple):
     K_I_y: Annotated[float, "N/(m.s)", "integral gain, across", GAIN] = _integral(_SWAY)
     K_I_psi: Annotated[float, "N.m/(rad.s)", "integral gain, heading", GAIN] = _integral(_YAW)
     # Against windup: with the gains above 2.1 N, 3.1 N and 0.2 N m, about what the thrusters give.
-    limit_position: Annotated[float, "m.s", "most of an integral of position", GAIN] = 10.0
-    limit_heading: Annotated[float, "rad.s", "most of the integral of heading", GAIN] = 6.0
+    limit_position: Annotated[float, "m.s", "limit of an integral of position", GAIN] = 10.0
+    limit_heading: Annotated[float, "rad.s", "limit of the integral of heading", GAIN] = 6.0
 
 
 class State(NamedTuple):

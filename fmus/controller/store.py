@@ -27,7 +27,9 @@ class StoreOptions(NamedTuple):
     store_change: Annotated[float, "1", "change of Phi between stored samples, delta", POSITIVE] = 0.015
     age_limit: Annotated[float, "s", "samples are forgotten after this time; 0: never", POSITIVE] = 0.0
     stale: Annotated[float, "1", "1: errors as they were when stored", FIXED, Range(0.0, 1.0)] = 0.0
-    rank_tolerance: Annotated[float, "1", "rank is met above this singular value", POSITIVE] = 0.01
+    rank_tolerance: Annotated[float, "1", "singular values above this count for the rank", POSITIVE] = (
+        0.01
+    )
     # Footnote 1 of 4.1.4 prints 0.1, for stale errors. With errors formed anew 1 learns faster.
     store_weight: Annotated[float, "1", "weight of the sum over the store, rho", POSITIVE] = 1.0
 

@@ -95,7 +95,7 @@ def _axis_sentence(way: str, what: str) -> Callable[[Found], str]:
     return lost(
         f"loss_{way}",
         lambda size, than: (
-            f"Of the commanded {way} {what} {size} do not arrive."
+            f"The thrusters lose {size} of the commanded {way} {what}."
             if than == "less"
             else f"The {way} {what} is {size} larger than commanded."
         ),
@@ -131,7 +131,7 @@ loss_surge = _axis_loss(
     Wording(
         _axis_sentence("surge", "force"),
         PROPELLERS,
-        {"X_u": "pulse the speed instead of keeping it", "mass": "run steady and accelerating legs"},
+        {"X_u": "pulse the speed instead of holding it", "mass": "run steady and accelerating legs"},
     ),
 )
 loss_sway = _axis_loss(
@@ -162,12 +162,12 @@ loss_yaw = _axis_loss(
     "N",
     formula="N + dx · Y - dy · X",
     symbol="dx, dy",
-    sign="positive: ahead and to starboard of where it is assumed",
+    sign="positive: ahead and to starboard of the assumed point",
     source="(2.17)-(2.19)",
     parameters=place_parameters("attack_point", "point of attack", REFERENCE),
-    description="the force acts elsewhere than assumed",
+    description="the force acts at another point than assumed",
     wording=Wording(
-        lambda f: f"The thrust acts {offset(f, 'attack_point')} of where the model believes.",
+        lambda f: f"The thrust acts {offset(f, 'attack_point')} of the point in the model.",
         SIDE_THRUST,
     ),
 )
@@ -181,13 +181,11 @@ LOSSES = (loss_surge, loss_sway, loss_yaw, attack_point)
 lag = slow(
     Devices("", "thrusters", "all thrusters", (), (), "XYN", TIMING, plural=True),
     "lag",
-    lambda f: (
-        f"The thrusters follow their commands slowly, with a time constant of {number(f['lag'])} s."
-    ),
+    lambda f: f"The thrusters follow their commands with a time constant of {number(f['lag'])} s.",
     slice(None),
     apart={
-        "delay": "give steps in the commands, and measure faster",
-        "clock_offset": "give steps in the commands; " + SYNC_PULSE,
+        "delay": "apply steps in the commands, and sample faster",
+        "clock_offset": "apply steps in the commands; " + SYNC_PULSE,
     },
 )
 

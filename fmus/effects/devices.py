@@ -54,8 +54,7 @@ class Devices(NamedTuple):
 
     def does(self, verb: str, article: str = "The") -> str:
         """Subject and verb of a sentence, such as ``The propellers give``."""
-        one = {"are": "is", "push": "pushes"}.get(verb, f"{verb}s")
-        return f"{article} {self.title} {verb if self.plural else one}"
+        return f"{article} {self.title} {verb if self.plural else f'{verb}s'}"
 
     def picture(self, what: Shows, axis: str = "") -> Picture:
         """A picture of the force along an axis, by default the first that it acts on."""

@@ -181,7 +181,7 @@ def _check_force(e: Effect) -> None:
     """
     values = {name: _unit(e, name) for name in e.coefficients}
     gets = ", ".join(f"ship.{name}" for name in Loaded._fields)
-    form = f"a force gets {gets} and gives three numbers, X, Y and N"
+    form = f"a force gets {gets} and returns three numbers, X, Y and N"
     for sign in _SIGNS:
         try:
             found = _flat(e, (_motion(sign),), values)
@@ -190,10 +190,12 @@ def _check_force(e: Effect) -> None:
         except (ValueError, ArithmeticError):  # it has no value there
             continue
         if len(found) != len("XYN"):
-            raise DeclarationError(f"'{e.id}' gives {len(found)} numbers; {form}")
+            raise DeclarationError(f"'{e.id}' returns {len(found)} numbers; {form}")
         for axis, force in zip("XYN", found, strict=True):
             if force and axis not in e.axis:
-                raise DeclarationError(f"'{e.id}' gives a force on {axis}, and is declared for {e.axis}")
+                raise DeclarationError(
+                    f"'{e.id}' returns a force on {axis}, and is declared for {e.axis}"
+                )
 
 
 def is_linear(e: Effect) -> bool:

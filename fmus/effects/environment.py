@@ -21,13 +21,13 @@ _GOLDEN = 2.0 * math.pi * (math.sqrt(5.0) - 1.0) / 2.0
     "environment",
     "XY",
     formula="(X, Y) = R^T(psi) (F_n, F_e) (1 + swing sin(2 pi t / period))",
-    sign="F_n pushes north, F_e pushes east",
+    sign="F_n acts north, F_e acts east",
     source="(2.3), (2.33)",
     settings=("earth_force_period", "earth_force_swing"),
     wording=Wording(
         lambda f: (
-            f"A steady force of {number(math.hypot(f['F_n'], f['F_e']))} N pushes the ship towards "
-            f"{compass(f['F_n'], f['F_e'])}, as wind would."
+            f"A constant force of {number(math.hypot(f['F_n'], f['F_e']))} N acts towards "
+            f"{compass(f['F_n'], f['F_e'])}, as by wind."
         ),
         EARTH_FIXED,
         {"body_bias": "run a full circle of headings"},
@@ -37,8 +37,10 @@ def earth_force(
     ship: Motion,
     F_n: Annotated[float, "N", "earth-fixed force to the north"] = 0.0,
     F_e: Annotated[float, "N", "earth-fixed force to the east"] = 0.0,
-    earth_force_period: Annotated[float, "s", "period of its slow swing", Range(min=1.0)] = 100.0,
-    earth_force_swing: Annotated[float, "1", "how much it swings, as a share of itself"] = 0.0,
+    earth_force_period: Annotated[float, "s", "period of its slow oscillation", Range(min=1.0)] = 100.0,
+    earth_force_swing: Annotated[
+        float, "1", "amplitude of its oscillation, relative to the force"
+    ] = 0.0,
 ) -> Triple:
     """Constant or slowly varying earth-fixed force."""
     swing = 1.0 + earth_force_swing * sin(2.0 * math.pi * ship.t / earth_force_period)
@@ -48,7 +50,7 @@ def earth_force(
 def bias_sentence(f: Found) -> str:
     units = {"X": "N", "Y": "N", "N": "N m"}
     parts = [towards(f[f"body_bias_{a}"], unit, a) for a, unit in units.items() if f[f"body_bias_{a}"]]
-    return f"A constant force goes with the ship: {', '.join(parts)}."
+    return f"A constant force in the body frame: {', '.join(parts)}."
 
 
 @effect(
@@ -57,7 +59,7 @@ def bias_sentence(f: Found) -> str:
     "XYN",
     formula="(X, Y, N) = constant",
     symbol="X, Y, N",
-    sign="positive pushes ahead, to starboard, and turns to starboard",
+    sign="positive acts ahead, to starboard, and turns to starboard",
     source="(2.33)",
     wording=Wording(bias_sentence, BODY_FIXED),
 )
@@ -88,7 +90,7 @@ def surface(t: Number, peak: Number) -> Number:
 def waves_sentence(f: Found) -> str:
     peak = f["wave_peak"]
     often = f", with a peak at {number(peak)} rad/s" if peak else ""
-    return f"Waves shake the ship{often}."
+    return f"Waves excite the ship{often}."
 
 
 @effect(
@@ -97,7 +99,7 @@ def waves_sentence(f: Found) -> str:
     "XYN",
     formula="(X, Y) = R^T(psi) (cos b, sin b) (F_w xi(t) + drift), N = arm · Y",
     symbol="F_w, drift",
-    sign="drift pushes towards where the waves run",
+    sign="drift acts in the direction of wave propagation",
     source="(2.33), (7.15); Fossen 2011, 8.2",
     settings=("wave_direction",),
     search=Search(by="spectrum"),
@@ -108,7 +110,7 @@ def waves(
     wave_force: Annotated[float, "N", "standard deviation of the wave force", POSITIVE] = 0.0,
     wave_drift: Annotated[float, "N", "mean drift force of the waves"] = 0.0,
     wave_peak: Annotated[float, "rad/s", "peak frequency of the waves", Range(0.1, 50.0)] = 4.0,
-    wave_direction: Annotated[float, "rad", "where the waves run to, from north"] = 0.0,
+    wave_direction: Annotated[float, "rad", "direction of wave propagation, from north"] = 0.0,
     wave_arm: Annotated[float, "m", "forward lever of their sway force"] = 0.1,
 ) -> Triple:
     """Wave-frequency force with a mean drift."""

@@ -19,7 +19,7 @@ class Family:
     apart: Mapping[str, str] = field(default_factory=dict)
 
 
-UNKNOWN = Family("other", "the same manoeuvres with and without what is suspected")
+UNKNOWN = Family("other", "the same manoeuvres with and without the suspected cause")
 SYNC_PULSE = "impossible from pose and commands alone: log a sync pulse in both"
 _SPEEDS = "turn on the spot, and at two speeds ahead"
 _TURNS = "turn on the spot, with starts and stops of the turn"
@@ -31,7 +31,7 @@ SURGE_DRAG = Family(
     {
         "surge drag": "run three or more speeds, ahead and astern, from very slow to full",
         "body-fixed": "run astern as well",
-        "propellers": "pulse the speed instead of keeping it",
+        "propellers": "pulse the speed instead of holding it",
         "earth-fixed": "run the same speeds on opposite headings",
     },
 )
@@ -68,27 +68,27 @@ INERTIA = Family("inertia", "steady legs, and hard starts and stops on each axis
 PROPELLERS = Family(
     "propellers",
     "pulses of surge thrust of several sizes, ahead and astern",
-    {"inertia": _STEADY, "propellers": "give pulses of several sizes, ahead and astern"},
+    {"inertia": _STEADY, "propellers": "apply pulses of several sizes, ahead and astern"},
 )
 SIDE_THRUST = Family("side thrust", "pulses of sway force alone and of yaw moment alone")
 TUNNEL_THRUSTER = Family(
     "tunnel thruster",
-    "the tunnel thruster at work at rest, at speed, and over the whole run",
+    "the tunnel thruster at rest, at speed, and over the whole run",
     {
         "tunnel thruster": "use the tunnel thruster at rest, at speed, and over the whole run",
-        "side thrust": "make the same moment by the propellers and by the tunnel thruster",
+        "side thrust": "give the same moment by the propellers and by the tunnel thruster",
     },
 )
 SMALL_OR_LARGE = Family(
-    "small or large commands", "commands from the very small to the full ones on each thruster"
+    "small or large commands", "commands from very small to full ones on each thruster"
 )
 TIMING = Family(
     "timing",
     "steps in the commands, each held for some seconds",
     {
-        "timing": "give steps in the commands, and measure faster",
+        "timing": "apply steps in the commands, and sample faster",
         "clock": SYNC_PULSE,
-        "inertia": "give steps in the commands, and hold each until the speed is steady",
+        "inertia": "apply steps in the commands, and hold each until the speed is steady",
     },
 )
 CLOCK = Family("clock", "a sync pulse in the log of both pose and commands")

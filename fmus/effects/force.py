@@ -71,11 +71,11 @@ def damping_sentence(f: Found) -> str:
     if moved == own and term != "uu":
         sense = "more" if force < 0.0 else "less"
         at = _at(moved, f.speeds)
-        return f"The ship has {sense} {drag} than the model believes: {number(force)} {unit} at {at}."
+        return f"The ship has {sense} {drag} than the model: {number(force)} {unit} at {at}."
     at = _at(moved, f.speeds, sides=True)
     what = "a moment" if axis == "N" else "a force"
     size = towards(force, unit, axis)
-    return f"{MOTION[moved]} gives {what} that the model does not know: {size} at {at}."
+    return f"{MOTION[moved]} gives {what} that the model lacks: {size} at {at}."
 
 
 def _at(moved: str, speeds: tuple[float, float, float], sides: bool = False) -> str:
@@ -115,7 +115,7 @@ def surge_curve_sentence(f: Found) -> str:
     place, value = peak(f)
     at = (2.0 * place - 1.0) * reach(f)
     return (
-        "The surge force follows another curve over the speed than the model's: "
+        "The surge force follows another curve over the speed than in the model: "
         f"{towards(value, 'N', 'X')} is missing at {at:.2g} m/s."
     )
 
@@ -126,7 +126,7 @@ def surge_curve_sentence(f: Found) -> str:
     "X",
     formula="X = Σ c_k · hat_k(u), 21 nodes over [-range, range]",
     symbol="c_1 … c_21",
-    sign="positive pushes ahead",
+    sign="positive acts ahead",
     source="3.2.3, on a triangle basis",
     settings=("curve_X_u_range",),
     parameters=node_parameters("curve_X_u", "N", "surge force", "surge speed, both ways", "m/s", 0.6),

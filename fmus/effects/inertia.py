@@ -20,9 +20,9 @@ def half(name: str, moving: Callable[[Values], float]) -> Search:
 
 def water_sentence(name: str, how: str, unit: str) -> Callable[[Found], str]:
     def sentence(f: Found) -> str:
-        sense = "More" if f[name] > 0.0 else "Less"
+        sense = "larger" if f[name] > 0.0 else "smaller"
         size = f"{number(f[name])} {unit}"
-        return f"{sense} water moves with the ship in {how} than the model believes: {size}."
+        return f"The added mass in {how} is {sense} than in the model: {size}."
 
     return sentence
 
@@ -38,8 +38,8 @@ def water_sentence(name: str, how: str, unit: str) -> Callable[[Found], str]:
     search=half("mass", lambda p: p["m"]),
     wording=Wording(
         lambda f: (
-            f"The ship has {number(f['mass'])} kg {'more' if f['mass'] > 0.0 else 'less'} mass "
-            "than the model believes."
+            f"The ship has {number(f['mass'])} kg {'more' if f['mass'] > 0.0 else 'less'} mass than the "
+            "model."
         ),
         INERTIA,
         measured=lambda more, model: f"a ship of {model('m') + more:.4g} kg: weigh it",

@@ -27,7 +27,7 @@ def loss(d: Devices, others: bool = True) -> Effect:
         d,
         name,
         (parameter(name, "1", f"share of {d.label} force lost", SHARE),),
-        lost(name, lambda size, than: f"{d.does('give')} {size} {than} force than the model believes."),
+        lost(name, lambda size, than: f"{d.does('give')} {size} {than} force than the model."),
         apart={
             f"{d.name}_speed_loss": f"use the {d.title} at rest and at speed",
             f"{d.name}_failure": f"use the {d.title} from the very start of a run to its end",
@@ -36,7 +36,7 @@ def loss(d: Devices, others: bool = True) -> Effect:
         else {},
         formula="f (1 - δ)",
         symbol="δ",
-        sign="positive: force is lost; negative: more power than is known",
+        sign="positive: force is lost; negative: more power than specified",
         source="(2.39), on one thruster",
         description=f"force lost by the {d.title}",
     )
@@ -82,15 +82,15 @@ def failure(d: Devices) -> Effect:
     @declared(
         d,
         name,
-        (parameter(time, "s", f"time from which the {d.label} is dead; 0: never", POSITIVE),),
-        lambda f: f"{d.does('are')} dead from t = {number(f[time])} s on.",
+        (parameter(time, "s", f"time from which the {d.label} gives no force; 0: never", POSITIVE),),
+        lambda f: f"{d.does('give')} no force from t = {number(f[time])} s on.",
         formula="f = 0 for t >= time",
         symbol="time",
         sign="0: never",
         source="7.2.5",
         linear=False,
         search=Search(intervals=((time, ""),)),
-        description=f"{d.title} dead from a time on",
+        description=f"{d.title} without force from a time on",
     )
     def function(f: Thrust, now: Running, since: Number) -> Thrust:
         dead = (since > 0.0) & (now.t >= since - INSTANT)
@@ -112,7 +112,7 @@ def outage_parameters(name: str) -> tuple[Variable, ...]:
     """Start and end of each interval, one after the other."""
     meaning = {
         "start": "first instant of outage {} of the {}",
-        "end": "end of outage {} of the {}; none if not after its start",
+        "end": "end of outage {} of the {}; no outage if not after its start",
     }
     return tuple(
         parameter(f"{name}_outage_{at}_{k}", "s", text.format(k, name), POSITIVE)
@@ -129,7 +129,7 @@ def outage(d: Devices, lasting: str = "") -> Effect:
     def sentence(f: Found) -> str:
         found = sorted((f[a], f[b]) for a, b in pairs if f[b] > f[a])
         *most, last = [f"from {number(a)} to {number(b)} s" for a, b in found] or ["at no time"]
-        return f"{d.does('are')} dead {', '.join(most)}{' and ' if most else ''}{last}."
+        return f"{d.does('fail')} {', '.join(most)}{' and ' if most else ''}{last}."
 
     @declared(
         d,
@@ -139,10 +139,10 @@ def outage(d: Devices, lasting: str = "") -> Effect:
         formula=f"f = 0 for start_k <= t < end_k, k = 1 … {INTERVALS}",
         symbol="intervals",
         sign="an interval that ends where it starts: none",
-        source="7.2.5, for failures that pass",
+        source="7.2.5, for temporary failures",
         linear=False,
         search=Search(intervals=pairs, lasting=lasting),
-        description=f"{d.title} dead during intervals",
+        description=f"{d.title} without force during intervals",
     )
     def function(f: Thrust, now: Running, *intervals: Number) -> Thrust:
         dead = inside(now.t, intervals)
@@ -182,7 +182,7 @@ def saturation(parts: Sequence[Devices], whole: Devices, name: str = "") -> Effe
 
     def sentence(f: Found) -> str:
         parts = [f"{d.does('give', 'the')} at most {number(f[n])} N" for n, d in limits.items() if f[n]]
-        return capital(f"{' and '.join(parts)}, whatever is commanded.")
+        return capital(f"{' and '.join(parts)}, independently of the command.")
 
     def tries(model: Values) -> list[Values]:
         """Shares of the full force that the model in use has."""
@@ -246,7 +246,7 @@ def inflow(d: Devices, slopes: Sequence[Inflow], apart: dict[str, str] | None = 
         apart=apart,
         formula="f_x - k_x |c_x| (u - y r), f_y - k_y |c_y| (v + x r), at an actuator's place (x, y)",
         symbol="k",
-        sign="positive: less force where the water comes against it",
+        sign="positive: less force against the inflow",
         source="(2.12): a propeller's force depends on the inflow; measured runs of the ship",
         description=f"force of the {d.title} lost with the water's speed at its place",
     )

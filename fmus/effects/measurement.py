@@ -25,11 +25,11 @@ OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)
     "XYN",
     formula="p_m = p + R(psi) (dx, dy)",
     symbol="dx, dy",
-    sign="positive: markers ahead and to starboard of where they are assumed",
+    sign="positive: markers ahead and to starboard of the assumed place",
     source="4.3.1, bias",
     search=Search(differentiable=True),
     wording=Wording(
-        lambda f: f"The position is measured {offset(f, 'marker_offset')} of where the model believes.",
+        lambda f: f"The position is measured {offset(f, 'marker_offset')} of the place in the model.",
         MEASUREMENT,
     ),
 )

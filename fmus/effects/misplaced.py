@@ -27,12 +27,12 @@ def elsewhere(d: Devices) -> Effect:
         d,
         name,
         place_parameters(name, f"place of the {d.label}", d.scale),
-        lambda f: f"{d.does('act')} {offset(f, name)} of where the model believes.",
+        lambda f: f"{d.does('act')} {offset(f, name)} of the place in the model.",
         axis="N",
         formula="N + dx · Y - dy · X",
         symbol="dx, dy",
-        sign="positive: ahead and to starboard of where it is assumed",
-        description=f"the {d.title} acts elsewhere than assumed",
+        sign="positive: ahead and to starboard of the assumed place",
+        description=f"the {d.title} acts at another place than assumed",
     )
     def function(f: Thrust, now: Running, dx: Number, dy: Number) -> Thrust:
         for k in d.members:
@@ -55,8 +55,8 @@ def turned(d: Devices) -> Effect:
             ),
         ),
         lambda f: (
-            f"{d.does('push')} {degrees(abs(f[name])):.3g}° to "
-            f"{'starboard' if f[name] > 0.0 else 'port'} of where the model believes."
+            f"{d.does('act')} {degrees(abs(f[name])):.3g}° to "
+            f"{'starboard' if f[name] > 0.0 else 'port'} of the direction in the model."
         ),
         axis="XYN",
         formula="(X cos a - Y sin a, Y cos a + X sin a)",
@@ -64,7 +64,7 @@ def turned(d: Devices) -> Effect:
         sign="positive: to starboard",
         linear=False,
         search=Search(differentiable=True),
-        description=f"the {d.title} points elsewhere than assumed",
+        description=f"the {d.title} acts in another direction than assumed",
     )
     def function(f: Thrust, now: Running, angle: Number) -> Thrust:
         c, s = cos(angle), sin(angle)

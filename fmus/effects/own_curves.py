@@ -29,9 +29,9 @@ def speed_curve(d: Devices) -> Effect:
             0.01 * d.scale.factor("m/s"),
         ),
         lambda f: (
-            f"The {d.title}'s force changes with the speed: "
-            f"{percent(peak(f)[1])} {'less' if peak(f)[1] < 0.0 else 'more'} than the model believes "
-            f"at {peak(f)[0] * reach(f):.2g} m/s."
+            f"The force of the {d.title} changes with the speed: {percent(peak(f)[1])} "
+            f"{'less' if peak(f)[1] < 0.0 else 'more'} than in the model at "
+            f"{peak(f)[0] * reach(f):.2g} m/s."
         ),
         pictures=(d.picture("effectiveness over speed"),),
         formula=f"f (1 + Σ c_k · hat_k(|u|)), {NODES} nodes over [0, range]",
@@ -57,7 +57,7 @@ def command_curve(d: Devices, command: str) -> Effect:
     def sentence(f: Found) -> str:
         at, value = peak(f)
         return (
-            f"The {d.title}'s force follows another curve over its command than the model's: "
+            f"The force of the {d.title} follows another curve over its command than in the model: "
             f"{percent(value)} {'less' if value < 0.0 else 'more'} at {percent(2.0 * at - 1.0)} of "
             f"full {'ahead' if at >= 0.5 else 'astern'}."
         )
@@ -88,14 +88,13 @@ def force_curve(d: Devices, axis: str) -> Effect:
     """A free force along an axis over the command on that axis."""
     way, on = ALONG[axis], axis.lower()
     stem, places = f"curve_{d.name}_{on}_c", d.commanding(axis)
-    push = {"X": "", "Y": " aside"}[axis]
-    verb, whose = ("push", "their") if d.plural else ("pushes", "its")
 
     def sentence(f: Found) -> str:
         at, value = peak(f)
         return (
-            f"The {d.title} {verb}{push} by another curve over {whose} command than the model's: "
-            f"{towards(value, 'N', axis)} is missing at command {(2.0 * at - 1.0) * reach(f):.2g}."
+            f"The {way} force of the {d.title} follows another curve over its command than in the "
+            f"model: {towards(value, 'N', axis)} is missing at command "
+            f"{(2.0 * at - 1.0) * reach(f):.2g}."
         )
 
     @declared(
@@ -107,7 +106,7 @@ def force_curve(d: Devices, axis: str) -> Effect:
         pictures=(d.picture("force over command", axis),),
         formula=f"f_{on} + Σ c_k · hat_k(c_{on}), {NODES} nodes over [-range, range]",
         symbol=f"c_1 … c_{NODES}",
-        sign=f"positive pushes {'ahead' if axis == 'X' else 'to starboard'}",
+        sign=f"positive acts {'ahead' if axis == 'X' else 'to starboard'}",
         source="(2.12); 3.2.3, on a triangle basis",
         settings=(f"{stem}_range",),
         search=Search(smooth=True),
@@ -129,9 +128,11 @@ def thrust_curve(d: Devices) -> Effect:
 
     def sentence(f: Found) -> str:
         change = {way: f[f"{name}_{way}"] for way in ("ahead", "astern")}
-        parts = [f"{percent(x)} {'more' if x > 0.0 else 'less'} {way}" for way, x in change.items() if x]
-        push = f"push {' and '.join(parts)} than the model believes" if parts else ""
-        still = f"do nothing at commands below {percent(f[band])}" if f[band] else ""
+        parts = [
+            f"{percent(x)} {'more' if x > 0.0 else 'less'} force {way}" for way, x in change.items() if x
+        ]
+        push = f"give {' and '.join(parts)} than the model" if parts else ""
+        still = f"give no force at commands below {percent(f[band])}" if f[band] else ""
         return f"The {d.title} {' and '.join(filter(None, (push, still)))}."
 
     @declared(

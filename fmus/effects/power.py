@@ -28,8 +28,8 @@ def crossed_forces(d: Devices) -> Effect:
             else "",
         ]
         return (
-            "The propeller to port also pushes across its command: "
-            f"{' and '.join(filter(None, parts))}; that to starboard the other way."
+            "The propeller to port also gives a force across its command: "
+            f"{' and '.join(filter(None, parts))}; the one to starboard mirrored."
         )
 
     @declared(
@@ -41,11 +41,11 @@ def crossed_forces(d: Devices) -> Effect:
         ),
         sentence,
         axis="XYN",
-        apart={"attack_point": "turn by one propeller alone"},
+        apart={"attack_point": "turn with one propeller only"},
         formula="f_y ∓ k_sway f_x, f_x ± k_surge f_y: upper sign to port, lower to starboard",
         symbol="k_sway, k_surge",
-        sign="k_sway: pushing ahead drives both outwards; "
-        "k_surge: to starboard drives the port one ahead",
+        sign="k_sway: ahead commands give an outward force on both; k_surge: starboard commands give "
+        "an ahead force on the port one",
         source="(2.12); measured runs of the ship",
         description="Force of each propeller across its command, mirrored between port and starboard.",
     )
@@ -65,7 +65,7 @@ def power_exponent(every: Devices, parts: Sequence[Devices]) -> Effect:
 
     def sentence(f: Found) -> str:
         told = [f"of the {d.title} is {number(1.0 + f[n])}" for n, d in names.items() if f[n]]
-        return f"Thrust is no straight line over the power setting: the exponent {', '.join(told)}."
+        return f"Thrust is not linear in the power setting: the exponent {', '.join(told)}."
 
     tries: list[dict[str, float]] = [{}]
     for name in names:

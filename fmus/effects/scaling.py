@@ -19,7 +19,7 @@ _FACTOR = Range(-0.9, 10.0)
 def sentence(name: str, what: str) -> Wording:
     def told(f: Found) -> str:
         sense = "more" if f[name] > 0.0 else "less"
-        return f"{what} is {percent(f[name])} {sense} than the model believes, on all axes alike."
+        return f"{what} is {percent(f[name])} {sense} than in the model, on all axes by the same factor."
 
     return Wording(told, INERTIA if name == "scale_inertia" else SURGE_DRAG)
 
@@ -52,7 +52,7 @@ def scale_inertia(
     "XYN",
     formula="-k D(nu) nu, D of the model",
     symbol="k = delta_D - 1",
-    sign="positive brakes more",
+    sign="positive damps more",
     source="(2.22)",
     search=Search(by="given"),
     wording=sentence("scale_damping", "The damping"),

@@ -135,10 +135,12 @@ class Slave(Fmi2Slave):
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         if self._initialising:
-            self.log("there is no state to step from before initialisation has ended", Fmi2Status.error)
+            self.log("a step needs a finished initialisation", Fmi2Status.error)
             return False
         if not 0.0 <= step_size < inf:
-            self.log(f"step at t = {current_time} s: {step_size} s is no step size", Fmi2Status.error)
+            self.log(
+                f"step at t = {current_time} s: {step_size} s is not a valid step size", Fmi2Status.error
+            )
             return False
         try:
             inputs, _ = self._arguments()
@@ -184,11 +186,11 @@ class Slave(Fmi2Slave):
     def _fmu_state_from_bytes(cls, state: bytes) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
         version, code_hash, checksum, body = json.loads(bytes(state))
         if code_hash != cls.code_hash:
-            raise StateError("these bytes are no state of this FMU")
+            raise StateError("these bytes are not a state of this FMU")
         if version != STATE_VERSION:
-            raise StateError("this state is of another version")
+            raise StateError("this state belongs to another version")
         if checksum != _checksum(body):
-            raise StateError("this state was changed: its checksum is another one")
+            raise StateError("this state was changed: its checksum differs")
         return json.loads(body)
 
 

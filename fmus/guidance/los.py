@@ -38,13 +38,17 @@ class Inputs(NamedTuple):
 class Params(NamedTuple):
     u_t: Annotated[float, "m/s", "speed", SPEED] = 0.06
     size: Any = Size()
-    loop: Annotated[float, "1", "1: round and round, 0: ends at the last way point", FLAG, FIXED] = 1.0
+    loop: Annotated[
+        float, "1", "1: closed route, repeated; 0: ends at the last way point", FLAG, FIXED
+    ] = 1.0
     acceptance: Annotated[float, "m", "radius of the circles of acceptance", Range(0.001, 100.0)] = 0.5
     lookahead: Annotated[float, "m", "look-ahead distance at rest", Range(0.001, 100.0)] = 1.0
     lookahead_time: Annotated[
         float, "s", "growth of the look-ahead distance with the speed", Range(0.0, 100.0)
     ] = 8.0
-    integral: Annotated[float, "1", "kappa over the speed wanted; 0: no integral", Range(0.0, 1.0)] = 0.1
+    integral: Annotated[float, "1", "kappa over the desired speed; 0: no integral", Range(0.0, 1.0)] = (
+        0.1
+    )
     u_given: Annotated[float, "1", "1: speeds u_k, 0: u_t everywhere", FLAG, FIXED] = 0.0
     x: Fields = Norths()
     y: Fields = Easts()

@@ -19,13 +19,13 @@ class Params(NamedTuple):
     x_0: Annotated[float, "m", "north position at the start", FIXED] = 5.0
     y_0: Annotated[float, "m", "east position at the start", FIXED] = 2.0
     psi_0: Annotated[float, "rad", "heading at the start", FIXED] = 0.0
-    slow_x: Annotated[float, "m", "slow swing to the north, from end to end"] = 1.0
-    slow_y: Annotated[float, "m", "slow swing to the east, from end to end"] = -1.0
-    slow_psi: Annotated[float, "rad", "slow swing of the heading, from end to end"] = 2.0
-    quick_x: Annotated[float, "m", "quick swing to the north, from end to end"] = 0.3
-    quick_y: Annotated[float, "m", "quick swing to the east, from end to end"] = 0.3
-    quick_psi: Annotated[float, "rad", "quick swing of the heading, from end to end"] = -0.6
-    rate: Annotated[float, "1", "how fast all of it runs", Range(0.0, 5.0), FIXED] = 1.0
+    slow_x: Annotated[float, "m", "slow oscillation to the north, peak to peak"] = 1.0
+    slow_y: Annotated[float, "m", "slow oscillation to the east, peak to peak"] = -1.0
+    slow_psi: Annotated[float, "rad", "slow oscillation of the heading, peak to peak"] = 2.0
+    quick_x: Annotated[float, "m", "fast oscillation to the north, peak to peak"] = 0.3
+    quick_y: Annotated[float, "m", "fast oscillation to the east, peak to peak"] = 0.3
+    quick_psi: Annotated[float, "rad", "fast oscillation of the heading, peak to peak"] = -0.6
+    rate: Annotated[float, "1", "factor of all frequencies", Range(0.0, 5.0), FIXED] = 1.0
 
 
 class State(NamedTuple):

@@ -19,13 +19,15 @@ class PathTiming(NamedTuple):
     runs at four times the speed that its own derivatives state. The pulses keep their period.
     """
 
-    calls: Annotated[float, "1", "times the path is advanced each step", Range(0.0, 100.0)] = 1.0
-    pulse: Annotated[float, "1", "part of the speed that pulses take away", Range(0.0, 1.0)] = 0.0
+    calls: Annotated[float, "1", "steps of the path parameter in each step", Range(0.0, 100.0)] = 1.0
+    pulse: Annotated[
+        float, "1", "reduction of the speed between pulses, as a share", Range(0.0, 1.0)
+    ] = 0.0
     pulse_period: Annotated[float, "s", "period of the pulses", Range(min=0.1), FIXED] = 15.0
     pulse_width: Annotated[float, "1", "part of the period at full speed", Range(0.05, 0.95), FIXED] = (
         0.7
     )
-    pulse_rise: Annotated[float, "s", "time that a change of speed takes", POSITIVE, FIXED] = 2.0
+    pulse_rise: Annotated[float, "s", "duration of a change of speed", POSITIVE, FIXED] = 2.0
 
 
 class PulseClock(NamedTuple):

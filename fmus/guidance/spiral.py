@@ -16,8 +16,10 @@ from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, TrialTime, begun,
 class Params(NamedTuple):
     start: START = 20.0
     angle: ANGLE = HARD_OVER
-    plateaus: Annotated[float, "1", "plateaus from the full order to none", Range(1.0, 50.0)] = 5.0
-    hold: Annotated[float, "s", "length of a plateau", Range(min=0.1)] = 60.0
+    plateaus: Annotated[
+        float, "1", "number of plateaus from the full order to none", Range(1.0, 50.0)
+    ] = 5.0
+    hold: Annotated[float, "s", "duration of a plateau", Range(min=0.1)] = 60.0
     helm: Helm = Helm()
 
 
@@ -34,7 +36,7 @@ def step(s: TrialTime, i: Nothing, p: Params, h: Number) -> tuple[TrialTime, Ord
 
 COMPONENT = component(
     name="guidance_spiral",
-    description="Direct spiral: an order that goes in plateaus to the other side and back",
+    description="Direct spiral: an order that changes in plateaus to the other side and back",
     init=init,
     step=step,
     trial="spiral",

@@ -14,7 +14,7 @@ from ..ops import Condition, Number, where
 
 START = Annotated[float, "s", "time of the first execute", POSITIVE]
 ANGLE = Annotated[
-    float, "rad", "angle that turns the ship to starboard; negative of an azimuth aft", Range(-1.6, 1.6)
+    float, "rad", "angle that turns the ship to starboard; negative of an aft azimuth", Range(-1.6, 1.6)
 ]
 TENTH = 0.17453292519943295  # 10 degrees [rad]
 HARD_OVER = 0.6108652381980153  # 35 degrees [rad], of a turning circle (MSC.137(76), 4.2.1)
@@ -23,7 +23,7 @@ HARD_OVER = 0.6108652381980153  # 35 degrees [rad], of a turning circle (MSC.137
 class Helm(NamedTuple):
     """What is put over."""
 
-    moment: Annotated[float, "N.m", "moment, where thrusters are asked for a force", POSITIVE] = 0.1
+    moment: Annotated[float, "N.m", "moment, for thrusters that are commanded a force", POSITIVE] = 0.1
     side: Annotated[float, "1", "side of the first execute: 1 starboard, -1 port", Range(-1.0, 1.0)] = (
         1.0
     )

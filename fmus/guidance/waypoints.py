@@ -45,12 +45,14 @@ Size = vector("Size", [("count", "1", "number of way points", 4.0)], (Range(2.0,
 class Params(NamedTuple):
     u_t: Annotated[float, "m/s", "speed; with u_given, a change scales all of them", SPEED] = 0.06
     size: Any = Size()
-    loop: Annotated[float, "1", "1: round and round, 0: ends at the last way point", FLAG, FIXED] = 1.0
+    loop: Annotated[
+        float, "1", "1: closed route, repeated; 0: ends at the last way point", FLAG, FIXED
+    ] = 1.0
     corner: Annotated[
         float, "m", "distance from a way point at which a bend begins", Range(0.01, 100.0), FIXED
     ] = 0.6
     run_up: Annotated[
-        float, "m", "run in which the target gets under way or stops", Range(0.01, 100.0), FIXED
+        float, "m", "distance over which the target accelerates or stops", Range(0.01, 100.0), FIXED
     ] = 0.2
     psi_given: Annotated[float, "1", "1: headings psi_k, 0: along the path", FLAG, FIXED] = 0.0
     u_given: Annotated[float, "1", "1: speeds u_k, 0: u_t everywhere", FLAG, FIXED] = 0.0

@@ -21,7 +21,7 @@ class Inputs(NamedTuple):
 class Params(NamedTuple):
     start: START = 20.0
     angle: ANGLE = TENTH
-    psi_check: Annotated[float, "rad", "heading off the original one at which it is reversed",
+    psi_check: Annotated[float, "rad", "heading change at which the order is reversed",
                          Range(0.01, 1.6)] = TENTH  # fmt: skip
     helm: Helm = Helm()
 

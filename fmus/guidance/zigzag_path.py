@@ -26,12 +26,16 @@ class Params(NamedTuple):
     x_0: Annotated[float, "m", "north position at the start", FIXED] = 3.0
     y_0: Annotated[float, "m", "east position at the start", FIXED] = 0.5
     psi_c: Annotated[float, "rad", "direction of the course", FIXED] = 0.0
-    psi_z: Annotated[float, "rad", "heading off the course on each leg", Range(-1.2, 1.2), FIXED] = 0.35
-    leg: Annotated[float, "m", "from turn to turn along the course", Range(min=0.01), FIXED] = 1.0
+    psi_z: Annotated[float, "rad", "angle between leg and course", Range(-1.2, 1.2), FIXED] = 0.35
+    leg: Annotated[float, "m", "distance between turns along the course", Range(min=0.01), FIXED] = 1.0
     turn: Annotated[float, "m", "length of a turn, at most a leg", Range(min=0.01), FIXED] = 0.6
-    length: Annotated[float, "m", "from end to end along the course", Range(min=0.01), FIXED] = 4.0
+    length: Annotated[float, "m", "length of the strip along the course", Range(min=0.01), FIXED] = 4.0
     stop: Annotated[
-        float, "m", "run in which the speed is reversed, at most the length", Range(min=0.01), FIXED
+        float,
+        "m",
+        "distance over which the speed is reversed, at most the length",
+        Range(min=0.01),
+        FIXED,
     ] = 0.4
     pace: PathTiming = PathTiming()
 

@@ -313,10 +313,10 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
     int k, after;
     (void)no_return;
     if (!(h >= 0.0 && is_finite(h))) {
-        tell(m, fmi2Error, "step at t = %.15g s: %.15g s is no step size", t, h);
+        tell(m, fmi2Error, "step at t = %.15g s: %.15g s is not a valid step size", t, h);
         return fmi2Error;
     }
-    if (m->initialising) return refuse(m, "there is no state to step from before initialisation has ended");
+    if (m->initialising) return refuse(m, "a step needs a finished initialisation");
     if (MAX_STEP > 0.0 && h > MOST_PARTS * MAX_STEP) {
         tell(m, fmi2Error, "step at t = %.15g s failed: a step of %.15g s is too long: %.15g s are integrated at once",
              t, h, MAX_STEP);
@@ -396,10 +396,10 @@ EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[
     Header header = {"", 0, 0, 0};
     if (size >= sizeof(Header) + sizeof(Saved)) memcpy(&header, bytes, sizeof header);
     if (strncmp(header.guid, GUID, sizeof header.guid) || header.size != sizeof(Saved))
-        return refuse(c, "these bytes are no state of this FMU");
-    if (header.version != STATE_VERSION) return refuse(c, "this state is of another version");
+        return refuse(c, "these bytes are not a state of this FMU");
+    if (header.version != STATE_VERSION) return refuse(c, "this state belongs to another version");
     if (header.checksum != checksum(bytes + sizeof header, sizeof(Saved)))
-        return refuse(c, "this state was changed: its checksum is another one");
+        return refuse(c, "this state was changed: its checksum differs");
     if (!*state) *state = malloc(sizeof(Saved));
     if (!*state) return refuse(c, "out of memory");
     memcpy(*state, bytes + sizeof header, sizeof(Saved));
@@ -411,22 +411,22 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueR
                                                const fmi2ValueReference k[], size_t nk, const fmi2Real dk[],
                                                fmi2Real du[]) {
     (void)u, (void)nu, (void)k, (void)nk, (void)dk, (void)du;
-    return refuse(c, "no derivatives are offered");
+    return refuse(c, "derivatives are not supported");
 }
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                               const fmi2Integer order[], const fmi2Real value[]) {
     (void)vr, (void)n, (void)order, (void)value;
-    return refuse(c, "no derivatives are offered");
+    return refuse(c, "derivatives are not supported");
 }
 
 EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                                const fmi2Integer order[], fmi2Real value[]) {
     (void)vr, (void)n, (void)order, (void)value;
-    return refuse(c, "no derivatives are offered");
+    return refuse(c, "derivatives are not supported");
 }
 
-EXPORT fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(c, "no step goes on behind fmi2DoStep"); }
+EXPORT fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(c, "there is no step to cancel"); }
 
 EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
     (void)c, (void)kind, (void)value;

@@ -28,8 +28,10 @@ SCATTER = 4.0
 class NoiseLearning(NamedTuple):
     """How the noise of the disturbance is learnt."""
 
-    change_time: Annotated[float, "s", "for which a disturbance goes on changing", Range(0.1)] = 8.0
-    memory_time: Annotated[float, "s", "over which its slope is remembered", Range(0.1)] = 2.0
+    change_time: Annotated[
+        float, "s", "correlation time of the slope of the disturbance", Range(0.1)
+    ] = 8.0
+    memory_time: Annotated[float, "s", "memory of the slope of the disturbance", Range(0.1)] = 2.0
     alert: Annotated[
         float, "1/s", "growth of the covariance while samples are rejected", Range(0.0, 100.0)
     ] = 20.0

@@ -21,10 +21,10 @@ class CorrectionGains(NamedTuple):
     k2_u: Annotated[float, "1/s2", "correction of the surge velocity", GAIN] = 9.0
     k2_v: Annotated[float, "1/s2", "correction of the sway velocity", GAIN] = 9.0
     k2_r: Annotated[float, "1/s2", "correction of the yaw rate", GAIN] = 9.0
-    u_max: Annotated[float, "m/s", "velocity that no ship has", Range(0.0, 100.0)] = 2.0
-    r_max: Annotated[float, "rad/s", "yaw rate that no ship has", Range(0.0, 100.0)] = 5.0
+    u_max: Annotated[float, "m/s", "upper limit of a plausible velocity", Range(0.0, 100.0)] = 2.0
+    r_max: Annotated[float, "rad/s", "upper limit of a plausible yaw rate", Range(0.0, 100.0)] = 5.0
     b: Annotated[float, "1", "weight of a new acceleration in its filter", FRACTION] = 0.05
-    filter_period: Annotated[float, "s", "sampling period that b belongs to", Range(1e-6)] = 0.01
+    filter_period: Annotated[float, "s", "sampling period of b", Range(1e-6)] = 0.01
 
 
 class MotionState(NamedTuple):

@@ -14,7 +14,7 @@ class Weights(NamedTuple):
 
     a: Annotated[float, "1", "weight of a new pose in the position filter", FRACTION] = 0.08
     b: Annotated[float, "1", "weight of a new rate in the velocity filter", FRACTION] = 0.05
-    filter_period: Annotated[float, "s", "sampling period that a and b belong to", Range(1e-6)] = 0.01
+    filter_period: Annotated[float, "s", "sampling period of a and b", Range(1e-6)] = 0.01
 
 
 class Filtered(NamedTuple):

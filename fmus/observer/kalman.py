@@ -42,7 +42,9 @@ class Rejection(NamedTuple):
     gate: Annotated[float, "1", "standard deviations beyond which a sample is a spike", Range(1.0)] = 5.0
     position_slack: Annotated[float, "m", "standard deviation added before that", STD] = 0.005
     heading_slack: Annotated[float, "rad", "standard deviation added before that", STD] = 0.01
-    jump_time: Annotated[float, "s", "spikes for longer are a new place", Range(0.0)] = 0.3
+    jump_time: Annotated[
+        float, "s", "spikes for a longer time are a jump of the position", Range(0.0)
+    ] = 0.3
     fade_time: Annotated[float, "s", "time constant of a velocity long lost", Range(0.01)] = 0.2
 
 
@@ -189,7 +191,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
 
 COMPONENT = component(
     name="observer_kalman",
-    description="Kalman filter with the model of the hull and a disturbance that it learns",
+    description="Kalman filter with the model of the hull and an estimated disturbance",
     init=init,
     step=step,
     hold_nonfinite=False,

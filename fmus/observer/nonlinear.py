@@ -31,7 +31,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
 
 COMPONENT = component(
     name="observer_nonlinear",
-    description="Nonlinear observer on kinematics alone",
+    description="Nonlinear observer of the kinematics without a ship model",
     init=init,
     step=step,
     hold_nonfinite=False,

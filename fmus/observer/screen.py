@@ -16,7 +16,9 @@ MOST_FORCE = 1e3  # N, N m; beyond, arithmetic may overflow
 
 class Screening(NamedTuple):
     measurement_period: Annotated[float, "s", "time between new measurements", Range(1e-6)] = 0.01
-    rest_time: Annotated[float, "s", "an identical pose for longer means rest", Range(0.0)] = 3.0
+    rest_time: Annotated[
+        float, "s", "an identical pose for a longer time is taken as rest", Range(0.0)
+    ] = 3.0
 
 
 class Inputs(NamedTuple):

@@ -31,7 +31,7 @@ def changed(function: str, change: Change) -> Effect:
 
     def sentence(f: Found) -> str:
         told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
-        return f"{capital(change.text)} is another than the model believes, by {', '.join(told)}."
+        return f"{capital(change.text)} differs from the model by {', '.join(told)}."
 
     @effect(
         change.stem,

@@ -27,7 +27,7 @@ class Number(StrictTable):
     prime: Finite | None = Field(None, description="in place of value: in prime units, see prime")
     origin: str = Field(GUESSED, description="weighed, tank test, borrowed, guessed, or a publication")
     std: PositiveFloat | None = Field(
-        None, description="standard deviation in the number's unit", allow_inf_nan=False
+        None, description="standard deviation in the unit of the number", allow_inf_nan=False
     )
     share: float | None = Field(
         None, ge=0.0, le=10.0, description="standard deviation as a share of the value; 0: exact"
@@ -111,6 +111,6 @@ class Term(Number):
     def _is_product(self) -> "Term":
         if not self.product or FACTOR.sub("", self.product):
             raise ValueError(
-                f"'{self.product}' is no product of u, v, r, |u|, |v| and |r|, as |u|u or uv is"
+                f"'{self.product}' is not a product of u, v, r, |u|, |v| and |r|, such as |u|u or uv"
             )
         return self

@@ -55,7 +55,7 @@ def _inertia(ship: Description, draft: float | None) -> Iterator[ShipDoubt]:
     for name, motion in zip(("X_udot", "Y_vdot", "N_rdot"), MOTIONS, strict=True):
         if name in values and values[name].value > 0.0:
             unit = "kg.m2" if motion == "yaw" else "kg"
-            text = f"is positive: the water that moves along in {motion} has a negative {name}"
+            text = f"is positive; the added mass in {motion} needs a negative {name}"
             yield ShipDoubt("inertia", 0, name, f"{name} = {values[name].value:.4g} {unit} {text}")
     numbers = {v.name.rpartition("_")[2]: v.value for part in ship.functions for v in part.values}
     draft = draft or numbers.get("draft")
@@ -87,7 +87,7 @@ def _products(ship: Description) -> Iterator[ShipDoubt]:
                     "product",
                     names.index(worst.name),
                     "product",
-                    f"{value} drives the ship on at {_told(axis, speed)} in {motion}: damping resists",
+                    f"{value} adds energy at {_told(axis, speed)} in {motion}; damping removes energy",
                 )
                 break
 
@@ -105,8 +105,10 @@ def _functions(ship: Description) -> Iterator[ShipDoubt]:
                 with_it = FUNCTIONS[part.law](u + base, v, r, **numbers)
                 without = FUNCTIONS[part.law](base, 0.0, 0.0, **numbers)
                 if (with_it[axis] - without[axis]) * speed > 0.0:
-                    text = f"{part.law} drives the ship on at {_told(axis, speed)} in {motion}"
-                    yield ShipDoubt(f"hull.functions.{part.law}", 0, "", f"{text}: damping resists")
+                    text = f"{part.law} adds energy at {_told(axis, speed)} in {motion}"
+                    yield ShipDoubt(
+                        f"hull.functions.{part.law}", 0, "", f"{text}; damping removes energy"
+                    )
                     break
 
 

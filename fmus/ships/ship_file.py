@@ -94,21 +94,24 @@ class ShipTable(StrictTable):
     outline: list[tuple[Finite, Finite]] = Field(
         [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
     )
-    allocates: bool = Field(True, description="false: the thrusters get commands instead of a force")
+    allocates: bool = Field(
+        True, description="false: commands are the inputs of the thrusters; true: a force is"
+    )
     inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
     prime: PrimeTable | None = None
     wind: WindTable | None = None
     hull: HullTable = HullTable()
     actuators: list[ActuatorTable] = Field(
-        [], description="empty: two forces as they are commanded, a quarter of the length fore and aft"
+        [],
+        description="default: two commanded forces, a quarter of the length fore and aft",
     )
     effects: list[str] = Field(
         [],
-        description="effects of its actuators, in their order; all that each may have where it is empty",
+        description="effects of its actuators, in their order (all possible ones)",
     )
     aliases: dict[str, Annotated[str, Field(pattern=VARIABLE, max_length=60)]] = Field(
         {},
-        description="variable of an actuator, or the beginning of its name -> what it is called instead",
+        description="variable of an actuator, or the beginning of its name -> new name",
     )
 
 
@@ -133,7 +136,7 @@ def find_ship(name: str | Path) -> Path:
     if path.suffix == ".toml":
         if not path.is_file():
             hint = nearest(path.name, [p.name for p in path.parent.glob("*.toml")])
-            raise DeclarationError(f"no such description of a ship: '{path}'{hint}")
+            raise DeclarationError(f"no such ship file: '{path}'{hint}")
         return path
     for folder in FOLDERS:
         if (folder / f"{name}.toml").is_file() and Path(str(name)).name == str(name):
@@ -161,7 +164,7 @@ def read_ship(name: str | Path) -> Description:
 @cache
 def _read(path: Path, _changed: int) -> Description:
     if path.stat().st_size > MOST_BYTES:
-        raise DeclarationError(f"'{path}' is too large for the description of a ship")
+        raise DeclarationError(f"'{path}' is too large for a ship file")
     try:
         table = ShipTable.model_validate(_toml(path))
     except ValidationError as error:
@@ -253,9 +256,9 @@ def _wind(table: WindTable, prime: Prime | None) -> tuple[Value, ...]:
     declared = described_numbers(given)
     missing = [v.name for v in declared if v.name not in given and v.name != "air_density"]
     if by_regression(given) and missing:
-        raise DeclarationError(f"wind: {missing[0]} is missing, which a superstructure needs as well")
+        raise DeclarationError(f"wind: {missing[0]} is missing; a superstructure needs it")
     if table.measured and not given:
-        raise DeclarationError("wind: frontal_area is missing, on which a measured wind acts")
+        raise DeclarationError("wind: frontal_area is missing; a measured wind needs it")
     return _values("wind", given, declared, prime)
 
 
@@ -278,19 +281,21 @@ def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:
     for a in actuators:
         where, law = f"actuator '{a.name}'", Law.known[a.law]
         if law.in_race != bool(a.behind):
-            told = "needs 'behind', the propeller in whose race it works" if law.in_race else ""
-            raise DeclarationError(f"{where}: {told or f'{a.law} works in no race'}")
+            right = "needs 'behind', its" if law.in_race else f"{a.law} cannot have 'behind', an"
+            raise DeclarationError(f"{where}: {right} upstream propeller")
         if a.behind and (a.behind not in named or not Law.known[named[a.behind].law].has_race):
-            raise DeclarationError(f"{where}: '{a.behind}' is no propeller with a race")
+            raise DeclarationError(f"{where}: '{a.behind}' is not a propeller with a slipstream")
         alike = [b for b in actuators if (b.order or b.name) == (a.order or a.name)]
         if any(Law.known[b.law].commands != law.commands for b in alike):
-            raise DeclarationError(f"{where}: others at its order have other commands")
+            raise DeclarationError(f"{where}: the other actuators of its group have other commands")
         if len(alike) > 1 and a.number("abreast"):
-            raise DeclarationError(f"{where}: two abreast share no order with others")
+            raise DeclarationError(f"{where}: two actuators abreast cannot share a group with others")
         if a.number("abreast") and (law.has_race or law.in_race):
-            raise DeclarationError(f"{where}: two abreast work in no race and have none")
+            raise DeclarationError(
+                f"{where}: two actuators abreast cannot have or be an upstream propeller"
+            )
         if len(alike) > 1 and allocates:
-            raise DeclarationError(f"{where}: a ship of shared orders has 'allocates = false'")
+            raise DeclarationError(f"{where}: a ship with command groups needs 'allocates = false'")
 
 
 def _inertia(given: Mapping[str, Any], prime: Prime | None) -> tuple[Value, ...]:
@@ -313,7 +318,7 @@ def _inertia(given: Mapping[str, Any], prime: Prime | None) -> tuple[Value, ...]
 def _once(names: list[str], where: str) -> None:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise DeclarationError(f"{where}: {twice} stands there twice")
+        raise DeclarationError(f"{where}: {twice} occurs twice")
 
 
 def _box(length: float, beam: float) -> tuple[tuple[float, float], ...]:
@@ -379,7 +384,7 @@ def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
         *rates,
     )
     if keyword.iskeyword(a.name):
-        raise DeclarationError(f"{where}: a word of Python's own is no name")
+        raise DeclarationError(f"{where}: a keyword of Python cannot be a name")
     numbers = {name: _checked(where, name, given) for name, given in (a.model_extra or {}).items()}
     title, values = a.title or a.name.replace("_", " "), _values(where, numbers, declared, prime)
     return Part(a.name, a.law, title, values, a.order or "", a.behind, a.label)

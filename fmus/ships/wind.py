@@ -64,9 +64,9 @@ def wind_by_regression(
     wind_X_1: Annotated[float, "1", "wind force ahead, by the cosine of the wind's angle"] = 0.0,
     wind_X_3: Annotated[float, "1", "wind force ahead, by that of three times the angle"] = 0.0,
     wind_X_5: Annotated[float, "1", "wind force ahead, by that of five times the angle"] = 0.0,
-    wind_Y_1: Annotated[float, "1", "wind force aside, by the sine of the wind's angle"] = 0.0,
-    wind_Y_3: Annotated[float, "1", "wind force aside, by that of three times the angle"] = 0.0,
-    wind_Y_5: Annotated[float, "1", "wind force aside, by that of five times the angle"] = 0.0,
+    wind_Y_1: Annotated[float, "1", "wind force to starboard, by the sine of the wind's angle"] = 0.0,
+    wind_Y_3: Annotated[float, "1", "wind force to starboard, by that of three times the angle"] = 0.0,
+    wind_Y_5: Annotated[float, "1", "wind force to starboard, by that of five times the angle"] = 0.0,
     wind_N_1: Annotated[float, "1", "wind moment, by the sine of the wind's angle"] = 0.0,
     wind_N_2: Annotated[float, "1", "wind moment, by that of twice the angle"] = 0.0,
     wind_N_3: Annotated[float, "1", "wind moment, by that of three times the angle"] = 0.0,
@@ -95,7 +95,9 @@ class Superstructure(NamedTuple):
     lateral_area: Annotated[float, "m2", "area above the water from the side, A_L", POSITIVE] = 1.0
     lateral_centre: Annotated[float, "m", "forward place of the lateral area's centre, C"] = 0.0
     lateral_height: Annotated[float, "m", "height of the lateral area's centre, H_C", POSITIVE] = 1.0
-    superstructure_area: Annotated[float, "m2", "lateral area of what is on deck, A_OD", POSITIVE] = 1.0
+    superstructure_area: Annotated[float, "m2", "lateral area of the deck equipment, A_OD", POSITIVE] = (
+        1.0
+    )
     superstructure_centre: Annotated[float, "m", "forward place of its centre, C_BR"] = 0.0
     superstructure_height: Annotated[float, "m", "height of its top, H_BR", POSITIVE] = 1.0
     air_density: Annotated[float, "kg/m3", "density of the air", POSITIVE] = 1.25
@@ -201,7 +203,7 @@ def wind(ship: Description) -> Effect:
         "XYN",
         formula="X, Y = ρ/2 V_rw² A C(γ), N = ρ/2 V_rw² A_L L C_N(γ)" if regressed else formula,
         symbol="W_n, W_e",
-        sign="direction that the air moves towards, as seen from the water",
+        sign="direction that the air moves towards, relative to the water",
         source="Fujiwara et al. 1998" if regressed else "Fossen 2021, ch. 10",
         linear=False,
         parameters=tuple(parameters),

@@ -8,5 +8,5 @@ from .thrusters import variant
 
 def make(effects: EffectSet, ship: Description) -> Component | None:
     """The FMU of a ship's thrusters by the square of the command; None: none of them has that form."""
-    form = ", whose force grows with the square of the command"
+    form = ", whose force increases with the square of the command"
     return variant("thrusters_propeller", "squared", form, effects, ship)

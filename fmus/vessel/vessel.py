@@ -80,9 +80,9 @@ class Outputs(NamedTuple):
     omega_X: Annotated[float, "N", "all model error in surge"] = 0.0
     omega_Y: Annotated[float, "N", "all model error in sway"] = 0.0
     omega_N: Annotated[float, "N.m", "all model error in yaw"] = 0.0
-    omega_star_X: Annotated[float, "N", "what control model (2.27) lacks in surge"] = 0.0
-    omega_star_Y: Annotated[float, "N", "what control model (2.27) lacks in sway"] = 0.0
-    omega_star_N: Annotated[float, "N.m", "what control model (2.27) lacks in yaw"] = 0.0
+    omega_star_X: Annotated[float, "N", "model error of the control model (2.27) in surge"] = 0.0
+    omega_star_Y: Annotated[float, "N", "model error of the control model (2.27) in sway"] = 0.0
+    omega_star_N: Annotated[float, "N.m", "model error of the control model (2.27) in yaw"] = 0.0
 
 
 def hull(p: Fields, effects: VesselEffects) -> Hull:

@@ -47,13 +47,13 @@ NEVER_SURE = 40.0  # largest logarithm of odds, so that no exponential overflows
 class Settings(NamedTuple):
     filter_time: Annotated[float, "s", "time constant of the low pass", Range(0.01)] = 1.0
     sample_time: Annotated[float, "s", "between samples of the window of 20", Range(0.01)] = 0.5
-    memory: Annotated[float, "s", "over which the usual is learned", Range(1.0)] = 120.0
-    first: Annotated[float, "s", "of judging before anything is told", POSITIVE] = 30.0
-    least_loss: Annotated[float, "1", "share of thrust below which no loss is told", Range(0.0, 1.0)] = (
-        0.15
-    )
+    memory: Annotated[float, "s", "time over which the usual level is learned", Range(1.0)] = 120.0
+    first: Annotated[float, "s", "time of judging before a failure is reported", POSITIVE] = 30.0
+    least_loss: Annotated[
+        float, "1", "thrust level below which no loss is reported", Range(0.0, 1.0)
+    ] = 0.15
     # One in ten hours: chosen.
-    failure_rate: Annotated[float, "1/s", "how often a failure is to be expected", Range(1e-12)] = 2.8e-5
+    failure_rate: Annotated[float, "1/s", "expected rate of failures", Range(1e-12)] = 2.8e-5
 
 
 class Detection(NamedTuple):
@@ -73,10 +73,10 @@ def outputs_of(ship: Description) -> type[Fields]:
             for a in actuators(ship)
         ]
 
-    since = Variable("since", "s", "when the failure that is told began; 0: none is", 0.0)
+    since = Variable("since", "s", "start of the reported failure; 0: none", 0.0)
     failed = each("failed", "probability that the {} failed, 0...1")
     return group_of(
-        "Outputs", [*failed, since, *each("lost", "share of the force of the {} that seems lost")]
+        "Outputs", [*failed, since, *each("lost", "estimated lost share of the force of the {}")]
     )
 
 

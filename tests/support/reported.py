@@ -53,7 +53,7 @@ def diagnosis(**changes):
         "remainder": SimpleNamespace(
             significant=False, beyond_chance=False, axes={}, sentence="Little is left."
         ),
-        "unrecorded": SimpleNamespace(stretches=[], sentence="No unrecorded force."),
+        "unrecorded": SimpleNamespace(stretches=[], sentence="No disturbance."),
         "posterior": SimpleNamespace(names=[], correlation=np.zeros((0, 0)), together=[], std={}),
         "start": start,
         "stability": STABILITY,

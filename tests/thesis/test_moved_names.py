@@ -19,7 +19,7 @@ def test_old_paths_of_moved_commands_run_and_say_so(old, new):
         [sys.executable, "-m", old, "--help"], capture_output=True, text=True, cwd=ROOT, check=True
     )
     assert done.stdout.startswith(f"usage: python -m {new} ")
-    assert done.stderr == f"note: {old} is now {new}; the old name goes with the next release\n"
+    assert done.stderr == f"note: {old} has the new name {new}; the next release removes the old name\n"
 
 
 @pytest.mark.slow
@@ -35,5 +35,5 @@ def test_an_old_name_is_the_module_itself():
         capture_output=True, text=True, cwd=ROOT, check=True,
     )  # fmt: skip
     assert done.stderr == (
-        "note: diagnosis.analysis is now thesis.analysis; the old name goes with the next release\n"
+        "note: diagnosis.analysis has the new name thesis.analysis; the next release removes the old name\n"
     )

@@ -103,13 +103,13 @@ class ConfinedFmu:
     def sentences(self) -> Iterator[str]:
         """What a reader should know of how instances have run so far."""
         if self.model.needs_tool:
-            yield "It needs the tool that it was made with (needsExecutionTool)."
+            yield "It needs the tool that exported it (needsExecutionTool)."
         if lines := [*self.printed]:
             yield f"It printed {len(lines)} different lines, the first: {lines[0]}"
         yield f"Its processes: {self.confinement}."
         if outside := [*self.outside]:
             named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
-            yield f"It opened, or tried to open, {len(outside)} files that are not its own: {named}."
+            yield f"It opened, or tried to open, {len(outside)} files outside of its own: {named}."
 
     def told(self, error: Exception) -> str:
         """What an error says, with the file of the FMU in place of its copy."""

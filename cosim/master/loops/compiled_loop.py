@@ -61,14 +61,14 @@ def compiled_run(
     if native is False:
         raise PlainLoopError('"native" is false')
     if realtime:
-        raise PlainLoopError("it keeps to the wall clock")
+        raise PlainLoopError("it runs in real time")
     for stepper in master.steppers:
         if stepper.access.direct is None:
             raise PlainLoopError(f"{stepper.instance.name} has a process of its own")
         for effect in (*stepper.input_effects, *stepper.output_effects):
             if type(effect) not in (*OPERATIONS, Changes):
                 raise PlainLoopError(
-                    f"a fault of {stepper.instance.name} is a function in Python, not an operation "
+                    f"a fault of {stepper.instance.name} is a Python function, not an operation "
                     "(cosim.scenario.operations)"
                 )
     try:
@@ -76,7 +76,7 @@ def compiled_run(
     except NoLibraryError as error:
         raise PlainLoopError(str(error)) from None
     if any(functions.layout(k) != ctypes.sizeof(found) for k, found in enumerate(STRUCTURES)):
-        raise PlainLoopError("the compiler lays out memory in another way than Python expects")
+        raise PlainLoopError("the compiler's memory layout differs from that in Python")
     return _CompiledLoop(master, rows, functions, patience).run()
 
 

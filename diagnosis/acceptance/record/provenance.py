@@ -40,9 +40,9 @@ def entry(role: str, path: Path, expected: str = "") -> dict[str, str]:
     """
     found = sha256_of(path)
     if not found:
-        raise InputError(f"'{path}' cannot be read any more, so that no record can name it")
+        raise InputError(f"'{path}' cannot be read again: the record needs its hash")
     if expected and found != expected:
-        raise InputError(f"'{path}' has changed since it was compared: compare it again")
+        raise InputError(f"'{path}' has changed since the comparison: repeat the comparison")
     return {"role": role, "path": str(path), "sha256": found}
 
 

@@ -26,7 +26,7 @@ def sections(r: Content) -> Iterator[ReportSection]:
     yield ReportSection("Particulars", purpose, [Table(("", ""), told, words=True)])
     heads = ("criterion", "signal", "unit", "least", "5 %", "50 %", "95 %", "greatest")
     covered = [(v.criterion, v.signal, v.unit, *map(number, [*v.values()][3:])) for v in r.validity]
-    text = "What the judged windows cover: least, quantiles and greatest over their samples."
+    text = "Range of the judged windows: minimum, quantiles and maximum of their samples."
     yield ReportSection("Validity range", [text], [Table(heads, covered)])
     faults = [f"{s['run']}: {s['sentence']}" for s in r.sensors]
     yield ReportSection("Faults of sensors", faults or ["The channels do not contradict each other."])
@@ -80,7 +80,7 @@ def _judged(r: Content) -> ReportSection:
     told.append(
         f"The model was learned from: {known}."
         if known
-        else "The model's file names no run that it was learned from."
+        else "The file of the model does not name its training runs."
     )
     return ReportSection("What was judged", told, [Table(heads, rows, words=True)])
 
@@ -99,11 +99,9 @@ def _errors(r: Content) -> ReportSection:
         for j in r.judgements
     ]
     told = (
-        "E = S − D is predicted minus measured at the horizon, its mean over windows; of position "
-        "the mean "
-        "distance, and the mean forward and to starboard. Bounds of the share, or of the RMS, are "
-        "one-sided "
-        "at the confidence of the criterion."
+        "E = S − D is predicted minus measured at the horizon, as the mean over windows. For "
+        "position it is the mean distance, and the mean error forward and to starboard. Bounds of "
+        "the share, or of the RMS, are one-sided at the confidence of the criterion."
     )
     heads = ("criterion", "unit", "tolerance", "E", "forward, starboard", "RMS", "largest", "windows")
     return ReportSection("Comparison error", [told], [Table((*heads, "share or RMS"), rows)])
@@ -120,11 +118,10 @@ def _uncertainty(r: Content) -> ReportSection:
         if j.budget is not None
     ]
     told = (
-        "Standard uncertainties of the judged quantity at the horizon. u_val² = u_num² + u_input² + "
-        "u_D², "
-        "u_input² being that of initial state, parameters, process noise, current and wind. Sources "
-        "that are "
-        "not known are left out, so that u_val is a lower bound. u_num is by Richardson's extrapolation."
+        "Standard uncertainties of the judged quantity at the horizon. u_val² = u_num² + u_input² "
+        "+ u_D², where u_input² includes initial state, parameters, process noise, current and "
+        "wind. Unknown contributions are left out, so u_val is a lower bound. u_num is by "
+        "Richardson's extrapolation."
     )
     heads = ("criterion", "unit", *(CALLED.get(name, name) for name in SOURCES))
     return ReportSection("Uncertainty", [told], [Table(heads, rows)])

@@ -42,9 +42,9 @@ def is_signed(content: bytes, signature: bytes, public: bytes, where: str) -> bo
     try:
         key = load_pem_public_key(public)
     except Exception:  # of several kinds, of which the library promises none
-        raise InputError(f"{where} is no public key (PEM)") from None
+        raise InputError(f"{where} is not a public key (PEM)") from None
     if not isinstance(key, Ed25519PublicKey):
-        raise InputError(f"{where} is a public key of another kind than Ed25519")
+        raise InputError(f"{where} is a public key of another kind; Ed25519 is needed")
     try:
         key.verify(signature, content)
     except InvalidSignature:
@@ -62,11 +62,11 @@ def _private(path: Path) -> Any:
     except OSError as error:
         raise InputError(f"the key '{path}' cannot be read: {error.strerror or error}") from None
     except TypeError:
-        raise InputError(f"the key '{path}' has a password; give one without") from None
+        raise InputError(f"the key '{path}' has a password; give a key without one") from None
     except Exception:  # of several kinds, of which the library promises none
-        raise InputError(f"'{path}' is no private key (PEM)") from None
+        raise InputError(f"'{path}' is not a private key (PEM)") from None
     if not isinstance(key, Ed25519PrivateKey):
-        raise InputError(f"'{path}' is a key of another kind than Ed25519")
+        raise InputError(f"'{path}' is a key of another kind; Ed25519 is needed")
     return key
 
 

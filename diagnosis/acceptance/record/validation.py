@@ -127,7 +127,7 @@ def validate(
     ):
         known = known._replace(posterior=None)
         notes.append(
-            f"'{learned}' is of a model with other values, so that its posterior says nothing here."
+            f"'{learned}' belongs to a model with other values; its posterior does not apply here"
         )
     runs = _JudgedRuns(comparison, known, read.content.input_std, notes)
     horizons = dict.fromkeys(c.horizon for c in read.content.criteria)
@@ -290,7 +290,9 @@ def _budget(b: Budget, factor: float) -> dict[str, Any]:
 
 def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Iterator[str]:
     """What nobody may conclude from the record."""
-    yield "Speeds, drift angles, yaw rates and commands outside the validity range of what was judged."
+    yield (
+        "Speeds, drift angles, yaw rates and commands outside the validity range of the judged windows."
+    )
     horizons = sorted({j.criterion.horizon for j in judgements})
     yield f"Predictions over other times than {', '.join(f'{h:g}' for h in horizons)} s."
     judged = {j.criterion.quantity for j in judgements if j.outcome != "cannot be judged"}
@@ -300,11 +302,17 @@ def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Ite
     for j in judgements:
         unknown = [] if j.budget is None else j.budget.unknown
         if unknown:
-            yield f"{j.criterion.title}: u_val is without {', '.join(unknown)}, which are not known."
+            yield (
+                f"{j.criterion.title}: u_val does not include {', '.join(unknown)}, which are not known."
+            )
     predictor = comparison.predictor
     if predictor.whole:
         yield f"Predictions from a measured state: the velocity of {predictor.name} cannot be set."
-    yield "Systematic errors of sensors that no other channel shows."
+    yield "Systematic errors of sensors that no redundant channel shows."
     trial = any(e.weak_windows.run.trial for e in comparison.evaluations)
-    which = ", which comparison.json has, and no criterion" if trial else ": no run is one"
+    which = (
+        ", which comparison.json has, but no criterion"
+        if trial
+        else ": there is no trial among the runs"
+    )
     yield f"Measures of manoeuvring trials{which}."

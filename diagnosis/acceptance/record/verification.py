@@ -99,9 +99,7 @@ def verify_record(
     known = {SIGNATURE, KEY, CODE, *tables, *(n for f in files for n in _names(f))}
     for name in allow_missing:
         if name not in known:
-            raise InputError(
-                f"nothing called '{name}' can be missing; there are {', '.join(sorted(known))}"
-            )
+            raise InputError(f"'{name}' cannot be allowed; there are {', '.join(sorted(known))}")
     return [
         c._replace(allowed=c.holds is None and not {*c.name.split("\n")}.isdisjoint(allow_missing))
         for c in checks
@@ -116,18 +114,18 @@ def _read(path: Path) -> tuple[bytes, Record]:
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
     except ValidationError as error:
-        raise InputError(f"'{path}' is no validation record: {first_fault(error)}") from None
+        raise InputError(f"'{path}' is not a validation record: {first_fault(error)}") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' is no validation record: {error}") from None
+        raise InputError(f"'{path}' is not a validation record: {error}") from None
     if content.form != FORM:
-        raise InputError(f"'{path}' is not of the form '{FORM}' but of '{content.form[:40]}'")
+        raise InputError(f"'{path}' has the form '{content.form[:40]}'; '{FORM}' is needed")
     return raw, content
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object without a key twice, of which readers would take one or the other."""
     if len(dict(pairs)) < len(pairs):
-        raise ValueError("a key stands twice in one object")
+        raise ValueError("a key occurs twice in one object")
     return dict(pairs)
 
 
@@ -135,8 +133,8 @@ def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) 
     beside, named = path.with_suffix(".sig"), content.public_key
     if not beside.exists():
         if key is None and named is None:
-            return Check(None, "signature: none; a change of the record would not show", SIGNATURE)
-        return Check(False, f"signature: '{beside.name}' is missing beside the record")
+            return Check(None, "signature: none; a change of the record is not detectable", SIGNATURE)
+        return Check(False, f"signature: '{beside.name}' is missing next to the record")
     if key is not None:
         try:
             public = Path(key).read_bytes()
@@ -146,7 +144,7 @@ def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) 
     elif named is not None:
         public, where, by = named.encode(), "public_key of the record", "that the record names"
     else:
-        return Check(False, "signature: there is one, but the record names no key; --key gives one")
+        return Check(False, "signature: present, but the record names no key; --key gives one")
     holds = is_signed(raw, beside.read_bytes(), public, where)
     return Check(holds, f"signature: {'' if holds else 'not of this record '}by the key {by}")
 
@@ -154,7 +152,9 @@ def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) 
 def _whose(content: Record, key: str | Path | None) -> Iterator[Check]:
     if content.public_key is not None and key is None:
         yield Check(
-            None, "key: whose it is that the record names is not known; --key gives the signer's", KEY
+            None,
+            "key: the owner of the key in the record is not known; --key gives the key of the signer",
+            KEY,
         )
 
 
@@ -163,7 +163,7 @@ def _code(content: Record) -> Check:
     same = there.sha256 == here["sha256"]
     told = f"code: cybership {there.version}, SHA-256 {there.sha256}"
     return Check(
-        True if same else None, f"{told}: {'the same as' if same else 'another than'} here", CODE
+        True if same else None, f"{told}: {'the same as' if same else 'different from'} here", CODE
     )
 
 

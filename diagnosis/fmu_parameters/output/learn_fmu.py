@@ -75,7 +75,9 @@ def _only_known(task: SystemTask, parts: Mapping[str, WindowResiduals], advance:
     refuse_unknown(found)
     task.notes += [s.fault for s in found.each if s.fault]
     if untold := [s.parameter.name for s in found.each if not s.known]:
-        task.notes.append(f"The runs do not determine {', '.join(untold)}: kept at the start value.")
+        task.notes.append(
+            f"Not identifiable from these runs: {', '.join(untold)}; kept at the start value."
+        )
     task.parameters = [s.parameter for s in found.each if s.known]
     for part in parts.values():
         part.choose(task.parameters)

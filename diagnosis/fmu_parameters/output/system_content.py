@@ -21,11 +21,11 @@ from ..system_calibration import MOST_MOVED, CalibratedValue, SystemCalibration
 
 Z95 = float(norm.ppf(0.975))
 SENTENCES = {
-    "parameters": "Parameters of the FMU are off, and nothing else is missing.",
+    "parameters": "Parameters of the FMU differ from their values, and no other error is detected.",
     "found": "The FMU lacks an additional force.",
-    "ambiguous": "The runs do not show which parameter or force is the cause.",
+    "ambiguous": "The runs do not discriminate the parameters or forces that may be the cause.",
     "unexplained": "Neither parameters nor additional forces explain the runs.",
-    "none": "The FMU agrees with the runs; nothing is learned.",
+    "none": "The FMU agrees with the runs; nothing was learned.",
 }
 
 
@@ -84,10 +84,11 @@ class CalibrationReport:
         text = SENTENCES[r.verdict]
         off = [v.parameter.name for v in r.values if v.moved]
         if r.verdict in ("found", "ambiguous") and off and r.forces:
-            text += f" Parameters are off as well: {', '.join(off)}."
+            text += f" Parameters differ as well: {', '.join(off)}."
         if far := [v.parameter.name for v in r.values if abs(v.z) > MOST_MOVED and v.moved]:
             text += (
-                f" Beyond three prior standard deviations: {', '.join(far)}; check the value or prior."
+                f" Beyond three prior standard deviations: {', '.join(far)}; check the value or "
+                "the prior."
             )
         if r.rejected:
             text += f" The fitted values are rejected: {r.rejected}."
@@ -257,7 +258,7 @@ class CalibrationReport:
         if self.result.forces:
             yield _table(FORCES, self.force_rows())
         for group in self.result.together:
-            yield f"Known only together: {', '.join(group)}."
+            yield f"Identifiable only together: {', '.join(group)}."
         yield _table(ERRORS, self.error_rows())
         yield self.result.remainder.sentence
         for f in self.result.forces:
@@ -274,7 +275,7 @@ class CalibrationReport:
             table = PageTable(FORCES, [*self.force_rows()], True)
             sections.append(ReportSection("Additional forces", text, [table]))
         if r.together:
-            lines = [f"Known only together: {', '.join(group)}." for group in r.together]
+            lines = [f"Identifiable only together: {', '.join(group)}." for group in r.together]
             sections.append(ReportSection("Not identifiable alone", lines))
         sections.append(
             ReportSection(
@@ -298,7 +299,8 @@ def advice(f: Accepted) -> str:
     others = ", ".join(f.alike)
     if f.force.output:
         return (
-            f"{f.force.id} is indistinguishable from {others}: run with other sizes of {f.force.output}."
+            f"{f.force.id} is indistinguishable from {others}: run with other levels of "
+            f"{f.force.output}."
         )
     return f"{f.force.id} is indistinguishable from {others}: run with more motion."
 

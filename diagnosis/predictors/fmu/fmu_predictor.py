@@ -192,11 +192,11 @@ class FmuPredictor(BlackBox):
             f"({description.title}); --ship NAME|FILE.toml selects another."
         )
         if (step := self.fmu.fixed_step) is not None:
-            yield f"It takes steps of {step:.6g} s, with a cubic spline through its outputs."
+            yield f"It is stepped every {step:.6g} s, with a cubic spline through its outputs."
         if self.late:
             yield (
-                f"Its outputs {', '.join(self.late)} are zero until the first step, against their start "
-                "values: the samples of each window's first step are left out."
+                f"Its outputs {', '.join(self.late)} are zero until the first step, contrary to "
+                "their start values: samples of the first step of each window are left out."
             )
         yield from self.confined.sentences()
 

@@ -147,7 +147,7 @@ class Fmu:
             InputError: as :meth:`variables`; the FMU refuses to be set to a measured state, or fails.
         """
         predictor = self.begun_on(runs)
-        advance(f"what {self.name} does in measured states")
+        advance(f"response of {self.name} in measured states")
         assert predictor.model  # which takes a while
         return predictor
 

@@ -66,14 +66,14 @@ class VariableMap(BaseModel):
 
     inputs: dict[str, Column | None] = Field(default_factory=dict, description="commands or forces")
     outputs: dict[str, Column | Number | None] = Field(
-        default_factory=dict, description="pose or velocity; a number [SI] where it stays the same"
+        default_factory=dict, description="pose or velocity; a number [SI] if it is constant"
     )
     start: dict[str, Column | None] = Field(default_factory=dict, description="start values")
     beside: dict[str, Column | None] = Field(
-        default_factory=dict, description="forces or accelerations that act beside all else"
+        default_factory=dict, description="forces or accelerations that act in addition to all others"
     )
     run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] | None = Field(
-        default=None, description="time before a whole run counts [s]"
+        default=None, description="time before the comparison of a whole run begins [s]"
     )
 
     @field_validator(*GROUPS, mode="before")
@@ -208,15 +208,15 @@ def completed(
         for signal, column in given.told(group).items():
             place = f"{where}: {group}.{signal}"
             if signal not in known:
-                raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
+                raise InputError(f"{place} is not a signal of these runs{nearest(signal, known)}")
             if column.name not in variables:
                 hint = nearest(column.name, variables)
-                raise InputError(f"{place}: the FMU has no such variable {quoted(column.name)}{hint}")
+                raise InputError(f"{place}: the FMU has no variable {quoted(column.name)}{hint}")
             if column.factor == 0.0:
                 raise InputError(f"{place}.factor is not zero")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
-                raise InputError(f"{place}: {quoted(column.unit)} is no unit of {signal}{hint}")
+                raise InputError(f"{place}: {quoted(column.unit)} is not a unit of {signal}{hint}")
             found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
     return VariableMap(**found)
 
@@ -287,7 +287,7 @@ def _with_unit(column: Column, v: FmuVariable, quantity: str, where: str) -> Col
         return column.model_copy(update={"unit": unit.name})
     if not _is_of(unit, quantity):
         raise InputError(
-            f"{where}: '{v.name}' is in '{unit.name}', which is no unit of {quantity}; tell its unit"
+            f"{where}: '{v.name}' is in '{unit.name}', which is not a unit of {quantity}; state its unit"
         )
     scaled = {"factor": column.factor * unit.factor, "offset": column.offset * unit.factor + unit.offset}
     return column.model_copy(update=scaled)

@@ -23,7 +23,7 @@ from .variable_map import VariableMap
 
 FOREIGN, ADDED = "model", "found"  # instances of the container
 
-NONE = "No FMU with what was found is written"
+NONE = "No FMU with the findings is written"
 SOURCE = """# What was found beside {name!r}.
 from fmus.addition import Line, addition
 from fmus.ship import ship
@@ -65,11 +65,11 @@ def write_wrapper(
     takes |= {*FORCE[:2]} if {"tau.force", "tau.angle"} <= takes else set()
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
-        return "Nothing is added to the FMU.", None
+        return "The findings add nothing to the FMU.", None
     if missing:
         axes = " and ".join(f"{FORCE[k]} or {ACCELERATION[k]}" for k in missing)
-        needs = f"{fmu.name} has no input for a force or an acceleration beside all else"
-        return f"{NONE}: {needs}; it needs {axes}, which the map tells under 'beside'.", None
+        needs = f"{fmu.name} has no input for an additional force or acceleration"
+        return f"{NONE}: {needs}; it needs {axes}, which the map names under 'beside'.", None
     if start.ship.effects.files:
         return f"{NONE}: the ship has effects of your own.", None
     try:
@@ -79,7 +79,7 @@ def write_wrapper(
                 export_fmu(system, path, overwrite=True, expose=_start_values(fmu))
     except (cosim.InputError, BuildError) as error:
         return f"{NONE}: {error}.", None
-    return f"{path.name} is {fmu.name} with what was found.", _map(fmu)
+    return f"{path.name} is {fmu.name} with the findings.", _map(fmu)
 
 
 def _scenario(

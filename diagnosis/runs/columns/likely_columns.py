@@ -180,7 +180,7 @@ def _evidence(
     if quantity == "time":
         if not np.all(np.diff(numbers) > 0.0):
             return None
-        reasons, score = ["rises in each row"], 1.0
+        reasons, score = ["increases in each row"], 1.0
     if like >= LIKELY:
         reasons, score = [*reasons, "by its name"], score + like
     if unit in UNITS[quantity]:

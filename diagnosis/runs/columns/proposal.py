@@ -130,7 +130,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     of = of or ship()
     quantity = quantities(of)
     if path.suffix not in (".csv", ".parquet") or path.is_dir():
-        raise InputError(f"'{path}' is not a CSV or Parquet file, whose columns have names")
+        raise InputError(f"'{path}' is not a CSV or Parquet file with named columns")
     stated, text = stated_layout(path) or Layout(), Layout()
     if path.is_file() and path.suffix == ".csv":
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
@@ -159,7 +159,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     try:
         signals(layout, names, f"'{path}'", of)
     except InputError as error:
-        more = f"; columns that are no signals as far as is known: {', '.join(unused)}" if unused else ""
+        more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
     run = read(path, layout, of)
     for signal, unit in _seen_units(run):
@@ -186,8 +186,9 @@ def common_layout(
     for path in others:
         if texts[path] != texts[first]:
             raise InputError(
-                f"'{path}' is laid out otherwise than '{first}': separator, decimal mark, encoding, "
-                "lines before the names, or what a file beside it says; propose for each alone"
+                f"the layout of '{path}' differs from that of '{first}': separator, decimal mark, "
+                "encoding, lines before the names, or entries of a side-car; propose for each "
+                "file alone"
             )
     common: dict[str, Column] = {}
     for signal in dict.fromkeys(s for layout in layouts.values() for s in layout.columns):

@@ -78,7 +78,7 @@ def refuse_encoding(path: Path, layout: Layout) -> None:
     """Refuse a CSV file whose text is not UTF-8, with the line that states the encoding it may have."""
     if layout.encoding == UTF_8 and b"\0" not in path.read_bytes():
         line = _changed(path, layout, encoding="latin-1")
-        raise InputError(f"'{path}' is not a text in UTF-8; if it is in Latin-1, {line}")
+        raise InputError(f"'{path}' is not a text in UTF-8; if its encoding is Latin-1, {line}")
 
 
 def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
@@ -90,7 +90,7 @@ def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
         return
     seen = f"has the names of its columns in line {found.skip + 1}"
     if found.separator != layout.separator:
-        seen = f"has cells that seem to be separated by {found.separator!r}"
+        seen = f"has cells that are probably separated by {found.separator}"
     line = _changed(path, layout, **found.model_dump(exclude_defaults=True))
     raise InputError(f"'{path}' {seen}; {line}")
 
@@ -114,4 +114,4 @@ def decimal_comma(path: Path, layout: Layout, cell: str) -> str:
     """The end of a message about a cell that is no number: what to do if it is one such as 0,5."""
     if not DECIMAL_COMMA.fullmatch(cell.strip()):
         return ""
-    return f"; if a comma begins the decimals, {_changed(path, layout, decimal=',')}"
+    return f"; if the decimal mark is a comma, {_changed(path, layout, decimal=',')}"

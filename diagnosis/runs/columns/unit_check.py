@@ -26,7 +26,7 @@ OTHERS: dict[str, tuple[str, dict[str, float]]] = {
     "angular acceleration": ("rad/s2", {"deg/s2": c.degree}),
 }
 UNITS = {quantity: {unit: 1.0, **others} for quantity, (unit, others) in OTHERS.items()}
-GO_ON = "--anyway goes on all the same"
+GO_ON = "--anyway continues nevertheless"
 # s between two samples, times the scale of the ship, whose own time constants are shorter (chosen)
 RAREST = 2.0
 OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
@@ -62,7 +62,7 @@ def refuse_time(
             f"is the time in another unit?{remedy}"
         )
     if seconds > LARGEST:
-        raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
+        raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp is wrong")
 
 
 def refuse_units(
@@ -75,7 +75,7 @@ def refuse_units(
     """
     far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
     if far > LARGEST:
-        raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
+        raise InputError(f"{where} is {far:.3g} m or rad from its origin: probably another column")
     for signals, unit, reason in () if anyway else doubts(time, pose):
         raise InputError(f"{where} {reason} {_remedy(signals, unit, called)}; {GO_ON}")
 
@@ -106,7 +106,7 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
 def _remedy(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
     """The line that states a unit."""
     columns = {s: {"name": called.get(s, s), "unit": unit} for s in signals}
-    return f"Then put {json.dumps({'columns': columns})} into the .json file beside it"
+    return f"Then put {json.dumps({'columns': columns})} into its side-car, the .json file next to it"
 
 
 def likely_unit(row: float) -> str | None:

@@ -49,7 +49,7 @@ def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
     names = (*of.layouts[-1].commands, *of.power_settings)
     if len(data) < POWER.stop:
         raise InputError(
-            f"'{path}' is not a measured run: its matrix has {len(data)} rows, {POWER.stop} are needed"
+            f"'{path}' is not a measured run: its matrix has {len(data)} rows; {POWER.stop} are needed"
         )
     given = zip(names, [*data[COMMANDS], *_power(data)], strict=True)
     return {s: rows[s] for s in ("time", *POSE)} | dict(given)

@@ -236,18 +236,22 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     if units == {"1"} and commands is not None:
         most = float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
-            raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
+            raise InputError(
+                f'{where}: commands reach {most:g}; allowed is -1 to 1; is their unit "unit": "%"?'
+            )
     if power is not None and power.max(initial=0.0) > LARGEST:
-        raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
+        raise InputError(f"{where}: power reaches {power.max():g} times the full thrust; allowed is 1")
     if tau is not None and np.abs(tau).max(initial=0.0) > LARGEST:
-        raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
+        raise InputError(
+            f"{where}: commands reach {np.abs(tau).max():g} N, more than any thruster gives"
+        )
     missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*TAU, *own, *settings)) if s in columns]
     lost = sum(gaps.any() for gaps in missing)
     if tau is None:
         assert commands is not None
         tau = of.commanded_force(commands, power)
-    notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
-    notes += tuple(f"no column {signal}: it is taken as zero" for signal in absent)
+    notes = (f"commands are missing in {lost} columns; the last value is held",) if lost else ()
+    notes += tuple(f"no column {signal}: zero is used" for signal in absent)
     return Run(
         name,
         columns["time"],

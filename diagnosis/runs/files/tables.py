@@ -95,7 +95,7 @@ def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
         return None
     wrong = _first(cells, stamps.isna())
     if wrong is not None:
-        raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a date stamp of ISO 8601")
+        raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a time stamp of ISO 8601")
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 

@@ -90,7 +90,7 @@ def _places(run: Run, scale: Scale) -> list[SensorFinding]:
     sides = np.repeat(np.eye(2), time.size, axis=0)
     least, period = least_place(scale), float(np.median(np.diff(time)))
     antenna = "the second antenna is {:.3g} m "
-    late = "the second position comes {:.3g} s later than the first"
+    late = "the second position is {:.3g} s later than the first"
     faults = (
         _Fault("x_2", "place", "m", least, antenna + "ahead of the first"),
         _Fault("y_2", "place", "m", least, antenna + "to starboard of the first"),
@@ -130,12 +130,14 @@ def accelerations(run: Run, scale: Scale) -> Examined:
     place, least = "the acceleration is measured {:.3g} m ", least_place(scale)
     axes = "the axes of a_x and a_y are turned by {:.3g} rad from those of the velocity"
     faults = (
-        _Fault("a_x", "scale", "1", LEAST, "a_x and a_y are {:.4g} times what the velocity says"),
+        _Fault(
+            "a_x", "scale", "1", LEAST, "a_x and a_y are {:.4g} times the acceleration by the velocity"
+        ),
         _Fault("a_x", "offset", "m/s2", LEAST_OFFSET, "a_x is {:.3g} m/s2 too large"),
         _Fault("a_y", "offset", "m/s2", LEAST_OFFSET, "a_y is {:.3g} m/s2 too large"),
         _Fault("a_y", "offset", "rad", LEAST, axes),
-        _Fault("a_x", "place", "m", least, place + "ahead of where the velocity is"),
-        _Fault("a_y", "place", "m", least, place + "to starboard of where the velocity is"),
+        _Fault("a_x", "place", "m", least, place + "ahead of the place of the velocity"),
+        _Fault("a_y", "place", "m", least, place + "to starboard of the place of the velocity"),
     )
     values = np.array([1.0 / factor, *(-value[1:3] / factor), -turn, *value[4:]])
     found = _findings(faults, values, np.array([std[0] / factor**2, *std[1:]]), time)
@@ -164,10 +166,10 @@ def through_water(run: Run, scale: Scale) -> Examined:
     notes: tuple[str, ...] = ()
     if np.hypot(*value[1:]) > SURE * np.hypot(*std[1:]):
         notes = (
-            f"the water moves by {value[1]:.3g} m/s to north and {value[2]:.3g} m/s to east: "
-            "that is a current, if the speed through the water is right",
+            f"the water moves by {value[1]:.3g} m/s to north and {value[2]:.3g} m/s to east: a "
+            "current, if the speed through the water is correct",
         )
-    text = "the speed through the water is {:.4g} times what the velocity over ground says"
+    text = "the speed through the water is {:.4g} times that by the velocity over ground"
     fault = _Fault(WATER[given[0]], "scale", "1", LEAST, text)
     found = _findings([fault], 1.0 / value[:1], std[:1] / value[:1] ** 2, e.time)
     if not found:

@@ -22,15 +22,15 @@ from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
 STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell where it is off; chosen
-CLOCK_OR_SCALE = "the data have too little turning: a clock that runs at this rate would look the same"
-CLOCK_OR_COMPASS = "a compass that is off by heading would look the same"
-CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look the same"
+CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
+CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
+CLOCK_OR_RATE = "no speed is measured: a clock at this rate has the same effect"
 # Of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
 # differ by beyond noise. Chosen: with more, most of it is not what both tell.
 MOST_APART = 0.5
 TWO_CLOCKS = (
-    "position and speed would need another clock than heading and yaw rate: something else is wrong "
-    "there, such as a filter, or values that were held, and nothing but a delay is repaired"
+    "position and speed imply another clock than heading and yaw rate: there is another fault, "
+    "such as a filter or held values, and only a delay is repaired"
 )
 
 
@@ -67,7 +67,7 @@ def motion(
     try:
         found = _estimated(e, columns(e, scale), jumps)
     except LinAlgError:
-        return Examined(run, notes=("the channels beside the pose do not determine a motion",))
+        return Examined(run, notes=("the channels in addition to the pose do not determine a motion",))
     findings = [*jumps, *_clock(found), *_constants(found, e)]
     late = [f for f in findings if f.kind == "delay"]
     if late:  # its column is a tangent: all else is estimated once it is gone
@@ -173,7 +173,10 @@ def _clock(found: MotionFaults) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
     clock = ("time", "clock_rate", "1")
     if not found.wanders:
-        scales, text = _even(found), "the log's clock is off throughout: {:.4g} s pass in a second of it"
+        scales, text = (
+            _even(found),
+            "the clock of the log is wrong throughout: {:.4g} s pass in one second of it",
+        )
         if scales is None:
             return []
         text = text.format(scales[0]) + ", by speed and turn"
@@ -183,7 +186,7 @@ def _clock(found: MotionFaults) -> list[SensorFinding]:
     made = []
     for begin, end, value, s in _stretches(found.path):
         way = "slow" if value > 1.0 else "fast"
-        text = f"the log's clock runs {way}: {value:.3g} s pass in a second of it{or_else}"
+        text = f"the clock of the log is {way}: {value:.3g} s pass in one second of it{or_else}"
         ends = np.array([begin, end])
         made.append(SensorFinding.estimated(clock, value, s, ends, text, alike, not found.either))
     return made
@@ -228,15 +231,15 @@ def _told(c: FaultColumn, value: float, e: Evidence) -> str:
     """A constant fault in words."""
     name = " and ".join(e.by) if e.by and c.channel == e.by[0] and e.by[0] != "speed" else c.channel
     if c.kind == "scale":
-        return f"{name} read {abs(value - 1.0):.1%} too {'much' if value > 1.0 else 'little'}"
+        return f"{name} are {abs(value - 1.0):.1%} too {'large' if value > 1.0 else 'small'}"
     if c.kind == "delay":
-        return f"{name} come {value:.3g} s later than the pose"
+        return f"{name} are {value:.3g} s later than the pose"
     if c.kind == "place":
         way = {"x": ("ahead", "aft"), "y": ("to starboard", "to port")}[c.channel][value < 0.0]
-        return f"the position is measured {abs(value):.3g} m {way} of where the velocity is"
+        return f"the position is measured {abs(value):.3g} m {way} of the place of the velocity"
     if c.kind in DEVIATIONS:
         by = c.kind.removeprefix("deviation_").replace("sin_2", "sin 2").replace("cos_2", "cos 2")
-        return f"psi reads {np.degrees(value):.3g}° times {by} ψ too much, as a compass beside iron does"
+        return f"psi is {np.degrees(value):.3g}° times {by} ψ too large, as of a compass next to iron"
     if c.unit == "rad":
         return f"{name} and the axes of the velocity differ by {np.degrees(value):.3g}°"
     return f"{name} is {np.degrees(value):.3g}°/s too large"
@@ -319,8 +322,9 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
     if abs(middle) < max(LEAST, spread_of(angle)):
         return ()
     return (
-        f"on straight legs the ship goes {np.degrees(middle):.2g}° to one side: the heading's axis is "
-        "off, or a force acts to that side; position, speed and heading cannot discriminate these",
+        f"on straight legs the ship drifts {np.degrees(middle):.2g}° to one side: the heading has "
+        "an offset, or a force acts to that side; position, speed and heading cannot discriminate "
+        "these",
     )
 
 

@@ -46,7 +46,7 @@ class SensorFinding:
     def not_repaired(self) -> str:
         """What becomes of a fault that is not repaired."""
         return (
-            f" (not repaired; {' and '.join(self.aside)} set aside)" if self.aside else " (not repaired)"
+            f" (not repaired; {' and '.join(self.aside)} not used)" if self.aside else " (not repaired)"
         )
 
     @classmethod
@@ -107,8 +107,8 @@ def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
     rates = [f for f in found if f.kind == "clock_rate"]
     if len(rates) > MOST_STRETCHES:
         values = [f.value for f in rates]
-        span = f"{min(values):.3g} to {max(values):.3g} s pass in a second of it"
-        yield f"the log's clock runs unevenly: {span}, in {len(rates)} stretches"
+        span = f"{min(values):.3g} to {max(values):.3g} s pass in one second of it"
+        yield f"the clock of the log runs unevenly: {span}, in {len(rates)} stretches"
         found = [f for f in found if f.kind != "clock_rate"]
     for f in found:
         when = f", {f.start:.1f} to {f.end:.1f} s" if f.kind == "clock_rate" else ""

@@ -18,7 +18,7 @@ WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
 NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen)
 FEWEST = 8  # windows; chosen
 SIGN = "the other sign"  # and nothing else
-OPPOSITE = "its sign is the other one"
+OPPOSITE = "its sign is reversed"
 
 
 def units(run: Run, scale: Scale) -> Examined:
@@ -87,7 +87,7 @@ def sway(run: Run, scale: Scale) -> Examined:
     value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
     if not value[1] < -SURE * std[1]:
         return Examined(run)
-    text = f"v is {1.0 / value[1]:.3g} times what the pose says: {OPPOSITE}"
+    text = f"v is {1.0 / value[1]:.3g} times that by the pose: {OPPOSITE}"
     factor, s = float(1.0 / value[1]), float(std[1] / value[1] ** 2)
     finding = SensorFinding.estimated(("v", "scale", "1"), factor, s, e.time, text)
     return Examined(replace(run, measured=dict(run.measured) | {"v": -run.measured["v"]}), (finding,))
@@ -125,7 +125,7 @@ def _judged(
     told = " and ".join(names)
     if abs(alike) < AGREED:
         measured = {n: v for n, v in found.run.measured.items() if n not in names}
-        note = f"{told} and the pose do not tell of the same motion: {told} is left out"
+        note = f"{told} and the pose disagree about the motion: {told} is not used"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
     if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
@@ -134,7 +134,7 @@ def _judged(
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
     name, factor = _nearest(abs(value), quantity)
     true = np.copysign(factor, value) if name else value
-    text = f"{told} is {value:.4g} times what the pose says"
+    text = f"{told} is {value:.4g} times that by the pose"
     text += f": {name}" if name and abs(true) != 1.0 else f": {OPPOSITE}" if value < 0.0 else ""
     measured = dict(found.run.measured) | {n: found.run.measured[n] / true for n in names}
     finding = SensorFinding.estimated((names[0], "scale", "1"), value, s, e.time, text)

@@ -41,7 +41,7 @@ LEAST_NOISE = 2e-5
 # Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
 # of channels against each other are wrong by less than four.
 MISSTATED = 2.0
-FILTERED = "; behind a filter samples scatter less than they are wrong"
+FILTERED = "; after a filter samples scatter less than their error"
 
 # Channel -> standard deviation of what it says over a sampling period, in SI.
 Agreeing = Mapping[str, float]
@@ -143,7 +143,7 @@ class Smoothed:
         if not (self.late and self.delay >= BRIEF * self.scale.time):
             return notes
         delay = (
-            f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
+            f"commands act {self.delay:.2f} s after they are given, as the pose shows without a model"
         )
         return (*notes, delay)
 
@@ -331,9 +331,8 @@ def _doubted(track: Track, found: Inliers, even: Problem) -> Iterator[str]:
             odds = f"10^{decades:.0f}" if decades < 100.0 else "more than 10^100"
             yield (
                 f"the noise of {POSE[k]} is given as {given[k]:.3g} {unit}, its samples scatter by "
-                f"{free.sigma[k]:.2g} {unit} ({odds} : 1): leave it out, and it is estimated"
-                + FILTERED
-                * (size < 1.0)
+                f"{free.sigma[k]:.2g} {unit} ({odds} : 1): remove the noise of the side-car, then "
+                "it is estimated" + FILTERED * (size < 1.0)
             )
 
 
@@ -380,7 +379,7 @@ def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
     of_channel = np.add.reduceat(track.fresh[rows], first, dtype=int).min(axis=1)
     enough = (last - first + 1 >= FEWEST) & (of_channel >= OF_CHANNEL)
     if not enough.any():
-        raise InputError(f"run '{track.run.name}': nowhere {FEWEST} samples without a long gap")
+        raise InputError(f"run '{track.run.name}': fewer than {FEWEST} samples between long gaps")
     return time[first[enough]], time[last[enough]]
 
 

@@ -52,14 +52,14 @@ class Unrecorded:
         """What is to be said of it."""
         size = zip(NAMES, self.push.size, UNITS, self.push.time, strict=True)
         told = [f"{x:.2g} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0]
-        text = "No unrecorded force shows. "
+        text = "No disturbance is detected. "
         if told:
-            text = f"An unrecorded force is left, its size and how long it lasts: {', '.join(told)}. "
-            text += "Intervals and bands allow for it. "
+            text = f"A disturbance remains, with size and correlation time: {', '.join(told)}. "
+            text += "Intervals and bands include it. "
         if self.differing:
             text += (
-                "It is no chance: the fit to the model error and the fit to predictions differ by more "
-                f"than their intervals in {', '.join(self.differing)}. "
+                "The difference is significant: the fit to the model error and the fit to "
+                f"predictions differ by more than their intervals in {', '.join(self.differing)}. "
             )
         return (text + self.pushes).strip()
 
@@ -69,7 +69,7 @@ class Unrecorded:
         named = {axis: f"{unit} in {name}" for axis, unit, name in zip(AXES, UNITS, NAMES, strict=True)}
         times = ((s, f"{s.run} {s.start:.1f} to {s.end:.1f} s") for s in self.stretches)
         each = [f"{time}, {s.size:+.2g} {named[s.axis]}" for s, time in times]
-        return f"Something pushed the ship at times: {'; '.join(each)}." if each else ""
+        return f"Disturbances at single times: {'; '.join(each)}." if each else ""
 
 
 def unrecorded(
