@@ -346,9 +346,10 @@ def test_the_shipped_campaigns_are_valid(name, runs):
     assert len(cases(loaded.campaign)) == runs
 
 
-def dask(*arguments):
+def dask(folder, *arguments):
     return subprocess.Popen(
         [sys.executable, "-m", "dask", *map(str, arguments)],
+        env={**os.environ, "DASK_TEMPORARY_DIRECTORY": str(folder)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -359,14 +360,11 @@ def scheduler(tmp_path):
     """A scheduler with two workers, each a process: address and the processes of the workers."""
     pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"
-    started = [
-        dask("scheduler", "--host", "127.0.0.1", "--port", 0, "--no-dashboard", "--scheduler-file", file)
-    ]
+    common = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", file)
+    started = [dask(tmp_path, "scheduler", "--port", 0, *common)]
     try:
-        for k in range(2):
-            folder = tmp_path / f"worker_{k}"
-            common = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--local-directory", folder)
-            started.append(dask("worker", "--scheduler-file", file, "--host", "127.0.0.1", *common))
+        for _ in range(2):
+            started.append(dask(tmp_path, "worker", "--nthreads", 1, "--no-nanny", *common))
         until = time.monotonic() + 60.0
         while not file.exists():
             assert time.monotonic() < until

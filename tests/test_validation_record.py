@@ -351,6 +351,16 @@ def test_a_side_car_that_changed_since_is_refused(folder, tmp_path):
         files_of(c, {})
 
 
+def test_samples_that_are_well_before_the_horizon_are_said(folder, tmp_path):
+    """At 1 Hz the last sample of a window of 4 s is at 3 s, where the error is smaller."""
+    run = sail(48.0, h=0.1)[0]
+    rare = replace(run, time=run.time[::10], pose=run.pose[::10], tau_cmd=run.tau_cmd[::10])
+    c = diagnosis.compare(write_run(tmp_path / "rare.csv", rare))
+    early, late = validated(c, tmp_path, {"horizon": 4.0}, {"horizon": 12.0}).content.judgements
+    assert any("is 3 s after the start" in flag for flag in early.flags)
+    assert not any("Samples are rare" in flag for flag in late.flags)
+
+
 def test_windows_without_samples_are_counted(folder, tmp_path):
     """Cells that somebody left empty leave a trace."""
     table = pd.read_csv(folder / "b.csv")

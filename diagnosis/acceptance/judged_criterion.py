@@ -12,7 +12,7 @@ from fmus.frames import rotate_to_body
 
 from .budget import Budget, Sources, budget
 from .criterion import Criterion
-from .predictions import Predictions, difference, judged
+from .predictions import LATE, Predictions, difference, judged
 from .statistics import Interval, independent, needed, root_mean_square, share
 
 Outcome = Literal["met", "not met", "cannot be judged"]
@@ -129,6 +129,7 @@ def judge(
     flags = [
         _too_good(q, judged(q, every), n, budget(q, sources, masks)) for q in ("position", "heading")
     ]
+    flags.append(_too_early(c, np.concatenate([p.predictions.after[rows] for p, rows in chosen])))
     if any(p.learned for p, _ in chosen):
         flags.append("Training runs of the model count, as the criterion states.")
     return Judgement(
@@ -247,6 +248,16 @@ LEARNED_ONLY = "every run was used to learn the model (training_runs lets such r
 
 def _limits(c: Criterion) -> str:
     return ", ".join(f"{s} from {a:g} to {b:g}" for s, (a, b) in c.within.items())
+
+
+def _too_early(c: Criterion, after: np.ndarray) -> str:
+    """A sentence where the samples that are judged are well before the horizon; else nothing."""
+    if np.mean(after) >= (1.0 - LATE) * c.horizon:
+        return ""
+    return (
+        f"Samples are rare: what is judged is {np.mean(after):.3g} s after the start of a prediction in "
+        f"the mean, not {c.horizon:g} s; errors there may be larger."
+    )
 
 
 def _too_good(quantity: str, errors: np.ndarray, n: float, b: Budget) -> str:

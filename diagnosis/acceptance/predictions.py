@@ -28,6 +28,7 @@ class Predictions:
         name: of the run.
         windows: of that length; of a predictor whose velocity cannot be set one, the whole run.
         possible: windows that there would be, were no sample missing.
+        after: (w,), time of prediction that is judged [s].
         rows: (w,), row of the last sample of each, near the horizon.
         measured: (w, 6), the sample of the pose there, and the smoothed velocity.
 
@@ -57,6 +58,7 @@ class Predictions:
             raise none
         window = self.windows.sample_window[self._last]
         self._since = self.windows.since
+        self.after = self._since[self._last] - begin
         time = self.windows.start[window] + self._since[self._last]
         whole, seconds = self.predictor.whole, possible(self.smoothed, horizon)
         self.possible = self._last.size if whole else max(seconds, self._last.size)
