@@ -808,9 +808,14 @@ def test_windows_are_told_with_those_that_are_worse_or_run_away(tmp_path):
     assert "| a | 100 | 50 | 50 | 11.5 | 5.73 | 5.73 |" in text
     assert "| b | 100 | runs away | – | 11.5 | 22.9 | – |" in text
     for quantity in ("position", "heading"):
-        assert f"The prediction error of the {quantity} is larger than with the nominal model in b." in text
+        assert (
+            f"The prediction error of the {quantity} is larger than with the nominal model in b." in text
+        )
     assert "In b the learned model runs away" in text
-    assert "Geometric mean of the reduction of the heading error: 1.00× left out, 2.00× with the run" in text
+    assert (
+        "Geometric mean of the reduction of the heading error: 1.00× left out, 2.00× with the run"
+        in text
+    )
 
 
 def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):

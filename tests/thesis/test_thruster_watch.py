@@ -215,8 +215,8 @@ def test_failures_are_told_by_their_surest_instant_the_longest_first():
     assert (vsp.thruster, vsp.since, vsp.noticed, vsp.until) == ("vsp", 1014.0, 1010.0, 1020.0)
     assert (bow.confidence, bow.lost, vsp.confidence, vsp.lost) == (0.99, 1.0, 0.9, 0.25)
     assert [*thruster_report.sentences(played)] == [
-        "Run trial: the bow thruster lost 100 % of its force at 1074 s (probability 0.99, noticed at 1040 s, "
-        "told until 1080 s).",
+        "Run trial: the bow thruster lost 100 % of its force at 1074 s (probability 0.99, detected at 1040 s, "
+        "reported until 1080 s).",
         "Run trial: the VSP lost 25 % of its force at 1014 s (probability 0.9, detected at 1010 s, reported until "
         "1020 s).",
         "a note",
