@@ -42,12 +42,9 @@ EXCEPTIONS: dict[tuple[str, str], str] = {}
 # Pages that are not rewritten yet, or are printed by commands whose texts are not.
 LATER = {
     "benchmarks/README.md",
-    "docs/checks.md",
     "docs/constants.md",
     "docs/diagnosis.md",
-    "docs/effects.md",
     "docs/foreign_models.md",
-    "docs/interface.md",
     "docs/measurements.md",
     "docs/sensors.md",
     "docs/ship.md",
