@@ -42,7 +42,6 @@ EXCEPTIONS: dict[tuple[str, str], str] = {}
 # Pages that are not rewritten yet, or are printed by commands whose texts are not.
 LATER = {
     "benchmarks/README.md",
-    "docs/constants.md",
     "docs/diagnosis.md",
     "docs/foreign_models.md",
     "docs/measurements.md",
