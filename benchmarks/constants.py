@@ -34,7 +34,7 @@ HEADER = """# Constants that act on a verdict
 
 This page lists the constants by which the diagnosis decides, each with its value, unit and reason.
 With it you can look up a constant and its place in the code. No command has an option for them.
-What is known of their influence:
+Their influence is in
 [sensitivity](../benchmarks/README.md#which-numbers-decide-and-which-of-them-matter).
 
 <!-- not run: writes this page, and takes hours -->

@@ -35,13 +35,13 @@ PARTS = {
     "waves": "waves",
     "effects without": "validation",
     "fit to": "fit to predictions",
-    "what the search": "gain over calibration",
+    "gain of the search": "gain over calibration",
     "predicting": "errors of predictions",
     "residual": "residual",
     "stability": "stability check",
     "dissipation": "stability check",
     "closed loop": "stability check",
-    "coming to rest": "stability check",
+    "decay of the motion": "stability check",
     "report": "report",
 }
 

@@ -14,7 +14,7 @@ USAGE = """usage: cybership COMMAND [...]
 
 {commands}
 
-'cybership COMMAND --help' tells more; begin with 'cybership demo' or 'cybership run ellipse'.
+'cybership COMMAND --help' describes a command; start with 'cybership demo' or 'cybership run ellipse'.
 Shipped scenarios may be named without a path.
 Exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted."""
 

@@ -57,10 +57,10 @@ def demonstrate(out: Path) -> None:
     import diagnosis
 
     hidden = cosim.shipped_folder() / HIDDEN
-    print("1. A ship with 2 N.s/m more drag than its model sails an ellipse and an eight.")
+    print("1. A ship with 2 N.s/m more drag than its model runs an ellipse and an eight.")
     _sail("ellipse", out / "ellipse", hidden, stop=SECONDS)
     _sail("eight", out / "eight", hidden)
-    print("2. What does the model lack? Poses and commands alone tell:\n")
+    print("2. Which effect does the model lack? The diagnosis uses poses and commands only:\n")
     runs = diagnosis.load([out / "ellipse", out / "eight"])
     found = diagnosis.diagnose(runs[:1], held_out=runs[1:])
     print(found)
@@ -68,7 +68,8 @@ def demonstrate(out: Path) -> None:
     found.write_report(out / "report.html")
     found.plot.where().save(out / "where.png")
     print(
-        "\n3. The same controller with the nominal model, and with the learned one; it does not adapt."
+        "\n3. The same controller, with the nominal and with the learned controller model; it "
+        "does not adapt."
     )
     nominal = out / "nominal.ssv"
     # One nominal value is enough: of all others the plant's own start values are believed.

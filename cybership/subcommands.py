@@ -27,25 +27,35 @@ class Subcommand(NamedTuple):
 
 # Those that are always there, in the order in which people meet them.
 SUBCOMMANDS = {
-    "demo": Subcommand("cybership.demo", "all in one: sail, diagnose, sail with what was found"),
+    "demo": Subcommand(
+        "cybership.demo", "run a ship with hidden drag, diagnose it, run it with the learned model"
+    ),
     "run": Subcommand("cosim.run", "run a scenario: log, metrics, pictures"),
     "metrics": Subcommand("cosim.metrics", "metrics of a finished run"),
-    "plots": Subcommand("cosim.plots", "pictures of runs, laid over each other; PNG, SVG or PDF"),
-    "trial": Subcommand("diagnosis.measure_trial", "measures of a manoeuvring trial, run or measured"),
-    "columns": Subcommand("diagnosis.propose_columns", "what must be told of a measurement of your own"),
-    "repair": Subcommand("diagnosis.repair", "what a run's own channels show to be wrong, repaired"),
-    "compare": Subcommand("diagnosis.compare", "where does a model fail against measured runs?"),
-    "criteria": Subcommand("diagnosis.criteria", "a first file of criteria for compare --criteria"),
-    "verify": Subcommand("diagnosis.verify", "check a validation record that compare has made"),
-    "learn": Subcommand("diagnosis.learn", "which physical effect does the model lack?"),
-    "parameters": Subcommand("diagnosis.parameters", "which parameters of an FMU can runs determine?"),
+    "plots": Subcommand("cosim.plots", "pictures of runs in the same axes; PNG, SVG or PDF"),
+    "trial": Subcommand(
+        "diagnosis.measure_trial", "measures of a manoeuvring trial, simulated or measured"
+    ),
+    "columns": Subcommand(
+        "diagnosis.propose_columns", "propose the side-car of a measurement of your own"
+    ),
+    "repair": Subcommand(
+        "diagnosis.repair", "repair faults of a measurement that its redundant channels show"
+    ),
+    "compare": Subcommand(
+        "diagnosis.compare", "compare a model with measured runs: size and location of its error"
+    ),
+    "criteria": Subcommand("diagnosis.criteria", "a template of criteria for compare --criteria"),
+    "verify": Subcommand("diagnosis.verify", "check a validation record that compare has written"),
+    "learn": Subcommand("diagnosis.learn", "find the physical effect that a model lacks"),
+    "parameters": Subcommand("diagnosis.parameters", "parameters of an FMU that can be calibrated"),
     "linearise": Subcommand("diagnosis.linearise", "A, B, C, D of an FMU in a state"),
     "campaign": Subcommand("cosim.campaign", "many runs: grids and samples, one table, differences"),
     "build": Subcommand("fmus.build", "build the FMUs, or one from a component file of your own"),
-    "check": Subcommand("fmus.check", "hold FMUs against the FMI 2.0 standard"),
-    "effects": Subcommand("fmus.effects", "table of what the ship may have and its model lacks"),
+    "check": Subcommand("fmus.check", "check FMUs against the FMI 2.0 standard"),
+    "effects": Subcommand("fmus.effects", "table of the effects that a model may lack"),
     "export": Subcommand("cosim.export", "a scenario for other tools: SSP, OSP, one FMU"),
-    "interface": Subcommand("cosim.interface", "what each FMU of a scenario gets and gives"),
+    "interface": Subcommand("cosim.interface", "inputs and outputs of each FMU of a scenario"),
     "schema": Subcommand("cosim.scenario", "the JSON schema of scenario files"),
     "completion": Subcommand("cybership.completion", "completion for bash, zsh or fish"),
 }

@@ -127,7 +127,7 @@ def _count(text: str) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=program("fmus.check"),
-        description="Check FMI 2.0 co-simulation FMUs, ours or anybody's, against the standard.",
+        description="Check FMI 2.0 co-simulation FMUs, of this project or others, against the standard.",
         epilog="examples:  %(prog)s\n"
         "           %(prog)s mine.fmu other.fmu\n"
         "           %(prog)s vessel --json\n"
@@ -137,22 +137,33 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "files", nargs="*", metavar="FILE", help="FMU, or the name of one of ours (all of ours)"
+        "files",
+        nargs="*",
+        metavar="FILE",
+        help="FMU, or the name of one of this project (all of this project)",
     )
-    parser.add_argument("--json", action="store_true", help="everything as JSON, no table")
-    parser.add_argument("--list", action="store_true", help="all rules as Markdown")
+    parser.add_argument("--json", action="store_true", help="print everything as JSON, no table")
+    parser.add_argument("--list", action="store_true", help="print all rules as Markdown")
     parser.add_argument(
-        "--only", metavar="RULE", action="append", default=[], help="only this rule; may be repeated"
+        "--only",
+        metavar="RULE",
+        action="append",
+        default=[],
+        help="check only this rule; may be repeated",
     )
-    parser.add_argument("--no-run", action="store_true", help="only read the FMU, run nothing of it")
+    parser.add_argument("--no-run", action="store_true", help="only read the FMU, do not run it")
     parser.add_argument(
-        "--timeout", type=_positive, default=60.0, metavar="S", help="for each rule that runs it (60)"
+        "--timeout",
+        type=_positive,
+        default=60.0,
+        metavar="S",
+        help="time limit of each rule that runs the FMU [s] (60)",
     )
     parser.add_argument(
         "--jobs",
         type=_count,
         default=os.cpu_count() or 1,
         metavar="N",
-        help="FMUs at a time (processors)",
+        help="number of FMUs at a time (processors)",
     )
     return parser

@@ -43,7 +43,7 @@ def _run(rule: str, folder: Path, library: str, note: Path) -> dict[str, object]
                 return {"skipped": f"needsExecutionTool is declared, and {told}"}
             found.append(told)
         except Exception as error:
-            found.append(f"the check itself fails, please report it: {error!r}")
+            found.append(f"internal error of the check: {error}; please report it")
         return {"found": found}
 
 

@@ -34,7 +34,7 @@ def examine(
         StoppedError: it was ended.
     """
     stopped = stopped or threading.Event()
-    obstacle = _obstacle(fmu) if run else "the FMU is not to be run"
+    obstacle = _obstacle(fmu) if run else "running the FMU was not requested"
     outcomes: dict[str, Outcome] = {}
     for rule in chosen:
         if stopped.is_set():
@@ -54,7 +54,7 @@ def _obstacle(fmu: Fmu) -> str:
     if fmu.library not in {member.filename for member in fmu.members}:
         return f"there is no binary for {platform()}"
     if any(RULES["archive"].check(fmu)):
-        return "its archive is not to be trusted"
+        return "its archive is refused"
     if not all(v.type and v.reference is not None for v in fmu.description.variables):
         return "variables have no type or no value reference"
     return ""
@@ -69,5 +69,5 @@ def _read(rule: Rule, fmu: Fmu) -> Outcome:
     except NotApplicableError as reason:
         outcome.skipped = str(reason)
     except Exception as error:
-        outcome.found.append(f"the check itself fails, please report it: {error!r}")
+        outcome.found.append(f"internal error of the check: {error}; please report it")
     return outcome

@@ -44,7 +44,7 @@ class Fmu:
         root, self.encoding = read_xml(text, path)
         version = root.get("fmiVersion")
         if version != "2.0":
-            raise BadFileError(f"'{path}' is for FMI {version}; this checks FMI 2.0")
+            raise BadFileError(f"'{path}' is for FMI {version}; FMI 2.0 is supported")
         if root.find("CoSimulation") is None:
             raise BadFileError(f"'{path}' is not for co-simulation")
         self.description = Description(root)

@@ -12,9 +12,9 @@ Outcomes = dict[str, Outcome]  # of one FMU, by the name of the rule
 
 HEAD = """# What `python -m fmus.check` checks
 
-Each rule, what it demands of an FMI 2.0 co-simulation FMU, and the clause of the standard (version
-2.0.4) behind it. Rules that run the FMU do so in a process of their own each, so that a crash or a hang
-is a finding. Printed by `python -m fmus.check --list`.
+This page lists each rule, its demand on an FMI 2.0 co-simulation FMU, and the clause of the standard
+(version 2.0.4). A rule that runs the FMU does so in its own process, so a crash or a hang is a finding.
+`python -m fmus.check --list` prints this page.
 
 | rule | demand | clause | |
 |---|---|---|---|

@@ -47,8 +47,8 @@ def _limit(path: Path, members: list[zipfile.ZipInfo]) -> None:
     packed, size = path.stat().st_size, sum(member.file_size for member in members)
     if size > min(MOST_BYTES, max(SMALL, MOST_RATIO * packed)):
         raise BadFileError(
-            f"'{path}' is taken for an archive bomb: its {packed} bytes unpack to {size}, more than "
-            f"{MOST_BYTES >> 30} GiB or {MOST_RATIO} times as much"
+            f"'{path}' is refused as an archive bomb: its {packed} bytes unpack to {size}, more "
+            f"than {MOST_BYTES >> 30} GiB or {MOST_RATIO} times as much"
         )
 
 
@@ -71,7 +71,7 @@ def read_xml(text: bytes, path: Path) -> tuple[ElementTree.Element, str]:
         encoding = declared or encoding
 
     def refuse_entity(*_: object) -> None:
-        raise BadFileError(f"{where} defines entities, which no FMU needs")
+        raise BadFileError(f"{where} defines entities, which are not allowed")
 
     def enter(*_: object) -> None:
         nonlocal depth

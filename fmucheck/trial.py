@@ -56,7 +56,9 @@ def attempt(rule: Rule, fmu: Fmu, timeout: float, stopped: threading.Event) -> O
                 return Outcome(**json.loads(report.read_text()))
             except (ValueError, TypeError):
                 ended = "the report of the trial was overwritten"
-    return Outcome([f"{where or 'start of the trial'}: {ended or 'the process ended without a word'}"])
+    return Outcome(
+        [f"{where or 'start of the trial'}: {ended or 'the process ended without a message'}"]
+    )
 
 
 def _run(arguments: list[str | Path], desk: Path, timeout: float, stopped: threading.Event) -> str:

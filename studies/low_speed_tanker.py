@@ -108,7 +108,7 @@ def study(data: Path, out: Path, folds: int, quick: bool) -> Path:
     report.heading("The same without the measured wind")
     table(report, "no wind", {w.run.name: errors(w, Model(ship=unaware)) for w in runs})
     if folds:
-        report.heading("Calibrated, tests left out in turn")
+        report.heading("Calibrated, with tests left out in turn")
         after = {}
         for k, left_out in enumerate(dealt(runs, folds)):
             rest = [w for w in runs if w not in left_out]
@@ -126,7 +126,7 @@ def main() -> None:
     command = "  python -m studies.low_speed_tanker ~/esso_osaka"
     parser = study_parser(
         "studies.low_speed_tanker",
-        "What the published description of the Esso Osaka predicts of its free-running tests.",
+        "Predict the free-running tests of the Esso Osaka with its published description.",
         f"{command}\n{command} --folds 3",
         seeds=None,
         jobs=False,
@@ -137,7 +137,7 @@ def main() -> None:
         type=int,
         metavar="N",
         default=0,
-        help="calibrate, and leave out folds in turn (0: no)",
+        help="calibrate, and leave out this number of folds in turn (0: no)",
     )
     options = parser.parse_args()
     run_study(partial(study, options.data, options.out, options.folds, options.quick))

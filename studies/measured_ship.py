@@ -61,11 +61,11 @@ def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:
     option = "" if prior is None else f" --prior {prior:g}"
     names = ", ".join(w.run.name for w in runs)
     report.text(
-        f"NTNU's measured runs of CyberShip Enterprise 1: {names}. Each is left out in turn; what the "
-        "model lacks is learned from the others, as by "
-        f"`python -m diagnosis.learn{option}`: the mass is believed to {share['m']:.0%}, thrusts to "
-        f"{share['plant_F_vsp']:.0%}, damping from tow tests to {share['X_u']:.0%} and from another "
-        f"ship to {share['N_r']:.0%}; none to more than a tenth in the search for what is missing."
+        f"NTNU's measured runs of CyberShip Enterprise 1: {names}. Each is left out in turn; the "
+        f"missing effects are learned from the others, as by `python -m diagnosis.learn{option}`. "
+        f"The prior standard deviation of the mass is {share['m']:.0%}, of thrusts "
+        f"{share['plant_F_vsp']:.0%}, of damping from tow tests {share['X_u']:.0%} and from "
+        f"another ship {share['N_r']:.0%}; none exceeds a tenth in the search for missing effects."
     )
     ship_tables.write_falls(report, folds)
     ship_tables.write_windows(report, folds)
@@ -73,7 +73,7 @@ def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:
     ship_tables.write_curve(report, folds, last.learned.model, pulls)
     for f in folds:
         ship_tables.write_findings(report, f"Learned without {f.name}", f.content)
-        caption = f"{f.name}: the force that the model lacks, before and after, not learned from it."
+        caption = f"{f.name}: the model error, before and after; the run is not in the training data."
         report.figure(f"omega_{f.name}", ship_tables.model_error_picture(f.evaluation), caption)
     everything = diagnosis_content(last, None, [])
     ship_tables.write_findings(report, "Learned from all runs", everything)
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
         "studies.measured_ship",
-        "Learn what the model lacks of the real ship, each measured run left out in turn.",
+        "Learn the missing effects of the real ship, with each measured run left out in turn.",
         "  python -m studies.measured_ship ~/data\n"
         "  python -m studies.measured_ship ~/data --prior 0.1 --out results/careful\n"
         "  python -m studies.measured_ship ~/data --quick",
@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--prior",
         type=float,
         metavar="SHARE",
-        help="relative standard deviation of every damping coefficient (by where each value comes from)",
+        help="relative standard deviation of every damping coefficient (by the source of each value)",
     )
     options = parser.parse_args(arguments)
     run_study(partial(study, options.data, options.out, options.prior, options.quick))

@@ -123,7 +123,9 @@ def circles(report: Report, folds: Sequence[ShipFold], model: Model) -> None:
             tracks = [(s.time[known], s.eta[known]), *((time, pose) for pose in free)]
             rows.append((e.name, [steady(*track) for track in tracks]))
     report.heading("Circles")
-    report.text("Each with its measured commands from its first state; what was learned, of other runs.")
+    report.text(
+        "Each with its measured commands from its initial state; the model was learned from other runs."
+    )
     report.table(
         ["circle", "speed [m/s]: measured, before, after", "yaw rate [°/s]: measured, before, after"],
         [
@@ -147,16 +149,17 @@ def circles(report: Report, folds: Sequence[ShipFold], model: Model) -> None:
 
 def sensors(report: Report, trials: Sequence[tuple[Run, Examined]]) -> None:
     """What the sensors got wrong."""
-    report.heading("What the sensors got wrong")
+    report.heading("Faults of the sensors")
     for run, examined in trials:
         rates = [f.value for f in examined.findings if f.kind == "clock_rate"]
         others = [f.sentence for f in examined.findings if f.kind != "clock_rate"]
         if rates:
-            told = f"{min(rates):.2f} to {max(rates):.2f} s pass in a second of the log"
+            told = f"{min(rates):.2f} to {max(rates):.2f} s pass in one second of the log"
             others.insert(0, f"the clock: {told}, in {len(rates)} stretches")
         report.text(
-            f"{run.name}: over {HORIZON:g} s integrated speed and heading miss the position by "
-            f"{closure(run):.3g} m (median) as logged, by {closure(examined.run):.3g} m as repaired."
+            f"{run.name}: over {HORIZON:g} s integrated speed and heading differ from the position "
+            f"by {closure(run):.3g} m (median) as logged, by {closure(examined.run):.3g} m as "
+            "repaired."
         )
         report.items([*others, *examined.notes])
 
@@ -191,7 +194,7 @@ def main() -> None:
     """Command line; leaves with an exit code."""
     folds_command(
         "research_vessel",
-        "What the sea trial of R/V Gunnerus says that its model lacks.",
+        "Learn the missing effects of R/V Gunnerus from its sea trial.",
         "~/gunnerus",
         "folder of the two trials",
         "manoeuvre",

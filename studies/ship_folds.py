@@ -88,10 +88,10 @@ def folds_command(
         f"studies.{name}", description, f"{command}\n{command} --folds 3", seeds=None, jobs=False
     )
     parser.add_argument("data", type=Path, metavar="DATA", help=data)
-    parser.add_argument("--folds", type=int, metavar="N", help=f"folds left out (one for each {one})")
     parser.add_argument(
-        "--calibrate", action="store_true", help="search no effects: what calibration alone gives"
+        "--folds", type=int, metavar="N", help=f"number of folds that are left out (one for each {one})"
     )
+    parser.add_argument("--calibrate", action="store_true", help="search no effects: calibration only")
     options = parser.parse_args()
     by = NoSearch() if options.calibrate else DEFAULT
     folds = 2 if options.quick else options.folds
@@ -124,7 +124,7 @@ def learn_folds(
     """
     count = min(folds or len(runs), len(runs))
     if count < 2:
-        raise InputError(f"{len(runs)} runs in {count} folds: nothing is left to learn from")
+        raise InputError(f"{len(runs)} runs in {count} folds: no training data is left")
     for k in range(count):
         out = [w for i, w in enumerate(runs) if i % count == k]
         rest = [w for i, w in enumerate(runs) if i % count != k]
@@ -150,9 +150,9 @@ def write_folds(report: Report, folds: Sequence[ShipFold]) -> None:
     )
     report.result("overall", overall)
     report.text(_windows(report, folds))
-    report.heading("What was found each time")
+    report.heading("Findings of each fold")
     report.table(
-        ["left out", "verdict", "in the model", "withdrawn", "known only together"],
+        ["left out", "verdict", "in the model", "withdrawn", "identifiable only together"],
         [
             [
                 ", ".join(fold.left_out),
@@ -165,7 +165,7 @@ def write_folds(report: Report, folds: Sequence[ShipFold]) -> None:
         ],
         words=True,
     )
-    report.heading("What these runs cannot tell")
+    report.heading("Effects that these runs cannot discriminate")
     report.items(dict.fromkeys(_open(folds)))
 
 

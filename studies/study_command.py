@@ -48,7 +48,10 @@ def study_parser(
         )
     if jobs:
         parser.add_argument(
-            "--jobs", type=whole_number(1), metavar="N", help="runs at a time (one for each core)"
+            "--jobs",
+            type=whole_number(1),
+            metavar="N",
+            help="number of runs at a time (one for each core)",
         )
     parser.add_argument(
         "--quick", action="store_true", help="few seeds and short runs, for a first look"

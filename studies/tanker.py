@@ -42,8 +42,8 @@ def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: boo
     report = Report(out, titled("KVLCC2, a tanker of 7 m: free-running zig-zags", by))
     report.text(
         f"{len(runs)} zig-zags; the nominal model is that of the MMG standard method "
-        f"(`ships/kvlcc2.toml`). Predictions over {runs[0].horizon:.3g} s; model error in windows of "
-        f"{runs[0].width:.3g} s. The measured thrust is used by no fit."
+        f"(`ships/kvlcc2.toml`). Predictions over {runs[0].horizon:.3g} s; model error in windows "
+        f"of {runs[0].width:.3g} s. No fit uses the measured thrust."
     )
     write_folds(report, list(learn_folds(runs, folds, model, by, silent)))
     return report.write()
@@ -53,7 +53,7 @@ def main() -> None:
     """Command line; leaves with an exit code."""
     folds_command(
         "tanker",
-        "What the zig-zags of KVLCC2 say that its model lacks.",
+        "Learn the missing effects of KVLCC2 from its zig-zags.",
         "~/kvlcc2_hsva",
         "folder of the files",
         "run",

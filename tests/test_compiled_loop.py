@@ -189,7 +189,7 @@ def test_reason_for_the_plain_loop_is_told(tmp_path):
         sidecar = json.loads((tmp_path / str(k) / "log.json").read_text())
         assert (sidecar["loop"], sidecar["loop_reason"]) == ("plain", result.loop_reason)
     scenario = cosim.load_scenario(lagging(fmu, stop=0.05))
-    assert "wall clock" in cosim.simulate(scenario, tmp_path / "r", realtime=50.0).loop_reason
+    assert "real time" in cosim.simulate(scenario, tmp_path / "r", realtime=50.0).loop_reason
     assert cosim.simulate(scenario, tmp_path / "n", native=False).loop == "plain"
     assert cosim.simulate(scenario, tmp_path / "c").loop == "compiled"
 

@@ -114,7 +114,7 @@ def test_values_beyond_a_range_are_its_end_and_the_set_gives_the_others(base):
         ({"covariance": [[0.04, 0.0]]}, "not 2 rows of 2 numbers"),
         ({"mean": [1.0]}, "mean has 1 entries for 2 names"),
         ({"mean": [1.0, "much"]}, "mean[1]: Input should be a valid number"),
-        ({"names": ["vessel.X_u", "vessel.X_u"]}, "'vessel.X_u' stands twice"),
+        ({"names": ["vessel.X_u", "vessel.X_u"]}, "'vessel.X_u' occurs twice"),
         ({"names": ["vessel.X_uu_", NAMES[1]]}, "no parameter 'X_uu_'; did you mean 'X_uu'?"),
         ({"names": ["vesel.X_u", NAMES[1]]}, "no model 'vesel' for 'vesel.X_u' runs here"),
         ({"names": ["vessel.x", NAMES[1]]}, "vessel has no parameter 'x'"),

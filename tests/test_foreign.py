@@ -163,7 +163,7 @@ def test_fmu_that_asks_for_the_end_is_told(tmp_path, capabilities):
     fmu = build_lag(tmp_path, "lag", habit, capabilities)
     result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
     assert result.status == "failed"
-    assert "asks to end the simulation at t = 0.51 s" in result.message
+    assert "requests the end of the simulation at t = 0.51 s" in result.message
 
 
 def test_fmu_that_always_discards_is_given_up(tmp_path):

@@ -302,7 +302,7 @@ def test_several_osp_scenarios_leave_the_choice(chain, tmp_path):
     write(chain, tmp_path / "osp", export_osp)
     folder = tmp_path / "osp" / "scenarios"
     shutil.copyfile(folder / "chain.json", folder / "other.json")
-    with pytest.raises(InputError, match="does not say its stop"):
+    with pytest.raises(InputError, match="does not state its stop"):
         load_scenario(tmp_path / "osp")
     scenario = load_scenario(tmp_path / "osp", {"stop": 2.0})
     assert "one of several scenarios" in scenario.notes[0]

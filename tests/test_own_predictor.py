@@ -109,7 +109,7 @@ def test_the_command_takes_a_file_and_says_how_it_predicts(tmp_path, file):
     content = json.loads((tmp_path / "out" / "comparison.json").read_text())
     assert content["fmu"]["kind"] == "Python function"
     assert content["fmu"]["name"] == "my_model.py"
-    assert "How the Python function predicts" in done.stdout
+    assert "Predictions of the Python function" in done.stdout
     assert {p.name for p in (tmp_path / "out").iterdir()} == {*content["files"]}
 
 

@@ -85,7 +85,7 @@ def test_only_pulls_within_the_range_count():
     ("table", "said"),
     [
         ({"pitch": [0.1], "F_per_vps": [0.1]}, "F_per_vsp"),
-        ({"pitch": [0.1, "x"], "F_per_vsp": [0.1, 0.2]}, "no numbers"),
+        ({"pitch": [0.1, "x"], "F_per_vsp": [0.1, 0.2]}, "not numbers"),
         ({"pitch": [0.9], "F_per_vsp": [1.2]}, "at most 0.7"),
     ],
 )
@@ -149,8 +149,8 @@ def test_single_commands_explain_what_is_made_of_them_and_nothing_else():
     ("fall", "said"),
     [
         (Fall(2.0, 2.2, 2.3, 0.1, 0.9), "noise alone allows 2.3×"),
-        (Fall(2.0, 6.0, 99.0, 0.1, 0.9), "does not hold here"),
-        (Fall(2.0, 2.2, 99.0, 0.1, 0.9), "90 % .* one law together"),
+        (Fall(2.0, 6.0, 99.0, 0.1, 0.9), "do not suffice"),
+        (Fall(2.0, 2.2, 99.0, 0.1, 0.9), "90 % .* one common law"),
         (Fall(2.0, float("nan"), 99.0, 0.1, 0.9), "not known"),
     ],
 )
@@ -467,7 +467,7 @@ def test_folders_without_runs_or_pulls(tmp_path):
     with pytest.raises(InputError, match="no bollard pulls"):
         measured_ship.study(tmp_path, out, 1.0, quick=False)
     measure(tmp_path, seeds=(1,))
-    with pytest.raises(InputError, match="one run alone"):
+    with pytest.raises(InputError, match="a single run"):
         measured_ship.study(tmp_path, out, 1.0, quick=False)
     assert not out.exists()
 

@@ -102,7 +102,7 @@ def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
         for rest, out in seen:
             assert not set(rest) & set(out)
             assert len(rest) + len(out) == 5
-    with pytest.raises(InputError, match="nothing is left to learn from"):
+    with pytest.raises(InputError, match="no training data is left"):
         list(ship_folds.learn_folds(runs[:1], None, Model(), "selection", lambda _: None))
 
 
@@ -130,7 +130,7 @@ def test_sensors_are_told_in_a_few_lines(tmp_path):
     research_vessel.sensors(report, [(run, examined)])
     text = report.write().read_text()
     assert "miss the position by 0 m (median) as logged, by 0 m as repaired" in text
-    assert "1.10 to 1.10 s pass in a second of the log, in 2 stretches" in text
+    assert "1.10 to 1.10 s pass in one second of the log, in 2 stretches" in text
     assert "- u and v read too little\n- a note" in text
 
 

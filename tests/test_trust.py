@@ -47,8 +47,8 @@ def renamed(path, old, new):
     [
         (["/etc/passwd"], "is not a path inside"),
         (["C:/windows"], "is not a path inside"),
-        (["../../evil"], "leaves the folder"),
-        (["resources/../../evil"], "leaves the folder"),
+        (["../../evil"], "leads out of the folder"),
+        (["resources/../../evil"], "leads out of the folder"),
         (["a/./b"], "some operating systems"),
         (["a//b"], "some operating systems"),
         (["resources/line\nbreak"], "some operating systems"),

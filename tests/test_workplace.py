@@ -219,7 +219,7 @@ def test_beliefs_are_the_learned_model(ellipse, tmp_path, observer):
     assert controller["phi_0_6"] == -1.9  # N_r, of which the file says nothing: nominal
     assert ("X_u" in told["observer"]) == (observer == "observer_luenberger.fmu")
     assert told["vessel"] == ellipse["fmus"]["vessel"].get("parameters", {})  # the plant is what it was
-    assert any("nothing here can believe vessel.V_n" in w for w in system.warnings)
+    assert any("no controller model here has vessel.V_n" in w for w in system.warnings)
     system.close()
 
 
@@ -229,7 +229,7 @@ def test_a_belief_that_nobody_can_have_is_refused(ellipse, tmp_path, chain):
         cosim.simulate(chain, tmp_path / "out", believe=[file])
     del ellipse["fmus"]["controller"], ellipse["fmus"]["observer"]
     ellipse |= {"connections": [], "faults": [], "events": []}
-    with pytest.raises(cosim.InputError, match="no FMU here believes anything of vessel"):
+    with pytest.raises(cosim.InputError, match="no controller model here has parameters of vessel"):
         cosim.simulate(ellipse, tmp_path / "out", believe=[file])
 
 

@@ -137,10 +137,10 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
                 advance()
     report = Report(out, "Tuning the thrust allocation (6.3.4)", seeds)
     report.text(
-        f"A ship at rest is commanded {push.force:g} N to starboard and to port for {push.seconds:g} s. "
-        "The assumed point of attack p_o is moved until neither push turns it. "
-        f"It took {np.mean(steps):.1f} pairs of pushes on average. The heading is measured with "
-        f"{push.noise:g} rad of noise."
+        f"A ship at rest is commanded {push.force:g} N to starboard and to port for "
+        f"{push.seconds:g} s. The assumed point of attack p_o is moved until neither force turns "
+        f"the ship. It took {np.mean(steps):.1f} pairs of forces on average. The heading is "
+        f"measured with {push.noise:g} rad of noise."
     )
     zero = min(hidden, key=abs)
     offset = interval(found[zero])
@@ -149,19 +149,19 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
         each = interval(found[dx])
         error = SampleMean(*(1000.0 * (x - dx - offset.mean + zero) for x in each))
         rows.append([f"{dx:+.3f}", str(each), str(error)])
-    header = ["thrust really acts at [m]", "p_o found [m]", "error against the shift [mm]"]
+    header = ["true point of attack [m]", "estimated p_o [m]", "error of the shift [mm]"]
     report.table(header, rows)
     report.text(
-        f"With the thrust where it is assumed, p_o = {offset.mean:.4f} m: the hull's own centre of "
-        "resistance and inertia in sway does not lie at the body origin (x_g = 0.0375 m and the added "
-        "mass), so a push at the origin turns the ship a little. What is tuned is the sum of both, as "
-        "in the basin, where (6.2) gave 0.18 m."
+        f"With the thrust at its assumed point, p_o = {offset.mean:.4f} m: the hull's own centre "
+        "of resistance and inertia in sway is not at the body origin (x_g = 0.0375 m and the "
+        "added mass), so a force at the origin turns the ship slightly. The tuned value is the "
+        "sum of both, as in the basin, where (6.2) gave 0.18 m."
     )
     worst = max(hidden, key=abs)
     before = headings(scenario(0.0, worst, push, seeds[0]))
     after = headings(scenario(found[worst][0], worst, push, seeds[0]))
     shown = {"p_o = 0": before, f"p_o = {found[worst][0]:.3f} m": after}
-    report.figure("heading", picture(shown), f"A push with the thrust acting {worst:+g} m away.")
+    report.figure("heading", picture(shown), f"A sway force with the thrust acting {worst:+g} m away.")
     report.result("found", {f"{dx:+.3f}": values for dx, values in found.items()})
     report.result("push", push)
     return report.write()
@@ -171,7 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
         "thesis.allocation",
-        "Find the point of attack of the thrust allocation from sway pushes (6.3.4).",
+        "Find the point of attack of the thrust allocation from sway forces (6.3.4).",
         "  python -m thesis.allocation\n  python -m thesis.allocation --hidden 0.18 --seeds 1",
         seeds=3,
         jobs=False,

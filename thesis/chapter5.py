@@ -125,7 +125,7 @@ def tables(report: Report, path: str, by_condition: Table) -> None:
         for controller, each in outcomes.items():
             broken = sum(not o.done for o in each)
             cells = [str(interval(columns(each, name))) for name in names]
-            rows.append([controller + (f" ({broken} broke off)" if broken else ""), *cells])
+            rows.append([controller + (f" ({broken} aborted)" if broken else ""), *cells])
         report.table(header, rows)
 
 
@@ -194,15 +194,16 @@ def singular_values(runs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure
 def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | None) -> Path:
     """Run everything and write the report; returns its path."""
     by_path = run(seeds, seconds, jobs)
-    report = Report(out, "Chapter 5: which way of learning tracks best?", seeds)
+    report = Report(out, "Chapter 5: which learning method tracks best?", seeds)
     report.text(
-        "Plant: Table 2.1, corrected; controllers: gains of Table 5.1, ignorant of the damping by the "
-        "yaw rate. Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s; "
-        "`true` means the ship's own state. In the thesis stored errors go stale (Algorithms 1 and 2 "
-        "store ε itself) and their sum has the weight 0.1 (footnote 1 of 4.1.4); here they are formed "
-        "anew and have weight 1. Samples of more than 2 N are kept out by default: `ungated` stores "
-        "them too, `request` does so without being told what the thrusters clip, `stale` is the printed "
-        "form of that with weight 1, `stale, 0.1` with that of the footnote."
+        "Plant: Table 2.1, corrected; controllers: gains of Table 5.1, without the damping by the "
+        "yaw rate in their model. Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s; "
+        "`true` means the ship's own state. In the thesis stored errors become stale (Algorithms "
+        "1 and 2 store ε itself) and their sum has the weight 0.1 (footnote 1 of 4.1.4); here "
+        "they are computed anew and have weight 1. Samples of more than 2 N are left out by "
+        "default: `ungated` stores them too, `request` does so without knowledge of the clipped "
+        "force, `stale` is the printed form of that with weight 1, `stale, 0.1` with that of the "
+        "footnote."
     )
     report.text(
         "More weights: `python -m thesis.store_weight`. Pictures `printed`: true states, no noise, "

@@ -24,7 +24,7 @@ from .basin_trials.observations import observations, other_sections
 from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS
 from .error_models.model_loops import parameters_of
 
-LEFT_OUT = "Experiments on spikes, stores and delay: not made of this ship (`--trials`)."
+LEFT_OUT = "Experiments on spikes, stores and delay: not run for this ship (`--trials`)."
 
 
 def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
@@ -60,15 +60,16 @@ def hidden(model: Path | None) -> tuple[str, Plant]:
     """
     if model is None:
         text = (
-            "Table 2.1 (corrected) with SYSID4 of Table 7.1 in it: X_|u|u, X_u and X_|u|r added, the "
-            "damping by the yaw rate replaced, 30 % of the surge force and 31 % of the yaw moment lost."
+            "Table 2.1 (corrected) with SYSID4 of Table 7.1: X_|u|u, X_u and X_|u|r added, the "
+            "damping by the yaw rate replaced, 30 % of the surge force and 31 % of the yaw moment "
+            "lost."
         )
         return text, sysid4.parameters()
     values = parameters_of(read_model(model))
     if not values:
         raise cosim.InputError(f"'{model}' holds no parameter of vessel or thrusters")
     listed = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
-    return f"Table 2.1 (corrected) with what `{model.name}` adds to it: {listed}.", values
+    return f"Table 2.1 (corrected) with the additions of `{model.name}`: {listed}.", values
 
 
 def study(
@@ -83,13 +84,14 @@ def study(
     text, plant = hidden(model)
     found = run(out, seeds, shorter, jobs, plant, causes)
     name = "SYSID4" if model is None else "the ship that was learned"
-    report = Report(out, f"Chapter 6 in simulation, {name}: which lessons come out again?", seeds)
+    report = Report(out, f"Chapter 6 in simulation, {name}: which lessons are reproduced?", seeds)
     report.text(
-        f"Plant: {text} Controllers: gains of Table 6.4, ignorant of all that. Noise 0.2 mm and "
-        "0.3 mrad, freezes of 0.1 to 1 s once in 20 s, and once a minute a single sample that is 0.1 m "
-        "and 0.1 rad off. `fault`: guidance set to a quarter of the speed, and called four times as "
-        "often. The eight at 0.16 and 0.32 is 0.01-0.03 and 0.02-0.067 m/s. Concurrent learning forms "
-        "stored errors anew, unless it says `as printed`. "
+        f"Plant: {text} Controllers: gains of Table 6.4, without these additions in their model. "
+        "Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s, and once a minute a "
+        "single sample that is 0.1 m and 0.1 rad off. `fault`: guidance set to a quarter of the "
+        "speed, and called four times as often. The eight at 0.16 and 0.32 is 0.01-0.03 and "
+        "0.02-0.067 m/s. Concurrent learning computes stored errors anew, except where it is `as "
+        "printed`. "
         + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else LEFT_OUT)
     )
     report.heading("The ellipse at 0.16 m/s (6.4.4)")
@@ -101,9 +103,10 @@ def study(
     report.verdicts("lessons", lessons(found), "numbers and cause")
     report.heading("The trials")
     report.text(
-        "Means over the seeds with their 95 % intervals, over the runs that kept up with the target; "
-        "`lost` is how many did not. Position, its part along the ship, and z1_x over the second half, "
-        "others from 20 s on. z1_x is the controller's, of the estimated pose, the rest is true."
+        "Means over the seeds with their 95 % intervals, over the runs that followed the target; "
+        "`lost` is the number of the others. Position, its part along the ship, and z1_x over the "
+        "second half, others from 20 s on. z1_x is the controller's, of the estimated pose, the "
+        "rest is true."
     )
     for key, runs in found.trials.items():
         table(report, key, runs)
@@ -131,7 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         help="parameter set of the ship, as diagnosis.learn writes it (SYSID4)",
     )
     parser.add_argument(
-        "--trials", action="store_true", help="the trials alone, without the experiments on causes"
+        "--trials", action="store_true", help="the trials only, without the experiments on causes"
     )
     options = parser.parse_args(arguments)
     seeds, shorter = range(2 if options.quick else options.seeds), 0.25 if options.quick else 1.0

@@ -123,8 +123,8 @@ def measured(report: Report, data: Path) -> None:
     samples = analysis.joined(runs)
     report.heading("The real ship")
     report.text(
-        f"NTNU's runs {', '.join(samples.names)} in a row, five commands, velocities by the smoother. "
-        " They are not the thesis' runs: dynamic positioning and sailing by hand."
+        f"NTNU's runs {', '.join(samples.names)} in a row, five commands, velocities by the "
+        "smoother. They are not the thesis' runs: dynamic positioning and manual control."
     )
     tables.write_components(report, samples, "measured")
     found = tables.regressions(samples)

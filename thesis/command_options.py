@@ -40,7 +40,7 @@ def ssv_option(made: argparse.ArgumentParser) -> None:
     made.add_argument(
         "--ssv",
         action="store_true",
-        help="write model.ssv also where its part of the force fails the check before simulation",
+        help="write model.ssv even if its part of the force fails the check before simulation",
     )
 
 

@@ -129,12 +129,12 @@ def measured(report: Report, files: Sequence[Path]) -> dict[str, Any]:
     """The observers on measured runs."""
     report.heading("Measured runs")
     report.text(
-        "There is no truth: estimates are held against a smoother that looks ahead (a cubic fitted to "
-        "the pose within 0.5 s on either side, frozen and lost samples left out). Given are the median "
-        "and, after the stroke, the RMS of the difference; a few losses of tracking make most of the "
-        "RMS. Prediction: median distance from where the estimate said the ship would be one sample and "
-        "0.5 s later, which needs no reference. tau follows from the five commands by the nominal "
-        "thrusters. The first 10 s are left out."
+        "There is no truth: estimates are compared with a smoother that uses later samples (a "
+        "cubic fitted to the pose within 0.5 s on either side, without frozen and lost samples). "
+        "The table gives the median and, after the stroke, the RMS of the difference; a few "
+        "losses of tracking cause most of the RMS. Prediction: median distance to the pose that "
+        "the estimate predicts one sample and 0.5 s ahead, which needs no reference. tau follows "
+        "from the five commands by the nominal thrusters. The first 10 s are left out."
     )
     found: dict[str, Any] = {}
     header = ["observer", *(f"{n} [{UNITS[n]}]" for n in SIGNALS), "one sample [mm]", "0.5 s [mm]"]
@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = study_parser(
         "thesis.estimators",
-        "The observers open loop on the same logs: errors, lags, freezes, wraps.",
+        "Run the observers open loop on the same logs: errors, lags, freezes, wraps.",
         "  python -m thesis.estimators\n"
         "  python -m thesis.estimators --quick --out /tmp/estimators\n"
         "  python -m thesis.estimators --data ~/cse1",
@@ -213,8 +213,8 @@ def study(out: Path, seeds: int, jobs: int | None, quick: bool, files: Sequence[
         found = run_all(runs, chosen, analyse, processes=jobs, advance=advance)
     tables = {name: over_seeds(values) for name, values in found.items()}
     report.text(
-        f"The observers {', '.join(OBSERVERS)} run open loop over the measurements and commanded forces "
-        f"of the same logs, {stop:g} s each, in which the ship was controlled by way of the mdf."
+        f"The observers {', '.join(OBSERVERS)} run open loop over the measurements and commanded "
+        f"forces of the same logs, {stop:g} s each, in which the mdf was in the loop."
     )
     claims.write(report, found)
     error_tables(report, tables)

@@ -136,7 +136,7 @@ def claims(found: Found) -> list[Verdict]:
             f"{listed(known)}",
         ),
         Verdict(
-            "A little error is kept in sway (7.5, Fig. 7.18b)",
+            "A small error remains in sway (7.5, Fig. 7.18b)",
             "reproduced: less than before, not zero"
             if all(a.mean < 0.0 for a in aside.values())
             else "no less than before",
@@ -160,10 +160,10 @@ def coefficients(report: Report, found: Found) -> None:
         rows.append([c.name, c.unit, f"{truth:g}", *each])
     report.table(header, rows)
     report.text(
-        "On an ellipse at constant speed u and τ_X hardly change: |u|u, u and the lost surge force "
-        "press on the ship in much the same proportion all the time, so do r, |r|r and the lost moment. "
-        "Their sums are found better than their parts, whose errors cancel: estimate less truth of the "
-        "surge force, by parts [N]."
+        "On an ellipse at constant speed u and τ_X hardly change: |u|u, u and the lost surge "
+        "force have nearly the same ratio all the time, and so have r, |r|r and the lost moment. "
+        "Their sums are estimated better than their parts, whose errors cancel: estimate minus "
+        "truth of the surge force, by parts [N]."
     )
     names = ("damping", "loss", "both")
     parts = [
@@ -225,7 +225,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
         "thesis.improved",
-        "Hold the improved controller of 7.5 against the original ones, with SYSID4 in the plant.",
+        "Compare the improved controller of 7.5 with the original ones, with SYSID4 in the plant.",
         "  python -m thesis.improved\n  python -m thesis.improved --quick --out results/first_look",
     )
     options = parser.parse_args(arguments)

@@ -161,7 +161,7 @@ def analyse(run: FinishedRun) -> dict[str, list[PassResult]]:
 def study(out: Path) -> Path:
     """Run and write the report; returns its path."""
     (found,) = run_all({"": scenario()}, [0], analyse)[""]
-    report = Report(out, "Loss of thrust in yaw: what decides it")
+    report = Report(out, "Loss of thrust in yaw: influences on its estimate")
     report.text(
         "Two laps of the ellipse at 0.08 m/s by backstepping, gains of Table 6.4, no noise; SYSID4 in "
         "the plant: delta_N = 0.31, N_r = -1.8. Passes of (7.10)-(7.11) from zero; gains of the "
@@ -178,8 +178,8 @@ def study(out: Path) -> Path:
     slope, offset = np.polyfit(every[:, 0], every[:, 1], 1)
     off = np.abs(every[:, 1] - offset - slope * every[:, 0]).max()
     report.text(
-        f"The line through them: N_r = {offset:.2f} + {slope:.2f} delta_N; on it delta_N = 0.07 goes "
-        f"with N_r = {offset + 0.07 * slope:.2f}. Farthest from it is N_r by {off:.2f}."
+        f"The line through them: N_r = {offset:.2f} + {slope:.2f} delta_N; at delta_N = 0.07 it "
+        f"has N_r = {offset + 0.07 * slope:.2f}. The largest distance from it is {off:.2f} in N_r."
     )
     report.heading("A bow thruster that fails (7.2.5)")
     (log,) = run_all({"": failure()}, [0], whole)[""]
@@ -196,7 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
         "thesis.lost_thrust",
-        "Where the passes of 7.2 leave the loss of thrust in yaw, by gains, passes and estimates.",
+        "Estimates of the loss of thrust in yaw by the passes of 7.2, over gains, passes and observers.",
         "  python -m thesis.lost_thrust",
         seeds=None,
         jobs=False,

@@ -97,7 +97,7 @@ def claims(found: Mapping[str, Sequence[Found]]) -> list[Row]:
         (said, f"reproduced with {', '.join(pairs)}" if pairs else "with none of these gains", tried)
         for said, pairs in (
             ("The derivative filter lags behind the other observers, but is less noisy", swift),
-            ("The DF takes the jump after a freeze better than the two others", jumpy),
+            ("The DF recovers from the jump after a freeze better than the two others", jumpy),
         )
     ]
 
@@ -120,11 +120,11 @@ def study(out: Path, seeds: Sequence[int], stop: float, jobs: int | None) -> Pat
         found = run_all(runs, seeds, analyse, processes=jobs, advance=advance)
     report = Report(out, "Lag and noise of the observers over their gains, 6.3.3", seeds)
     report.text(
-        "The thesis does not give K_1 and K_2. All axes alike, K_1 = 2 ζ √K_2 with damping ζ = "
-        f"{' and '.join(f'{d:g}' for d in DAMPING)}. The nonlinear observer lags by K_1/K_2 behind a "
-        "steady acceleration; the Luenberger observer has the right model here and does not lag. "
-        f"Estimate of u, lag and noise on `{CLEAN}`, largest error within 1 s of a freeze on "
-        f"`{FROZEN}`, {stop:g} s each, open loop."
+        "The thesis does not give K_1 and K_2. All axes have the same values, K_1 = 2 ζ √K_2 with "
+        f"damping ζ = {' and '.join(f'{d:g}' for d in DAMPING)}. The nonlinear observer lags by "
+        "K_1/K_2 behind a constant acceleration; the Luenberger observer has the correct model "
+        f"here and does not lag. Estimate of u, lag and noise on `{CLEAN}`, largest error within 1 "
+        f"s of a freeze on `{FROZEN}`, {stop:g} s each, open loop."
     )
     rows = claims(found)
     report.table(["thesis", "here", "numbers"], rows, words=True)

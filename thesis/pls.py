@@ -65,7 +65,7 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
     if not possible:
         shown.append(f"{MODEL} is not written: the plant has no such columns.")
     elif not written:
-        shown.append(f"{MODEL} is not written; --ssv writes it all the same.")
+        shown.append(f"{MODEL} is not written; --ssv writes it anyway.")
     files = [name for name in FILES if written or name != MODEL]
     return Done(0, [*shown, f"in {options.out}: {', '.join(files)}"])
 
@@ -82,14 +82,14 @@ def _parser() -> argparse.ArgumentParser:
         "smoothed",
     )
     ship_option(made)
-    made.add_argument("--recipe", default="PLS3", metavar="NAME", help="how X is made (PLS3)")
+    made.add_argument("--recipe", default="PLS3", metavar="NAME", help="recipe of X (PLS3)")
     made.add_argument(
         "--keep-outliers", action="store_true", help="do not remove outliers by PCA beforehand (7.3)"
     )
     made.add_argument(
         "--stable",
         action="store_true",
-        help=f"{MODEL} holds the model nearest to it that is stable by construction",
+        help=f"write the nearest model that is stable by construction to {MODEL}",
     )
     ssv_option(made)
     return made

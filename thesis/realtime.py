@@ -82,9 +82,9 @@ def study(out: Path, seconds: float, factors: Sequence[float], controllers: Sequ
                 advance()
     report = Report(out, "Hardware in the loop in software (6.3.2)", [ellipse["seed"]])
     report.text(
-        f"The ellipse with noise and freezes, {seconds:g} s in steps of {ellipse['step']:g} s, paced to "
-        "the wall clock. A step misses its deadline when it ends more than one step late. Jitter is the "
-        "standard deviation of the lateness."
+        f"The ellipse with noise and freezes, {seconds:g} s in steps of {ellipse['step']:g} s, in "
+        "real time. A step misses its deadline when it ends more than one step late. Jitter is "
+        "the standard deviation of the lateness."
     )
     header = ["controller", "times real time", "deadline misses", "largest lateness [ms]", "jitter [ms]"]
     rows = [
@@ -96,11 +96,11 @@ def study(out: Path, seconds: float, factors: Sequence[float], controllers: Sequ
         [*row, "same" if runs[row[0]][f].log == free[row[0]].log else "different"]
         for row, f in zip(rows, list(factors) * len(runs), strict=True)
     ])  # fmt: skip
-    report.figure("pace", picture(runs, ellipse["step"]), "Lateness against the deadline.")
+    report.figure("pace", picture(runs, ellipse["step"]), "Lateness and deadline.")
     report.text(
-        "The operating system is an ordinary one: what else the machine does shows as single late "
-        "steps, and the next run of this study gives other numbers. What the pacing may never change is "
-        "the simulation itself; the last column compares the logs to the byte."
+        "The operating system is not a real-time system: other load of the machine causes single "
+        "late steps, and the next run of this study gives other numbers. Real time must not "
+        "change the simulation itself; the last column compares the logs byte by byte."
     )
     report.result("runs", runs)
     return report.write()
@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
         "thesis.realtime",
-        "Pace a scenario to the wall clock and report deadline misses and jitter (6.3.2).",
+        "Run a scenario in real time, and report deadline misses and jitter (6.3.2).",
         "  python -m thesis.realtime\n  python -m thesis.realtime --factor 1 2 5 --seconds 10",
         seeds=None,
         jobs=False,

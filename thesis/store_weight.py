@@ -84,11 +84,11 @@ def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | No
     todo = {path: variants(path, seconds) for path in paths}
     report = Report(out, "The weight of the stored sums")
     report.text(
-        "Footnote 1 of 4.1.4 reduces the stored part of the adaptation by ρ = 0.1: a "
-        "weight of every stored sum. True states, no noise, one run each. `stale`: stored errors as "
-        "Algorithms 1 and 2 print them. `ungated`: samples of forces above 2 N are stored "
-        "too. `request`: the controller is not told the clipped force and learns from what it asks "
-        "for, as printed."
+        "Footnote 1 of 4.1.4 reduces the stored part of the adaptation by ρ = 0.1: a weight of "
+        "every stored sum. True states, no noise, one run each. `stale`: stored errors as "
+        "Algorithms 1 and 2 print them. `ungated`: samples of forces above 2 N are stored too. "
+        "`request`: the controller does not get the clipped force and learns from its requested "
+        "force, as printed."
     )
     with progress(sum(map(len, todo.values())), "store weight") as advance:
         for path, contents in todo.items():
@@ -102,11 +102,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
         "thesis.store_weight",
-        "Find out what the weight of the stored sums does (footnote 1 of 4.1.4).",
+        "Compare weights of the stored sums (footnote 1 of 4.1.4).",
         "  python -m thesis.store_weight\n  python -m thesis.store_weight --quick",
         seeds=None,
     )
-    parser.add_argument("--path", choices=PATHS, help="this path alone (both)")
+    parser.add_argument("--path", choices=PATHS, help="only this path (both)")
     options = parser.parse_args(arguments)
     paths = (options.path,) if options.path else PATHS
     run_study(partial(study, options.out, paths, 60.0 if options.quick else None, options.jobs))

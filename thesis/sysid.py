@@ -53,7 +53,7 @@ def sysid(options: argparse.Namespace, advance: Advance) -> Done:
         write_document(new / REPORT, document(found, options.estimates))
     shown = [*sentences(found)]
     if not written:
-        shown.append(f"{MODEL} is not written; --ssv writes it all the same.")
+        shown.append(f"{MODEL} is not written; --ssv writes it anyway.")
     files = [name for name in FILES if written or name != MODEL]
     return Done(0, [*shown, f"in {options.out}: {', '.join(files)}"])
 
@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
         action="extend",
         metavar="RUN",
         default=[],
-        help="runs of which nothing is learned, for R² on others",
+        help="test runs, not used for learning, for R² on other data",
     )
     made.add_argument(
         "--recipe", metavar="NAME", help="a row of Table 7.1 in place of learning: SYSID1 to SYSID4"

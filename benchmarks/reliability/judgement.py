@@ -31,7 +31,7 @@ def line_faults(code: int, stderr: str, expected: set[int], late: float) -> list
     wrong = []
     if code not in expected:
         wrong.append(f"exit code {code}, not {sorted(expected)}")
-    if "Traceback" in stderr or "should not have happened" in stderr:
+    if "Traceback" in stderr or "internal error" in stderr:
         wrong.append(f"a traceback: {stderr.strip()[-TOLD:]}")
     lines = [line for line in stderr.splitlines() if line.startswith(OURS)]
     if code and len(lines) != 1:

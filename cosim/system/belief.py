@@ -46,11 +46,13 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
             if fmu is plant:
                 continue
             for v, value, names in model.of(fmu):
-                chosen[name][v.name] = (value, f"belief '{path}'")
+                chosen[name][v.name] = (value, f"controller model '{path}'")
                 believers.add(name)
                 used.update((model_name, used_name) for used_name in names)
     if not believers:
-        raise InputError(f"'{path}': no controller model here has a parameter {', '.join(given.values)}")
+        raise InputError(
+            f"'{path}': no controller model here has parameters of {', '.join(given.values)}"
+        )
     unused = [f"{m}.{n}" for m, values in given.values.items() for n in values if (m, n) not in used]
     if unused:
         system.warnings.append(f"'{path}': no controller model here has {', '.join(unused)}")

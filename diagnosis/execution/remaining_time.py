@@ -17,7 +17,7 @@ LAST = {
     "waves": 0.7,
     **OF_EFFECTS,
     "residual": 0.1,
-    "gained over calibration": 1.7,
+    "gain of the search over calibration": 1.7,
     "predicting": 0.4,
     "stability": 1.1,
     "report: figures": 1.0,

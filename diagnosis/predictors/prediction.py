@@ -23,8 +23,8 @@ from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
 
 HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
-# Standard deviations beyond which a speed is none of rest, a gain is wrong, and a nominal coefficient is
-# no explanation alone (contract).
+# Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
+# coefficient alone does not explain the data (contract).
 FAR_OFF = 3.0
 MOTION = (attrgetter("eta"), attrgetter("eta_dot"), attrgetter("eta_ddot"))  # of a smoothed run
 

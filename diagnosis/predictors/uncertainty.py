@@ -32,7 +32,7 @@ FREQUENCIES = np.geomspace(0.02, 60.0, 400)
 # Factor within which the standard deviation is right (tests/test_diagnosis_where.py).
 NOISE_TOLERANCE = 1.3
 # Of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come from
-# how a simulator integrates. Contract, for what is left; the same for what is found, there also of the
+# how a simulator integrates. Contract, for the residual; the same for findings, there also of the
 # squares of the first model error.
 SHARE_OF_COMMAND = 0.02
 # 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance

@@ -32,7 +32,7 @@ MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spike
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
 PLACE, HEADING = slice(0, 2), slice(2, 3)  # channels of the pose, each of one receiver
-FARTHEST = 4e7  # m, round the earth, and rad: what is further is no pose
+FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 FEWEST = 4  # samples, without which there is no third difference
 DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
 # Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.

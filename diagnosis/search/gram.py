@@ -19,8 +19,8 @@ from .most_likely import ridge
 
 FOLDS = 8  # of cross-validation over blocks
 WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
-# Parts that are left out in turn, at the least: stretches of fewer runs, of which each of a single run
-# is as long as the shortest that can be learned from; runs of a calibration; chosen.
+# Least number of parts that are left out in turn: stretches of fewer runs, or runs of a calibration.
+# Each stretch of a single run is as long as the shortest that can be learned from; chosen.
 PARTS = 4
 
 

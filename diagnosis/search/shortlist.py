@@ -30,11 +30,11 @@ from .refinement import (
 
 LENGTH = 8  # of the shortlist
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
-# Least fall of the score, which is twice a log likelihood ratio, and so the signal to noise, a sum of
-# squares, that a candidate beside those found must be able to have of its own. Chance does not give it
-# among some fifty candidates (2 log 50 = 7.8).
+# Least fall of the score that a candidate must be able to have in addition to those found. The score is
+# twice a log likelihood ratio, and so the signal to noise, a sum of squares. Chance does not give this
+# fall among some fifty candidates (2 log 50 = 7.8).
 NEW = 10.0
-TIE = 2.0  # paired standard errors within which two candidates are alike
+TIE = 2.0  # paired standard errors within which two candidates are indistinguishable
 
 
 @dataclass(frozen=True, eq=False)

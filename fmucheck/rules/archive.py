@@ -12,8 +12,8 @@ from ..registry import rule
 
 @rule("2.3")
 def archive(fmu: Fmu) -> Iterator[str]:
-    """Every path in the archive is relative, stays inside, occurs once, is no link, has forward slashes,
-    and is stored or compressed with deflate.
+    """Every path in the archive is relative, stays inside, occurs once, is not a link, has forward
+    slashes, and is stored or compressed with deflate.
     """
     for member in fmu.members:
         # ZipInfo.filename has been tidied already; what was written is in orig_filename.
@@ -22,20 +22,20 @@ def archive(fmu: Fmu) -> Iterator[str]:
         if "\\" in name:
             yield f"'{name}' has a backslash"
         if path.anchor or ".." in path.parts:
-            yield f"'{name}' leaves the folder that it is unpacked to"
+            yield f"'{name}' leads out of the folder that it is unpacked to"
         if stat.S_ISLNK(member.external_attr >> 16):
             yield f"'{name}' is a link"
         if member.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
             yield f"'{name}' is compressed by method {member.compress_type}, not by deflate"
     for name, times in Counter(member.filename for member in fmu.members).items():
         if times > 1:
-            yield f"'{name}' is there {times} times"
+            yield f"'{name}' occurs {times} times"
 
 
 @rule("2.3")
 def binaries(fmu: Fmu) -> Iterator[str]:
-    """Each folder of a platform holds the library that modelIdentifier names; without any, there are
-    sources.
+    """Each platform folder contains the library that modelIdentifier names; without such folders
+    there are sources.
     """
     names = {member.filename for member in fmu.members}
     identifier = fmu.description.cs.get("modelIdentifier", "")
@@ -47,4 +47,4 @@ def binaries(fmu: Fmu) -> Iterator[str]:
         if suffix(folder) and library not in names:
             yield f"'{library}' is missing"
     if not any(map(suffix, folders)) and not any(n.startswith("sources/") for n in names):
-        yield "there are neither binaries of a platform that the standard names, nor sources"
+        yield "the archive has neither binaries for a platform of the standard nor sources"

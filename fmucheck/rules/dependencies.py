@@ -20,7 +20,7 @@ def _told(bench: Bench, element: str) -> list[tuple[Variable, set[int | None]]]:
 
 @trial("2.2.8")
 def initial_dependencies(bench: Bench) -> Iterator[str]:
-    """While initialising, an unknown changes only with what its dependencies in InitialUnknowns list."""
+    """During initialisation an unknown changes only with its dependencies in InitialUnknowns."""
     told = _told(bench, "InitialUnknowns")
     unknowns = [v for v, _ in told]
     one = bench.initialising()
@@ -41,7 +41,7 @@ def initial_dependencies(bench: Bench) -> Iterator[str]:
 
 @trial("2.2.8")
 def output_dependencies(bench: Bench) -> Iterator[str]:
-    """At a communication point, before the next step, an output follows only inputs it lists."""
+    """At a communication point, before the next step, an output depends only on inputs that it lists."""
     told = _told(bench, "Outputs")
     outputs = [v for v, _ in told]
     one = bench.ready()
@@ -58,8 +58,8 @@ def output_dependencies(bench: Bench) -> Iterator[str]:
 
 @trial("2.2.7, 2.2.8")
 def step_dependencies(bench: Bench) -> Iterator[str]:
-    """Over a step that shrinks to nothing, an output follows only inputs that it lists, or that are
-    discrete: those act at communication points by convention.
+    """Over a step of vanishing length an output depends only on inputs that it lists, or that are
+    discrete: by convention these act at communication points.
 
     What follows an input through a state shrinks with the step, what follows it directly does not.
     """
@@ -91,7 +91,7 @@ def _after(
     try:
         one.step(bench.start + 3 * bench.step, share * bench.step)
     except StatusError as refused:
-        raise NotApplicableError(f"so short a step is not for it: {refused}") from None
+        raise NotApplicableError(f"the FMU refuses so short a step: {refused}") from None
     found = one.get(outputs)
     one.free()
     return found
@@ -106,4 +106,4 @@ def _undeclared(
 ) -> Iterator[str]:
     for unknown, dependencies in told:
         if unknown.name in moved and known.index not in dependencies:
-            yield f"{unknown.name} follows {known.name} {when}, but does not list it"
+            yield f"{unknown.name} depends on {known.name} {when}, but does not list it"

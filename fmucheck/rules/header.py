@@ -26,7 +26,7 @@ def encoding(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2.1")
 def header(fmu: Fmu) -> Iterator[str]:
-    """guid and modelName are there, and the date of generation reads YYYY-MM-DDThh:mm:ssZ."""
+    """guid and modelName exist, and the date of generation has the form YYYY-MM-DDThh:mm:ssZ."""
     root = fmu.description.root
     for attribute in ("guid", "modelName"):
         if not (root.get(attribute) or "").strip():
@@ -45,7 +45,7 @@ def capabilities(fmu: Fmu) -> Iterator[str]:
     description = fmu.description
     identifier = description.cs.get("modelIdentifier", "")
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
-        yield f"modelIdentifier '{identifier}' is no name that C could use"
+        yield f"modelIdentifier '{identifier}' is not a valid name in C"
     if description.has("canSerializeFMUstate") and not description.has("canGetAndSetFMUstate"):
         yield "canSerializeFMUstate without canGetAndSetFMUstate: there is no state to serialise"
     order = whole(description.cs.get("maxOutputDerivativeOrder", "0"))
@@ -62,18 +62,18 @@ def capabilities(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2.4")
 def log_categories(fmu: Fmu) -> Iterator[str]:
-    """Log categories have names, each its own."""
+    """Log categories have unique names."""
     names = [c.get("name") for c in fmu.description.root.iterfind("LogCategories/Category")]
     for name in twice(names):
         yield f"category '{name}' is defined twice"
     if not all(names):
-        yield "a category has no name"
+        yield "a category without a name"
 
 
 @rule("2.2.5")
 def experiment(fmu: Fmu) -> Iterator[str]:
-    """The default experiment has finite values, ends after it starts, and holds its positive step
-    size.
+    """The default experiment has finite values, ends after its start, and is not shorter than its
+    positive step size.
     """
     given = fmu.description.experiment
     values = {name: number(text) for name, text in given.items()}

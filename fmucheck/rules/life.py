@@ -10,7 +10,9 @@ from ..registry import trial
 
 @trial("2.1, 4.2")
 def exports(bench: Bench) -> Iterator[str]:
-    """The library exports all functions of co-simulation, tells version 2.0 and the default platform."""
+    """The library exports all functions of co-simulation, and reports version 2.0 and the default
+    platform.
+    """
     for name in bench.library.missing:
         yield f"{name} is not exported"
     for name, meant in (("fmi2GetVersion", b"2.0"), ("fmi2GetTypesPlatform", b"default")):
@@ -23,7 +25,7 @@ def exports(bench: Bench) -> Iterator[str]:
 @trial("2.1.5, 2.1.6, 4.2.4")
 def life(bench: Bench) -> Iterator[str]:
     """Instantiate with the guid of the description, initialise, step, terminate, free: no error, no
-    crash, and its files are left for the next instance.
+    crash, and its files remain for the next instance.
     """
     files = [path for path in bench.folder.rglob("*") if path.is_file()]
     one = bench.ready()
@@ -50,8 +52,8 @@ def _undeclared(bench: Bench, one: Instance) -> Iterator[str]:
 
 @trial("2.1.5")
 def free(bench: Bench) -> Iterator[str]:
-    """An instance can be freed at any time: just instantiated, while initialising, and without
-    terminating.
+    """An instance can be freed at any time: after instantiation, during initialisation, and without
+    termination.
     """
     bench.instance().free()
     bench.initialising().free()
@@ -61,7 +63,7 @@ def free(bench: Bench) -> Iterator[str]:
 
 @trial("2.1.5, 2.2.4")
 def logging(bench: Bench) -> Iterator[str]:
-    """fmi2SetDebugLogging takes every log category that the description lists."""
+    """fmi2SetDebugLogging accepts every log category that the description lists."""
     names = [c.get("name", "") for c in bench.description.root.iterfind("LogCategories/Category")]
     one = bench.instance()
     one.debug(names)

@@ -12,7 +12,7 @@ STEPS = 20
 
 @trial("2.1.6")
 def reset(bench: Bench) -> Iterator[str]:
-    """After fmi2Reset the FMU has its start values again, and runs as it did when it was new."""
+    """After fmi2Reset the FMU has its start values again, and runs like a new instance."""
     given = bench.given()
     one = bench.initialising()
     new = one.get(given)
@@ -31,8 +31,8 @@ def reset(bench: Bench) -> Iterator[str]:
 
 @trial("2.1.8")
 def state(bench: Bench) -> Iterator[str]:
-    """A state got with fmi2GetFMUstate and set again, even more than once, has the same values and
-    continues as it did.
+    """A state of fmi2GetFMUstate that is set again, also more than once, has the same values and
+    the same continuation.
     """
     bench.needs("canGetAndSetFMUstate")
     one, before = _on_the_way(bench)
@@ -48,7 +48,7 @@ def state(bench: Bench) -> Iterator[str]:
 
 @trial("2.1.8")
 def serialised_state(bench: Bench) -> Iterator[str]:
-    """A serialised state continues as it did, in the same instance and in a new one."""
+    """A serialised state has the same continuation, in the same instance and in a new one."""
     bench.needs("canSerializeFMUstate")
     one, before = _on_the_way(bench)
     kept = one.state()
@@ -94,7 +94,7 @@ def _amiss(bench: Bench, one: Instance, kept: c_void_p, before: Row, first: list
 
 @trial("2.1.5, 4.3.1")
 def instances(bench: Bench) -> Iterator[str]:
-    """Two instances do not disturb each other, unless canBeInstantiatedOnlyOncePerProcess is
+    """Two instances do not influence each other, unless canBeInstantiatedOnlyOncePerProcess is
     declared.
     """
     given = bench.given()
@@ -108,7 +108,7 @@ def instances(bench: Bench) -> Iterator[str]:
         bench.play(other, 1, seed=1, first=k)
     bench.disturb(other)
     rows += bench.play(one, 1, seed=0, first=STEPS)
-    yield from (f"beside another instance {text}" for text in unlike(given, meant, one.get(given)))
+    yield from (f"with another instance {text}" for text in unlike(given, meant, one.get(given)))
     where = differing(bench.description.outputs(), alone, rows)
     if where:
-        yield f"beside another instance the run differs: {where}"
+        yield f"with another instance the run differs: {where}"

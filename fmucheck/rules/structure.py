@@ -24,22 +24,20 @@ def _without(names: Sequence[str], others: Sequence[str]) -> list[str]:
 
 @rule("2.2.8")
 def outputs(fmu: Fmu) -> Iterator[str]:
-    """Outputs lists every variable with causality output and nothing else; without outputs it is left
-    out.
-    """
+    """Outputs lists every variable with causality output and no other; without outputs it is absent."""
     description = fmu.description
     unknowns = description.unknowns("Outputs")
     listed, meant = _listed(description, "Outputs"), [v.name for v in description.outputs()]
     yield from (f"{name} is an output, but not listed" for name in _without(meant, listed))
-    yield from (f"{name} is listed, but no output" for name in _without(listed, meant))
+    yield from (f"{name} is listed, but is not an output" for name in _without(listed, meant))
     if unknowns is not None and not unknowns:
-        yield "Outputs is there, but empty"
+        yield "Outputs exists, but is empty"
 
 
 @rule("2.2.8")
 def state_derivatives(fmu: Fmu) -> Iterator[str]:
-    """Derivatives lists only variables with the attribute derivative; all, where directional
-    derivatives need them.
+    """Derivatives lists only variables with the attribute derivative, and all of them if
+    directional derivatives need them.
     """
     description = fmu.description
     unknowns = description.unknowns("Derivatives")
@@ -52,7 +50,7 @@ def state_derivatives(fmu: Fmu) -> Iterator[str]:
         for name in _without(meant, listed):
             yield f"{name} is a derivative, but not listed"
     if unknowns is not None and not unknowns:
-        yield "Derivatives is there, but empty"
+        yield "Derivatives exists, but is empty"
 
 
 @rule("2.2.8")
@@ -81,13 +79,13 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
     if known != sorted(known):
         yield "the entries are not in ascending order"
     if unknowns is not None and not unknowns:
-        yield "InitialUnknowns is there, but empty"
+        yield "InitialUnknowns exists, but is empty"
 
 
 @rule("2.2.8")
 def structure(fmu: Fmu) -> Iterator[str]:
-    """Each entry is there once and is a variable; its dependencies are, too, each once, in ascending
-    order and with one kind.
+    """Each entry is a variable that occurs once; so are its dependencies, in ascending order and
+    with one kind each.
     """
     description = fmu.description
     for element in ELEMENTS:
@@ -123,7 +121,7 @@ def _lists(description: Description, unknown: Unknown) -> Iterator[str]:
 
 @rule("2.2.8")
 def dependencies(fmu: Fmu) -> Iterator[str]:
-    """Dependencies are on what is known there: inputs, states and time; at initialisation inputs,
+    """Dependencies are on known quantities: inputs, states and time; at initialisation inputs,
     exact values and time.
     """
     description = fmu.description
@@ -154,6 +152,6 @@ def _kind(v: Variable, known: Variable, element: str, kind: str) -> Iterator[str
     if kind not in KINDS:
         yield f"{where} is '{kind}'"
     elif element == "InitialUnknowns" and kind not in ("dependent", "constant"):
-        yield f"{where} is {kind}; at initialisation only dependent and constant mean something"
+        yield f"{where} is {kind}; only dependent and constant are allowed at initialisation"
     elif kind != "dependent" and not v.type == known.type == "Real":
         yield f"{where} is {kind}, but not both are Real"

@@ -28,7 +28,7 @@ def xsd(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2")
 def fmpy(fmu: Fmu) -> Iterator[str]:
-    """FMPy's validate_fmu finds nothing."""
+    """FMPy's validate_fmu reports no error."""
     try:
         from fmpy.validation import validate_fmu
     except ImportError:
@@ -39,7 +39,7 @@ def fmpy(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2")
 def fmutool(fmu: Fmu) -> Iterator[str]:
-    """The checkers of the FMU Manipulation Toolbox find nothing."""
+    """The checkers of the FMU Manipulation Toolbox report no error."""
     try:
         from fmu_manipulation_toolbox.checker import get_checkers
         from fmu_manipulation_toolbox.operations import FMU

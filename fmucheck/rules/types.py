@@ -11,8 +11,8 @@ from .header import twice
 
 @rule("2.2.3")
 def types(fmu: Fmu) -> Iterator[str]:
-    """Types have names of their own, no variable's, limits in order, and enumerations one value an
-    item.
+    """Types have unique names that no variable has, ordered limits, and one value for each item of
+    an enumeration.
     """
     names = [t.get("name") for t in fmu.description.types]
     for name in twice(names):
@@ -35,13 +35,13 @@ def _items(name: str, enumeration: Element) -> Iterator[str]:
         yield f"enumeration '{name}' has no items"
     for attribute in ("name", "value"):
         for text in twice(i.get(attribute) for i in items):
-            yield f"enumeration '{name}': {attribute} '{text}' is there twice"
+            yield f"enumeration '{name}': {attribute} '{text}' occurs twice"
 
 
 @rule("2.2.3, 2.2.7")
 def declared_types(fmu: Fmu) -> Iterator[str]:
-    """A variable's declared type exists, is of the variable's kind, and its limits hold the
-    variable's.
+    """The declared type of a variable exists, is of the same kind, and its limits include those of
+    the variable.
     """
     known = {t.get("name"): t[0] for t in fmu.description.types if len(t)}
     for v in fmu.description.variables:

@@ -16,7 +16,7 @@ BASES = ("kg", "m", "s", "A", "K", "mol", "cd")  # and rad, which may be left ou
 
 @rule("2.2.2")
 def units(fmu: Fmu) -> Iterator[str]:
-    """Units and their display units have names of their own, and factors that can be divided by."""
+    """Units and their display units have unique names, and factors that are not zero."""
     for name in twice(u.get("name") for u in fmu.description.units):
         yield f"unit '{name}' is defined twice"
     for unit in fmu.description.units:
@@ -36,8 +36,8 @@ def _conversion(element: Element, where: str) -> Iterator[str]:
 
 @rule("2.2.2")
 def base_units(fmu: Fmu) -> Iterator[str]:
-    """A unit whose name is made of SI symbols (m/s, N.m) has the exponents and the factor that it
-    says.
+    """A unit whose name is made of SI symbols (m/s, N.m) has the exponents and the factor of its
+    name.
     """
     for unit in fmu.description.units:
         base, name = unit.find("BaseUnit"), unit.get("name", "")
@@ -59,7 +59,7 @@ def base_units(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2.2, 2.2.7")
 def units_defined(fmu: Fmu) -> Iterator[str]:
-    """Every unit and display unit that is used is defined, and a display unit stands beside a unit."""
+    """Every unit and display unit that is used is defined, and a display unit has a unit."""
     known = {
         u.get("name"): {d.get("name") for d in u.iterfind("DisplayUnit")} for u in fmu.description.units
     }

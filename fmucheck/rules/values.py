@@ -10,9 +10,7 @@ from ..registry import trial
 
 @trial("2.1.7, 2.2.7")
 def start_values(bench: Bench) -> Iterator[str]:
-    """Before anything is set, inputs and exact values are what the description says that they start
-    at.
-    """
+    """Before any value is set, inputs and exact values equal the start values of the description."""
     one = bench.initialising()
     told = [v for v in bench.description.variables if v.initial == "exact" or v.causality == "input"]
     told = [v for v in told if start_value(v) is not None]
@@ -24,7 +22,9 @@ def start_values(bench: Bench) -> Iterator[str]:
 
 @trial("2.1.7, 4.2.4")
 def read_back(bench: Bench) -> Iterator[str]:
-    """What a master sets while initialising, inputs and parameters, reads back as it was set."""
+    """Inputs and parameters that a master sets during initialisation have these values when they
+    are read.
+    """
     one = bench.initialising()
     settable = [
         v
@@ -42,8 +42,8 @@ def read_back(bench: Bench) -> Iterator[str]:
 
 @trial("2.2.7")
 def range_of_values(bench: Bench) -> Iterator[str]:
-    """Outputs are finite, items where they are Enumerations, and keep to their min and max, as
-    initialised and after each step.
+    """Outputs are finite, items if they are Enumerations, and within their min and max, after
+    initialisation and after each step.
     """
     outputs = [v for v in bench.description.outputs() if v.type in ("Real", "Integer", "Enumeration")]
     one = bench.ready()
@@ -61,5 +61,5 @@ def _wrong(v: Variable, value: float) -> str:
     if not math.isfinite(value):
         return "which is not finite"
     if v.items and value not in v.items:
-        return "which is no item of its Enumeration"
+        return "which is not an item of its Enumeration"
     return "" if low <= value <= high else f"outside of {low:g} to {high:g}"

@@ -18,16 +18,16 @@ _STRUCTURED = re.compile(rf"{_NAME}|der\({_NAME}(?:,\d+)?\)")
 
 @rule("2.2.7, 2.2.9")
 def names(fmu: Fmu) -> Iterator[str]:
-    """Every variable has a name of its own that follows variableNamingConvention."""
+    """Every variable has a unique name that follows variableNamingConvention."""
     variables = fmu.description.variables
     for name in twice(v.name for v in variables):
         yield f"'{name}' is the name of several variables"
     structured = fmu.description.root.get("variableNamingConvention") == "structured"
     for v in variables:
         if not v.name or re.search(r"[\r\n\t]", v.name):
-            yield f"'{v.name}' (variable {v.index}) is no name"
+            yield f"'{v.name}' (variable {v.index}) is not a valid name"
         elif structured and not _STRUCTURED.fullmatch(v.name):
-            yield f"'{v.name}' is no structured name"
+            yield f"'{v.name}' is not a structured name"
         elif structured and v.name.startswith("der(") and v.type != "Real":
             yield f"'{v.name}' is a derivative, but a {v.type}"
 
@@ -52,8 +52,8 @@ def causality(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2.7")
 def start(fmu: Fmu) -> Iterator[str]:
-    """A start value is there where it must be, absent where it must not be, and a finite value of its
-    type.
+    """A start value exists where it is required, is absent where it is not allowed, and is a finite
+    value of its type.
     """
     for v in fmu.description.variables:
         needed = v.initial in ("exact", "approx") or v.causality == "input"
@@ -65,7 +65,7 @@ def start(fmu: Fmu) -> Iterator[str]:
         if forbidden:
             yield f"{v.name} has a start value, though it is {v.initial or v.causality}"
         if not _of_type(v):
-            yield f"{v.name}: start '{v.start}' is no finite {v.type}"
+            yield f"{v.name}: start '{v.start}' is not a finite {v.type}"
 
 
 def _of_type(v: Variable) -> bool:
@@ -93,7 +93,7 @@ def limits(fmu: Fmu) -> Iterator[str]:
         ):
             yield f"{v.name}: start {value:g} is outside of {low:g} to {high:g}"
         if v.items and value is not None and value not in v.items:
-            yield f"{v.name}: start {value:g} is no item of its Enumeration"
+            yield f"{v.name}: start {value:g} is not an item of its Enumeration"
         nominal = number(v.all.get("nominal", "1"))
         if nominal is None or not 0.0 < nominal < math.inf:
             yield f"{v.name}: nominal is '{v.all['nominal']}'"
@@ -101,7 +101,7 @@ def limits(fmu: Fmu) -> Iterator[str]:
 
 @rule("2.2.7")
 def aliases(fmu: Fmu) -> Iterator[str]:
-    """Of variables that share type and value reference one may be set, one has a start, and units
+    """Of variables that share type and value reference one can be set, one has a start, and units
     agree.
     """
     groups: dict[tuple[str, int | None], list[Variable]] = {}
@@ -140,7 +140,7 @@ def derivatives(fmu: Fmu) -> Iterator[str]:
         if "derivative" in v.own:
             state = description.variable(v.derivative)
             if state is None or state is v:
-                yield f"{v.name}: derivative is '{v.own['derivative']}', which is no other variable"
+                yield (f"{v.name}: derivative is '{v.own['derivative']}', which is not another variable")
             elif not all(x.type == "Real" and x.variability == "continuous" for x in (v, state)):
                 yield f"{v.name} is the derivative of {state.name}, but not both are continuous Reals"
         if flag(v.own.get("reinit")) and not (exchange and v.index in states):

@@ -17,9 +17,10 @@ from .effect_set import EffectSet
 
 HEAD = """# Model effects
 
-What the real ship may have and the nominal model lacks. Every effect is off (its coefficients are zero)
-until a parameter of the vessel or the thrusters says otherwise; all parameters can be changed during a
-run. The effects of actuators are those of the default ship. Printed by `python -m fmus.effects`.
+This page lists the effects that a real ship may have and its nominal model lacks. Every effect is off
+(its coefficients are zero) until a parameter of the vessel or the thrusters sets it. All parameters can
+change during a run. The effects of actuators are those of the default ship. `python -m fmus.effects`
+prints this page.
 
 | id | kind | axis | formula | symbol | parameters [unit] | sign | source |
 |---|---|---|---|---|---|---|---|

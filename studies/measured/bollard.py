@@ -51,7 +51,7 @@ def read(data: Path) -> Pulls:
             raise InputError(f"'{path}' has no column '{name}'{nearest(name, list(table))}")
     numbers = table[list(COLUMNS)].apply(pd.to_numeric, errors="coerce").to_numpy(float)
     if not np.isfinite(numbers).all():
-        raise InputError(f"'{path}' has cells that are no numbers")
+        raise InputError(f"'{path}' has cells that are not numbers")
     command, force = numbers.T
     if not (np.abs(command) <= WITHIN).any():
         raise InputError(f"'{path}' has no pull at a command of at most {WITHIN:g}")

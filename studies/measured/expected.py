@@ -58,9 +58,12 @@ def reason(fall: Fall, target: float) -> str:
     if not isfinite(fall.seen):
         return "not known"
     if fall.seen >= target:
-        text = f"what the others teach does not hold here: with this run among them {fall.seen:.2g}×"
+        text = (
+            "the other runs do not suffice to learn this run; with this run in the training data: "
+            f"{fall.seen:.2g}×"
+        )
         return text + commanded(fall)
-    text = f"not reached with this run among those learned from either ({fall.seen:.2g}×)"
+    text = f"not reached with this run in the training data either ({fall.seen:.2g}×)"
     return text + commanded(fall)
 
 
@@ -68,9 +71,9 @@ def commanded(fall: Fall) -> str:
     """Share of the rest that the commands of the VSP explain, in words; empty: hardly any."""
     if fall.single < CLEARLY:
         return ""
-    text = f"; {100.0 * fall.single:.0f} % of the squares that are left go with the commands of each VSP"
+    text = f"; {100.0 * fall.single:.0f} % of the squared residual depend on the commands of single VSP"
     if fall.both < 0.5 * fall.single:
-        text += ", for which the model has one law together"
+        text += ", for which the model has one common law"
     return text
 
 

@@ -94,7 +94,7 @@ def gather(files: Sequence[Path], advance: Advance) -> list[WeakWindows]:
         InputError: there is one only, or one cannot be used.
     """
     if len(files) < 2:
-        raise InputError(f"one run alone, '{files[0]}', cannot be left out of training")
+        raise InputError(f"'{files[0]}' is a single run and cannot be left out of training")
     return diagnosis.gather(files, advance)
 
 

@@ -33,12 +33,12 @@ def falls(fold: LeftOutRun) -> list[Fall]:
 
 def write_falls(report: Report, folds: Sequence[LeftOutRun]) -> None:
     """The model error before and after on the run left out, beside the target."""
-    report.heading("The model error on the run left out")
+    report.heading("Model error on the run left out")
     report.text(
-        "RMS of the force that the model lacks, in windows of 3 s with the thrusters at work. Before: "
-        "the nominal model with the power settings that the run logged; in brackets as if they were not "
-        "known. After: with what was learned from the other runs. The last column: the fall if this run "
-        "is among those learned from."
+        "RMS of the model error, in windows of 3 s with the thrusters at work. Before: the "
+        "nominal model with the power settings that the run logged; in brackets with unknown "
+        "power settings. After: with the model learned from the other runs. Last column: the "
+        "reduction if this run is part of the training data."
     )
     rows, results = [], {}
     every = [(f, falls(f)) for f in folds]
@@ -59,10 +59,12 @@ def write_falls(report: Report, folds: Sequence[LeftOutRun]) -> None:
                 "target": target,
                 **x._asdict(),
             }
-    header = ["run left out", "axis", "before", "after", "fall", "target", "learned from it"]
+    header = ["run left out", "axis", "before", "after", "fall", "target", "training run"]
     report.table(header, rows)
     least = min(x.most for _, of in every for x in of)
-    report.text(f"Noise of the measurement is not what is left: it would allow {least:.0f}× or more.")
+    report.text(
+        f"The noise of the measurement does not explain the residual: it allows {least:.0f}× or more."
+    )
     worse = [
         f"{axis} of {f.name}" for f, of in every for axis, x in zip(AXES, of, strict=True) if x.out < 1.0
     ]
@@ -75,7 +77,7 @@ def write_falls(report: Report, folds: Sequence[LeftOutRun]) -> None:
         if (target := wanted(axis, kind(f))) is not None and x.out < target
     ]
     if missed:
-        report.text("Not reached, and why, as far as the numbers tell:")
+        report.text("Not reached, with the reasons that the numbers show:")
         report.items(missed)
     report.result("falls", results)
 
@@ -99,7 +101,7 @@ def write_windows(report: Report, folds: Sequence[LeftOutRun]) -> None:
         heading = ["–" if e is None else window_error(e.heading, 180.0 / np.pi) for e in errors]
         return [f.name, *position, *heading]
 
-    when = ("before", "after", "learned from it")
+    when = ("before", "after", "training run")
     quantities = ("position [mm]", "heading [°]")
     header = ["run left out", *(f"{what}: {w}" for what in quantities for w in when)]
     report.table(header, [row(f) for f in folds])
@@ -109,12 +111,13 @@ def write_windows(report: Report, folds: Sequence[LeftOutRun]) -> None:
     for what, names in (("position", farther), ("heading", askew)):
         if names:
             report.text(
-                f"The {what} is predicted worse than by the nominal model in {', '.join(names)}."
+                f"The prediction error of the {what} is larger than with the nominal model in "
+                f"{', '.join(names)}."
             )
     write_heading(report, folds)
     away = [f.name for f in folds if np.isinf(f.evaluation.after.position)]
     if away:
-        report.text(f"In {', '.join(away)} the learned model runs away in one window or more.")
+        report.text(f"In {', '.join(away)} the learned model diverges in one window or more.")
 
 
 def write_heading(report: Report, folds: Sequence[LeftOutRun]) -> None:
@@ -128,18 +131,19 @@ def write_heading(report: Report, folds: Sequence[LeftOutRun]) -> None:
 
     out, learned = mean_fall([f.evaluation for f in folds]), mean_fall(seen)
     report.text(
-        f"Geometric mean of the heading's fall: {out:.2f}× left out, {learned:.2f}× with the run among "
-        f"those learned from; the target is {HEADING:g}×."
+        f"Geometric mean of the reduction of the heading error: {out:.2f}× left out, "
+        f"{learned:.2f}× with the run in the training data; the target is {HEADING:g}×."
     )
     if learned < HEADING:
         report.text(
-            "So no candidate has what turns the ship over 8 s; the yaw moment that falls above is quick."
+            "So no candidate explains the rotation of the ship over 8 s; the yaw moment that is "
+            "reduced above is fast."
         )
 
 
 def write_expected(report: Report, folds: Sequence[LeftOutRun]) -> None:
     """Expectations set before the study, and the result of each."""
-    report.heading("What was expected")
+    report.heading("Expected effects")
     rows = expectations([f.content for f in folds])
     header = ["expected", *(f"without {f.name}" for f in folds)]
     report.table(header, [[row.expected, *row.came] for row in rows], words=True)
@@ -149,9 +153,9 @@ def write_expected(report: Report, folds: Sequence[LeftOutRun]) -> None:
     )
     if listed:
         report.text(
-            f"Pose and commands alone, without any model of the ship, give the delay of the commands: "
-            f"{listed}. "
-            "The model's delay is learned along with all else, and other effects take a part of it."
+            "Pose and commands alone, without any model of the ship, give the delay of the "
+            f"commands: {listed}. The delay of the model is learned together with the other "
+            "effects, which explain a part of it."
         )
     report.result("expected", rows)
     report.result("late", delays)
@@ -177,7 +181,7 @@ def write_findings(report: Report, name: str, d: Content) -> None:
     else:
         report.text("No effect was found.")
     suspects = [f"{s.name} = {s.value:.3g} (z = {s.z:.1f})" for s in d.suspect_coefficients]
-    report.text(f"Nominal coefficients that are likely wrong: {', '.join(suspects) or 'none'}.")
+    report.text(f"Nominal coefficients that are probably wrong: {', '.join(suspects) or 'none'}.")
     s = d.stability
     least = f"{s.learned_min_dissipation:.3g} 1/s (nominal {s.nominal_min_dissipation:.3g})"
     held = "holds" if s.bounded else "does not hold"
@@ -189,21 +193,21 @@ def write_findings(report: Report, name: str, d: Content) -> None:
 
 def write_curve(report: Report, folds: Sequence[LeftOutRun], last: Model, pulls: bollard.Pulls) -> None:
     """The learned VSP beside bollard pulls."""
-    report.heading("The VSP beside bollard pulls")
+    report.heading("The VSP and bollard pulls")
     models = {"nominal": Model(), "all runs": last} | {f"without {f.name}": f.model for f in folds}
     found = {name: bollard.difference(m, pulls) for name, m in models.items()}
     rms = found["all runs"].rms
     said = "reached" if rms <= CURVE_WITHIN else "not reached"
     report.text(
-        f"RMS difference to the pulls at |pitch| ≤ {bollard.WITHIN:g}: {rms:.3f} N learned from all "
-        f"runs, {found['nominal'].rms:.3f} N nominal; the target was {CURVE_WITHIN:g} N: {said}. It is "
-        "not known at which speed the propellers ran in the pulls: with one factor on the model's "
-        "force, fitted to the pulls, only the shape counts."
+        f"RMS difference to the pulls at |pitch| ≤ {bollard.WITHIN:g}: {rms:.3f} N learned from "
+        f"all runs, {found['nominal'].rms:.3f} N nominal; the target was {CURVE_WITHIN:g} N: "
+        f"{said}. The speed of the propellers in the pulls is not known: the force of the model is "
+        "scaled by one factor, fitted to the pulls, so only the shape is compared."
     )
     header = ["learned from", "RMS [N]", "best factor", "RMS with it [N]"]
     report.table(header, [[name, *map(float, x)] for name, x in found.items()])
     figure = bollard.picture(pulls, last, {f.name: f.model for f in folds})
-    report.figure("bollard", figure, "Surge force of one VSP at rest: learned, nominal, and pulled.")
+    report.figure("bollard", figure, "Surge force of one VSP at rest: learned, nominal, and measured.")
     forces = {name: bollard.surge_force(m, pulls.command) for name, m in models.items()}
     report.result("bollard", {"pulls": pulls, "forces": forces, "differences": found})
 

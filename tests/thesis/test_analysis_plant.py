@@ -158,7 +158,9 @@ class TestPasses:
         said = " ".join(warnings(found, [s]))
         assert "|r|v = −|v|r" in said
         condition = number(found.condition[1], 2)
-        assert re.search(rf"Y: condition number {re.escape(condition)}; .* tell apart .*Y_absr_v", said)
+        assert re.search(
+            rf"Y: condition number {re.escape(condition)}; .* discriminate .*Y_absr_v", said
+        )
         assert found.condition[1] > 1e6
         rich = made(row("SYSID4"), n=800)
         assert "|r|v =" not in " ".join(warnings(cp.identify([rich]), [rich]))
@@ -254,7 +256,7 @@ class TestPasses:
         b.run[:] = "other"
         both = joined([a, b])
         for use in (cp.thinned, cp.material, lambda s: cp.identify([s]), lambda s: cp.explained([s], a)):
-            with pytest.raises(ValueError, match="time goes back"):
+            with pytest.raises(ValueError, match="time decreases"):
                 use(both)
         one, two = by_run(both)
         assert [s.names for s in (one, two)] == [["made"], ["other"]]

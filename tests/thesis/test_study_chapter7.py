@@ -193,7 +193,7 @@ def test_the_row_that_made_the_samples_explains_them(tmp_path, drawn):
         "model", ":--", *analysis.TABLE_7_1, "least squares", "identified, limits of Algorithm 4", "identified, limits of the data"
     }  # fmt: skip
     found = analysis.identify(analysis.by_run(analysis.without_outliers(made)))
-    rest = "" if found.settled else ", not at rest"
+    rest = "" if found.settled else ", not converged"
     passed = ", ".join(f"{100.0 * x:.0f}" for x in found.passed)
     assert (
         f"limits of Algorithm 4: {found.passes} passes{rest}, the blocker lets {passed} % of each run"
@@ -391,7 +391,7 @@ def test_real_runs_have_the_same_parts(found, tmp_path, monkeypatch, drawn):
     text = told(tmp_path, chapter7.measured, tmp_path)
     assert asked == [([tmp_path / "a.mat"], "smoothed")]
     assert "NTNU's runs run0, run1 in a row" in text
-    assert "limits of Algorithm 4: 1 passes, not at rest, the blocker" in text
+    assert "limits of Algorithm 4: 1 passes, not converged, the blocker" in text
     rows = [line for line in text.splitlines() if line.startswith("| PLS1 |")]
     assert rows[0].endswith("| – |")
     for part in ("4 components explain", "| Three factors suffice", "| least squares |"):

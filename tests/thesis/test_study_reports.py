@@ -538,7 +538,7 @@ def test_report_of_the_lost_thrust(tmp_path, monkeypatch, figures):
     text, results = written(lost_thrust.study(tmp_path), tmp_path)
     assert asked == [(False, [0], lost_thrust.analyse), (True, [0], lost_thrust.whole)]
     assert results["line"] == pytest.approx([-2.0, -1.0])
-    assert "N_r = -1.00 + -2.00 delta_N; on it delta_N = 0.07 goes with N_r = -1.14." in text
+    assert "N_r = -1.00 + -2.00 delta_N; at delta_N = 0.07 it has N_r = -1.14." in text
     assert "Farthest from it is N_r by 0.00." in text
     assert len(results["places"]) == len(lost_thrust.ESTIMATES) * len(lost_thrust.PACES)
     assert results["places"]["MDF, 1"][0] == {"delta_N": 0.1, "N_r": -1.2, "r2": 0.9}
@@ -763,8 +763,8 @@ def test_fall_of_the_heading_is_told_beside_that_with_the_run_learned_from(tmp_p
     text = said([1.0, 4.0], [2.0, 8.0])
     assert "2.00× left out, 4.00× with the run among those learned from" in text
     assert "no candidate" not in text
-    assert "no candidate has what turns the ship" in said([1.0, 1.0], [1.5, 1.5])
-    assert "heading's fall" not in said([1.0], [None])
+    assert "no candidate explains the rotation of the ship" in said([1.0, 1.0], [1.5, 1.5])
+    assert "reduction of the heading error" not in said([1.0], [None])
 
 
 def test_falls_are_told_beside_their_targets(tmp_path, monkeypatch):
@@ -808,9 +808,14 @@ def test_windows_are_told_with_those_that_are_worse_or_run_away(tmp_path):
     assert "| a | 100 | 50 | 50 | 11.5 | 5.73 | 5.73 |" in text
     assert "| b | 100 | runs away | – | 11.5 | 22.9 | – |" in text
     for quantity in ("position", "heading"):
-        assert f"The {quantity} is predicted worse than by the nominal model in b." in text
+        assert (
+            f"The prediction error of the {quantity} is larger than with the nominal model in b." in text
+        )
     assert "In b the learned model runs away" in text
-    assert "Geometric mean of the heading's fall: 1.00× left out, 2.00× with the run" in text
+    assert (
+        "Geometric mean of the reduction of the heading error: 1.00× left out, 2.00× with the run"
+        in text
+    )
 
 
 def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):

@@ -343,10 +343,10 @@ def test_coefficient_is_sure_if_far_from_zero_and_of_one_sign():
 )
 def test_regression_that_loses_the_ship(lost, holds, here):
     assert model_loops.unstable(lost, holds, "").here.startswith(here)
-    assert model_loops.unstable(lost, holds, "").here.endswith("tells which")
-    assert "does not tell which" not in model_loops.unstable(lost, holds, "").here
+    assert model_loops.unstable(lost, holds, "").here.endswith("predicts which")
+    assert "does not predict which" not in model_loops.unstable(lost, holds, "").here
     wrong = {name: not held for name, held in holds.items()}
-    assert model_loops.unstable(lost, wrong, "").here.endswith("does not tell which")
+    assert model_loops.unstable(lost, wrong, "").here.endswith("does not predict which")
 
 
 def test_eight_settles_with_the_hidden_losses():

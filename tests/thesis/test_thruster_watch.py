@@ -215,9 +215,9 @@ def test_failures_are_told_by_their_surest_instant_the_longest_first():
     assert (vsp.thruster, vsp.since, vsp.noticed, vsp.until) == ("vsp", 1014.0, 1010.0, 1020.0)
     assert (bow.confidence, bow.lost, vsp.confidence, vsp.lost) == (0.99, 1.0, 0.9, 0.25)
     assert [*thruster_report.sentences(played)] == [
-        "Run trial: the bow thruster lost 100 % of its force at 1074 s (probability 0.99, noticed at 1040 s, "
-        "told until 1080 s).",
-        "Run trial: the VSP lost 25 % of its force at 1014 s (probability 0.9, noticed at 1010 s, told until "
+        "Run trial: the bow thruster lost 100 % of its force at 1074 s (probability 0.99, detected at 1040 s, "
+        "reported until 1080 s).",
+        "Run trial: the VSP lost 25 % of its force at 1014 s (probability 0.9, detected at 1010 s, reported until "
         "1020 s).",
         "a note",
     ]
@@ -251,7 +251,7 @@ def test_failures_are_told_by_their_surest_instant_the_longest_first():
 def test_of_a_run_without_a_failure_the_largest_probability_is_told():
     played = watched([])
     assert [*thruster_report.sentences(played)] == [
-        "Run trial: no thruster seems to fail (probability 0.01 at most).",
+        "Run trial: no failed thruster detected (probability at most 0.01).",
         "a note",
     ]
     content = thruster_report.content(played)

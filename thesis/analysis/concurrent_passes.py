@@ -50,7 +50,7 @@ def thinned(s: Samples) -> Samples:
         ValueError: time goes back, as where runs are joined.
     """
     if (np.diff(s.time) < 0.0).any():
-        raise ValueError(f"time goes back in {', '.join(s.names)}: give each run by itself (by_run)")
+        raise ValueError(f"time decreases in {', '.join(s.names)}: give each run separately (by_run)")
     place = np.floor((s.time - s.time[0]) / EVERY + 1e-9)
     return s.rows(np.concatenate([[True], np.diff(place) > 0.0]))
 

@@ -122,7 +122,7 @@ def nearest_stable(
     """
     names = list(columns)
     if not goes_into_the_plant(names):
-        raise InputError("the plant has no such columns: no stable model can be made of them")
+        raise InputError("the plant has no such columns: a stable model is not possible")
     mean_x, mean_y = X.mean(axis=0), omega.mean(axis=0)
     Z, Y = X - mean_x, omega - mean_y
     H = Z.T @ Z

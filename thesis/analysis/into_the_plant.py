@@ -48,7 +48,7 @@ class EffectiveThrust:
         if self.holds:
             return (
                 f"Thrust: sym(I + B_τ) ≥ {number(self.least)} > {EPSILON}, eigenvalues of I + B_τ "
-                f"{real}: every force acts towards where it is asked for."
+                f"{real}: every force acts in the commanded direction."
             )
         if min(x.real for x in self.eigenvalues) <= 0.0:
             return (
@@ -56,8 +56,9 @@ class EffectiveThrust:
                 "feedback of a controller. Do not simulate this model in closed loop."
             )
         return (
-            f"Thrust: sym(I + B_τ) ≥ {number(self.least)} only, below {EPSILON}; eigenvalues of I + B_τ "
-            f"{real}. Some force acts across or against where it is asked for: a closed loop may break."
+            f"Thrust: sym(I + B_τ) ≥ {number(self.least)} only, below {EPSILON}; eigenvalues of I "
+            f"+ B_τ {real}. Some force acts across or against its commanded direction: a closed "
+            "loop may become unstable."
         )
 
 

@@ -105,8 +105,9 @@ def sentences(a: OutlierComponents) -> Iterator[str]:
     above = np.flatnonzero(a.q2 > m.explained + 1e-9) + 1
     if above.size:
         yield (
-            f"Q² exceeds R² with {', '.join(map(str, above))} components: what they explain varies more "
-            "in some of the blocks left out than in the rest; there Q² says nothing on their number."
+            f"Q² exceeds R² with {', '.join(map(str, above))} components: the explained part "
+            "varies more in some left-out blocks than in the rest; there Q² does not indicate "
+            "their number."
         )
     gone = int((~a.kept).sum())
     yield (
@@ -162,15 +163,15 @@ def document(a: OutlierComponents, estimates: str) -> Document:
     gone = ReportSection(
         "Outliers",
         [
-            "T² is how far a sample is within the model's plane, in variances of the scores; Q its "
-            "squared distance from that plane. Limits: F distribution, and Jackson and Mudholkar "
-            "(1979). Good samples exceed either one once in a hundred." + listed,
+            "T² is the distance of a sample within the plane of the model, in variances of the "
+            "scores; Q its squared distance from that plane. Limits: F distribution, and Jackson and "
+            "Mudholkar (1979). Good samples exceed either limit once in a hundred." + listed,
         ],
         [Table(["run", "from [s]", "to [s]", "samples", "why", "variable"], rows)] if rows else [],
         [
             Plot(pictures.against_limit(m.t2(a.X), m.t2_limit, "T²"), "Hotelling's T²."),
             Plot(pictures.against_limit(m.q(a.X), m.q_limit, "Q"), "Q residual."),
-            Plot(pictures.before_and_after(s.nu, a.kept), "Velocity, with what is removed."),
+            Plot(pictures.before_and_after(s.nu, a.kept), "Velocity, with the removed samples."),
         ],
     )
     made = {"runs": ", ".join(s.names), "estimates": estimates}

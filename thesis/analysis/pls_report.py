@@ -77,7 +77,7 @@ def sentences(r: Regressed, stable: Stable | None = None) -> Iterator[str]:
             f"The nearest stable model explains R² {', '.join(numbers(list(stable.r2)))}, this one "
             f"{', '.join(numbers(list(stable.given_r2)))}."
             if stable.changed
-            else "The model is stable as it is."
+            else "The model is already stable."
         )
 
 
@@ -101,7 +101,7 @@ def document(r: Regressed, estimates: str, stable: Stable | None = None) -> Docu
     parts = [_part(r, part) for part in r.parts]
     shown = pictures.model_error_over_time(r.samples.omega, {r.recipe.name: r.predicted}, r.samples.time)
     fit = ReportSection(
-        "Model error", rest, (), [Plot(shown, "Model error and what the model makes of it.")]
+        "Model error", rest, (), [Plot(shown, "Model error, and its prediction by the model.")]
     )
     made = {
         "runs": ", ".join(r.samples.names),

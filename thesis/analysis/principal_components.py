@@ -88,7 +88,7 @@ def standardise(X: np.ndarray, names: list[str]) -> tuple[np.ndarray, np.ndarray
     mean, scale = X.mean(axis=0), X.std(axis=0, ddof=1)
     flat = [n for n, s, m in zip(names, scale, mean, strict=True) if not s > 1e-9 * max(abs(m), 1e-6)]
     if flat:
-        raise InputError(f"constant over all samples, which tells nothing: {', '.join(flat)}")
+        raise InputError(f"constant over all samples, so without information: {', '.join(flat)}")
     return mean, scale
 
 
@@ -107,7 +107,7 @@ def fit_components(X: np.ndarray, names: list[str], kept: int | None = None) -> 
     if n < 2 * m:
         raise InputError(f"{n} samples are too few for {m} variables")
     if kept is not None and not 1 <= kept < m:
-        raise InputError(f"{kept} components: 1 to {m - 1} can be kept of {m} variables")
+        raise InputError(f"{kept} components are not possible: 1 to {m - 1} of {m} variables")
     mean, scale = standardise(X, names)
     _, sigma, Vt = np.linalg.svd((X - mean) / scale, full_matrices=False)
     loadings = Vt.T * np.where(Vt[np.arange(m), np.abs(Vt).argmax(axis=1)] < 0.0, -1.0, 1.0)

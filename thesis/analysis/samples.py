@@ -142,7 +142,7 @@ def gather_samples(
         prepared = prepare(run, of, anyway)
         s = _smoothed(prepared, of) if estimates == "smoothed" else _filtered(prepared, of)
         if s.time.size < FEWEST:
-            raise InputError(f"run '{run.name}': {s.time.size} samples are too few, {FEWEST} are needed")
+            raise InputError(f"run '{run.name}': {s.time.size} samples are too few; {FEWEST} are needed")
         found.append(s)
     return found
 

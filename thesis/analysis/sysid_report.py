@@ -69,30 +69,33 @@ def warnings(found: Identified | None, runs: Sequence[Samples]) -> Iterator[str]
     if not found.settled:
         yield (
             f"The estimate still changes by {100.0 * found.change:.1f} % in pass {found.passes}: "
-            "it has not come to rest."
+            "it has not converged."
         )
     s = joined(runs)
     v, r = s.nu[:, 1], s.nu[:, 2]
     a, b = np.abs(r) * v, np.abs(v) * r
     if np.linalg.norm(a + b) < PRODUCTS * np.linalg.norm(a):
         yield (
-            "|r|v = −|v|r throughout, as sway and yaw have opposite signs all the time: their "
-            "coefficients cannot be told apart, only their differences; Table 7.1's pair (−1.44, 1.4) "
-            "shows the same. Add turns both ways and drift with no turn; until then judge by ω."
+            "|r|v = −|v|r in all samples, because sway and yaw always have opposite signs: only "
+            "the differences of their coefficients are identifiable; Table 7.1's pair (−1.44, "
+            "1.4) has the same property. Add turns both ways and drift without turning; until "
+            "then compare ω."
         )
     for axis, indices in enumerate(SURGE.pattern):
         if found.condition[axis] > HARMFUL:
             weak = [NAMES[k] for k in indices if found.own[k] < SEPARATION]
             yield (
-                f"{AXES[axis]}: condition number {number(found.condition[axis], 2)}; these data hardly "
-                f"tell apart {', '.join(weak) or 'its coefficients'}. Judge by ω, not by them."
+                f"{AXES[axis]}: condition number {number(found.condition[axis], 2)}; these data "
+                f"hardly discriminate {', '.join(weak) or 'its coefficients'}. Compare ω, not "
+                "these coefficients."
             )
     for k, axis in enumerate(AXES, len(NAMES) - LOSSES):
         if found.own[k] < SEPARATION and abs(found.phi[k]) > SEPARATION:
             yield (
-                f"{NAMES[k]} = {number(found.phi[k])} may be invented: the force in {axis} is nearly a "
-                "function of the velocity here, so that a loss of thrust and damping look alike. Pulse "
-                f"the force in {axis}; a lag of the velocity estimates has the same effect."
+                f"{NAMES[k]} = {number(found.phi[k])} may be spurious: here the force in {axis} is "
+                "nearly a function of the velocity, so a loss of thrust and damping are "
+                f"indistinguishable. Pulse the force in {axis}; a lag of the velocity estimates "
+                "has the same effect."
             )
 
 
@@ -150,11 +153,12 @@ def document(r: SysidResult, estimates: str) -> Document:
         for k, (name, c) in enumerate(zip(NAMES, SURGE.coefficients, strict=True))
     ]
     text = [
-        "The surge coefficients add to g(ν), those of sway and yaw are totals, δ is the share of thrust "
-        "that is lost. Beside them least squares and ridge on the same samples, and Table 7.1."
+        "The surge coefficients add to g(ν), those of sway and yaw are totals, δ is the lost "
+        "share of thrust. For comparison: least squares and ridge on the same samples, and Table "
+        "7.1."
     ]
     sections = [
-        ReportSection("What to know", rest),
+        ReportSection("Notes", rest),
         ReportSection("Coefficients", text, [Table(header, rows)]),
     ]
     if r.runs:

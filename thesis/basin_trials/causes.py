@@ -43,7 +43,7 @@ def spikes(found: TrialRuns) -> list[Verdict]:
     stored = all(h.stored > 3.0 * time for h in kept.values())
     return [
         Verdict(
-            "CL storage algorithms stored spikes; SVD does not let go of them (6.5, 6.3.6)",
+            "CL storage algorithms stored spikes; SVD does not discard them (6.5, 6.3.6)",
             f"{'reproduced' if stored else 'not reproduced'}; SVD keeps them "
             f"{'longer' if min(ages[0]) > max(ages[1]) else 'no longer'} than the window",
             f"samples taken within a second after a spike, which is {100 * time:.1f} % of the time, in "

@@ -75,7 +75,7 @@ def write_regressions(report: Report, found: Mapping[str, Regressed], name: str)
     lap = slice(0, r.samples.time.size // 4)
     predicted = {n: each.predicted[lap] for n, each in found.items()}
     shown = analysis.model_error_over_time(r.samples.omega[lap], predicted, r.samples.time[lap])
-    report.figure(f"{name}_PLS", shown, "ω and what the regressions make of it (Fig. 7.10).")
+    report.figure(f"{name}_PLS", shown, "ω and its prediction by the regressions (Fig. 7.10).")
 
 
 def suffice(some: np.ndarray, best: np.ndarray) -> str:
@@ -154,7 +154,7 @@ def write_table_7_1(report: Report, s: Samples, name: str) -> None:
     ]
     report.table(["model", *(f"R² {a}" for a in AXES), *analysis.NAMES], rows)
     passed = "; ".join(
-        f"{n}: {f.passes} passes{'' if f.settled else ', not at rest'}, the blocker lets "
+        f"{n}: {f.passes} passes{'' if f.settled else ', not converged'}, the blocker lets "
         f"{', '.join(f'{100.0 * x:.0f}' for x in f.passed)} % of each run through"
         for n, f in own.items()
     )

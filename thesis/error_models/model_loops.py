@@ -99,7 +99,8 @@ def unstable(lost: Mapping[str, int], holds: Mapping[str, bool], numbers: str) -
     told = all(holds[name] == (not count) for name, count in lost.items())
     return Verdict(
         "With PLS3 (SYSMV3; SYSMV4 in the caption) in the plant the ship is lost (7.4, Fig. 7.16)",
-        f"{here}; the check before the simulation {'tells which' if told else 'does not tell which'}",
+        f"{here}; the check before the simulation "
+        f"{'predicts which' if told else 'does not predict which'}",
         f"runs lost: {', '.join(f'{n} {k} of {len(RUNS)}' for n, k in lost.items())}. {numbers}",
     )
 

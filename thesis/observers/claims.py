@@ -70,7 +70,10 @@ def robust(found: Runs) -> Verdict:
     numbers = ", ".join(
         f"{o} {_mean(found, 'rich', o, 'after_freeze_u')} m/s" for o in ("df", "nonlinear", "luenberger")
     )
-    said = "The DF takes the jump after a freeze better than the nonlinear and the Luenberger observer"
+    said = (
+        "The DF recovers from the jump after a freeze better than the nonlinear and the "
+        "Luenberger observer"
+    )
     return Verdict(said, _verdict(holds), f"largest error of u within 1 s of a freeze, rich: {numbers}")
 
 
@@ -86,7 +89,7 @@ def stuck(found: Runs) -> Verdict:
     upsets = "ellipse, upsets"
     counts = {o: sum(_each(found, upsets, o, "stuck")) for o in OBSERVERS}
     lost = [o for o in ("nonlinear", "luenberger") if counts[o] > 0.0]
-    said = "The nonlinear and the Luenberger observer get stuck in NaN after high spikes"
+    said = "The nonlinear and the Luenberger observer remain at NaN after large spikes"
     verdict = f"reproduced for {' and '.join(lost)}" if lost else "mended: their velocity is limited"
     numbers = ", ".join(f"{o} {count:.0f}" for o, count in counts.items())
     runs = len(found[upsets])
@@ -102,10 +105,11 @@ def write(report: Report, found: Runs) -> None:
     rows = [claim(found) for claim in (lag_and_noise, held, spikes, robust, wrap, stuck)]
     report.heading("What the thesis says, and what comes out here")
     report.verdicts("claims", rows)
-    report.heading("The Kalman filter beside the best of the others")
+    report.heading("The Kalman filter compared with the best of the others")
     report.text(
-        "RMS error of the Kalman filter divided by that of whichever other observer is best for this "
-        "signal and run; geometric mean over the seeds with its 95 % interval. Below 1, it is the best."
+        "RMS error of the Kalman filter divided by that of the best other observer for this "
+        "signal and run; geometric mean over the seeds with its 95 % interval. Below 1, the "
+        "Kalman filter is the best."
     )
     table = {variant: ahead(runs) for variant, runs in found.items()}
     report.table(["run", *SIGNALS], [[v, *(row[s] for s in SIGNALS)] for v, row in table.items()])

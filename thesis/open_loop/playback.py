@@ -242,8 +242,8 @@ def _scenario(
         connections.append(["guidance.*", "controller.*"])
     elif source.target is None and loop.thrusters is not None:
         notes.append(
-            "the run has no target, and no --scenario gives one: errors are zero, and the requested "
-            "force says nothing; learning by ε needs neither"
+            "the run has no target, and no --scenario gives one: errors are zero, and the "
+            "requested force has no meaning; learning by ε needs neither"
         )
         connections += [[f"observer.{a}_hat", f"controller.{a}_t"] for a in ("x", "y", "psi")]
     rows = int(np.floor(source.time[-1] / source.step + 1e-6))

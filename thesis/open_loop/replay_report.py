@@ -88,9 +88,12 @@ def sentences(r: Replay) -> Iterator[str]:
     worst = r.agreement
     if worst and played.loop.own:
         name = max(worst, key=lambda k: worst[k])
-        yield f"What the run has of the signals differs by {number(worst[name])} at most ({name})."
+        yield (
+            f"The replayed signals differ from those in the run by at most {number(worst[name])} "
+            f"({name})."
+        )
     elif not played.loop.own:
-        yield "The run was made with another controller or observer, or does not say with which."
+        yield "The run was made with another controller or observer, or does not name it."
     if "controller.stored" in played.log:
         share = r.spike_share
         yield (
@@ -109,10 +112,10 @@ def document(r: Replay) -> Document:
     first, *rest = sentences(r)
     lost = r.played.source.lost
     sections = [
-        ReportSection("What came of it", rest),
+        ReportSection("Results", rest),
         ReportSection(
             "Errors and force",
-            ["Drawn are the replayed signals; dots are what the run has, where it has lost samples."],
+            ["Lines: the replayed signals. Dots: the signals of the run, where it has lost samples."],
             [Table(["signal", "lost", "largest difference"], _rows(r))],
             [
                 Plot(_signals(r, ERRORS[:3]), "z1 (Fig. 7.1)."),

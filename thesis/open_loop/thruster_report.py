@@ -83,12 +83,14 @@ def sentences(played: Played) -> Iterator[str]:
     every = alarms(played)
     name = played.source.name
     if not every:
-        yield f"Run {name}: no thruster seems to fail (probability {number(highest(played))} at most)."
+        yield (
+            f"Run {name}: no failed thruster detected (probability at most {number(highest(played))})."
+        )
     for a in every:
         yield (
-            f"Run {name}: {THRUSTERS[a.thruster]} lost {number(100.0 * a.lost, 2)} % of its force at "
-            f"{number(a.since, 4)} s (probability {number(a.confidence)}, noticed at "
-            f"{number(a.noticed, 4)} s, told until {number(a.until, 4)} s)."
+            f"Run {name}: {THRUSTERS[a.thruster]} lost {number(100.0 * a.lost, 2)} % of its force "
+            f"at {number(a.since, 4)} s (probability {number(a.confidence)}, detected at "
+            f"{number(a.noticed, 4)} s, reported until {number(a.until, 4)} s)."
         )
     yield from played.notes
 
@@ -103,9 +105,10 @@ def document(played: Played) -> Document:
     header = ["thruster", "since [s]", "noticed [s]", "until [s]", "probability", "share lost"]
     text = [
         *rest,
-        "The detector learns for 50 s at least what is usual for a velocity and a command, then holds "
-        "the last 10 s against it (7.2.5). A thruster of which nothing is asked is not seen to fail.",
-        f"In simulated runs without a failure it tells {number(FALSE_ALARMS)} an hour "
+        "The detector learns the usual level for a velocity and a command for at least 50 s, then "
+        "compares the last 10 s with it (7.2.5). It cannot detect the failure of a thruster "
+        "without a command.",
+        f"In simulated runs without a failure it reports {number(FALSE_ALARMS)} an hour "
         "(benchmarks.watch_delay).",
     ]
     sections = [
@@ -115,7 +118,7 @@ def document(played: Played) -> Document:
             [Table(header, rows)] if rows else [],
             [
                 Plot(_lines(played, "failed", "probability"), "Probability of a failure."),
-                Plot(_lines(played, "lost", "share"), "Share of the force that seems lost (Fig. 7.3)."),
+                Plot(_lines(played, "lost", "share"), "Estimated lost share of the force (Fig. 7.3)."),
             ],
         )
     ]

@@ -54,13 +54,13 @@ def saturated(by_path: Paths) -> Verdict:
     for path, table in by_path.items():
         gated, told, untold = (error(table[c]) for c in ("true", "true, ungated", "true, request"))
         numbers += [
-            f"{path}, {n}: {x:.5f} m, told the clipped force {told[n]:.5f} m, with the gate "
+            f"{path}, {n}: {x:.5f} m, with the clipped force {told[n]:.5f} m, with the gate "
             f"{gated[n]:.5f} m"
             for n, x in untold.items()
         ]
     return Verdict(
-        "SVD storage is fragile: it keeps what is wrong (5.3.3, Table 5.2)",
-        "reproduced without any spike, until the clipped force is told"
+        "SVD storage is fragile: it keeps wrong samples (5.3.3, Table 5.2)",
+        "reproduced without any spike, if the controller does not get the clipped force"
         if _svd_suffers(by_path["eight"])
         else "not reproduced in these runs",
         "true states, samples of saturated thrusters stored as printed: " + "; ".join(numbers),
@@ -80,7 +80,7 @@ def lack_of_rank(sway: float, signs: float) -> str:
         reasons.append("the columns with v are nearly zero")
     if abs(signs) > ONE_SIGN:
         reasons.append(
-            f"|r|v = {'−' if signs < 0.0 else ''}|v|r, v and r being of one relation of signs"
+            f"|r|v = {'−' if signs < 0.0 else ''}|v|r, because v and r have a fixed relation of signs"
         )
     return " and ".join(reasons) or "no reason in v and r"
 

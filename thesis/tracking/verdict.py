@@ -111,7 +111,7 @@ def correlation(by_path: Paths) -> Verdict:
     verdict = "reproduced" if lowest > 0.5 else "not reproduced" if lowest < 0.0 else "weak"
     numbers = "; ".join(f"{run}: {value:.2f}" for run, value in found.items())
     return Verdict(
-        "A better estimate of ω goes with better tracking (5.4.3)",
+        "A better estimate of ω improves tracking (5.4.3)",
         verdict,
         f"Spearman's rank correlation of the two errors over controllers and seeds: {numbers}",
     )

@@ -6,12 +6,12 @@ where a telegram arrived the lines meet, mostly between two rows.
 
 import numpy as np
 
-# A row is on a line to rounding, which must be less than this share of how far the others are off: with
-# normal noise in two channels one row in two thousand is on a line by chance then. Chosen.
+# A row is on a line to rounding, which must be less than this share of the distance of the other rows.
+# With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
 ON_LINE = 0.03
 FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
 KINK = 2  # rows about a telegram that are on no line
-LONGEST = 8  # rows in a line that is no ship's steady motion without noise (chosen)
+LONGEST = 8  # rows in a line that cannot be steady motion without noise (chosen)
 
 
 def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndarray:

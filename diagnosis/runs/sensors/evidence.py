@@ -16,7 +16,7 @@ from ..files.telegrams import filled
 FEWEST = 20
 SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 FAR = 8.0  # times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
-AGREED = 0.7  # correlation from which on two channels tell of the same motion (chosen)
+AGREED = 0.7  # correlation from which on two channels measure the same motion (chosen)
 ALIKE = 0.3  # relative difference up to which two quantities may be the same but for a fault (chosen)
 LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)
 # Of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).

@@ -21,12 +21,12 @@ from .gaps import gaps
 from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
-STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell where it is off; chosen
+STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to locate its error; chosen
 CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
 CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
 CLOCK_OR_RATE = "no speed is measured: a clock at this rate has the same effect"
 # Of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
-# differ by beyond noise. Chosen: with more, most of it is not what both tell.
+# differ by beyond noise. Chosen: with more, most of it is not common to both.
 MOST_APART = 0.5
 TWO_CLOCKS = (
     "position and speed imply another clock than heading and yaw rate: there is another fault, "

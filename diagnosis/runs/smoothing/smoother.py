@@ -36,7 +36,7 @@ from .spline import DEGREE, Knots, basis, knots
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 QUICKEST = 0.5  # s, of a motion (chosen)
 SPACING = 0.1 * QUICKEST  # s between knots, or a sampling period if that is longer
-# [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
+# [m, m, rad]; a smaller noise is implausible, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
 # of channels against each other are wrong by less than four.

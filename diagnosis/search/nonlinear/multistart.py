@@ -24,7 +24,8 @@ from fmus.effects import Effect
 POINTS = 32  # of the Sobol sequence, besides the start; chosen: of one parameter every 3 % of the range
 REFINED = 3  # of the best; chosen
 # An effect without values of its own is tried at these multiples of the value at which its force is as
-# large as the model error, a parameter without limits as far to both sides of its scale; chosen.
+# large as the model error. A parameter without limits is tried as far to both sides of its scale;
+# chosen.
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
 FAR = MULTIPLES[-1]
 

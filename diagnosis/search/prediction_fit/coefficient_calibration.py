@@ -31,7 +31,7 @@ from .refit import RefitOutcome
 
 # Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
-# (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms; half
+# (1983, RINA 125, 45-68) gives such terms 2 to 25 units. Models have some of these by other terms. Half
 # a unit of X_uuu is three tenths of the resistance of both at their speed.
 LIFT, RESISTANCE = 3.0, 0.5
 LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), LIFT)
