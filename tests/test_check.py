@@ -97,7 +97,7 @@ BROKEN = [
     ("causality", [('variability="constant"><Enum', 'causality="output"><Enum')], "by default continuous"),
     ("start", [('declaredType="Speed" start="0"', 'declaredType="Speed"')], "has no start value"),
     ("start", [('initial="calculated"><Real', 'initial="calculated"><Real start="1"')], "though it is calculated"),
-    ("start", [('start="0"', 'start="NaN"')], "no finite Real"),
+    ("start", [('start="0"', 'start="NaN"')], "not a finite Real"),
     ("limits", [('min="0.01"', 'min="2"')], "outside of 2"),
     ("limits", [('min="0.01"', 'min="2" max="0"')], "min 2, max 0"),
     ("limits", [('nominal="1"', 'nominal="0"')], "nominal is '0'"),
