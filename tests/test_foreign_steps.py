@@ -190,7 +190,7 @@ def test_an_fmu_of_fixed_step_takes_no_other(made, tmp_path):
     fixed = described(made, tmp_path / "fixed.fmu", *FIXED_STEP)
     asked, found = steps_of(fixed, tmp_path)
     assert asked == {0.25}
-    assert any("takes steps of 0.25 s" in s for s in found.predictor.description().sentences)
+    assert any("is stepped every 0.25 s" in s for s in found.predictor.description().sentences)
     free, at_once = steps_of(made, tmp_path)
     assert 0.25 not in free
     assert error(found) == pytest.approx(error(at_once), rel=0.02)
@@ -271,3 +271,18 @@ def test_the_length_of_the_ship_is_stated(made, tmp_path, capsys, monkeypatch):
     np.savetxt("run.csv", table, delimiter=",", header=header, comments="")
     assert diagnosis.compare.main(["run.csv", "--model", str(made), "--out", "out"]) == 0
     assert "a ship of 1.105 m" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_run_that_is_not_of_the_default_ship_asks_for_the_ship(made, tmp_path, capsys, monkeypatch):
+    """Its forces are far beyond those of a ship of 1.105 m."""
+    monkeypatch.chdir(tmp_path)
+    t = 0.5 * np.arange(240)
+    psi, speed = 0.3 * np.sin(0.05 * t), 7.5
+    x, y = (0.5 * speed * np.cumsum(f(psi)) for f in (np.cos, np.sin))
+    table = np.column_stack([t, x, y, psi, np.full(t.size, 1e5), 0.0 * t, 1e4 * np.cos(0.05 * t)])
+    header = "time,x,y,psi,tau_X,tau_Y,tau_N"
+    np.savetxt("run.csv", table, delimiter=",", header=header, comments="")
+    assert diagnosis.compare.main(["run.csv", "--model", str(made), "--out", "out"]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "of 1.105 m? --ship NAME|FILE.toml selects it" in told
+    assert not (tmp_path / "out").exists()

@@ -92,7 +92,7 @@ def test_u_num_of_an_euler_method_with_steps_of_its_own_is_not_known(run, tmp_pa
         predicted(compared(run, tmp_path, "euler", EULER.replace("INNER", str(inner)))), None
     )
     assert found.numerical is None
-    assert "does not make the predictions of euler.fmu converge" in found.notes["numerical"]
+    assert "the predictions of euler.fmu do not converge" in found.notes["numerical"]
 
 
 @pytest.mark.slow

@@ -31,7 +31,10 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
         f"the {full[k]:.4g} {unit} that the thrusters give in {rows} of {len(size)} rows"
     )
     if 2 * rows > len(size):
-        return seen
+        ship = model.ship.description
+        return (
+            f"{seen}: is the ship {ship.title}, of {ship.length:.4g} m? --ship NAME|FILE.toml selects it"
+        )
     return f"{seen}: leave false cells empty, and log commands after they are clipped"
 
 
