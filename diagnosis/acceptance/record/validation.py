@@ -262,7 +262,7 @@ def _of_code(comparison: Comparison) -> Iterator[str]:
     description = comparison.predictor.description()
     if outside := () if description is None else description.outside:
         named = ", ".join(outside[:3]) + (", ..." if outside[3:] else "")
-        yield f"The model opened, or tried to open, files that are not its own: {named}."
+        yield f"The model opened, or tried to open, files outside of its own: {named}."
 
 
 def _result(j: Judgement) -> dict[str, Any]:
