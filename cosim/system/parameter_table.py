@@ -35,7 +35,7 @@ def read_table(path: Path) -> dict[str, list[float]]:
     names = [name.strip() for name in lines[0][1]]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"'{path}': the column {name} occurs twice")
+            raise InputError(f"'{path}': the column {name!r} occurs twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for line, cells in lines[1:]:
         where = f"'{path}', line {line}"
@@ -74,7 +74,7 @@ def table_parameters(
     takes = [name.removesuffix("_1") for name in known if name.endswith("_1")]
     for name in columns:
         if name not in takes:
-            raise InputError(f"{where}: the FMU takes no column {name}{nearest(name, takes)}")
+            raise InputError(f"{where}: the FMU takes no column {name!r}{nearest(name, takes)}")
     for name in takes:
         if name not in columns and f"{name}_given" not in known:
             raise InputError(f"{where}: the column '{name}' is missing")
