@@ -59,7 +59,7 @@ def main() -> None:
     seeds = range(1, parser.parse_args().seeds + 1)
     with TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        print("| the controller believes | median [mm] | lowest | highest |\n|---|--:|--:|--:|")
+        print("| controller model | median [mm] | lowest | highest |\n|---|--:|--:|--:|")
         for text, name, believe in rows(folder):
             errors = [1e3 * sailed(name, folder / "run", seed, believe) for seed in seeds]
             low, middle, high = np.quantile(errors, [0.0, 0.5, 1.0])

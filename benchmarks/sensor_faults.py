@@ -145,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     scale = ship().scale
     fleets = [list(voyages(options.seeds, hidden)) for hidden in ({}, HIDDEN)]
     total: Counter[str] = Counter()
-    print("| fault | named | with another told | effect found |")
+    print("| fault | named | with another fault | effect found |")
     print("|---|--:|--:|--:|")
     for name, fault in FAULTS.items():
         count: Counter[str] = Counter()

@@ -165,7 +165,7 @@ def run_command(main: Callable[[], int]) -> NoReturn:
         complain(error)
     except ModuleNotFoundError as error:
         line = missing_extra(error)
-        complain(line or f"internal error: {error}; please report it")
+        complain(line or f"internal error: {error!r}; please report it")
         code = BAD_INPUT if line else FAILED
     except Exception as error:
         # Python wraps what is raised while a class is made, and libraries what they meet.
@@ -173,7 +173,7 @@ def run_command(main: Callable[[], int]) -> NoReturn:
             complain("interrupted", kind="")
             code = INTERRUPTED
         else:
-            complain(f"internal error: {error}; please report it")
+            complain(f"internal error: {error!r}; please report it")
     STATE.end(code)
     # Text left in the buffer of a closed pipe must not raise again while Python exits.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,8 +1,8 @@
 """The mission in one command: ``cybership demo``.
 
-A ship with more drag than its model sails an ellipse and an eight. From the ellipse the diagnosis finds
-what the model lacks, the eight puts that to the test. Then the ship sails with a controller that
-believes the nominal model, and with one that believes what was found.
+A ship with more drag than its model runs an ellipse and an eight. The diagnosis finds the missing effect
+from the ellipse, and tests it on the eight. Then the ship runs with the nominal model in its controller,
+and with the learned model.
 """
 
 if __name__ == "__main__":

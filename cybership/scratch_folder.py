@@ -59,8 +59,8 @@ def scratch_folder() -> Iterator[Path]:
 def atomic_write(path: Path) -> Iterator[Path]:
     """A scratch file to write, which replaces ``path`` when the block ends without an exception.
 
-    It lies in the same folder; a failure leaves ``path`` as it was and removes the scratch file. What
-    killed processes have left of the same file goes as well.
+    It is in the same folder; a failure leaves ``path`` as it was and removes the scratch file. Scratch
+    files of the same path that killed processes have left are removed as well.
     """
     sweep_parts(path.parent.glob(f".{glob.escape(path.name)}.*.part"))
     part = path.with_name(f".{path.name}.{os.getpid()}.part")

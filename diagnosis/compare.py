@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
         "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
         "           %(prog)s trial.csv --model vendor.fmu --map map.json\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written, but map.json where "
-        "an FMU's names do not tell enough)",
+        "an FMU's names do not suffice)",
     )
     fmu_options(made)
     made.add_argument(

@@ -58,7 +58,7 @@ def load(
         sources: one or several: files (CSV, Parquet, MATLAB), folders of logs, results of
             :func:`cosim.simulate`, tables with the columns of a file and units in their names
             (``x [mm]``) or in ``attrs["units"]``.
-        anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
+        anyway: whether a file is used although its units, signs or columns seem wrong.
         advance: receives the name of each step when it begins.
         model: the initial one, by which that is judged, and of whose ship they are; the nominal one by
             default.
@@ -147,7 +147,7 @@ def _listed(runs: Any) -> Sequence[Any]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShownDiagnosis(session.Diagnosis):
-    """What a model lacks; shows itself in a terminal in ten lines, and in a notebook with pictures."""
+    """A diagnosis; shows itself in a terminal in ten lines, and in a notebook with pictures."""
 
     @cached_property
     def _report(self) -> ReportData:
@@ -165,7 +165,7 @@ class ShownDiagnosis(session.Diagnosis):
 
     @property
     def residual(self) -> pandas.DataFrame:
-        """What the learned model leaves: one row a window of the weak form.
+        """Residual of the learned model: one row a window of the weak form.
 
         Columns ``run``, ``held_out``, ``time`` (of the middle) [s], ``X``, ``Y`` [N], ``N`` [N m], and
         their standard deviations ``X_std``, ...; ``attrs["units"]`` has the units.

@@ -43,7 +43,7 @@ def _run(rule: str, folder: Path, library: str, note: Path) -> dict[str, object]
                 return {"skipped": f"needsExecutionTool is declared, and {told}"}
             found.append(told)
         except Exception as error:
-            found.append(f"internal error of the check: {error}; please report it")
+            found.append(f"internal error of the check: {error!r}; please report it")
         return {"found": found}
 
 

@@ -69,5 +69,5 @@ def _read(rule: Rule, fmu: Fmu) -> Outcome:
     except NotApplicableError as reason:
         outcome.skipped = str(reason)
     except Exception as error:
-        outcome.found.append(f"internal error of the check: {error}; please report it")
+        outcome.found.append(f"internal error of the check: {error!r}; please report it")
     return outcome

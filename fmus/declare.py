@@ -411,7 +411,7 @@ class Component(Generic[_S, _I, _P, _O]):
         init: see :class:`Init`.
         step: see :class:`Step`.
         sampled: True for a law that acts at its sampling instants, so that an output may use the
-            input of the same instant; False for a plant in continuous time, where the input acts
+            input of the same instant. False for a plant in continuous time, where the input acts
             through the integral (and through direct feedthrough, found by tracing).
         held: inputs of a sampled law that act over the whole step, as the force does that moved a ship
             between two measurements: an output follows the value of the step's start.
@@ -450,7 +450,7 @@ class Component(Generic[_S, _I, _P, _O]):
         return replace(self, starts={**self.starts, **starts})
 
     def prepared(self, params: _P) -> Any:
-        """What :meth:`advance` wants of the parameters: to be kept while they stay the same."""
+        """The argument of :meth:`advance` by the parameters, to be kept while they are the same."""
         return params if self.prepare is None else self.prepare(params)
 
     @property

@@ -78,7 +78,7 @@ class Ship:
 
     @property
     def layout(self) -> CommandLayout:
-        """What commands the thrusters get, and how these become a force."""
+        """The commands of the thrusters, and how these become a force."""
         return self.nominal_drive.effects.layout
 
     @property
@@ -147,7 +147,7 @@ class Ship:
         return {v.name: v.known for part in parts for v in variables(part) if v.known is not None}
 
     def serving(self, component: Component) -> Component:
-        """A component that is no part of the ship, such as a controller, made for it."""
+        """A component that is not part of the ship, such as a controller, made for it."""
         return sized(component, self.description)
 
     def component(self, component: Component | None, module: ModuleType) -> Component | None:

@@ -159,7 +159,7 @@ def test_a_description_without_a_fault_passes(tmp_path):
     [("../evil", "leads out of the folder"), ("/etc/evil", "leads out of the folder"), ("a\\b", "backslash"),
      ("C:/evil", "leads out of the folder"),
      (member("resources/link", stat.S_IFLNK | 0o777), "is a link"),
-     (member("resources/x", compressed=zipfile.ZIP_BZIP2), "compressed by method 12"), ("sources/lag.c", "there 2 times")],
+     (member("resources/x", compressed=zipfile.ZIP_BZIP2), "compressed by method 12"), ("sources/lag.c", "occurs 2 times")],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_archive_that_reaches_outside_is_told_and_not_run(member, text, tmp_path):
@@ -213,10 +213,10 @@ MISBEHAVING = [
     ("serialised-state", [(STEP, "if (!s->hidden) s->hidden = alive; s->y += s->hidden * h"),
                           ("((Lag *)c)->s = *(State *)s", "double k = ((Lag *)c)->s.hidden; ((Lag *)c)->s = *(State *)s; ((Lag *)c)->s.hidden = k")], [], "a new instance"),
     ("instances", [(STEP, "shared += s->u; s->y += shared + h")], [], "with another instance"),
-    ("initial-dependencies", [], [('index="3" dependencies="2"', 'index="3" dependencies="1"')], "y follows T while initialising"),
+    ("initial-dependencies", [], [('index="3" dependencies="2"', 'index="3" dependencies="1"')], "y depends on T while initialising"),
     ("step-dependencies", [("double all[] = {s.u, y, s.T, s.T * s.u", "double all[] = {s.u, y, s.T, s.hidden"), (STEP, "s->hidden = s->T * s->u; s->y += h")],
-                          [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct follows in.u[1] over a step of no length"),
-    ("output-dependencies", [], [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct follows in.u[1] without a step"),
+                          [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct depends on in.u[1] over a step of no length"),
+    ("output-dependencies", [], [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct depends on in.u[1] without a step"),
 ]  # fmt: skip
 
 
@@ -347,7 +347,7 @@ def test_fmu_without_abilities_is_not_asked_for_them(tmp_path):
 def test_plain_python_fmu_that_denies_what_its_step_does(plain_fmu):
     lie = [('<Unknown index="2"/>', '<Unknown index="2" dependencies=""/>')]
     gain = plain_fmu("Gain", GAIN, "self.y = 2.0 * self.x\nreturn True", lie)
-    assert "y follows x over a step" in found(gain, "step-dependencies")["step-dependencies"][0]
+    assert "y depends on x over a step" in found(gain, "step-dependencies")["step-dependencies"][0]
     integral = plain_fmu("Integral", GAIN, "self.y += h * self.x\nreturn True", lie)
     assert found(integral, "step-dependencies") == {}
     sampled = plain_fmu("Sampled", GAIN, "self.y = 2.0 * self.x\nreturn True",

@@ -215,7 +215,7 @@ def test_fault_of_a_user_that_is_no_known_operation_takes_the_plain_loop(effect,
     content = lagging(build_lag(tmp_path), stop=0.1, faults=[bias])
     result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
     assert result.loop == "plain"
-    assert result.loop_reason.startswith("a fault of lag is a function in Python")
+    assert result.loop_reason.startswith("a fault of lag is a Python function")
     assert set(cosim.read_log(tmp_path / "out")["lag.in[1]"][1:]) == {0.25}
 
 

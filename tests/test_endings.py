@@ -211,7 +211,7 @@ def test_a_journal_whose_numbers_are_none_is_told(change, runs, tmp_path):
     journal.write_text(f"{json.dumps(json.loads(first) | change)}\n{second}\n")
     notes = []
     again = cosim.run_campaign(path, tmp_path / "out", workers=0, show=notes.append)
-    assert any("1 lines of 'runs.jsonl' tell of no run" in note for note in notes)
+    assert any("1 lines of 'runs.jsonl' do not describe a run" in note for note in notes)
     assert again.drop(columns="wall_s").equals(made.drop(columns="wall_s"))
 
 

@@ -129,7 +129,7 @@ def test_stages_follow_the_measurement_chain():
         ({"kind": "freeze", "signals": ["observer.x_m"], "at": [1.0], "rate": 1.0}, "either 'at'"),
         ({"kind": "freeze", "signals": [], "rate": 1.0}, "faults[0].signals"),
         ({"kind": "freeze", "signals": ["observer.x_m"], "rate": -1.0}, "faults[0].rate"),
-        ({"kind": "freeze", "signals": ["observer.x_m"], "rate": 1.0, "duration": [2, 1]}, "shortest"),
+        ({"kind": "freeze", "signals": ["observer.x_m"], "rate": 1.0, "duration": [2, 1]}, "shorter"),
         ({"kind": "freeze", "signals": ["observer.x_m"], "rate": 1.0, "durations": 1}, "did you mean 'duration'"),
         ({"kind": "noise", "signals": ["observer.x_m"], "std": [0.1, 0.2]}, "one for each of the 1"),
         ({"kind": "noise", "signals": ["observer.x_m"], "std": -0.1}, "faults[0].std"),

@@ -458,7 +458,7 @@ def test_nothing_that_is_named_is_a_cause_of_foreign_physics(effect, tmp_path):
     assert (wrong.right, wrong.true, wrong.surest) == (False, ["0"], 0.95)
     text = write(tmp_path, [wrong, doubt]).read_text()
     assert (
-        "| foreign physics: told as unexplained, nothing wrong at >= 0.9 | >= 95 % | 50.0 % (1/2)"
+        "| foreign physics: reported as unexplained, nothing wrong at >= 0.9 | >= 95 % | 50.0 % (1/2)"
         in text
     )
 

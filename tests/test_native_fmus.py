@@ -191,7 +191,7 @@ def test_step_before_initialisation_is_refused_whatever_was_called_before(
         }[call]()
     with pytest.raises(FMICallException):
         vessel.fmu.doStep(0.0, 0.01)
-    assert "before initialisation has ended" in " ".join(text for _, text in vessel.messages)
+    assert "needs a finished initialisation" in " ".join(text for _, text in vessel.messages)
 
 
 def test_what_is_out_of_place_is_told_and_changes_nothing(native, opened_here):

@@ -494,7 +494,7 @@ def test_set_changes_one_value(ellipse, tmp_path, path, place, expected):
         ("fmus.vesel.path=x.fmu", "no instance 'vesel'"),
         ("metrics.form=1", "unknown key; did you mean 'from'?"),
         ("name.x=1", "'name' is a value"),
-        ("fmus=1", "'fmus' is a group: name the one value"),
+        ("fmus=1", "'fmus' is a group: name one of the values"),
         ("fmus.vessel.parameters=1", "'fmus.vessel.parameters' is a group"),
         ("controller=./none.fmu", "no such FMU"),
         ("vessel.m", "sets nothing"),

@@ -240,7 +240,7 @@ def test_group_connects_all_that_agree(ellipse):
         ("no.json", None, "no such scenario"),
         ("bad.json", "{", "is not JSON"),
         ("list.json", "[]", "the content: "),
-        ("twice.json", '{"name": "a", "step": 1, "step": 2}', "the key 'step' stands twice"),
+        ("twice.json", '{"name": "a", "step": 1, "step": 2}', "the key 'step' occurs twice"),
         ("deep.json", "[" * 100000, "cannot be read"),
         ("digits.json", '{"stop": 1' + "0" * 5000 + "}", "cannot be read"),
         ("surrogate.json", '{"name": "a", "description": "\\ud800"}', "cannot be read"),

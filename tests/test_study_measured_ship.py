@@ -191,7 +191,7 @@ def test_expectations_say_what_came():
 
 def test_error_of_a_model_that_runs_away():
     assert ship_tables.window_error(0.0123, 1000.0) == "12.3"
-    assert ship_tables.window_error(float("inf"), 1000.0) == "runs away"
+    assert ship_tables.window_error(float("inf"), 1000.0) == "diverges"
     assert ship_tables.window_error(float("nan"), 1000.0) == "–"
 
 
@@ -302,7 +302,7 @@ def test_findings_are_told_with_their_shares_or_that_there_are_none(tmp_path):
     assert "## Learned" in text
     assert "| `lag` | x = 1 (0, 2) | 0.90 | 0.00 | delay, Y_r |" in text
     assert "| `N_r` | y | 0.00 | 0.50 | none |" in text
-    assert "likely wrong: m = 23.5 (z = 4.0)." in text
+    assert "probably wrong: m = 23.5 (z = 4.0)." in text
     assert "A controller holds the learned ship" in text
     assert "Least dissipation 0.125 1/s (nominal 0.25). Less than nominal: |r| > 1." in text
     content.accepted, content.suspect_coefficients, stability.bounded, stability.region = (
@@ -313,7 +313,7 @@ def test_findings_are_told_with_their_shares_or_that_there_are_none(tmp_path):
     )
     text, _ = told(tmp_path, ship_tables.write_findings, "Learned", content)
     assert "No effect was found." in text
-    assert "likely wrong: none." in text
+    assert "probably wrong: none." in text
     assert "does not hold the learned ship" in text
     assert "Less than nominal" not in text
 

@@ -129,7 +129,7 @@ def test_sensors_are_told_in_a_few_lines(tmp_path):
     examined = SimpleNamespace(run=run, findings=(slow, slow, low), notes=("a note",))
     research_vessel.sensors(report, [(run, examined)])
     text = report.write().read_text()
-    assert "miss the position by 0 m (median) as logged, by 0 m as repaired" in text
+    assert "differ from the position by 0 m (median) as logged, by 0 m as repaired" in text
     assert "1.10 to 1.10 s pass in one second of the log, in 2 stretches" in text
     assert "- u and v read too little\n- a note" in text
 

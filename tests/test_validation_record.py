@@ -315,7 +315,7 @@ def test_the_pdf_is_fit_for_a_client(comparison, tmp_path):
     assert "Figure 1. close enough: error E = S − D" in every
     assert "Figure 2. a: measured track" in every
     shown = (tmp_path / "out" / FILES[1]).read_text()
-    assert "What was judged" in shown
+    assert "Judged model and data" in shown
     assert "the same motion as a" in shown
 
 

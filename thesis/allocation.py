@@ -152,7 +152,7 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
     header = ["true point of attack [m]", "estimated p_o [m]", "error of the shift [mm]"]
     report.table(header, rows)
     report.text(
-        f"With the thrust at its assumed point, p_o = {offset.mean:.4f} m: the hull's own centre "
+        f"With the thrust at its assumed point, p_o = {offset.mean:.4f} m. The hull's own centre "
         "of resistance and inertia in sway is not at the body origin (x_g = 0.0375 m and the "
         "added mass), so a force at the origin turns the ship slightly. The tuned value is the "
         "sum of both, as in the basin, where (6.2) gave 0.18 m."

@@ -201,15 +201,15 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
         "`true` means the ship's own state. In the thesis stored errors become stale (Algorithms "
         "1 and 2 store ε itself) and their sum has the weight 0.1 (footnote 1 of 4.1.4); here "
         "they are computed anew and have weight 1. Samples of more than 2 N are left out by "
-        "default: `ungated` stores them too, `request` does so without knowledge of the clipped "
-        "force, `stale` is the printed form of that with weight 1, `stale, 0.1` with that of the "
+        "default. `ungated` stores them too, `request` does so without knowledge of the clipped "
+        "force. `stale` is the printed form of that with weight 1, `stale, 0.1` with that of the "
         "footnote."
     )
     report.text(
         "More weights: `python -m thesis.store_weight`. Pictures `printed`: true states, no noise, "
         "`stale, 0.1`; `today`: the shipped scenarios with the modified derivative filter."
     )
-    report.heading("What the thesis concludes, and what comes out here")
+    report.heading("Conclusions of the thesis, and results here")
     rows = [*claims(by_path), *store_claims(by_path), *goals(by_path)]
     report.verdicts("claims", rows, "numbers and reason")
     differences(report, by_path)

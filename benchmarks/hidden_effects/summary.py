@@ -28,7 +28,7 @@ nuisance parameters. There the right effect must come first; two must come withi
 
 *Foreign physics* is in no candidate of the diagnosis: nothing that it names is a true cause.
 
-The fall of the held-out error stands beside that with the true model, and that with the
+The fall of the held-out error is next to that with the true model, and that with the
 true model from the true state at the beginning of each window. Then nothing but the noise of the
 measurement is left, and no method can do better.
 """

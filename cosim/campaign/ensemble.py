@@ -64,7 +64,7 @@ def run_ensemble(
         members: how many ships are drawn, at least two.
         out: result folder; default ``results/<name>_ensemble`` in the working directory.
         parameters: SSP parameter sets for the plant, under the values that are drawn.
-        believe: SSP parameter sets that controllers and observers believe of the plant.
+        believe: SSP parameter sets for the controller models in controllers and observers.
         only_own: whether to refuse FMUs with programs that were not built on this computer.
         workers: processes; None is one for each core, 0 runs in this process.
         pictures: whether to draw.

@@ -131,7 +131,7 @@ def _clash(names: list[str]) -> str:
         if not name.endswith("/"):
             key = _key(name)
             if key in files:
-                return f"its entries {files[key]} and {name} are the same file on some operating systems"
+                return f"its entries {files[key]!r} and {name!r} are the same file on some operating systems"
             files[key] = name
     for name in names:
         parents = _key(name.removesuffix("/")).split("/")[: None if name.endswith("/") else -1]

@@ -45,8 +45,8 @@ class ParameterSet:
         beside: values of the model that are no parameter of an FMU, so that no tool applies them.
         name: of the set.
         runs: measured run -> values that hold in it alone. Those of the first run stand in ``values``,
-            too, where nothing else does, so that a tool that knows no measured runs can apply them.
-        learned_from: what is told of each measured run of which the values were learned.
+            too, if these have no other value, so that a tool without measured runs can apply them.
+        learned_from: description of each training run of the values.
     """
 
     values: Values = field(default_factory=dict)

@@ -38,7 +38,7 @@ class Result:
         rows: number of logged rows.
         message: why it failed; empty otherwise.
         metrics: as in metrics.json; empty if the system lacks the signals for them.
-        warnings: oddities that were no reason to refuse.
+        warnings: doubts that did not stop the run.
         pace: with ``realtime``: lateness and missed deadlines.
         loop: which step loop ran, ``compiled`` or ``plain``; empty if none did.
         loop_reason: why it was the plain one.

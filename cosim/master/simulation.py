@@ -65,7 +65,7 @@ def simulate(
         pool: FMUs that serve several runs, for a scenario whose paths are all files.
         native: in place of the scenario's: True compiles the project's own FMUs and the step loop, False
             nothing, "auto" where the system has a C compiler; None leaves it to the scenario.
-        believe: SSP parameter sets that controllers and observers believe of the plant.
+        believe: SSP parameter sets for the controller models in controllers and observers.
         overwrite: whether the default folder is ``results/<name>``, whatever is there, and whether files
             of no run may be replaced.
         measured: receives the metrics as soon as they are known, before anything is drawn.

@@ -20,7 +20,7 @@ def log_frame(folder: str | Path) -> pandas.DataFrame:
         folder: results of a run.
 
     Returns:
-        The columns of ``log.csv``; ``attrs["units"]`` and ``attrs["descriptions"]`` tell of each.
+        The columns of ``log.csv``; ``attrs["units"]`` and ``attrs["descriptions"]`` describe each.
 
     Raises:
         InputError: there is no log, or pandas is not installed.

@@ -65,7 +65,7 @@ class Stability:
         mass_definite: whether M is positive definite.
         nominal_min_dissipation, learned_min_dissipation: smallest dissipation over the region [1/s].
         bounded: whether the ship stays within some ship lengths of its target on every reference path;
-            of a ship that lacks thrust on an axis, whether it comes to rest without thrust.
+            of a ship that lacks thrust on an axis, whether its motion decays without thrust.
         closed_loop: which of the two was judged.
         from_start: whether the initial model fails wherever the learned one does, and its hull
             dissipates no more: then nothing that was learned is the reason.

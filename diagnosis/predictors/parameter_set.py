@@ -36,7 +36,7 @@ NO_FMU = "of the measurement system: no FMU has this parameter; a scenario has a
 def write_model(path: Path, model: Model) -> None:
     """Write a model as a parameter set.
 
-    What equals its nominal value is left out: the file of the nominal model is an empty set. No FMU has
+    Nominal values are left out: the file of the nominal model is an empty set. No FMU has
     a parameter of the measurement system, such as the offset of its clock: it stands in an
     annotation, which :func:`read_model` knows, and of which ``cosim.run`` says that it has no effect.
     Values that hold in one run alone stand in another, with the name of their run; those of the first

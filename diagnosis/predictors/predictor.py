@@ -81,15 +81,15 @@ DEFAULT_EXECUTION = Execution()
 class Predictor(Protocol):
     """Predicts the motion of one ship along measured runs.
 
-    A predictor guarantees that
+    A predictor guarantees:
 
-    - it changes nothing that it was given but ``WeakWindows.memory``, a store of intermediate results;
-    - the same arguments give the same numbers, to the bit on one machine;
-    - all quantities are in SI: pose (x, y, psi) [m, m, rad] north, east and clockwise, heading of
-      residuals wrapped; velocity (u, v, r) [m/s, m/s, rad/s] of the body over ground; force
-      [N, N, N m];
-    - a prediction that runs away has values that are not finite, and raises nothing;
-    - a run that it cannot predict is an :class:`cosim.InputError` in one line, which names the run.
+    - It changes no argument but ``WeakWindows.memory``, a store of intermediate results.
+    - The same arguments give the same numbers, to the bit on one machine.
+    - All quantities are in SI: pose (x, y, psi) [m, m, rad] north, east and clockwise, with the
+      heading of residuals wrapped. Velocity (u, v, r) [m/s, m/s, rad/s] of the body over ground; force
+      [N, N, N m].
+    - A prediction that diverges has values that are not finite, and raises nothing.
+    - A run that it cannot predict is an :class:`cosim.InputError` in one line, which names the run.
 
     Attributes:
         name: of the model, as messages have it.
@@ -163,7 +163,7 @@ class Predictor(Protocol):
         ...
 
     def in_windows(self) -> "Predictor":
-        """What predicts windows that begin in a measured state: itself, or ``model`` in its place."""
+        """Predictor of windows that begin in a measured state: itself, or ``model`` in its place."""
         ...
 
     def description(self) -> PredictorDescription | None:

@@ -88,7 +88,7 @@ class Model:
 
     A time within a run, such as that of a failure, is of that run alone. Such a value is called
     ``parameter@run``, wherever values have names, and stands in ``runs``; :meth:`during` is the model of
-    a run with its values. What knows no run, or another one, has none of them.
+    a run with its values. Without the run, or with another one, they are absent.
 
     Attributes:
         vessel, thrusters: parameter -> value.
@@ -177,7 +177,7 @@ class Model:
         raise InputError(f"no parameter '{name}'{nearest(name, known)}")
 
     def unit(self, name: str) -> float:
-        """What one unit of a parameter is at the size of the ship, by Froude's law."""
+        """One unit of a parameter at the size of the ship, by Froude's law."""
         return self.ship.scale.factor(self.declared(name).unit)
 
     @property

@@ -59,7 +59,7 @@ class Content(dict[str, Any]):
 
     @classmethod
     def of(cls, value: Any) -> Any:
-        """What JSON can hold of a value, mappings as contents."""
+        """A value in the types of JSON, mappings as contents."""
         if isinstance(value, Mapping):
             return cls((name, cls.of(each)) for name, each in value.items())
         return [*map(cls.of, value)] if isinstance(value, list) else value

@@ -114,7 +114,7 @@ class Track:
         return np.searchsorted(last, time, "left") + np.searchsorted(next_one, time, "right")
 
     def counts(self, spikes: int = 0) -> Counts:
-        """What became of the samples."""
+        """Counts of the samples by their use."""
         frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.out
         samples = int((~self.between).sum()) + self.out
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
@@ -125,7 +125,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
 
     Args:
         run: as it was read.
-        anyway: whether a speed that no ship has, or a heading in degrees, is believed.
+        anyway: whether a speed that no ship has, or a heading in degrees, is accepted.
         scale: of the ship.
 
     Raises:

@@ -65,10 +65,10 @@ class Finding:
         ci95: interval of each that is fitted, at the final step.
         confidence: probability that it is a true cause: what its method says, NaN where that says none;
             of a finding with evidence it is set by the verdict.
-        alike: the other ids of the smallest set that holds it and 95 % of the candidates' probability,
+        alike: indistinguishable effects, the other ids of the smallest set with 95 % of the probability,
             by the weights that its confidence comes from; the most likely first.
         q2: cross-validated share of the model error that is explained, with all found before.
-        share: how much of the cross-validated model error went with this finding.
+        share: cross-validated share of the model error that this finding explains.
         model: with this and all earlier findings.
         evidence: what the confidence is made of; None where a method has none.
         together: probability that it or one of ``alike`` is a true cause; else as ``confidence``.
@@ -98,7 +98,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What a method found.
+    """The result of a method.
 
     Attributes:
         effects: in the order of acceptance.
@@ -137,7 +137,7 @@ class Findings:
         return all(abs(z) <= FAR_OFF for z in self.moved.values())
 
     def plausible_by(self, prior: NominalPrior) -> bool:
-        """The same by another prior than that of the search, which believes in all to a tenth."""
+        """The same by another prior than that of the search, which is a tenth for all."""
         if self.searched is None or self.estimate is None:
             return self.plausible
         offset = prior.rescaled(self.estimate.offset, self.searched)

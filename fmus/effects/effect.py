@@ -168,16 +168,16 @@ class Search:
         tries: values to try of the parameters that the force is not linear in, each a mapping from
             parameter to value; or a function that makes them of the parameters of the model in use. The
             best is refined afterwards. An effect that is neither differentiable nor has any is tried at
-            multiples of the value of each coefficient at which its force is as large as the model error,
-            and refined in all parameters that are no settings.
+            multiples of a value of each coefficient, at which its force is as large as the model error.
+            It is refined in all parameters but settings.
         fitted: parameters that are fitted by regression at each value tried; by default all
             coefficients of a differentiable effect, else none.
         intervals: start and end [s] of each interval of a run in which the effect acts, of which there
-            may be any number up to these, at other times in each run: found by segmentation, as the fit
-            has no slope by them. An end without a name is that of the run.
+            may be any number up to these, at other times in each run. Segmentation finds them, as the
+            fit has no slope by them. An end without a name is that of the run.
         lasting: id of the effect that is the same as one interval without an end.
         smooth: whether the coefficients are values of a curve at equally spaced nodes, of which
-            neighbours are alike.
+            neighbours are similar.
     """
 
     by: Literal["regression", "spectrum", "given"] = "regression"
@@ -206,7 +206,7 @@ class Wording:
         sentence: the finding in one sentence, from a :class:`~fmus.effects.text.Found`; by default the
             effect's description.
         family: effects of a kind, with the manoeuvre that brings them out.
-        apart: id of another effect -> what to run so that the two can be told apart.
+        apart: id of another effect -> what to run to discriminate the two.
         pictures: curves to draw.
         measured: what to measure in place of estimating a value, as a part of a sentence, from that
             value and a function of names that gives the model's parameters.

@@ -14,7 +14,7 @@ from .expected import AXES, BY_HAND, CURVE_WITHIN, STEERED, Fall, expectations, 
 from .leave_one_out import LeftOutRun, at_full_power, commanded, fall, steered
 
 UNITS = ("N", "N", "N m")
-RUNS_AWAY = "runs away"
+RUNS_AWAY = "diverges"
 HEADING = 2.0  # target: fall of the heading error over 8 s, geometric mean of the runs
 
 

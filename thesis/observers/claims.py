@@ -103,7 +103,7 @@ def stuck(found: Runs) -> Verdict:
 def write(report: Report, found: Runs) -> None:
     """The table of claims, and what is new here: how far the Kalman filter is ahead."""
     rows = [claim(found) for claim in (lag_and_noise, held, spikes, robust, wrap, stuck)]
-    report.heading("What the thesis says, and what comes out here")
+    report.heading("Statements of the thesis, and results here")
     report.verdicts("claims", rows)
     report.heading("The Kalman filter compared with the best of the others")
     report.text(

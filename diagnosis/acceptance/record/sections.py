@@ -30,7 +30,7 @@ def sections(r: Content) -> Iterator[ReportSection]:
     yield ReportSection("Validity range", [text], [Table(heads, covered)])
     faults = [f"{s['run']}: {s['sentence']}" for s in r.sensors]
     yield ReportSection("Faults of sensors", faults or ["The channels do not contradict each other."])
-    yield ReportSection("What is not covered", r.not_covered)
+    yield ReportSection("Limits of the validation", r.not_covered)
     if r.notes:
         yield ReportSection("Notes", r.notes)
     yield _origin(r)
@@ -82,7 +82,7 @@ def _judged(r: Content) -> ReportSection:
         if known
         else "The file of the model does not name its training runs."
     )
-    return ReportSection("What was judged", told, [Table(heads, rows, words=True)])
+    return ReportSection("Judged model and data", told, [Table(heads, rows, words=True)])
 
 
 def _errors(r: Content) -> ReportSection:

@@ -50,7 +50,7 @@ BUDGET = (
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """What criteria say of a model, see :func:`validate`.
+    """Judgements of a model by criteria, see :func:`validate`.
 
     Attributes:
         content: of ``validation.json``, but for the reports and the key.
@@ -112,7 +112,7 @@ def validate(
         learned: result folder of ``diagnosis.learn`` that made the model, which says how uncertain its
             parameters are and what acts unrecorded.
         files: further files that the result depends on, by what they are for, such as ``model``.
-        command: that the record tells; None: that of this program.
+        command: that the record names; None: that of this program.
 
     Raises:
         InputError: the criteria or the folder cannot be used.

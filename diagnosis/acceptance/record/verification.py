@@ -80,14 +80,14 @@ def verify_record(
     record's folder. Wherever one is found, it must be the one that the record names.
 
     Args:
-        record: ``validation.json``; its signature lies beside it.
+        record: ``validation.json``; its signature is next to it.
         key: file of the public key (PEM) that must have signed; None: the one that the record names, of
             which nobody says whose it is.
         allow_missing: what need not be checked: ``signature``, ``key``, ``code``, and files by their
             name, their path or what they are for.
 
     Raises:
-        InputError: it is no record, or no key; a name that is allowed to be missing is none of these.
+        InputError: it is not a record, or not a key; or a name in ``allow_missing`` is unknown.
     """
     path = Path(record)
     raw, content = _read(path)

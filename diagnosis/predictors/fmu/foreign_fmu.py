@@ -40,7 +40,7 @@ class Fmu:
     Args:
         path: of the file; a system, as an SSP archive or a scenario, is made one FMU, with what no
             connection feeds as its inputs, and variables called ``instance.variable``.
-        map: which of its variables is which signal, a file; None: as names and units tell.
+        map: file that maps its variables to signals; None: from names and units.
         ship: that it is a model of; None: that of the runs.
         execution: how it is run.
 
@@ -93,7 +93,7 @@ class Fmu:
 
     @property
     def files(self) -> list[tuple[str, Path]]:
-        """What decides its predictions: each file, after what it is for."""
+        """The files that decide its predictions, each after its role."""
         return [("model", self._given), *self.inner, *([("map", self.map)] if self.map else [])]
 
     @property
@@ -122,7 +122,7 @@ class Fmu:
         return self.model.needs_tool
 
     def given(self, runs: Sequence[Run]) -> VariableMap:
-        """The map of the file, else the one that names and units tell, for some runs."""
+        """The map of the file, else the one from names and units, for some runs."""
         return self.told or propose(self.model, commands_of(runs))
 
     def variables(self, runs: Sequence[Run]) -> VariableMap:

@@ -90,7 +90,7 @@ def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
         return
     seen = f"has the names of its columns in line {found.skip + 1}"
     if found.separator != layout.separator:
-        seen = f"has cells that are probably separated by {found.separator}"
+        seen = f"has cells that are probably separated by {found.separator!r}"
     line = _changed(path, layout, **found.model_dump(exclude_defaults=True))
     raise InputError(f"'{path}' {seen}; {line}")
 

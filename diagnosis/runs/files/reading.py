@@ -63,7 +63,7 @@ class Run:
         absent: commands that have no column, and are taken as zero.
         signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
         measured: beside the pose: signal of :mod:`.columns` -> (n,) in SI, NaN where it is missing.
-        noise: signal -> standard deviation that the file beside tells [SI].
+        noise: signal -> standard deviation that the side-car states [SI].
         ship: that was measured; None: the default ship.
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
         resolution: (n, 3), step to which the pose is rounded in the file [m, m, rad]; None: not at all.

@@ -82,7 +82,7 @@ class Smoothed:
         track: the run with its samples judged; a heading that was not measured with a position, or is a
             spike, is the smoothed one.
         spikes: (n,), samples of the position refused by the outlier test.
-        agrees: (n, 3), which channels were measured anew and are no outliers.
+        agrees: (n, 3), which channels were measured anew and are not outliers.
         eta, eta_dot, eta_ddot: pose, heading continuous, and derivatives [m, m, rad; /s; /s2].
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
@@ -138,7 +138,7 @@ class Smoothed:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was found in the data, a line each."""
+        """Notes on the data, a line each."""
         notes = (*self.track.notes, *self.doubted)
         if not (self.late and self.delay >= BRIEF * self.scale.time):
             return notes
@@ -149,7 +149,7 @@ class Smoothed:
 
     @property
     def counts(self) -> Counts:
-        """What became of the samples."""
+        """Counts of the samples by their use."""
         return self.track.counts(int(self.spikes.sum()))
 
 
