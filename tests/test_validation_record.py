@@ -164,6 +164,7 @@ def test_code_and_confinement_are_told(comparison, tmp_path):
     assert content.confinement.startswith("none needed")
 
 
+@pytest.mark.slow
 def test_effects_of_a_user_are_code_that_nothing_confines(folder, tmp_path):
     """It runs in this process, where it may read the run and play it back."""
     (tmp_path / "own.py").write_text(LINEAR)
@@ -351,6 +352,7 @@ def test_a_side_car_that_changed_since_is_refused(folder, tmp_path):
         files_of(c, {})
 
 
+@pytest.mark.slow
 def test_samples_that_are_well_before_the_horizon_are_said(folder, tmp_path):
     """At 1 Hz the last sample of a window of 4 s is at 3 s, where the error is smaller."""
     run = sail(48.0, h=0.1)[0]
