@@ -34,7 +34,7 @@ def sailed(
 ) -> float:
     """Distance to the target [m], root mean square, of a run of the ship with the hidden drag."""
     wanted = {"log.signals": "compact", **settings}
-    result = cosim.simulate(name, folder, [HIDDEN], seed=seed, set=wanted, believe=believe)
+    result = cosim.simulate(name, folder, [HIDDEN], seed=seed, set=wanted, controller_model=believe)
     return result.metrics["e_pos_rms"]
 
 

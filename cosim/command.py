@@ -6,11 +6,12 @@ import sys
 from collections import namedtuple
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from rich.console import Console
 
 from cybership.message_text import printable as printable
+from cybership.renamed import OPTIONS, old_names
 
 from .interrupts import (
     INTERRUPTED,
@@ -33,6 +34,7 @@ __all__ = [
     "positive",
     "printable",
     "program",
+    "renamed_option",
     "run_command",
     "whole_number",
 ]
@@ -79,6 +81,30 @@ def command_parser(module: str, description: str, epilog: str) -> argparse.Argum
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+
+
+def renamed_option(
+    made: argparse._MutuallyExclusiveGroup, new: str, of: Callable[[str], Any] = str, **how: Any
+) -> None:
+    """Add an option that had another name, which is read with a warning.
+
+    Args:
+        made: of options that exclude each other.
+        new: the option; :data:`cybership.renamed.OPTIONS` has its old name.
+        of: its type.
+        how: further arguments of ``add_argument``.
+    """
+    old, warned = OPTIONS[new], []
+
+    def under_old_name(text: str) -> Any:
+        if not warned:
+            warned.append(old)
+            complain(old_names({old: new}), "warning: ")
+        return of(text)
+
+    made.add_argument(new, type=of, **how)
+    dest = new.strip("-").replace("-", "_")
+    made.add_argument(old, type=under_old_name, dest=dest, **how | {"help": argparse.SUPPRESS})
 
 
 def whole_number(least: int) -> Callable[[str], int]:

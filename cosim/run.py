@@ -22,6 +22,7 @@ from .command import (
     folder_name,
     positive,
     printable,
+    renamed_option,
     run_command,
     whole_number,
 )
@@ -73,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 only_own=options.only_own,
                 show=show,
                 progress=progress,
-                believe=options.believe,
+                believe=options.controller_model,
                 overwrite=options.overwrite,
                 measured=measured,
             )
@@ -114,7 +115,7 @@ def _ensemble(
                 options.ensemble,
                 folder,
                 options.parameters,
-                options.believe,
+                options.controller_model,
                 options.only_own,
                 pictures=not options.no_plots,
                 show=show,
@@ -269,8 +270,9 @@ def _parser() -> argparse.ArgumentParser:
         help="SSP parameter set for the plant, whose values override the scenario's; may be given "
         "several times",
     )
-    parser.add_argument(
-        "--believe",
+    renamed_option(
+        parser.add_mutually_exclusive_group(),
+        "--controller-model",
         metavar="FILE.ssv",
         action="append",
         default=[],

@@ -9,6 +9,8 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from cybership.renamed import renamed_keyword
+
 from .errors import InputError
 from .master import simulation
 from .master.ending import Result
@@ -57,6 +59,7 @@ class Options(TypedDict, total=False):
     measured: Callable[[dict[str, float]], None]
 
 
+@renamed_keyword("believe", "controller_model")
 def simulate(
     scenario: Scenario | str | Path | dict[str, Any],
     out: str | Path | None = None,
@@ -69,7 +72,7 @@ def simulate(
     log: str | None = None,
     parquet: bool = False,
     set: Mapping[str, Any] | None = None,  # noqa: A002 - as the option of the command
-    believe: str | Path | Sequence[str | Path] = (),
+    controller_model: str | Path | Sequence[str | Path] = (),
     **options: Unpack[Options],
 ) -> Result:
     """Run a scenario, and write its log and metrics.
@@ -92,7 +95,7 @@ def simulate(
         parquet: whether to write ``log.parquet`` in place of ``log.csv``.
         set: values by their paths, as ``{"vessel.m": 15.0, "controller": "./mine.fmu", "stop": 60.0}``;
             files are relative to the working directory.
-        believe: SSP parameter sets for the controller models in controllers and observers.
+        controller_model: SSP parameter sets of the plant for the models in controllers and observers.
         options: ``realtime``: simulated seconds for each second of wall time. ``pictures``: whether to
             write them. ``only_own``: whether to refuse FMUs with programs that were not built on this
             computer. ``show``: receives notes, a line each. ``progress``: receives the simulated time
@@ -121,6 +124,6 @@ def simulate(
         scenario = with_settings(scenario, settings.items(), Path.cwd(), "set")
     if stop is not None:
         scenario = cut_short(scenario)
-    sets, beliefs = ([p] if isinstance(p, (str, Path)) else p for p in (parameters, believe))
+    sets, beliefs = ([p] if isinstance(p, (str, Path)) else p for p in (parameters, controller_model))
     with _one_at_a_time():
         return simulation.simulate(scenario, out, sets, believe=beliefs, **options)

@@ -93,7 +93,7 @@ def _sail(
         InputError: it did not go through.
     """
     beliefs = [] if believe is None else [believe]
-    result = cosim.simulate(name, folder, [hidden], stop=stop, log="compact", believe=beliefs)
+    result = cosim.simulate(name, folder, [hidden], stop=stop, log="compact", controller_model=beliefs)
     if result.status != "done":
         raise cosim.InputError(f"the run in '{folder}' {result.status}: {result.message}")
     return result

@@ -1,4 +1,4 @@
-"""Linearise an FMU in a state: ``python -m diagnosis.linearise vendor.fmu --at state.json``."""
+"""Linearise an FMU: ``python -m diagnosis.linearise vendor.fmu --operating-point state.json``."""
 
 if __name__ == "__main__":
     from cosim.supervision import supervised
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim import InputError
-from cosim.command import command_parser, run_command
+from cosim.command import command_parser, renamed_option, run_command
 from cosim.errors import nearest
 from cybership.message_text import quoted
 
@@ -59,8 +59,8 @@ def linearise(options: argparse.Namespace, advance: Advance) -> Done:
     if (options.run is None) != (options.time is None):
         raise InputError("--run and --time belong together: a run, and the time in it [s]")
     states = states_of(model, given)
-    if options.at is not None:
-        at = _read_state(options.at, model)
+    if options.operating_point is not None:
+        at = _read_state(options.operating_point, model)
     elif options.run is None:
         at = {}
     elif of_ship:
@@ -138,15 +138,16 @@ def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.linearise",
         "Compute A, B, C, D of an FMU in a state, with names and units, as JSON and MAT.",
-        "examples:  %(prog)s vendor.fmu --at state.json\n"
+        "examples:  %(prog)s vendor.fmu --operating-point state.json\n"
         "           %(prog)s vendor.fmu --run trial.csv --time 60\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
     )
     made.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMI 2.0 FMU for co-simulation")
     where = made.add_mutually_exclusive_group()
-    where.add_argument(
-        "--at",
-        type=Path,
+    renamed_option(
+        where,
+        "--operating-point",
+        Path,
         metavar="STATE.json",
         help="start values, parameters and inputs by their names (start values of the FMU)",
     )

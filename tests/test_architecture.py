@@ -323,7 +323,7 @@ def test_modules_import_modules_inside_cosim():
 
 
 # What any command shares, whatever it is about.
-SHARED = {"cybership.message_text", "cybership.scratch_folder"}
+SHARED = {"cybership.message_text", "cybership.renamed", "cybership.scratch_folder"}
 
 
 @pytest.mark.parametrize("package", ["fmus", "cosim"])

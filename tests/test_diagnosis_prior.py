@@ -69,7 +69,7 @@ def test_a_zero_with_a_standard_deviation_is_as_uncertain_as_that_and_a_plain_on
 
 
 def test_a_standard_deviation_holds_for_the_value_of_another_model_and_a_share_goes_with_it(tmp_path):
-    model = raft(tmp_path, "x_g = { value = 0.2, std = 0.05 }\nX_udot = { value = -5.0, share = 0.1 }")
+    model = raft(tmp_path, "x_g = { value = 0.2, std = 0.05 }\nX_udot = { value = -5.0, rel_std = 0.1 }")
     prior = NominalPrior.of(model.plus({"x_g": 0.2, "X_udot": -5.0}))
     assert [prior.std["x_g"], prior.std["X_udot"]] == [0.05, 1.0]
     assert NominalPrior.of(model, most=MEASURED).std["x_g"] == pytest.approx(0.02)

@@ -30,7 +30,7 @@ HIDDEN = {"ship": {"V_n": 0.05, "V_e": -0.03}, "thrusters": {"lag": 0.6}}
 def grown(d, scale):
     """A description with every number at another size."""
     units = {n: v.unit for n, v in ship(STANDARD, d).parameters["vessel"].items()}
-    always = {"x": "m", "y": "m", "abreast": "m", "lag": "s"}
+    always = {"x": "m", "y": "m", "half_spacing": "m", "lag": "s"}
 
     wind = {v.name: v.unit for v in described_numbers([v.name for v in d.wind])}
 

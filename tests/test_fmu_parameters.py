@@ -137,7 +137,7 @@ def test_wrong_parameters_are_refused(fmu, tmp_path, name):
         ({"outputs": {"position": "y"}}, "no output 'y'"),
         ({"inputs": {"force": "x"}}, "no input 'x'"),
         ({"start": {"velocity": "v0"}}, r"der\(COLUMN\)"),
-        ({"beside": ["c"]}, "no input 'c'"),
+        ({"disturbance_inputs": ["c"]}, "no input 'c'"),
         ({"outputs": {"position": {"name": "x", "factor": 0.0}}}, "must not be zero"),
     ],
 )
@@ -149,7 +149,7 @@ def test_wrong_map_is_refused(fmu, change, message):
 def test_force_inputs_are_those_in_newtons(fmu):
     given = SystemMap.model_validate(MAP)
     assert force_inputs(given, FmuModel(fmu)) == ["f"]
-    assert force_inputs(given.model_copy(update={"beside": []}), FmuModel(fmu)) == []
+    assert force_inputs(given.model_copy(update={"disturbance_inputs": []}), FmuModel(fmu)) == []
 
 
 # Properties
@@ -214,7 +214,7 @@ def test_linear_model_of_the_oscillator_is_its_equation(fmu, work, seen):
     content = {"outputs": seen, "start": {"position": "x0", second: "v0"}}
     at = written(work / "at.json", {"x0": 0.2, "v0": -0.1, "f": 1.0, "c": 20.0})
     given = written(work / "map.json", content)
-    assert linearise.main([str(fmu), "--at", at, "--map", given, "--out", "linear"]) == 0
+    assert linearise.main([str(fmu), "--operating-point", at, "--map", given, "--out", "linear"]) == 0
     found = json.loads((work / "linear/linear.json").read_text())
     assert np.allclose(found["A"], [[0.0, 1.0], [-10.0, -0.5]], atol=5e-3)
     assert np.allclose(found["B"], [[0.0], [0.5]], atol=1e-3)
@@ -232,7 +232,7 @@ def test_linear_model_of_the_oscillator_is_its_equation(fmu, work, seen):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--at", "at.json"], "'y0' cannot be set"),
+        (["--operating-point", "at.json"], "'y0' cannot be set"),
         (["--time", "3"], "belong together"),
     ],
 )
@@ -340,7 +340,7 @@ def test_verdict(fmu, work, name):
 def test_physics_that_no_force_can_show_is_unexplained(fmu, work):
     """A cubic spring, and no input on which a force may act."""
     run = measured(fmu, work, "run", {"c3": 400.0})
-    given = written(work / "map.json", {**MAP, "beside": []})
+    given = written(work / "map.json", {**MAP, "disturbance_inputs": []})
     own = written(work / "parameters.json", some())
     options = ["--model", str(fmu), "--map", given, "--parameters", own, "--out", "out"]
     assert learn.main([run, *options]) == 0

@@ -392,7 +392,7 @@ def test_an_fmu_without_a_force_is_told_what_input_it_would_need(folder, runs, t
     model = mapped(folder, "vessel.fmu", tmp_path, inputs={"tau_Y": "tau_Y"}, outputs=SAME, start=BEGUN)
     predictor = model.on(runs)
     (told,) = predictor.write(tmp_path, predictor.model.plus({"delta_X_u": -2.0}), runs)
-    assert "it needs tau_X or u_dot, which the map names under 'beside'" in told
+    assert "it needs tau_X or u_dot, which the map names under 'disturbance_inputs'" in told
     assert not (tmp_path / "found.fmu").exists()
 
 

@@ -36,7 +36,7 @@ I_z = 20.0
 X_udot = -5.0
 
 [hull]
-terms = [{ axis = "X", product = "u", value = -10.0, share = 0.2 }]
+terms = [{ axis = "X", product = "u", value = -10.0, rel_std = 0.2 }]
 
 [hull.functions.cross_flow]
 cross_flow_length = 2.0
@@ -87,7 +87,7 @@ CHANGES = [
     ("value = 50.0", "vlaue = 50.0", "inertia.m.vlaue: unknown key; did you mean 'value'?"),
     ("value = 50.0", "value = -50.0", "inertia: m = -50 kg is out of its range"),
     ("value = 50.0", "value = nan", "inertia.m.value: Input should be a finite number"),
-    ("std = 0.5", "std = 0.5, share = 0.1", "inertia.m: a number has std or share, not both"),
+    ("std = 0.5", "std = 0.5, rel_std = 0.1", "inertia.m: a number has std or rel_std, not both"),
     ("std = 0.5", "std = -0.5", "inertia.m.std: Input should be greater than 0"),
     ("X_udot = -5.0", "X_udot = 60.0", "mass matrix of these numbers is not positive definite"),
     ("X_udot = -5.0", "x_g = 2.0", "mass matrix of these numbers is not positive definite"),
@@ -96,7 +96,7 @@ CHANGES = [
     ('product = "u"', 'product = ""', "'' is not a product"),
     ('axis = "X"', 'axis = "Z"', "hull.terms[0].axis: "),
     ('axis = "X"', 'axes = "X"', "hull.terms[0].axes: unknown key; did you mean 'axis'?"),
-    ("share = 0.2 }", 'share = 0.2 }, { axis = "X", product = "u", value = 1.0 }', "X_u occurs twice"),
+    ("rel_std = 0.2 }", 'rel_std = 0.2 }, { axis = "X", product = "u", value = 1.0 }', "X_u occurs twice"),
     ("terms =", "termes =", "hull.termes: unknown key; did you mean 'terms'?"),
     ("cross_flow]", "crossflow]", "there is no 'crossflow'; did you mean 'cross_flow'?"),
     ("cross_flow_length", "cross_length", "unknown key 'cross_length'; did you mean 'cross_flow_length'?"),
@@ -129,19 +129,19 @@ CHANGES = [
 DOUBTS = [
     ("value = -10.0", "value = 10.0", 13, "X_u = 10 N.s/m adds energy at 0.0044 m/s in surge"),
     (
-        "share = 0.2 }]", 'share = 0.2 },\n  { axis = "X", product = "|u|u", value = 1.0 }]', 14,
+        "rel_std = 0.2 }]", 'rel_std = 0.2 },\n  { axis = "X", product = "|u|u", value = 1.0 }]', 14,
         "X_absu_u = 1 N.s2/m2 adds energy at 14 m/s in surge",
     ),
     (
-        "share = 0.2 }]", 'share = 0.2 },\n  { axis = "N", product = "r", value = 1.0 }]', 14,
+        "rel_std = 0.2 }]", 'rel_std = 0.2 },\n  { axis = "N", product = "r", value = 1.0 }]', 14,
         "N_r = 1 N.m.s/rad adds energy at 0.0022 rad/s in yaw",
     ),
     (
-        "share = 0.2 }]", 'share = 0.2 }, { axis = "Y", product = "vvv", value = 1.0 }]', 13,
+        "rel_std = 0.2 }]", 'rel_std = 0.2 }, { axis = "Y", product = "vvv", value = 1.0 }]', 13,
         "Y_vvv = 1 N.s3/m3 adds energy at 0.0044 m/s in sway",
     ),
     (
-        "share = 0.2 }]", 'share = 0.2 }]\n[hull.functions.resistance]\ndrag_ahead = -0.1', 14,
+        "rel_std = 0.2 }]", 'rel_std = 0.2 }]\n[hull.functions.resistance]\ndrag_ahead = -0.1', 14,
         "resistance adds energy at 0.89 m/s in surge",
     ),
     ("X_udot = -5.0", "X_udot = 5.0", 10, "X_udot = 5 kg is positive"),
@@ -153,9 +153,9 @@ DOUBTS = [
 ]  # fmt: skip
 # What a ship may have: damping that resists at all speeds with a coefficient of either sign, an outboard motor.
 SOUND = [
-    ("share = 0.2 }]", """share = 0.2 }, { axis = "X", product = "|u|u", value = 1.0 },
+    ("rel_std = 0.2 }]", """rel_std = 0.2 }, { axis = "X", product = "|u|u", value = 1.0 },
         { axis = "X", product = "uuu", value = -1.0 }]"""),
-    ("share = 0.2 }]", 'share = 0.2 }, { axis = "N", product = "v", value = 9.0 }]'),
+    ("rel_std = 0.2 }]", 'rel_std = 0.2 }, { axis = "N", product = "v", value = 9.0 }]'),
     ("X_udot = -5.0", "X_udot = -5.0\nY_rdot = 1.0"),
     ("y = -0.4", "y = -0.4\nx = -1.05"),
     ("value = 50.0", "value = 200.0"),

@@ -185,8 +185,8 @@ LAWS = {
     },
     "four_quadrant_rudder": {**RACE_RUDDER, "race_astern": 0.1, "pressure_astern": -0.2},
     "azimuth_with_leg": LEG,
-    "force_table_ahead": TABLE,
-    "force_table_aside": TABLE,
+    "force_table_surge": TABLE,
+    "force_table_sway": TABLE,
 }
 RACE = Race(0.3, 1.2, 0.2)
 FLOWS = [Flow(race=RACE), Flow(1.0, 0.0, 1.0, race=RACE), Flow(-0.6, 0.0, -0.6, race=RACE)]

@@ -78,7 +78,7 @@ def write_criteria(path, *criteria, **more):
     return path
 
 
-@pytest.mark.parametrize("statistic", ["share", "median", "rms"])
+@pytest.mark.parametrize("statistic", ["fraction", "median", "rms"])
 def test_all_three_outcomes(statistic):
     told = {"statistic": statistic}
     assert outcome(np.full(60, 0.5), **told) == "met"
@@ -241,13 +241,13 @@ def test_predicted_velocities_are_those_of_the_ship(predictions):
 def test_only_windows_within_count(comparison, predictions):
     p = Predicted("run", predictions, sources_of(predictions, None), window_means(predictions))
     u = p.signals["u"]
-    some = judge(criterion(within={"u": [float(np.median(u)), 9.0]}), ["run"], [p])
+    some = judge(criterion(operating_range={"u": [float(np.median(u)), 9.0]}), ["run"], [p])
     assert some.errors.size == np.sum(u >= np.median(u))
-    none = judge(criterion(within={"u": [8.0, 9.0]}), ["run"], [p])
+    none = judge(criterion(operating_range={"u": [8.0, 9.0]}), ["run"], [p])
     assert none.reason == "outside the data: no window has u from 8 to 9"
     assert judge(criterion(runs=["other"]), ["run"], [p]).reason == "run other was not compared"
     with pytest.raises(InputError, match=r"run run has no 'tau_x'; did you mean 'tau_X'"):
-        judge(criterion(within={"tau_x": [0.0, 1.0]}), ["run"], [p])
+        judge(criterion(operating_range={"tau_x": [0.0, 1.0]}), ["run"], [p])
 
 
 @pytest.mark.parametrize(
@@ -263,8 +263,8 @@ def test_only_windows_within_count(comparison, predictions):
         ({"tolerance": -1.0}, r"criteria\[0\].tolerance: Input should be greater than 0"),
         ({"tolerence": 1.0}, r"criteria\[0\].tolerence: unknown key; did you mean 'tolerance'"),
         ({"horizon": 1e400}, r"criteria\[0\].horizon"),
-        ({"statistic": "rms", "coverage": 0.5}, "coverage belongs to the statistic 'share'"),
-        ({"within": {"u": [2, 1]}}, "within.u: 2 is not below 1"),
+        ({"statistic": "rms", "coverage": 0.5}, "coverage belongs to the statistic 'fraction'"),
+        ({"operating_range": {"u": [2, 1]}}, "operating_range.u: 2 is not below 1"),
         ({"tolerance": True}, r"criteria\[0\].tolerance: Input should be a valid number"),
         ({"tolerance": "1"}, r"criteria\[0\].tolerance: Input should be a valid number"),
         ({"training_runs": 1}, r"criteria\[0\].training_runs: Input should be a valid boolean"),

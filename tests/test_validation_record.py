@@ -64,7 +64,7 @@ def validated(comparison, folder, *criteria, **more):
 
 
 def test_restrictions_and_counts_are_in_the_record(comparison, tmp_path):
-    v = validated(comparison, tmp_path, {}, {"within": {"u": [-0.5, 0.1]}, "runs": ["a", "b"]})
+    v = validated(comparison, tmp_path, {}, {"operating_range": {"u": [-0.5, 0.1]}, "runs": ["a", "b"]})
     free, narrow = v.content.judgements
     assert narrow.requirement.endswith(
         "only runs a, b; only windows with a mean of u from -0.5 to 0.1 m/s"
@@ -77,12 +77,14 @@ def test_restrictions_and_counts_are_in_the_record(comparison, tmp_path):
     assert narrow.excluded["not among the runs of the criterion"] > 0
     told = [*lines(v.content)]
     assert f"{narrow.windows} of {narrow.offered} windows of 2 of 3 runs count" in told[1]
-    assert v.content.criteria.content["criteria"][1]["within"] == {"u": [-0.5, 0.1]}
+    assert v.content.criteria.content["criteria"][1]["operating_range"] == {"u": [-0.5, 0.1]}
 
 
 @pytest.mark.slow
 def test_the_range_of_validity_is_that_of_what_was_judged(comparison, tmp_path):
-    v = validated(comparison, tmp_path, {"name": "all"}, {"name": "slow", "within": {"u": [-0.5, 0.1]}})
+    v = validated(
+        comparison, tmp_path, {"name": "all"}, {"name": "slow", "operating_range": {"u": [-0.5, 0.1]}}
+    )
     most = {r.criterion: r.greatest for r in v.content.validity if r.signal == "u"}
     assert most["slow"] < most["all"]
 

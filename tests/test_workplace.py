@@ -226,11 +226,11 @@ def test_beliefs_are_the_learned_model(ellipse, tmp_path, observer):
 def test_a_belief_that_nobody_can_have_is_refused(ellipse, tmp_path, chain):
     file = model_file(tmp_path / "model.ssv", delta_X_u=-2.0)
     with pytest.raises(cosim.InputError, match="'vessel', which does not run here"):
-        cosim.simulate(chain, tmp_path / "out", believe=[file])
+        cosim.simulate(chain, tmp_path / "out", controller_model=[file])
     del ellipse["fmus"]["controller"], ellipse["fmus"]["observer"]
     ellipse |= {"connections": [], "faults": [], "events": []}
     with pytest.raises(cosim.InputError, match="no controller model here has parameters of vessel"):
-        cosim.simulate(ellipse, tmp_path / "out", believe=[file])
+        cosim.simulate(ellipse, tmp_path / "out", controller_model=[file])
 
 
 def test_every_command_of_cybership_is_a_module_and_told():

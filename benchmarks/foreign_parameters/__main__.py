@@ -75,7 +75,7 @@ def one(path: Path, s: ForeignSystem, kind: str, seed: int, folder: Path) -> dic
     content = {
         "inputs": {n: n for n in s.inputs},
         "outputs": {s.output: s.output},
-        "beside": [s.force] if s.force else [],
+        "disturbance_inputs": [s.force] if s.force else [],
     }
     given = [
         {"name": n, "value": v, "log": True, "prior": {"rel_std": share}}

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.table import Table
 
+from cybership.renamed import renamed_keyword
 from cybership.scratch_folder import atomic_write
 
 from ..errors import InputError, SimulationError, nearest
@@ -39,13 +40,14 @@ QUANTILES = (0.05, 0.25, 0.75, 0.95)
 POSE = ("x", "y", "psi")
 
 
+@renamed_keyword("believe", "controller_model")
 def run_ensemble(
     scenario: Scenario,
     posterior: Path,
     members: int,
     out: str | Path | None = None,
     parameters: Sequence[str | Path] = (),
-    believe: Sequence[str | Path] = (),
+    controller_model: Sequence[str | Path] = (),
     only_own: bool = False,
     workers: int | None = None,
     pictures: bool = True,
@@ -64,7 +66,7 @@ def run_ensemble(
         members: how many ships are drawn, at least two.
         out: result folder; default ``results/<name>_ensemble`` in the working directory.
         parameters: SSP parameter sets for the plant, under the values that are drawn.
-        believe: SSP parameter sets for the controller models in controllers and observers.
+        controller_model: SSP parameter sets of the plant for the models in controllers and observers.
         only_own: whether to refuse FMUs with programs that were not built on this computer.
         workers: processes; None is one for each core, 0 runs in this process.
         pictures: whether to draw.
@@ -83,7 +85,7 @@ def run_ensemble(
         raise InputError(f"an ensemble needs two members or more; got {members}")
     demand_packages()
     given = read_posterior(posterior)
-    overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(believe))
+    overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(controller_model))
     system = prepare(scenario, overrides, only_own, beliefs=beliefs)
     try:
         for warning in system.warnings:

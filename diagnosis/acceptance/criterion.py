@@ -21,13 +21,14 @@ from pydantic import (
 from cosim import InputError
 from cosim.errors import nearest
 from cybership.message_text import Location, first_fault, quoted
+from cybership.renamed import with_new_names
 
 from ..runs import UNITS
 
 # Quantity of each signal that can be judged.
 JUDGED = {"position": "length", "heading": "angle", "u": "speed", "v": "speed", "r": "rate"}
 
-# Unit of what ``within`` may name, of commands that of the ship.
+# Unit of what ``operating_range`` may name, of commands that of the ship.
 MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
 
 Quantity = Literal["position", "heading", "u", "v", "r"]
@@ -46,11 +47,11 @@ class Criterion(BaseModel):
     horizon: Positive = Field(description="time of prediction at which the error is judged [s]")
     tolerance: Positive = Field(description="largest error, in 'unit'")
     unit: str = Field(description="of the tolerance, such as m, deg, m/s, kn, deg/s")
-    statistic: Literal["share", "median", "rms"] = Field(
-        "share",
-        description="statistic of the errors: share within the tolerance, or median or RMS within it",
+    statistic: Literal["fraction", "median", "rms"] = Field(
+        "fraction",
+        description="statistic of the errors: fraction within the tolerance, or median or RMS within it",
     )
-    coverage: float = Field(0.9, gt=0.0, lt=1.0, description="smallest share within the tolerance")
+    coverage: float = Field(0.9, gt=0.0, lt=1.0, description="smallest fraction within the tolerance")
     confidence: float = Field(
         0.95,
         gt=0.5,
@@ -60,8 +61,8 @@ class Criterion(BaseModel):
     runs: Annotated[list[str], Field(min_length=1)] | None = Field(
         None, description="names of the runs that count (all)"
     )
-    within: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
-        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in a window [SI]"
+    operating_range: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
+        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in windows [SI]"
     )
 
     training_runs: bool = Field(
@@ -74,11 +75,11 @@ class Criterion(BaseModel):
         if self.unit not in units:
             hint = nearest(self.unit, units)
             raise ValueError(f"{quoted(self.unit)} is not a unit of {self.quantity}{hint}")
-        if self.statistic != "share" and "coverage" in self.model_fields_set:
-            raise ValueError(f"coverage belongs to the statistic 'share', not to '{self.statistic}'")
-        for signal, (low, high) in self.within.items():
+        if self.statistic != "fraction" and "coverage" in self.model_fields_set:
+            raise ValueError(f"coverage belongs to the statistic 'fraction', not to '{self.statistic}'")
+        for signal, (low, high) in self.operating_range.items():
             if not low < high:
-                raise ValueError(f"within.{signal}: {low:g} is not below {high:g}")
+                raise ValueError(f"operating_range.{signal}: {low:g} is not below {high:g}")
         return self
 
     @property
@@ -104,7 +105,7 @@ class Criterion(BaseModel):
     def text(self) -> str:
         """What is required, in words."""
         what = {
-            "share": f"at least {100.0 * self.coverage:g} % of the windows' errors",
+            "fraction": f"at least {100.0 * self.coverage:g} % of the windows' errors",
             "median": "the median of the windows' errors",
             "rms": "the RMS of the windows' errors",
         }[self.statistic]
@@ -118,7 +119,7 @@ class Criterion(BaseModel):
         """What narrows or widens the data that count, a part of a sentence each."""
         limits = [
             f"{s} from {low:g} to {high:g} {MOTION.get(s, '(SI)')}"
-            for s, (low, high) in self.within.items()
+            for s, (low, high) in self.operating_range.items()
         ]
         told = [] if self.runs is None else [f"only runs {', '.join(self.runs)}"]
         told += [f"only windows with a mean of {' and '.join(limits)}"] if limits else []
@@ -211,9 +212,9 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     path = Path(path)
     try:
         changed, text = path.stat().st_mtime, path.read_bytes()
-        json.loads(text, object_pairs_hook=_once)
+        given = with_new_names(json.loads(text, object_pairs_hook=_once), "criteria", path)
         # As JSON, where "0.01" is no number and true no metre.
-        content = Criteria.model_validate_json(text, strict=True)
+        content = Criteria.model_validate_json(json.dumps(given), strict=True)
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None
     except ValidationError as error:

@@ -80,7 +80,7 @@ class Predicted(NamedTuple):
         name: of the run.
         predictions: in windows of the criterion's horizon.
         sources: of their uncertainty.
-        signals: name -> mean (w,) in each window, of what ``within`` may name.
+        signals: name -> mean (w,) in each window, of what ``operating_range`` may name.
         same: names of runs that are this one, or nearly.
         learned: whether the model was learned from it.
     """
@@ -193,7 +193,7 @@ def _counted(
     """The windows that count, of each run that has some, a mask (w,).
 
     Raises:
-        InputError: ``within`` names what is no signal of a run.
+        InputError: ``operating_range`` names what is no signal of a run.
     """
     excluded = {FEW: sum(short.values())}
     left_out, chosen = dict.fromkeys(short, f"no window of {c.horizon:g} s has enough samples"), []
@@ -204,10 +204,11 @@ def _counted(
             excluded[why] = excluded.get(why, 0) + keep.size
             left_out[p.name] = why
             continue
-        for signal, (low, high) in c.within.items():
+        for signal, (low, high) in c.operating_range.items():
             if signal not in p.signals:
                 hint = nearest(signal, p.signals)
-                raise InputError(f"criterion '{c.title}': within: run {p.name} has no '{signal}'{hint}")
+                where = f"criterion '{c.title}': operating_range"
+                raise InputError(f"{where}: run {p.name} has no '{signal}'{hint}")
             inside = (p.signals[signal] >= low) & (p.signals[signal] <= high)
             why = f"mean {signal} not from {low:g} to {high:g}"
             excluded[why] = excluded.get(why, 0) + int(np.sum(keep & ~inside))
@@ -234,7 +235,7 @@ def _left_out(c: Criterion, p: Predicted, before: Sequence[str]) -> str:
 
 def _why_nothing(c: Criterion, counts: WindowCounts) -> str:
     whys = {*counts.left_out.values()}
-    if c.within and any(why.startswith("no window") for why in whys):
+    if c.operating_range and any(why.startswith("no window") for why in whys):
         return f"outside the data: no window has {_limits(c)}"
     return (
         LEARNED_ONLY
@@ -247,7 +248,7 @@ LEARNED_ONLY = "every run was used to learn the model (training_runs lets such r
 
 
 def _limits(c: Criterion) -> str:
-    return ", ".join(f"{s} from {a:g} to {b:g}" for s, (a, b) in c.within.items())
+    return ", ".join(f"{s} from {a:g} to {b:g}" for s, (a, b) in c.operating_range.items())
 
 
 def _too_early(c: Criterion, after: np.ndarray) -> str:

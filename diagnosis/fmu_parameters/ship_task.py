@@ -16,6 +16,7 @@ from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
 from ..predictors.fmu.fmu_predictor import FmuPredictor
+from ..predictors.fmu.variable_map import DISTURBANCES
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed
 from .additional_force import AdditionalForce
@@ -68,14 +69,14 @@ class ShipTask:
     def forces_on(self) -> list[str]:
         """Inputs for the force or acceleration that may act in addition."""
         told = self.predictor.map
-        given = {**told.told("inputs"), **told.told("beside")}
+        given = {**told.told("inputs"), **told.told(DISTURBANCES)}
         return [c.name for s, c in given.items() if s in (*TAU, "u_dot", "v_dot", "r_dot")]
 
     @property
     def usual(self) -> dict[str, float]:
         """Of each of these inputs a usual size: that of its commands, else of the ship's full force."""
         told, found = self.predictor.map, {}
-        for group in ("beside", "inputs"):
+        for group in (DISTURBANCES, "inputs"):
             for s, c in told.told(group).items():
                 if s in TAU:
                     k = TAU.index(s)
@@ -210,7 +211,8 @@ def ship_task(
     told = predictor.map
     if not set(POSE) <= told.told("outputs").keys():
         raise InputError(f"'{fmu.name}' needs outputs for x, y and psi to calibrate its parameters")
-    mapped = {c.name for g in ("inputs", "outputs", "start", "beside") for c in told.told(g).values()}
+    groups = ("inputs", "outputs", "start", DISTURBANCES)
+    mapped = {c.name for g in groups for c in told.told(g).values()}
     notes: list[str] = []
     if getattr(options, "parameters", None) is not None:
         chosen = read_parameters(options.parameters, fmu.model, mapped)

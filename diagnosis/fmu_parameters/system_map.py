@@ -4,7 +4,7 @@
         "inputs": {"force": "f"},
         "outputs": {"position": {"name": "s", "unit": "mm", "noise": 0.5}},
         "start": {"position": "springDamper.s_rel", "der(position)": "springDamper.v_rel"},
-        "beside": ["f"],
+        "disturbance_inputs": ["f"],
         "window": 20.0,
         "run_in": 0.0
     }
@@ -34,6 +34,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
 from cybership.message_text import first_fault, quoted
+from cybership.renamed import with_new_names
 
 # Units of an input that acts in addition to all else.
 FORCES = ("N", "N.m", "Nm", "m/s2", "rad/s2")
@@ -82,7 +83,7 @@ class SystemMap(BaseModel):
     start: dict[str, MappedVariable] = Field(
         default_factory=dict, description="start values, by measured outputs or their derivatives"
     )
-    beside: list[str] | None = Field(
+    disturbance_inputs: list[str] | None = Field(
         default=None, description="inputs where an additional force may act (those in N, N.m, m/s2)"
     )
     window: Positive | None = Field(default=None, description="length of the windows [s] (whole runs)")
@@ -110,7 +111,8 @@ def read_system_map(path: Path) -> SystemMap:
         InputError: it is none.
     """
     try:
-        return SystemMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return SystemMap.model_validate(with_new_names(content, "map", path))
     except ValidationError as error:
         raise InputError(f"'{path}': {first_fault(error)}") from None
     except (OSError, ValueError, RecursionError) as error:
@@ -164,10 +166,10 @@ def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
                 raise InputError(f"{place}: the FMU has no {role} {quoted(channel.name)}{hint}")
             if channel.factor == 0.0:
                 raise InputError(f"{place}.factor must not be zero")
-    for name in found.beside or ():
+    for name in found.disturbance_inputs or ():
         if name not in roles["inputs"][0]:
             hint = nearest(name, roles["inputs"][0])
-            raise InputError(f"{where}: beside: the FMU has no input {quoted(name)}{hint}")
+            raise InputError(f"{where}: disturbance_inputs: the FMU has no input {quoted(name)}{hint}")
     for column in found.start:
         if column_of_start(column)[0] not in found.outputs:
             raise InputError(
@@ -183,7 +185,7 @@ def column_of_start(key: str) -> tuple[str, bool]:
 
 def force_inputs(found: SystemMap, model: FmuModel) -> list[str]:
     """Inputs on which a force may act in addition."""
-    if found.beside is not None:
-        return list(found.beside)
+    if found.disturbance_inputs is not None:
+        return list(found.disturbance_inputs)
     real = (v for v in model.variables.values() if v.causality == "input" and v.type == "Real")
     return [v.name for v in real if v.unit is not None and v.unit.name in FORCES]

@@ -63,7 +63,7 @@ class Actuator(NamedTuple):
     @property
     def sides(self) -> tuple[float, ...]:
         """How far to starboard of its place each of its units is [m]."""
-        off = self.part.number("abreast")
+        off = self.part.number("half_spacing")
         return (-off, off) if off else (0.0,)
 
     @property

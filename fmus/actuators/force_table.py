@@ -24,7 +24,7 @@ def _forces(way: str) -> type[Fields]:
 class ForceTableAhead(Law[Fields]):
     """Force ahead at the commands -1, -0.8 ... 1 as it was measured at rest; it must not fall."""
 
-    name = "force_table_ahead"
+    name = "force_table_surge"
     commands = (Command("u", "1", "command, -1...1"),)
     components = "X"
     limiting = ()
@@ -56,7 +56,7 @@ class ForceTableAhead(Law[Fields]):
 class ForceTableAside(ForceTableAhead):
     """The same, of a force to starboard."""
 
-    name = "force_table_aside"
+    name = "force_table_sway"
     components = "Y"
     Parameters = _forces("to starboard")
 

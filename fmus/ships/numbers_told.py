@@ -29,16 +29,16 @@ class Number(StrictTable):
     std: PositiveFloat | None = Field(
         None, description="standard deviation in the unit of the number", allow_inf_nan=False
     )
-    share: float | None = Field(
-        None, ge=0.0, le=10.0, description="standard deviation as a share of the value; 0: exact"
+    rel_std: float | None = Field(
+        None, ge=0.0, le=10.0, description="standard deviation relative to the value; 0: exact"
     )
 
     @model_validator(mode="after")
     def _one(self) -> "Number":
         if (self.value is None) == (self.prime is None):
             raise ValueError("a number has value or prime")
-        if self.std is not None and self.share is not None:
-            raise ValueError("a number has std or share, not both")
+        if self.std is not None and self.rel_std is not None:
+            raise ValueError("a number has std or rel_std, not both")
         return self
 
     def named(self, name: str, unit: str, of: "Prime | None") -> Value:
@@ -54,7 +54,7 @@ class Number(StrictTable):
         """
         size = 1.0 if self.prime is None else _size(name, unit, of)
         value = size * (self.prime or self.value or 0.0)
-        share, std = 0.5 if self.share is None else self.share, size * (self.std or 0.0)
+        share, std = 0.5 if self.rel_std is None else self.rel_std, size * (self.std or 0.0)
         return Value(name, value, self.origin, std / abs(value) if std and value else share, std)
 
 

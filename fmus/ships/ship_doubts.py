@@ -128,7 +128,7 @@ def _told(axis: int, speed: float) -> str:
 
 def _place(ship: Description, k: int, part: Part) -> Iterator[ShipDoubt]:
     """An actuator outside of the outline."""
-    apart = part.number("abreast")
+    apart = part.number("half_spacing")
     for j, (name, room, sides) in enumerate(
         (("x", ship.length, (0.0,)), ("y", ship.beam, (-apart, apart)))
     ):

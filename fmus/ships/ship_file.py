@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from cybership.message_text import Location, brief, first_fault
+from cybership.renamed import with_new_names
 
 from .. import installed
 from ..actuators import actuation as actuation  # registers the laws
@@ -59,8 +60,8 @@ class ActuatorTable(BaseModel):
     law: str
     title: Annotated[str, Field(max_length=60)] = ""
     label: Annotated[str, Field(max_length=60)] = ""
-    order: Annotated[str, Field(pattern=NAME, max_length=30)] | None = None
-    behind: str = ""
+    command_group: Annotated[str, Field(pattern=NAME, max_length=30)] | None = None
+    upstream_propeller: str = ""
 
 
 class WindTable(BaseModel):
@@ -94,7 +95,7 @@ class ShipTable(StrictTable):
     outline: list[tuple[Finite, Finite]] = Field(
         [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
     )
-    allocates: bool = Field(
+    thrust_allocation: bool = Field(
         True, description="false: commands are the inputs of the thrusters; true: a force is"
     )
     inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
@@ -166,9 +167,11 @@ def _read(path: Path, _changed: int) -> Description:
     if path.stat().st_size > MOST_BYTES:
         raise DeclarationError(f"'{path}' is too large for a ship file")
     try:
-        table = ShipTable.model_validate(_toml(path))
+        table = ShipTable.model_validate(with_new_names(_toml(path), "ship", path))
     except ValidationError as error:
         raise DeclarationError(f"'{path}': {_told(error)}") from None
+    except ValueError as error:
+        raise DeclarationError(f"'{path}': {brief(str(error))}") from None
     try:
         found = _description(table)
     except DeclarationError as error:
@@ -222,8 +225,8 @@ def _description(table: ShipTable) -> Description:
         _actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators or _given_forces(L)
     )
     _once([a.name for a in actuators], "actuators")
-    _belong_together(actuators, table.allocates)
-    if any(a.number("abreast") for a in actuators) and not table.effects:
+    _belong_together(actuators, table.thrust_allocation)
+    if any(a.number("half_spacing") for a in actuators) and not table.effects:
         raise DeclarationError("effects: a ship with two units abreast names those of its actuators")
     terms = tuple(t.named(t.name, term_variable(t.name).unit, prime) for t in table.hull.terms)
     _once([t.name for t in terms], "hull.terms")
@@ -238,7 +241,7 @@ def _description(table: ShipTable) -> Description:
         terms,
         tuple(_function(name, given, prime) for name, given in table.hull.functions.items()),
         actuators,
-        table.allocates,
+        table.thrust_allocation,
         () if table.wind is None else _wind(table.wind, prime),
         tuple(table.effects),
         tuple(table.aliases.items()),
@@ -281,21 +284,24 @@ def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:
     for a in actuators:
         where, law = f"actuator '{a.name}'", Law.known[a.law]
         if law.in_race != bool(a.behind):
-            right = "needs 'behind', its" if law.in_race else f"{a.law} cannot have 'behind', an"
-            raise DeclarationError(f"{where}: {right} upstream propeller")
+            right = f"{a.law} {'needs' if law.in_race else 'cannot have'} an 'upstream_propeller'"
+            raise DeclarationError(f"{where}: {right}")
         if a.behind and (a.behind not in named or not Law.known[named[a.behind].law].has_race):
             raise DeclarationError(f"{where}: '{a.behind}' is not a propeller with a slipstream")
         alike = [b for b in actuators if (b.order or b.name) == (a.order or a.name)]
         if any(Law.known[b.law].commands != law.commands for b in alike):
-            raise DeclarationError(f"{where}: the other actuators of its group have other commands")
-        if len(alike) > 1 and a.number("abreast"):
-            raise DeclarationError(f"{where}: two actuators abreast cannot share a group with others")
-        if a.number("abreast") and (law.has_race or law.in_race):
             raise DeclarationError(
-                f"{where}: two actuators abreast cannot have or be an upstream propeller"
+                f"{where}: the other actuators of its command group have other commands"
             )
+        if len(alike) > 1 and a.number("half_spacing"):
+            raise DeclarationError(
+                f"{where}: two units abreast cannot share a command group with other actuators"
+            )
+        if a.number("half_spacing") and (law.has_race or law.in_race):
+            raise DeclarationError(f"{where}: two units abreast cannot have or be an upstream propeller")
         if len(alike) > 1 and allocates:
-            raise DeclarationError(f"{where}: a ship with command groups needs 'allocates = false'")
+            needs = "'thrust_allocation = false'"
+            raise DeclarationError(f"{where}: a ship with command groups needs {needs}")
 
 
 def _inertia(given: Mapping[str, Any], prime: Prime | None) -> tuple[Value, ...]:
@@ -379,15 +385,18 @@ def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
         *variables(law.Parameters),
         Variable("x", "m", "place", 0.0),
         Variable("y", "m", "place", 0.0),
-        Variable("abreast", "m", "place of two units to port and starboard of it", 0.0, Range(0.0)),
+        Variable("half_spacing", "m", "place of two units to port and starboard of it", 0.0, Range(0.0)),
         Variable("lag", "s", "first-order lag", 0.0, scale.limits("s", LONGEST)),
         *rates,
     )
     if keyword.iskeyword(a.name):
         raise DeclarationError(f"{where}: a keyword of Python cannot be a name")
+    keys = [*ActuatorTable.model_fields, *(v.name for v in declared)]
+    if unknown := next((name for name in a.model_extra or {} if name not in keys), None):
+        raise DeclarationError(f"{where}: unknown key '{unknown}'{nearest(unknown, keys)}")
     numbers = {name: _checked(where, name, given) for name, given in (a.model_extra or {}).items()}
     title, values = a.title or a.name.replace("_", " "), _values(where, numbers, declared, prime)
-    return Part(a.name, a.law, title, values, a.order or "", a.behind, a.label)
+    return Part(a.name, a.law, title, values, a.command_group or "", a.upstream_propeller, a.label)
 
 
 def _checked(where: str, name: str, given: Any) -> "float | Number":

@@ -41,7 +41,7 @@ def scaled(d: Description, ratio: float) -> Description:
         command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
         if command is not None:
             return {"1": "1/s", "1/s": "1/s2"}.get(command.unit, f"{command.unit}/s")
-        placed = {"lag": "s", "abreast": "m"}
+        placed = {"lag": "s", "half_spacing": "m"}
         return placed[name] if name in placed else units[d.called(f"{a.part.name}_{name}")]
 
     in_wind = {v.name: v.unit for v in described_numbers([v.name for v in d.wind])}
@@ -79,8 +79,8 @@ EVERY_LAW = described(
     part("pod", "azimuth", {**AZIMUTH, "x": -0.8}),
     part("bow", "tunnel_thruster", {"x": 0.8, "F": 6.0}),
     part("vsp", "voith_schneider", {"x": 0.2, "F": 9.0}),
-    part("jet", "force_table_ahead", {**TABLE, "x": -0.9, "y": 0.1}),
-    part("stern", "force_table_aside", {**TABLE, "x": -0.9}),
+    part("jet", "force_table_surge", {**TABLE, "x": -0.9, "y": 0.1}),
+    part("stern", "force_table_sway", {**TABLE, "x": -0.9}),
     part("square", "squared_tunnel_thruster", {"x": 0.7, "F": 2.0}),
     part("squares", "squared_voith_schneider", {"x": 0.1, "F": 3.0}),
     part("tabled", "tabulated_tunnel_thruster", {"x": 0.6, "F": 2.0}),

@@ -9,9 +9,9 @@ A map has the form of the file beside a measurement, once for inputs, outputs an
         "run_in": 60.0,
     }
 
-Inputs for a force or an acceleration that acts beside all else stand in ``beside``, by ``tau_X`` or
-``u_dot`` and so on. A number in place of an output is one that the FMU lacks, as the sway of what moves
-ahead alone. A variable whose unit the map does not tell is in the one that its FMU declares, else in SI.
+Inputs for a force or an acceleration that acts in addition are in ``disturbance_inputs``, by ``tau_X``
+or ``u_dot`` and so on. A number in place of an output is one that the FMU lacks, as the sway of what
+moves ahead alone. A variable whose unit the map does not state is in that of its FMU, else in SI.
 """
 
 import json
@@ -35,6 +35,7 @@ from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import FmuModel, FmuVariable
 from cybership.message_text import Location, first_fault, quoted
+from cybership.renamed import with_new_names
 from fmus.addition import Line
 from fmus.base_units import base_exponents
 
@@ -44,7 +45,8 @@ from .signal_names import NONE, Meant, lone, meant
 
 QUARTER = 0.5 * pi  # rad, from north to east
 PROPOSED = ("inputs", "outputs", "start")
-GROUPS = (*PROPOSED, "beside")
+DISTURBANCES = "disturbance_inputs"
+GROUPS = (*PROPOSED, DISTURBANCES)
 # Inputs that act beside all else: forces, or accelerations.
 BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
           "u_dot": "acceleration", "v_dot": "acceleration", "r_dot": "angular acceleration"}  # fmt: skip
@@ -69,7 +71,7 @@ class VariableMap(BaseModel):
         default_factory=dict, description="pose or velocity; a number [SI] if it is constant"
     )
     start: dict[str, Column | None] = Field(default_factory=dict, description="start values")
-    beside: dict[str, Column | None] = Field(
+    disturbance_inputs: dict[str, Column | None] = Field(
         default_factory=dict, description="forces or accelerations that act in addition to all others"
     )
     run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] | None = Field(
@@ -114,7 +116,8 @@ def read_map(path: Path) -> VariableMap:
         InputError: it is none.
     """
     try:
-        return VariableMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return VariableMap.model_validate(with_new_names(content, "map", path))
     except ValidationError as error:
         raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
     except RecursionError:
@@ -136,7 +139,7 @@ def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Group -> signal -> quantity of all that a map may have, of a run with some commands."""
     motion = {signal: QUANTITY[signal] for signal in MOTION}
     start = {**motion, **commands}
-    return {"inputs": dict(commands), "outputs": motion, "start": start, "beside": BESIDE}
+    return {"inputs": dict(commands), "outputs": motion, "start": start, DISTURBANCES: BESIDE}
 
 
 def signal_lines(map: VariableMap, commands: Mapping[str, str]) -> dict[str, dict[str, Line]]:  # noqa: A002

@@ -19,7 +19,7 @@ from ...runs import Column
 from ..ship_model import Model
 from ..weak_form import WeakWindows, omega
 from ..windows import step_of
-from .variable_map import VariableMap
+from .variable_map import DISTURBANCES, VariableMap
 
 FOREIGN, ADDED = "model", "found"  # instances of the container
 
@@ -61,7 +61,7 @@ def write_wrapper(
     """
     change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
     needed = ~np.isclose(np.abs(change).max(axis=0) / start.ship.scale.forces, 0.0)
-    takes = {*fmu.map.told("inputs"), *fmu.map.told("beside")}
+    takes = {*fmu.map.told("inputs"), *fmu.map.told(DISTURBANCES)}
     takes |= {*FORCE[:2]} if {"tau.force", "tau.angle"} <= takes else set()
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
@@ -69,7 +69,7 @@ def write_wrapper(
     if missing:
         axes = " and ".join(f"{FORCE[k]} or {ACCELERATION[k]}" for k in missing)
         needs = f"{fmu.name} has no input for an additional force or acceleration"
-        return f"{NONE}: {needs}; it needs {axes}, which the map names under 'beside'.", None
+        return f"{NONE}: {needs}; it needs {axes}, which the map names under '{DISTURBANCES}'.", None
     if start.ship.effects.files:
         return f"{NONE}: the ship has effects of your own.", None
     try:
@@ -86,14 +86,14 @@ def _scenario(
     fmu: Wrapped, start: Model, learned: Model, folder: Path, runs: Sequence[WeakWindows]
 ) -> dict[str, Any]:
     """The two FMUs, wired; values pass as they are, for the addition converts them."""
-    groups = {group: fmu.map.told(group) for group in ("outputs", "inputs", "beside")}
+    groups = {group: fmu.map.told(group) for group in ("outputs", "inputs", DISTURBANCES)}
     lines = {g: {_plain(s): line for s, line in fmu.lines[g].items()} for g in groups}
     told: dict[str, Line | float] = {**lines["outputs"], **fmu.map.fixed}
     parts = [
         {part: {n: float(x) for n, x in getattr(m, part).items()} for part in ("vessel", "thrusters")}
         for m in (start, learned)
     ]
-    arguments = (*parts, told, lines["inputs"], lines["beside"])
+    arguments = (*parts, told, lines["inputs"], lines[DISTURBANCES])
     source = folder / f"{ADDED}.py"
     description = start.ship.description
     text = ", ".join(map(repr, arguments))
@@ -103,7 +103,7 @@ def _scenario(
     except BuildError:  # no compiler
         (made,) = build(source, folder)
     wires = [(f"{FOREIGN}.{c.name}", f"{ADDED}.from_{s}") for s, c in groups["outputs"].items()]
-    for group, mark in (("inputs", "to"), ("beside", "add")):
+    for group, mark in (("inputs", "to"), (DISTURBANCES, "add")):
         wires += [
             (f"{ADDED}.{mark}_{_plain(s)}", f"{FOREIGN}.{c.name}") for s, c in groups[group].items()
         ]
