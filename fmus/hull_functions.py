@@ -89,7 +89,7 @@ def cross_flow_along(
     section_length: Annotated[float, "m", "length of the hull, about the origin", POSITIVE] = 1.0,
     section_draft: Annotated[float, "m", "draft of the hull", POSITIVE] = 0.1,
     section_drag: Annotated[float, "1", "drag coefficient of a section"] = 1.0,
-    section_tilt: Annotated[float, "1", "relative increase at the bow, decrease at the stern"] = 0.0,
+    section_tilt: Annotated[float, "1", "relative increase forward, decrease aft"] = 0.0,
     section_ends: Annotated[float, "1", "relative increase at both ends, decrease amidships"] = 0.0,
 ) -> tuple[Number, Number, Number]:
     """Drag of the cross-flow at points from end to end, unevenly spread along the hull.
