@@ -131,7 +131,8 @@ def _clash(names: list[str]) -> str:
         if not name.endswith("/"):
             key = _key(name)
             if key in files:
-                return f"its entries {files[key]!r} and {name!r} are the same file on some operating systems"
+                both = f"its entries {files[key]!r} and {name!r}"
+                return f"{both} are the same file on some operating systems"
             files[key] = name
     for name in names:
         parents = _key(name.removesuffix("/")).split("/")[: None if name.endswith("/") else -1]
