@@ -102,9 +102,9 @@ def renamed_option(
             complain(old_names({old: new}), "warning: ")
         return of(text)
 
-    made.add_argument(new, type=of, **how)
-    dest = new.strip("-").replace("-", "_")
-    made.add_argument(old, type=under_old_name, dest=dest, **how | {"help": argparse.SUPPRESS})
+    dest = made.add_argument(new, type=of, **how).dest
+    hidden: dict[str, Any] = how | {"help": argparse.SUPPRESS}
+    made.add_argument(old, type=under_old_name, dest=dest, **hidden)
 
 
 def whole_number(least: int) -> Callable[[str], int]:

@@ -6,9 +6,9 @@ The tables below are the whole list; CHANGELOG has it for people. In a place ``*
 import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar, cast
 
-P, R = ParamSpec("P"), TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
 
 # Kind of file -> place of the old key -> new key.
 KEYS = {
@@ -112,12 +112,12 @@ def _tables(content: Any, place: list[str]) -> Iterator[tuple[str, dict[str, Any
     yield from ((at, each) for at, each in found if isinstance(each, dict))
 
 
-def renamed_keyword(old: str, new: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def renamed_keyword(old: str, new: str) -> Callable[[F], F]:
     """Let a function take a keyword argument under its old name, too."""
 
-    def decorated(function: Callable[P, R]) -> Callable[P, R]:
+    def decorated(function: F) -> F:
         @wraps(function)
-        def called(*args: P.args, **kwargs: P.kwargs) -> R:
+        def called(*args: Any, **kwargs: Any) -> Any:
             if old in kwargs:
                 if new in kwargs:
                     raise TypeError(f"{function.__name__}() got '{new}' and its old name '{old}'")
@@ -125,6 +125,6 @@ def renamed_keyword(old: str, new: str) -> Callable[[Callable[P, R]], Callable[P
                 kwargs[new] = kwargs.pop(old)
             return function(*args, **kwargs)
 
-        return called
+        return cast(F, called)
 
     return decorated
