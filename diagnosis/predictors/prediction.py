@@ -185,7 +185,8 @@ def propagate(
     power = starts.power(model.clock)
     thrusters, beside, air = drive, starts.given(model), starts.air(model)
     # The smoothed motion, seen through the model's measurement effects.
-    pose, nu = true_motion(*map(starts.first, MOTION), model)
+    eta, eta_dot, eta_ddot = map(starts.first, MOTION)
+    pose, nu = true_motion(eta, eta_dot, eta_ddot, model)
     s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
     steps: Sequence[Any] = thrust
     if single:
