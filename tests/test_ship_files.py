@@ -103,7 +103,7 @@ CHANGES = [
     ('law = "fixed_propeller"', 'law = "propeler"', "no law 'propeler'; did you mean 'fixed_propeller'?"),
     ('law = "fixed_propeller"', "", "actuators[0].law: is missing"),
     ('name = "starboard"', 'name = "port"', "actuators: port stands there twice"),
-    ('name = "port"', 'name = "for"', "actuator 'for': a word of Python's own is no name"),
+    ('name = "port"', 'name = "for"', "actuator 'for': a keyword of Python cannot be a name"),
     ("n_max = 10.0", "n_mx = 10.0", "actuator 'port': unknown key 'n_mx'; did you mean 'n_max'?"),
     ("n_max = 10.0", "n_max = -10.0", "n_max = -10 1/s is out of its range"),
     ("n_max = 10.0", "n_min = 10.0", "n_min = 10 1/s is out of its range"),

@@ -259,7 +259,7 @@ def test_only_windows_within_count(comparison, predictions):
         ('{"criteria": []}', "criteria: List should have at least 1 item"),
         ('{"criterai": []}', r"criteri.*(did you mean 'criteria'|is missing)"),
         ({"quantity": "headin"}, r"'headin' cannot be judged; did you mean 'heading'"),
-        ({"unit": "deg"}, "'deg' is no unit of position; there are m, mm"),
+        ({"unit": "deg"}, "'deg' is not a unit of position; there are m, mm"),
         ({"tolerance": -1.0}, r"criteria\[0\].tolerance: Input should be greater than 0"),
         ({"tolerence": 1.0}, r"criteria\[0\].tolerence: unknown key; did you mean 'tolerance'"),
         ({"horizon": 1e400}, r"criteria\[0\].horizon"),

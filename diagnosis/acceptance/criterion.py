@@ -59,7 +59,7 @@ class Criterion(BaseModel):
         None, description="names of the runs that count; all"
     )
     operating_range: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
-        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in windows [SI]"
+        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in a window [SI]"
     )
 
     training_runs: bool = Field(
@@ -71,7 +71,7 @@ class Criterion(BaseModel):
         units = UNITS[JUDGED[self.quantity]]
         if self.unit not in units:
             hint = nearest(self.unit, units)
-            raise ValueError(f"{quoted(self.unit)} is no unit of {self.quantity}{hint}")
+            raise ValueError(f"{quoted(self.unit)} is not a unit of {self.quantity}{hint}")
         if self.statistic != "fraction" and "coverage" in self.model_fields_set:
             raise ValueError(f"coverage belongs to the statistic 'fraction', not to '{self.statistic}'")
         for signal, (low, high) in self.operating_range.items():

@@ -289,7 +289,9 @@ def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:
             raise DeclarationError(f"{where}: '{a.behind}' is not a propeller with a slipstream")
         alike = [b for b in actuators if (b.order or b.name) == (a.order or a.name)]
         if any(Law.known[b.law].commands != law.commands for b in alike):
-            raise DeclarationError(f"{where}: the others of its command group have other commands")
+            raise DeclarationError(
+                f"{where}: the other actuators of its command group have other commands"
+            )
         if len(alike) > 1 and a.number("half_spacing"):
             raise DeclarationError(
                 f"{where}: two units abreast cannot share a command group with other actuators"
@@ -387,7 +389,7 @@ def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
         *rates,
     )
     if keyword.iskeyword(a.name):
-        raise DeclarationError(f"{where}: a word of Python's own is no name")
+        raise DeclarationError(f"{where}: a keyword of Python cannot be a name")
     keys = [*ActuatorTable.model_fields, *(v.name for v in declared)]
     if unknown := next((name for name in a.model_extra or {} if name not in keys), None):
         raise DeclarationError(f"{where}: unknown key '{unknown}'{nearest(unknown, keys)}")

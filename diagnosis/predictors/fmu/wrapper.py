@@ -68,7 +68,7 @@ def write_wrapper(
         return "Nothing is added to the FMU.", None
     if missing:
         axes = " and ".join(f"{FORCE[k]} or {ACCELERATION[k]}" for k in missing)
-        needs = f"{fmu.name} has no input for a force or an acceleration beside all else"
+        needs = f"{fmu.name} has no input for an additional force or acceleration"
         return f"{NONE}: {needs}; it needs {axes}, which the map names under '{DISTURBANCES}'.", None
     if start.ship.effects.files:
         return f"{NONE}: the ship has effects of your own.", None
