@@ -95,7 +95,7 @@ def simulate(
         parquet: whether to write ``log.parquet`` in place of ``log.csv``.
         set: values by their paths, as ``{"vessel.m": 15.0, "controller": "./mine.fmu", "stop": 60.0}``;
             files are relative to the working directory.
-        controller_model: SSP parameter sets of the plant for the models in controllers and observers.
+        controller_model: SSP parameter sets for the controller models in controllers and observers.
         options: ``realtime``: simulated seconds for each second of wall time. ``pictures``: whether to
             write them. ``only_own``: whether to refuse FMUs with programs that were not built on this
             computer. ``show``: receives notes, a line each. ``progress``: receives the simulated time

@@ -66,7 +66,7 @@ def run_ensemble(
         members: how many ships are drawn, at least two.
         out: result folder; default ``results/<name>_ensemble`` in the working directory.
         parameters: SSP parameter sets for the plant, under the values that are drawn.
-        controller_model: SSP parameter sets of the plant for the models in controllers and observers.
+        controller_model: SSP parameter sets for the controller models in controllers and observers.
         only_own: whether to refuse FMUs with programs that were not built on this computer.
         workers: processes; None is one for each core, 0 runs in this process.
         pictures: whether to draw.

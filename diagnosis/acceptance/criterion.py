@@ -62,7 +62,7 @@ class Criterion(BaseModel):
         None, description="names of the runs that count (all)"
     )
     operating_range: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
-        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in windows [SI]"
+        {}, description="lowest and highest mean of u, v, r, speed, drift or a command in a window [SI]"
     )
 
     training_runs: bool = Field(
