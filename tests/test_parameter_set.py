@@ -105,8 +105,8 @@ def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
         write_model(path, Model(thrusters={"lag": 0.3}, runs=runs))
         short = cosim.load_scenario({**ellipse, "stop": 0.1})
         warnings = cosim.simulate(short, tmp_path / "out", [path], overwrite=True).warnings
-        alone = [text for text in warnings if "alone" in text]
-        assert alone == [f"'{path}': thrusters.{told}"] * bool(told)
+        only = [text for text in warnings if "only" in text]
+        assert only == [f"'{path}': thrusters.{told}"] * bool(told)
         assert read_starts(path).runs == [*runs], "which fmus.build tells"
 
 
