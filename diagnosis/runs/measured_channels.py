@@ -16,7 +16,7 @@ from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
 FIRST = 3  # outliers whose times are stated
-# Relative standard deviation from which on a noise is hardly known. Chosen: its 95 % interval then
+# Relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
 # begins below half of it.
 HARDLY_KNOWN = 0.3
 GIVEN, ESTIMATED = "given", "estimated"

@@ -289,7 +289,7 @@ class CalibrationReport:
 PARAMETERS = ("parameter", "start", "value", "95 % interval", "unit", "")
 FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indistinguishable")
 ERRORS = ("run", "output", "rms before", "rms after", "unit")
-USES = {"train": "learned from", "validate": "validates", "test": "test"}
+USES = {"train": "training", "validate": "validation", "test": "test"}
 
 
 def advice(f: Accepted) -> str:
