@@ -57,19 +57,20 @@ def test_results_are_read_back():
 
 
 def test_each_aim_is_counted():
+    """A filter is a right finding where the way of recording has it."""
     known: dict[str, Any] = {"noise": (1.0, 1.5, np.nan), "rel_std": (0.1, 0.1, 0.0)}
     found = [
         Recorded("clean", verdict="found", found={"X_u": 0.95}, error=1.0, **known),
         Recorded(
-            "a",
+            "heading filtered 1 s",
             noise=(1.0, 2.0, 1.0),
             rel_std=(0.1, 0.5, 0.1),
             verdict="found",
-            found={"X_u": 0.9},
+            found={"X_u": 0.9, "heading_lag": 0.95},
             error=1.2,
         ),
-        Recorded("b", verdict="found", found={"mass": 0.85}, error=3.0),
-        Recorded("c", misstated=("x",), doubted=("x",), verdict="none", error=9.0),
+        Recorded("2 Hz held in 10", verdict="found", found={"mass": 0.85}, error=3.0),
+        Recorded("clock jumps +1 s", misstated=("x",), doubted=("x",), verdict="none", error=9.0),
         Recorded("d", refused="no"),
     ]
     numbers = dict(aims(found, None))
@@ -79,7 +80,7 @@ def test_each_aim_is_counted():
         "1 of 1",
         "0 channels of 9",
         "1 of 2",
-        "1 of 3: b",
-        "2.10, worst 3.00 (b)",
+        "1 of 3: 2 Hz held in 10",
+        "2.10, worst 3.00 (2 Hz held in 10)",
     ]
-    assert dict(aims(found, ["mass"]))["none sure (0.8) of an absent cause"] == "1 of 3: a"
+    assert dict(aims(found, ["mass"]))["none sure (0.8) of an absent cause"] == "1 of 3: heading filtered 1 s"
