@@ -518,6 +518,6 @@ def test_no_home_folder_is_one_line(ellipse, chain, tmp_path):
         )  # fmt: skip
         assert done.returncode == code, done.stderr
         if code:
-            assert done.stderr.startswith("error: this user has no home folder: let CYBERSHIP_CACHE")
+            assert done.stderr.startswith("error: this user has no home folder: set CYBERSHIP_CACHE")
             assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "~").exists()

@@ -375,7 +375,7 @@ def test_range_in_which_the_fmu_fails_is_said_and_the_rest_goes_on(work, capsys)
     notes = " ".join(found["fmu"]["notes"])
     assert "the FMU fails" in notes
     assert "x is not finite" in notes
-    assert "do not determine unused" in notes
+    assert "Not identifiable from these runs: unused" in notes
 
 
 @pytest.mark.slow

@@ -110,7 +110,7 @@ def test_foreign_parameters_travel_beside(chain, tmp_path):
     """FMPy ignores them, and a note says so; the foreign FMUs are the same bytes."""
     notes = write(chain, tmp_path / "chain.ssp", export_ssp)
     assert len(notes) == 1
-    assert "gain: k cannot be baked" in notes[0]
+    assert "gain: k cannot become start values" in notes[0]
     write(chain, tmp_path / "osp", export_osp)
     foreign = Path(chain["fmus"]["gain"]["path"])
     assert (tmp_path / "osp" / "gain.fmu").read_bytes() == foreign.read_bytes()
