@@ -1,11 +1,12 @@
-"""The two ways in which a run can go wrong, and hints for messages."""
+"""The two ways in which a run can go wrong, hints for messages, and keys that occur twice."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
-from cybership.message_text import LONGEST_VALUE, PrintableError
+from cybership.message_text import LONGEST_VALUE, PrintableError, quoted
 
-__all__ = ["InputError", "SimulationError", "most_alike", "nearest"]
+__all__ = ["InputError", "SimulationError", "most_alike", "nearest", "unique_keys"]
 
 # Similarity (difflib's ratio, 0 to 1) above which a known name is suggested; chosen: lower ones mislead.
 SIMILAR = 0.5
@@ -51,3 +52,17 @@ def nearest(name: str, known: Iterable[str]) -> str:
         ", ..." if len(known) > LISTED else ""
     )
     return f"; there is {shown}" if len(known) == 1 else f"; there are {shown}"
+
+
+def unique_keys(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object from its pairs, for :func:`json.loads`, which alone keeps the last of equal keys.
+
+    Raises:
+        InputError: a key occurs twice.
+    """
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise InputError(f"the key {quoted(name)} occurs twice in one object")
+        found[name] = value
+    return found

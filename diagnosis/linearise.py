@@ -6,7 +6,6 @@ if __name__ == "__main__":
     supervised()  # before all other imports, which take a while
 
 import argparse
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +28,7 @@ from .commands.command_line import (
 )
 from .execution.progress import Advance
 from .execution.result_folder import together
+from .execution.user_files import json_content
 
 if TYPE_CHECKING:
     from cosim.fmu import FmuModel
@@ -90,10 +90,7 @@ def _read_state(path: Path, model: "FmuModel") -> dict[str, float]:
     Raises:
         InputError: it is not that.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' cannot be read as a state: {error}") from None
+    content = json_content(path, "a state")
     if not isinstance(content, dict):
         raise InputError(f'\'{path}\' must be an object of numbers, as {{"u_0": 0.1, "tau_X": 0.5}}')
     possible = [v.name for v in model.variables.values() if v.type == "Real" and model.can_be_set(v)]

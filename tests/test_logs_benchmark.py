@@ -83,4 +83,7 @@ def test_each_aim_is_counted():
         "1 of 3: 2 Hz held in 10",
         "2.10, worst 3.00 (2 Hz held in 10)",
     ]
-    assert dict(aims(found, ["mass"]))["none sure (0.8) of an absent cause"] == "1 of 3: heading filtered 1 s"
+    assert (
+        dict(aims(found, ["mass"]))["none sure (0.8) of an absent cause"]
+        == "1 of 3: heading filtered 1 s"
+    )

@@ -106,10 +106,9 @@ def code_sentences(part):
     elif part == "public docstrings":
         found = [(name, 0, text) for name, text in texts.public_docstrings()]
     else:
-        paths = (ROOT if part == "report templates" else ROOT / part).rglob(
-            "templates/*.html" if part == "report templates" else "*.py"
-        )
-        read = texts.template_texts if part == "report templates" else texts.module_texts
+        pages = part == "report templates"  # of any package, and none of an old build
+        names, read = (PACKAGES, texts.template_texts) if pages else ((part,), texts.module_texts)
+        paths = [p for n in names for p in (ROOT / n).rglob("templates/*.html" if pages else "*.py")]
         found = [(p.relative_to(ROOT).as_posix(), *text) for p in sorted(paths) for text in read(p)]
     return [
         (place, line, sentence.strip())

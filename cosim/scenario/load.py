@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from cybership.message_text import Location, first_fault
 
-from ..errors import InputError, most_alike, nearest
+from ..errors import InputError, most_alike, nearest, unique_keys
 from ..formats.systems import is_system, read_system
 from . import faults
 from .roles import Roles
@@ -49,7 +49,7 @@ def load_scenario(
         scenario.set_origin(system.folder, system.notes, system.unpacked)
         return scenario
     try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once)
+        content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=unique_keys)
         json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
@@ -104,15 +104,6 @@ def cut_short(scenario: Scenario) -> Scenario:
     )
     changed.set_origin(scenario.folder, [*scenario.notes, note], scenario.unpacked)
     return changed
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object; of a key that occurs twice, Python's json would silently drop the first."""
-    names = [name for name, _ in pairs]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"the key '{name}' occurs twice in one object")
-    return dict(pairs)
 
 
 def _validate(content: Any, name: str, folder: Path) -> Scenario:

@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from cosim import InputError
-from cosim.errors import nearest
+from cosim.errors import nearest, unique_keys
 from cybership.message_text import Location, first_fault, quoted
 from cybership.renamed import with_new_names
 
@@ -212,7 +212,7 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     path = Path(path)
     try:
         changed, text = path.stat().st_mtime, path.read_bytes()
-        given = with_new_names(json.loads(text, object_pairs_hook=_once), "criteria", path)
+        given = with_new_names(json.loads(text, object_pairs_hook=unique_keys), "criteria", path)
         # As JSON, where "0.01" is no number and true no metre.
         content = Criteria.model_validate_json(json.dumps(given), strict=True)
     except InputError as error:
@@ -232,15 +232,6 @@ def read_criteria(path: str | Path) -> ReadCriteria:
 def now() -> str:
     """The time of this computer with its offset, ISO 8601."""
     return _stamp(datetime.now().astimezone())
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object; of a key that occurs twice, Python's json would silently drop the first."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        twice = next(n for n, (name, _) in enumerate(pairs) if name in dict(pairs[:n]))
-        raise InputError(f"the key {quoted(pairs[twice][0])} occurs twice in one object")
-    return found
 
 
 def _stamp(time: datetime) -> str:

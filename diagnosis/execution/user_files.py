@@ -1,7 +1,9 @@
-"""A user's Python file that extends the diagnosis: a method, a criterion."""
+"""A user's files: JSON, and Python that extends the diagnosis by a method or a criterion."""
 
+import json
 import runpy
 from pathlib import Path
+from typing import Any
 
 from cosim import InputError
 
@@ -18,3 +20,17 @@ def from_file(path: Path, name: str, what: str) -> object:
         return runpy.run_path(str(path)).get(name)
     except (Exception, SystemExit) as error:
         raise InputError(f"'{path}' fails when imported: {error!r}") from error
+
+
+def json_content(path: Path, what: str) -> Any:
+    """The content of a JSON file of ``what`` (for messages).
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read as {what}: {error}") from None

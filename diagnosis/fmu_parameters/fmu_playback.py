@@ -5,7 +5,6 @@ A request that fails says why; the others go on. A process that an FMU ends is r
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from queue import SimpleQueue
 from threading import Lock
@@ -17,6 +16,7 @@ from cosim import InputError, SimulationError
 from cosim.fmu import ConfinedFmu, DoubleMemory, IsolatedInstance, Port
 
 from ..predictors import Execution
+from ..predictors.fmu.short_steps import returns_by_reset
 from .additional_force import AdditionalForce
 
 PROCESSES = 2  # chosen: as everywhere in the diagnosis
@@ -114,13 +114,11 @@ class Playback:
         return np.full((len(self.courses[request.course].inputs) + 1, len(self.outputs)), np.nan)
 
     def _returns_by_reset(self, request: PlaybackRequest) -> bool:
-        """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
-        new = self._run(request)
-        with suppress(SimulationError):
-            again = self._run(request)
-            return np.array_equal(new.outputs, again.outputs, equal_nan=True)
-        self.close()
-        return False
+        return returns_by_reset(
+            lambda: self._run(request),
+            lambda new, again: np.array_equal(new.outputs, again.outputs, equal_nan=True),
+            self.close,
+        )
 
     def _ready(self, h: float) -> IsolatedInstance:
         if self._instance is not None and self._resets is not False and h == self._h:

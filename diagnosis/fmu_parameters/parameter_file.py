@@ -32,6 +32,8 @@ from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
 from cybership.message_text import first_fault, quoted
 
+from ..execution.user_files import json_content
+
 Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
 
@@ -172,12 +174,11 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
     Raises:
         InputError: no such file, a fault of it, or a name that the FMU does not have.
     """
+    content = json_content(path, "parameters")
     try:
-        found = ParameterFile.model_validate(json.loads(path.read_text(encoding="utf-8"))).parameters
+        found = ParameterFile.model_validate(content).parameters
     except ValidationError as error:
         raise InputError(f"'{path}': {first_fault(error)}") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' cannot be read as parameters: {error}") from None
     possible = {v.name for v in model.variables.values() if can_be_calibrated(v)} - set(mapped)
     for p in found:
         if p.name in mapped:

@@ -13,7 +13,6 @@ The key is the column, the name that of the variable, as in the map of a ship. W
 that are called as inputs and outputs are those.
 """
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,15 +25,15 @@ from pydantic import (
     FiniteFloat,
     NonNegativeFloat,
     PositiveFloat,
-    ValidationError,
     field_validator,
 )
 
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
-from cybership.message_text import first_fault, quoted
-from cybership.renamed import with_new_names
+from cybership.message_text import quoted
+
+from ..predictors.fmu.variable_map import map_content, with_names_alone
 
 # Units of an input that acts in addition to all else.
 FORCES = ("N", "N.m", "Nm", "m/s2", "rad/s2")
@@ -94,8 +93,7 @@ class SystemMap(BaseModel):
     @field_validator("inputs", "outputs", "start", mode="before")
     @classmethod
     def _names_alone(cls, value: Any) -> Any:
-        given = value.items() if isinstance(value, dict) else ()
-        return {k: {"name": c} if isinstance(c, str) else c for k, c in given} or value
+        return with_names_alone(value)
 
     @property
     def variables(self) -> set[str]:
@@ -110,13 +108,7 @@ def read_system_map(path: Path) -> SystemMap:
     Raises:
         InputError: it is none.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return SystemMap.model_validate(with_new_names(content, "map", path))
-    except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error)}") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+    return map_content(path, SystemMap)
 
 
 def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemMap:

@@ -1,6 +1,5 @@
 """What the commands ask of an FMU and measured runs: read, checked, and ready to be predicted."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from cosim import InputError
 from cosim.fmu import ConfinedFmu, FmuModel
 from cybership.message_text import quoted
 
+from ..execution.user_files import json_content
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, POSE
 from ..predictors.fmu.instances import confined
@@ -45,10 +45,7 @@ def is_system(runs: Sequence[Path], map: Path | None) -> bool:  # noqa: A002
             return True
     if map is None:
         return False
-    try:
-        content = json.loads(map.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"'{map}' cannot be read as a map: {error}") from None
+    content = json_content(map, "a map")
     outputs = content.get("outputs") if isinstance(content, dict) else None
     return isinstance(outputs, dict) and not set(outputs) <= set(MOTION)
 

@@ -263,7 +263,7 @@ def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) ->
         starts: the windows, which begin with the measured pose.
         h: interval [s].
     """
-    if not any(np.any(lag) for lag in model.lags):
+    if not model.is_filtered:
         return poses
     first = starts.first(lambda s: s.eta)
     poses = np.stack([*poses.transpose(1, 0, 2, 3)[:2], np.unwrap(poses[:, 2], axis=0)], axis=1)
@@ -285,7 +285,7 @@ def true_motion(eta: Any, eta_dot: Any, eta_ddot: Any, model: Model) -> tuple[li
     A low-pass filter of first order with the time constant T is undone by y + T dy/dt.
     """
     b, step = model.hull, LONGEST_STEP
-    if any(np.any(lag) for lag in model.lags):
+    if model.is_filtered:
         eta, eta_dot = (
             [y + lag * y_dot for y, y_dot, lag in zip(a, a_dot, model.lags, strict=True)]
             for a, a_dot in ((eta, eta_dot), (eta_dot, eta_ddot))

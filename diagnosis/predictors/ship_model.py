@@ -196,6 +196,11 @@ class Model:
         position, heading = (self.measurement.get(e.id, 0.0) for e in (POSITION_LAG, HEADING_LAG))
         return position, position, heading
 
+    @property
+    def is_filtered(self) -> bool:
+        """Whether a channel of the pose is measured behind a low-pass filter."""
+        return any(np.any(lag) for lag in self.lags)
+
     @cached_property
     def hull(self) -> PreparedVessel:
         """The vessel, ready for a step."""

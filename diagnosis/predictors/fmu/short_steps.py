@@ -4,8 +4,9 @@ The FMU is begun anew for each state. It is reset in between, if a reset is seen
 instantiation does; else each state has an instance of its own.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,24 @@ from .instances import FmuRun
 STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
 
 Values = Mapping[str, float]
+Found = TypeVar("Found")
+
+
+def returns_by_reset(
+    run: Callable[[], Found], same: Callable[[Found, Found], bool], close: Callable[[], None]
+) -> bool:
+    """Whether a reset leaves an FMU as its instantiation does, as far as can be seen.
+
+    Args:
+        run: runs the FMU, after a reset if it has run before.
+        same: whether two results are the same.
+        close: frees the FMU, which a failed reset has left in an unknown state.
+    """
+    new = run()
+    with suppress(SimulationError):
+        return same(new, run())
+    close()
+    return False
 
 
 class ShortSteps:
@@ -66,12 +85,11 @@ class ShortSteps:
 
     def _tried(self, start: Values, inputs: Values) -> bool:
         """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
-        new = self._run(start, inputs)
-        with suppress(SimulationError):
-            again = self._run(start, inputs)
-            return all(np.array_equal(new[name], again[name]) for name in new)
-        self.close()
-        return False
+        return returns_by_reset(
+            lambda: self._run(start, inputs),
+            lambda new, again: all(np.array_equal(new[name], again[name]) for name in new),
+            self.close,
+        )
 
     def _run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
         if self._instance is not None and self._resets is not False:

@@ -16,10 +16,10 @@ moves ahead alone. A variable whose unit the map does not state is in that of it
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import pi
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AllowInfNan,
@@ -39,6 +39,7 @@ from cybership.renamed import with_new_names
 from fmus.addition import Line
 from fmus.base_units import base_exponents
 
+from ...execution.user_files import json_content
 from ...runs import QUANTITY, UNITS, Column
 from ..black_box import MOTION, POSE, VELOCITY
 from .signal_names import NONE, Meant, lone, meant
@@ -58,6 +59,7 @@ SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "forc
            "angular acceleration": "rad/s2"}  # fmt: skip
 
 
+Map = TypeVar("Map", bound=BaseModel)
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 
@@ -81,8 +83,7 @@ class VariableMap(BaseModel):
     @field_validator(*GROUPS, mode="before")
     @classmethod
     def _names_alone(cls, value: Any) -> Any:
-        told = value.items() if isinstance(value, dict) else ()
-        return {s: {"name": c} if isinstance(c, str) else c for s, c in told} or value
+        return with_names_alone(value)
 
     def told(self, group: str) -> dict[str, Column]:
         """The signals of a group that have a variable."""
@@ -109,20 +110,38 @@ class VariableMap(BaseModel):
         return told
 
 
+def with_names_alone(group: Any) -> Any:
+    """A group of a map's entries, in which a text is the name of a variable."""
+    given = group.items() if isinstance(group, dict) else ()
+    return {key: {"name": x} if isinstance(x, str) else x for key, x in given} or group
+
+
 def read_map(path: Path) -> VariableMap:
     """A map from its file.
 
     Raises:
         InputError: it is none.
     """
+    return map_content(path, VariableMap, _nearest_key)
+
+
+def map_content(path: Path, of: type[Map], hint: Callable[[Location], str] = lambda _: "") -> Map:
+    """A map of some form from its file.
+
+    Args:
+        path: of the file.
+        of: the form.
+        hint: text behind the fault at a place of the content.
+
+    Raises:
+        InputError: it is none.
+    """
+    content = json_content(path, "a map")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return VariableMap.model_validate(with_new_names(content, "map", path))
+        return of.model_validate(with_new_names(content, "map", path))
     except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
-    except RecursionError:
-        raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
-    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}': {first_fault(error, hint)}") from None
+    except ValueError as error:
         raise InputError(f"'{path}' cannot be read as a map: {error}") from None
 
 
