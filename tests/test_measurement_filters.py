@@ -1,19 +1,23 @@
-"""Channels that are measured behind a low-pass filter: predicted as filtered, undone, and found."""
+"""Channels that are measured behind a filter: predicted as filtered, undone, and found."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, diagnose
-from diagnosis.predictors.prediction import filtered, true_motion
+from diagnosis.predictors.prediction import before_filters, filtered, true_motion
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.predictors.weak_form import HORIZON, weak_windows
 
 LAGS = {"position_lag": 0.7, "heading_lag": 0.4}
 BEHIND = Model(measurement=LAGS)
+TRACKERS = {"position_tracker": 0.6, "heading_tracker": 0.9}
+TRACKED = Model(measurement=TRACKERS)
+BOTH = Model(measurement=LAGS | TRACKERS)
 
 
 def behind_filters(run, position_lag=0.0, heading_lag=0.0):
@@ -34,27 +38,83 @@ def test_a_filter_gives_the_response_to_a_ramp_and_comes_to_its_lag():
     t = h * np.arange(40.0)
     poses = first[None, :, None] + 0.2 * t[:, None, None, None]
     found = filtered(poses, BEHIND, shooting.starts, h) - first[None, :, None]
-    for k, lag in enumerate(BEHIND.lags):
+    for k, lag in enumerate(BEHIND.filters.lag):
         expected = 0.2 * (t - lag * (1.0 - np.exp(-t / lag)))
         np.testing.assert_allclose(found[:, k, 0, 0], expected, atol=1e-12)
         assert found[-1, k, 0, 0] == pytest.approx(0.2 * (t[-1] - lag), rel=1e-6)
 
 
-def test_the_motion_behind_a_filter_is_that_before_it():
-    """A sine through (1 + T s)^-1 has the gain cos(a) and the lag a = atan(w T): both are undone."""
-    t, w = np.linspace(0.0, 30.0, 200), 0.5
-    eta, eta_dot, eta_ddot = [], [], []
-    for lag in BEHIND.lags:
-        a = np.arctan(w * lag)
-        eta.append(np.cos(a) * np.sin(w * t - a))
-        eta_dot.append(w * np.cos(a) * np.cos(w * t - a))
-        eta_ddot.append(-(w**2) * np.cos(a) * np.sin(w * t - a))
-    (x, y, psi), (u, v, r) = true_motion(eta, eta_dot, eta_ddot, BEHIND)
-    for true in (x, y, psi):
-        np.testing.assert_allclose(true[0], np.sin(w * t), atol=1e-12)
-    speed = w * np.cos(w * t)
-    np.testing.assert_allclose(r[0], speed, atol=1e-6)
-    np.testing.assert_allclose(np.hypot(u, v)[0], np.sqrt(2.0) * np.abs(speed), atol=1e-6)
+def test_a_tracker_is_the_integral_of_its_differential_equations():
+    """Of a ramp it has no error in the end, and of a parabola T^2 times the acceleration."""
+    shooting = Shooting([smoothed(sail(40.0)[0])], HORIZON)
+    first, h = shooting.starts.first(lambda s: s.eta), 0.05
+    rate = shooting.starts.first(lambda s: s.eta_dot)
+    t = h * np.arange(400.0)
+    T = TRACKED.filters.tracker[0]
+    poses = first[None, :, None] + (0.1 * t + 0.02 * t**2)[:, None, None, None]
+    found = filtered(poses, TRACKED, shooting.starts, h)
+    off = poses - found
+    np.testing.assert_allclose(off[-1, :2], T**2 * 0.04, rtol=1e-3)
+    x, at = poses[:, 0, 0, 0], lambda s: np.interp(s, t, poses[:, 0, 0, 0])
+
+    def follows(s, state):
+        y, v = state
+        return v + np.sqrt(2.0) / T * (at(s) - y), (at(s) - y) / T**2
+
+    start = found[0, 0, 0, 0]
+    v = rate[0, 0] - np.sqrt(2.0) / T * (x[0] - start)
+    exact = solve_ivp(follows, (0.0, t[-1]), (start, v), t_eval=t, rtol=1e-9, atol=1e-12, max_step=h)
+    np.testing.assert_allclose(found[:, 0, 0, 0], exact.y[0], atol=1e-8)
+
+
+@dataclass(eq=False)
+class Sine:
+    """A smoothed motion that is a sine with its derivatives, in all three coordinates."""
+
+    time: np.ndarray
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+
+    @classmethod
+    def behind(cls, model, t, w):
+        """sin(w t) behind filters with the frequency response H(i w), in steady state."""
+        s = 1j * w
+        low = 1.0 / (1.0 + s * np.array(model.filters.lag))
+        T = np.array(model.filters.tracker)
+        tracking = (np.sqrt(2.0) * s * T + 1.0) / (s**2 * T**2 + np.sqrt(2.0) * s * T + 1.0)
+        z = low * tracking * np.exp(s * t)[:, None]
+        return cls(t, z.imag, (s * z).imag, (s**2 * z).imag)
+
+
+@pytest.mark.parametrize("model", [Model(measurement=LAGS), TRACKED, BOTH])
+def test_the_motion_behind_filters_is_that_before_them(model):
+    """Whatever the filters do to a sine is undone, once a tracker's unknown start is forgotten."""
+    t, w = np.linspace(0.0, 60.0, 6001), 0.5
+    pose, rate = before_filters(Sine.behind(model, t, w), model)
+    later = (t > 20.0) & (t < 59.9)  # at the end the slope of the rate is one-sided
+    np.testing.assert_allclose(pose[later], np.sin(w * t)[later, None] * np.ones(3), atol=2e-5)
+    np.testing.assert_allclose(rate[later], w * np.cos(w * t)[later, None] * np.ones(3), atol=2e-5)
+
+
+def test_forward_and_back_are_inverse():
+    """A motion behind the filters, sample by sample, is undone to the motion."""
+    t, w = np.linspace(0.0, 60.0, 6001), 0.5
+    sine = Sine.behind(BOTH, t, w)
+    _, _, between = BOTH.filters.undone(sine)
+    at = 3000
+    poses = np.repeat(np.sin(w * t[at:])[:, None, None, None], 3, axis=1)
+    starts = (x[at][:, None] for x in (between, sine.eta, sine.eta_dot))
+    found = BOTH.filters.behind(poses, *starts, t[1])
+    np.testing.assert_allclose(found[:, :, 0, 0], sine.eta[at:], atol=1e-4)
+
+
+def test_poses_and_rates_become_body_fixed_speeds():
+    (x, y, psi), (u, v, r) = true_motion(
+        np.array([[1.0], [2.0], [np.pi / 2]]), np.array([[0.3], [0.4], [0.1]]), Model()
+    )
+    assert (x.item(), y.item(), psi.item()) == (1.0, 2.0, np.pi / 2)
+    np.testing.assert_allclose([u.item(), v.item(), r.item()], [0.4, -0.3, 0.1], atol=1e-9)
 
 
 def test_a_model_with_the_filters_predicts_what_they_give():
@@ -86,6 +146,28 @@ def test_a_filter_is_found_in_addition_to_the_hidden_effect(channel, lag):
     assert found[channel].confidence >= 0.5
     assert found[channel].coefficients[channel].value == pytest.approx(lag - h / 2.0, rel=0.1)
     assert found["X_u"].coefficients["delta_X_u"].value == pytest.approx(-2.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_tracker_is_found_in_addition_to_the_hidden_effect():
+    """The heading of an alpha-beta filter at 10 Hz, whose continuous time constant is h / sqrt(beta)."""
+    h, gain = 0.1, 0.2
+    beta = 2.0 * (2.0 - gain) - 4.0 * np.sqrt(1.0 - gain)  # Kalata 1984
+    made = [sail(120.0, h=h, ship={"delta_X_u": -2.0}, seed=seed)[0] for seed in (1, 2)]
+    runs = []
+    for run in made:
+        pose, at, speed = np.array(run.pose), float(run.pose[0, 2]), 0.0
+        for n, value in enumerate(np.unwrap(run.pose[:, 2]).tolist()):
+            expected = at + h * speed
+            at, speed = expected + gain * (value - expected), speed + beta / h * (value - expected)
+            pose[n, 2] = at
+        runs.append(weak_windows(smoothed(replace(run, pose=pose))))
+    found = {e.id: e for e in diagnose(runs).content.effects}
+    assert {*found} == {"heading_tracker", "X_u"}
+    assert found["X_u"].confidence > 0.9
+    assert found["heading_tracker"].coefficients["heading_tracker"].value == pytest.approx(
+        h / np.sqrt(beta), rel=0.15
+    )
 
 
 @pytest.mark.slow

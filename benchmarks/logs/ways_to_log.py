@@ -203,8 +203,10 @@ for lag in LAGS:
         added = frozenset({"heading_lag" if of == "heading" else "position_lag"})
         WAYS[f"{of} filtered {lag:g} s"] = Way(filtered(names, lag), None, adds=added)
 for gain in (0.2, 0.5):
-    WAYS[f"Kalman pose {gain:g} held"] = Way(tracked(POSE, gain), None)
-    WAYS[f"Kalman heading {gain:g}, place 5 Hz held"] = Way(tracked(["psi"], gain), None)
+    both = frozenset({"position_tracker", "heading_tracker"})
+    WAYS[f"Kalman pose {gain:g} held"] = Way(tracked(POSE, gain), None, adds=both)
+    name, added = f"Kalman heading {gain:g}, place 5 Hz held", frozenset({"heading_tracker"})
+    WAYS[name] = Way(tracked(["psi"], gain), None, adds=added)
 for step in (1.0, 0.1):
     noise = _by_rounding(["psi"], np.radians(step))
     WAYS[f"heading in {step:g} degrees"] = Way(degrees(step), noise, columns=DEGREES)

@@ -26,7 +26,6 @@ HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
 # Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).
 FAR_OFF = 3.0
-MOTION = (attrgetter("eta"), attrgetter("eta_dot"), attrgetter("eta_ddot"))  # of a smoothed run
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +45,11 @@ class WindowStarts:
     def first(self, values: Callable[[Smoothed], np.ndarray]) -> np.ndarray:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
+
+    def motion(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
+        """Smoothed pose and its rate (3, w) where windows begin, before a model's filters."""
+        pose, rate = (self.first(lambda s, k=k: before_filters(s, model)[k]) for k in (0, 1))
+        return pose, rate
 
     def drive(self, model: Model) -> PreparedThrusters:
         """The thrusters of a model, in the layout of the runs' commands."""
@@ -185,8 +189,7 @@ def propagate(
     power = starts.power(model.clock)
     thrusters, beside, air = drive, starts.given(model), starts.air(model)
     # The smoothed motion, seen through the model's measurement effects.
-    eta, eta_dot, eta_ddot = map(starts.first, MOTION)
-    pose, nu = true_motion(eta, eta_dot, eta_ddot, model)
+    pose, nu = true_motion(*starts.motion(model), model)
     s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
     steps: Sequence[Any] = thrust
     if single:
@@ -219,7 +222,7 @@ def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
 
 def by_measurement(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:
     """Models of one ship that are predicted at once, those measured alike; which, and in one."""
-    measurements = [(m.clock, *m.lags) for m in models]
+    measurements = [(m.clock, m.filters) for m in models]
     for measurement in sorted({*measurements}):
         chosen = [k for k, m in enumerate(measurements) if m == measurement]
         yield chosen, stacked([models[k] for k in chosen])
@@ -255,7 +258,7 @@ def moved(s: vessel.State, tau: Force, b: vessel.PreparedVessel, h: float) -> ve
 
 
 def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) -> np.ndarray:
-    """Poses (n, 3, p, w) behind a model's low-pass filters, which are exact for straight lines between.
+    """Poses (n, 3, p, w) behind a model's filters.
 
     Args:
         poses: of windows, at their start and at equal intervals from there.
@@ -263,33 +266,25 @@ def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) ->
         starts: the windows, which begin with the measured pose.
         h: interval [s].
     """
-    if not model.is_filtered:
+    filters = model.filters
+    if not filters:
         return poses
-    first = starts.first(lambda s: s.eta)
-    poses = np.stack([*poses.transpose(1, 0, 2, 3)[:2], np.unwrap(poses[:, 2], axis=0)], axis=1)
-    found = np.array(poses)
-    for k, lag in enumerate(model.lags):
-        p, kept = poses[:, k], np.exp(-h / np.maximum(lag, np.finfo(float).tiny))
-        behind = p[0] - first[k]
-        behind = np.where(np.equal(lag, 0.0), 0.0, wrap(behind) if k == 2 else behind)
-        for n, slope in enumerate(np.diff(p, axis=0) / h):
-            found[n, k] = p[n] - behind
-            behind = lag * slope + kept * (behind - lag * slope)
-        found[-1, k] = p[-1] - behind
-    return found
+    between = starts.first(lambda s: filters.undone(s)[2])
+    eta, eta_dot = (starts.first(attrgetter(name)) for name in ("eta", "eta_dot"))
+    return filters.behind(poses, between, eta, eta_dot, h)
 
 
-def true_motion(eta: Any, eta_dot: Any, eta_ddot: Any, model: Model) -> tuple[list[Any], list[Any]]:
-    """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,).
+def before_filters(s: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Smoothed pose and its rate (n, 3) of a run, before a model's filters."""
+    if not model.filters:
+        return s.eta, s.eta_dot
+    pose, rate, _ = model.filters.undone(s)
+    return pose, rate
 
-    A low-pass filter of first order with the time constant T is undone by y + T dy/dt.
-    """
+
+def true_motion(eta: Any, eta_dot: Any, model: Model) -> tuple[list[Any], list[Any]]:
+    """Pose and body-fixed velocity, each three of (p, w), of a measured pose and its rate (3, w)."""
     b, step = model.hull, LONGEST_STEP
-    if model.is_filtered:
-        eta, eta_dot = (
-            [y + lag * y_dot for y, y_dot, lag in zip(a, a_dot, model.lags, strict=True)]
-            for a, a_dot in ((eta, eta_dot), (eta_dot, eta_ddot))
-        )
     poses = ([y + h * y_dot for y, y_dot in zip(eta, eta_dot, strict=True)] for h in (0.0, step, -step))
     (x, y, psi), ahead, astern = (true_pose(pose, b) for pose in poses)
     x_dot, y_dot, r = ((a - b) / (2.0 * step) for a, b in zip(ahead, astern, strict=True))

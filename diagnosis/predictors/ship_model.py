@@ -11,10 +11,12 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
 from fmus.effects.linear_map import AXES, parameter
-from fmus.effects.measurement import CLOCK_OFFSET, HEADING_LAG, POSITION_LAG
+from fmus.effects.measurement import CLOCK_OFFSET, MEASURED_BEHIND
 from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
 from fmus.vessel.vessel import PreparedVessel
+
+from .filters import Filters
 
 if TYPE_CHECKING:  # at run time it takes a while to import
     from ..runs import Fingerprint
@@ -190,16 +192,11 @@ class Model:
         """Time [s] by which a pose is older than its stamp."""
         return self.measurement.get(CLOCK_OFFSET.id, 0.0)
 
-    @property
-    def lags(self) -> tuple[Any, Any, Any]:
-        """Time constants [s] of the low-pass filters behind which x, y and psi are measured."""
-        position, heading = (self.measurement.get(e.id, 0.0) for e in (POSITION_LAG, HEADING_LAG))
-        return position, position, heading
-
-    @property
-    def is_filtered(self) -> bool:
-        """Whether a channel of the pose is measured behind a low-pass filter."""
-        return any(np.any(lag) for lag in self.lags)
+    @cached_property
+    def filters(self) -> Filters:
+        """Filters behind which x, y and psi are measured."""
+        values = (tuple(self.measurement.get(e.id, 0.0) for e in each) for each in MEASURED_BEHIND)
+        return Filters(*((position, position, heading) for position, heading in values))
 
     @cached_property
     def hull(self) -> PreparedVessel:

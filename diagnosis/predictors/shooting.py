@@ -121,9 +121,9 @@ class Shooting:
             model: about which.
             steps: parameter -> step of its finite difference.
         """
-        key = Response.key(model)
+        key = Response.key(model), model.filters
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
-        same = {n: steps[n] for n, m in changed.items() if Response.key(m) == key}
+        same = {n: steps[n] for n, m in changed.items() if (Response.key(m), m.filters) == key}
         together = _together(model, same)
         states = self._states(together, model)
         base, *others = self._poses(states, together)

@@ -21,7 +21,7 @@ from ..runs import Smoothed
 from ..runs.cleaning import EVERY, HORIZON, WIDTH
 from ..runs.files.reading import Run
 from ..runs.smoothing.smoother import breaks
-from .prediction import at_rest, true_motion
+from .prediction import at_rest, before_filters, true_motion
 from .ship_model import Model
 from .thrust import Response, inflow, thrust
 
@@ -214,7 +214,7 @@ def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
-    measured = (*((name, model.vessel.get(name, 0.0)) for name in names), *model.lags)
+    measured = (*((name, model.vessel.get(name, 0.0)) for name in names), model.filters)
     ship = (measured, tuple(sorted(model.vessel.items())))
     water = model.hull.params.water
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
@@ -329,7 +329,6 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
 
 def _motion(w: WeakWindows, model: Model) -> np.ndarray:
     """True pose and velocity (2, n, 3) behind the measured ones."""
-    smoothed = w.smoothed
-    motion = true_motion(smoothed.eta.T, smoothed.eta_dot.T, smoothed.eta_ddot.T, model)
+    motion = true_motion(*(part.T for part in before_filters(w.smoothed, model)), model)
     # Columns in one piece each: all that is computed of them goes along time.
     return np.array([np.where(w.known, np.concatenate(part), 0.0) for part in motion]).swapaxes(1, 2)

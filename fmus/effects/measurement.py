@@ -10,11 +10,12 @@ from .effect import Effect, Search, Wording, effect
 from .families import CLOCK, FILTER, MEASUREMENT
 from .text import Found, number, offset, towards
 
+TRACKERS = (0.2, 0.4, 0.8, 1.6)  # s, to try: a fit starts within a factor of 1.5 of those between
+
 Pose = tuple[Number, Number, Number]
 ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
-LAGS = Range(
-    0.0, 3.0
-)  # s, of a filter; receivers smooth over some samples, a chart plotter over seconds
+# s, of a filter; receivers smooth over some samples, a chart plotter over seconds.
+LAGS = Range(0.0, 3.0)
 # Offsets of the clock to try [s]: some samples, and what a slow network gives.
 OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)
 
@@ -119,6 +120,34 @@ def low_pass(channel: str, symbol: str, coordinates: str) -> Effect:
     )
 
 
+def tracker(channel: str, symbol: str, coordinates: str) -> Effect:
+    """The effect that a channel is the estimate of a steady Kalman filter of constant velocity."""
+    name = f"{channel}_tracker"
+    return Effect(
+        id=name,
+        kind="measurement",
+        axis="XYN",
+        description=f"the measured {channel} is the estimate of a Kalman filter of constant velocity",
+        formula=f"T^2 d2y/dt2 + sqrt(2) T d(y - p)/dt + y - p = 0, p = ({coordinates})",
+        symbol=symbol,
+        sign="0: none",
+        source="Kalata 1984, alpha-beta filter at small gains",
+        linear=False,
+        parameters=(
+            Variable(name, "s", f"time constant of the tracker of the {channel}", 0.0, LAGS, False),
+        ),
+        function=None,
+        search=Search(tries=[{name: T} for T in TRACKERS]),
+        wording=Wording(
+            lambda f: f"The {channel} is measured behind a tracking filter of {number(f[name])} s.",
+            FILTER,
+        ),
+    )
+
+
 # No FMU has the receiver's filter, as none has its clock.
 POSITION_LAG = low_pass("position", "T_p", "x, y")
 HEADING_LAG = low_pass("heading", "T_ψ", "psi")
+POSITION_TRACKER = tracker("position", "T_p", "x, y")
+HEADING_TRACKER = tracker("heading", "T_ψ", "psi")
+MEASURED_BEHIND = ((POSITION_LAG, HEADING_LAG), (POSITION_TRACKER, HEADING_TRACKER))

@@ -1,0 +1,114 @@
+"""Filters between the true and the measured pose: a low-pass, then a tracker of constant velocity."""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from fmus.ops import wrap
+
+from ..runs import Smoothed
+
+DAMPING = 0.5**0.5  # of a steady Kalman filter of constant velocity, whose noise is white acceleration
+
+
+class Filters(NamedTuple):
+    """Filters behind which x, y and psi are measured; zero: none.
+
+    Attributes:
+        lag: (3,), time constants T [s] of low-pass filters of first order, T dz/dt = p - z.
+        tracker: (3,), time constants T = 1/w [s] of trackers of constant velocity: with d = sqrt(1/2),
+            dy/dt = v + 2 d w (z - y), and dv/dt = w^2 (z - y).
+    """
+
+    lag: tuple[float, float, float]
+    tracker: tuple[float, float, float]
+
+    def __bool__(self) -> bool:
+        return any(self.lag) or any(self.tracker)
+
+    def undone(self, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pose before the filters, its rate, and the pose between the two, (n, 3) each."""
+        return _undone(self, s)
+
+    def behind(
+        self, poses: np.ndarray, between: np.ndarray, eta: np.ndarray, eta_dot: np.ndarray, h: float
+    ) -> np.ndarray:
+        """Poses (n, 3, p, w) behind the filters, exact for straight lines between.
+
+        Args:
+            poses: of windows, at their start and at equal intervals from there.
+            between: (3, w), the pose between the filters at the start, of :meth:`undone`.
+            eta, eta_dot: (3, w), the measured pose and its rate at the start.
+            h: interval [s].
+        """
+        found = np.stack([*poses.transpose(1, 0, 2, 3)[:2], np.unwrap(poses[:, 2], axis=0)], axis=1)
+        for k, (lag, T) in enumerate(zip(self.lag, self.tracker, strict=True)):
+            if lag:
+                found[:, k] = _lagging(found[:, k], _off(found[0, k], between[k], k), lag, h)
+            if T:
+                off = _off(found[0, k], eta[k], k)
+                found[:, k] = _tracking(found[:, k], off, eta_dot[k], T, h)
+        return found
+
+
+@lru_cache(maxsize=64)  # runs; a fit asks for the same several times
+def _undone(f: Filters, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """See :meth:`Filters.undone`: y + T dy/dt of a low-pass, and y + b of a tracker.
+
+    The error b of the tracker follows 2 d w db/dt + w^2 b = d2y/dt2.
+    """
+    eta, eta_dot, eta_ddot = (np.array(part) for part in (s.eta, s.eta_dot, s.eta_ddot))
+    for k, T in enumerate(f.tracker):
+        if T:
+            tau = 2.0 * DAMPING * T
+            error = T**2 * _low_passed(s.time, eta_ddot[:, k], tau)
+            rate = (T**2 * eta_ddot[:, k] - error) / tau
+            eta[:, k] += error
+            eta_dot[:, k] += rate
+            eta_ddot[:, k] += np.gradient(rate, s.time)
+    return eta + f.lag * eta_dot, eta_dot + f.lag * eta_ddot, eta
+
+
+def _off(a: Any, b: Any, k: int) -> Any:
+    return wrap(a - b) if k == 2 else a - b
+
+
+def _lagging(p: np.ndarray, off: np.ndarray, lag: float, h: float) -> np.ndarray:
+    """A coordinate (n, p, w) behind a low-pass filter whose output is off behind it at the start."""
+    found, kept = np.array(p), np.exp(-h / lag)
+    found[0] -= off
+    for n, slope in enumerate(np.diff(p, axis=0) / h, start=1):
+        off = lag * slope + kept * (off - lag * slope)
+        found[n] -= off
+    return found
+
+
+def _tracking(p: np.ndarray, off: np.ndarray, rate: np.ndarray, T: float, h: float) -> np.ndarray:
+    """The same behind a tracker, whose output has a rate at the start.
+
+    Its error and that of its velocity are a free oscillation but where the slope of the input changes.
+    """
+    found, slopes = np.array(p), np.diff(p, axis=0) / h
+    found[0] -= off
+    (bb, bw), (wb, ww) = expm(h * np.array([[-2.0 * DAMPING / T, 1.0], [-1.0 / T**2, 0.0]]))
+    velocity = rate - 2.0 * DAMPING / T * off
+    for n, slope in enumerate(slopes, start=1):
+        slow = slope - velocity
+        off, slow = bb * off + bw * slow, wb * off + ww * slow
+        velocity = slope - slow
+        found[n] -= off
+    return found
+
+
+def _low_passed(time: np.ndarray, x: np.ndarray, T: float) -> np.ndarray:
+    """A signal (n,) behind a low-pass filter, steady at the start and after each gap of NaN."""
+    kept = np.exp(-np.diff(time, prepend=time[:1]) / T).tolist()
+    found, y, last = [], np.nan, np.nan
+    for value, keep in zip(x.tolist(), kept, strict=True):
+        mean = 0.5 * (last + value)
+        y = value if y != y else mean + keep * (y - mean)
+        found.append(y)
+        last = value
+    return np.array(found)
