@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.measured import NOISE, changed, sail
 
 from diagnosis import InputError, clean
-from diagnosis.runs.cleaning import in_order, noise, unwrap
+from diagnosis.runs.cleaning import continued, in_order, noise, unwrap
 
 N = 1200
 
@@ -70,6 +70,30 @@ def test_time_stamps_that_repeat_or_go_backwards_are_left_out():
     assert tuple(track.counts()) == (N, 0, 4, 0, N - 4)
     assert (np.diff(track.run.time) > 0.0).all()
     assert "4 rows left out" in track.notes[0]
+
+
+def moving():
+    t = base().time
+    return replace(base(), pose=np.column_stack([0.1 * t, 0.02 * t, 0.01 * t]))
+
+
+@pytest.mark.parametrize("seconds", [0.5, 1.0, 7.0])
+def test_a_clock_that_was_set_back_goes_on(seconds):
+    run, later = moving(), np.arange(N) >= 700
+    mended = continued(replace(run, time=run.time - seconds * later))
+    np.testing.assert_allclose(mended.time, run.time, atol=1e-9)
+    assert f"set back by {seconds:.4g} s" in mended.notes[-1]
+
+
+def test_rows_that_come_late_are_no_clock_and_neither_is_another_run():
+    """A packet that came late has times of its own; a second run in the file begins elsewhere."""
+    run = moving()
+    order = np.r_[0:500, 520:540, 500:520, 540:N]
+    late = run.rows(order)
+    assert continued(late) is late
+    again = replace(run, time=np.r_[run.time[:700], run.time[: N - 700]])
+    elsewhere = replace(again, pose=run.pose + (np.arange(N) >= 700)[:, None] * [5.0, 0.0, 0.0])
+    assert continued(elsewhere) is elsewhere
 
 
 @pytest.mark.parametrize("every", [2, 3, 4])

@@ -12,7 +12,7 @@ The first sees any error that is larger than the noise, the second a smaller one
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -97,7 +97,12 @@ class AxisRemainder:
 def remaining(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
     """The residual of a model on each axis of some runs, compared with that of the first one."""
     before, after = ([omega(w, m) for w in runs] for m in (start, model))
-    return axis_remainders(runs, before, after, [omega_std(w, start) for w in runs], start)
+    return axis_remainders(runs, before, after, noise_of(runs, start, model), start)
+
+
+def noise_of(runs: Sequence[WeakWindows], start: Model, model: Model) -> list[np.ndarray]:
+    """Of each run the std (K, 3) of the first model's error by noise, behind a model's measurement."""
+    return [omega_std(w, replace(start, measurement=model.measurement)) for w in runs]
 
 
 def any_significant(runs: Sequence[WeakWindows], start: Model, model: Model) -> bool:

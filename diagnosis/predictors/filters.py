@@ -32,6 +32,17 @@ class Filters(NamedTuple):
         """Pose before the filters, its rate, and the pose between the two, (n, 3) each."""
         return _undone(self, s)
 
+    def first_response(self, h: float) -> np.ndarray:
+        """(3,), share of a new sample in the output of a filter that is computed at intervals h [s]."""
+        with np.errstate(divide="ignore"):
+            lag, tracker = (h / np.array(each) for each in self)
+        return np.expm1(-lag) * np.expm1(-2.0 * DAMPING * tracker)
+
+    @property
+    def squared_time(self) -> np.ndarray:
+        """(3,), the factor of w^2 [s2] by which undoing the filters adds to a density, at the most."""
+        return np.array(self.lag) ** 2 + 0.5 * np.array(self.tracker) ** 2
+
     def behind(
         self, poses: np.ndarray, between: np.ndarray, eta: np.ndarray, eta_dot: np.ndarray, h: float
     ) -> np.ndarray:

@@ -12,6 +12,10 @@ velocity that it goes with: a yaw moment by sway far more than the yaw accelerat
 nu = B eta' + A eta, where B turns the axes and A has what an error of the heading does to u and v, a
 mass M and the slope F of the force by nu make of an error of the pose at the frequency w
 (-w^2 M B + i w (M A - F B) - F A) of it; the last term is counted as if it were independent.
+
+Behind a filter of the measurement the noise of a pose is what it changes by from sample to sample: that
+of the receiver is larger, by the filter's first response to an impulse, and white again once the filter
+is undone. Rounding comes after the filter, and undoing it adds (w T)^2 to its density.
 """
 
 from collections.abc import Sequence
@@ -42,11 +46,11 @@ NEGLIGIBLE = 0.05
 
 @cache
 def noise_gain() -> list[np.ndarray]:
-    """For order k = 0, 1, 2 and each w0 the integral of w^2k |kernel|^2 H [s^-2k-1]."""
+    """For order k = 0 to 3 and each w0 the integral of w^2k |kernel|^2 H [s^-2k-1]."""
     half = WIDTH / 2
     transform = hyp0f1(4.5, -((FREQUENCIES * half / 2) ** 2))  # of (1 - s^2)^3: of its power + 3/2
     H = 1.0 / (1.0 + (FREQUENCIES / FREQUENCIES[:, None]) ** 6)
-    densities = [(FREQUENCIES**k * transform) ** 2 / np.pi for k in (0, 1, 2)]
+    densities = [(FREQUENCIES**k * transform) ** 2 / np.pi for k in range(4)]
     return [np.trapezoid(d * H, FREQUENCIES) for d in densities]
 
 
@@ -65,16 +69,21 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     time, period = s.scale.time, s.track.period
     # Share of a window's time that its samples cover, and the variance of the smoothed pose there.
     share = np.clip(w.smooth @ (s.used * period / np.gradient(s.time)), period / w.width, 1.0)
-    density = s.noise**2 * period / share[:, None]
+    rounding = np.minimum(s.noise, s.track.usual_rounding)
+    filters, sampled = model.filters, period / share[:, None]
+    density = sampled * (s.noise**2 - rounding**2) / filters.first_response(period) ** 2
     variance = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
-    corner = 3.0 * variance / density * time
+    corner = 3.0 * variance / (sampled * s.noise**2) * time
     # Weights of samples at uneven distances sum to a little more or less than one.
     c2 = np.clip(w.smooth @ np.where(w.known, np.cos(s.eta[:, 2]) ** 2, 0.0), 0.0, 1.0)
 
     def in_axes(order: int) -> np.ndarray:
         """(K, 3), variance of a derivative of the pose in the ship's axes, averaged over windows."""
-        gain = np.exp(np.interp(np.log(corner), np.log(FREQUENCIES), np.log(noise_gain()[order])))
-        x, y, psi = (density * gain / time ** (2 * order + 1)).T
+        gain = _gain(corner, order) / time ** (2 * order + 1)
+        rounded = gain
+        if filters:
+            rounded = gain + filters.squared_time * _gain(corner, order + 1) / time ** (2 * order + 3)
+        x, y, psi = (density * gain + sampled * rounding**2 * rounded).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
     pose, velocity, acceleration = map(in_axes, (0, 1, 2))
@@ -85,6 +94,11 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
             variance += np.einsum("kij,kj->ki", by**2, of)
     return np.sqrt(variance)
+
+
+def _gain(corner: np.ndarray, order: int) -> np.ndarray:
+    """An entry of :func:`noise_gain` at corner frequencies between those of its grid."""
+    return np.exp(np.interp(np.log(corner), np.log(FREQUENCIES), np.log(noise_gain()[order])))
 
 
 def _slope(w: WeakWindows, model: Model) -> np.ndarray:

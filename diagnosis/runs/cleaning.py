@@ -228,6 +228,27 @@ def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
     return row, seconds
 
 
+def continued(run: Run) -> Run:
+    """A run whose clock was set back, as it would be if it had not been: all rows after that are later.
+
+    A clock was set back where the times after it were there before, row by row, while the ship goes on
+    from where it was: rows that only come late have times of their own.
+    """
+    time, notes = np.array(run.time), []
+    for row in np.flatnonzero(np.diff(time) < 0.0) + 1:
+        back, period = time[row - 1] - time[row], float(np.median(np.abs(np.diff(time[:row]))))
+        ends = np.flatnonzero(~((np.diff(time[row:]) > 0.0) & (time[row + 1 :] <= time[row - 1])))
+        again = time[row : row + 1 + (ends[0] if ends.size else time.size)]
+        there = (time[:row] >= again[0]) & (time[:row] <= again[-1])
+        if min(there.sum(), again.size) < max(LONG, 0.5 * max(there.sum(), again.size)):
+            continue
+        step = np.linalg.norm(np.diff(run.pose[:, :2], axis=0), axis=1)
+        if step[row - 1] <= LONG * np.nanmedian(step[row - 1 - again.size : row + again.size]):
+            notes.append(f"the clock was set back by {back + period:.4g} s at {time[row - 1]:.4g} s")
+            time[row:] += back + period
+    return replace(run, time=time, notes=(*run.notes, *notes)) if notes else run
+
+
 def in_order(time: np.ndarray) -> np.ndarray:
     """Rows of the longest part of some times [s] that grows strictly; non-finite ones are left out."""
     rows = np.flatnonzero(np.isfinite(time))

@@ -15,7 +15,7 @@ from cosim import InputError
 from fmus.scale import Scale
 from fmus.ship import Ship, ship
 
-from .cleaning import Track, clean, refuse_short
+from .cleaning import Track, clean, continued, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
 from .sensors.further_channels import accelerations, receivers, through_water
@@ -99,7 +99,7 @@ def prepare(
     """
     of = of or ship()
     raw = source if isinstance(source, Run) else read(source, of=of, also=also)
-    sensors = examine(raw, of.scale)
+    sensors = examine(continued(raw), of.scale)
     unrepaired = [finding for finding in sensors.findings if not finding.repaired]
     in_doubt = next((finding for finding in unrepaired if not finding.aside), None)
     if in_doubt and not anyway:

@@ -8,11 +8,10 @@ import numpy as np
 
 from ..assessment.recurrence import recurrence
 from ..assessment.regions import find_regions
-from ..assessment.remainder import Remainder, remainder_sentence, remaining
+from ..assessment.remainder import Remainder, noise_of, remainder_sentence, remaining
 from ..assessment.stability import OperatingRegion, drives_on
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows, omega
-from ..predictors.uncertainty import omega_std
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
@@ -169,7 +168,7 @@ def remainder_of(
     axes, left = remaining(runs, start, model), [omega(w, model) for w in runs]
     significant = any(axis.significant for axis in axes.values())
     how = recurrence(runs, np.concatenate(left)) if significant else None
-    regions = find_regions(runs, left, [omega_std(w, start) for w in runs]).regions
+    regions = find_regions(runs, left, noise_of(runs, start, model)).regions
     effects = learned.model.ship.effects
     waves = any(effects[f.id].search.by == "spectrum" for f in learned.effects)
     return Remainder(axes, remainder_sentence(axes, how, regions, waves, runs[0].scale))
