@@ -23,7 +23,7 @@ from thesis.basin_trials import (
     trials,
 )
 from thesis.basin_trials.found import FAULTY, FRESH, PRINTED, REGULAR, TrialRuns, share
-from thesis.monte_carlo import shipped, vary
+from thesis.monte_carlo import SampleMean, shipped, vary
 from thesis.observers.estimates_replayed import parameters
 from thesis.tracking.outcome import missing, quick
 
@@ -223,8 +223,24 @@ def test_adaptive_backstepping_that_is_far_better_would_be_seen():
     better = {trials.ABS: {"position": 0.1}}
     assert lessons.adaptive(made_up(better, better)).here.startswith("in 0 of 8")
     assert "Fell behind for good: none." in lessons.adaptive(made_up()).numbers
-    fell = lessons.adaptive(made_up(faulty={trials.RBS: {"lost": 1.0}})).numbers
-    assert "ellipse 0.08, fault: 5 of RBS and 0 of ABS" in fell
+    fell = lessons.adaptive(made_up(faulty={trials.RBS: {"lost": 1.0}}))
+    assert "ellipse 0.08, fault: 5 of RBS and 0 of ABS" in fell.numbers
+    assert fell.here.startswith("in 4 of 8"), "a controller that is lost is not as good as the other"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "same"),
+    [
+        ((1.04, 1.03, 1.05), True),
+        ((1.2, 0.9, 1.6), True),
+        ((1.2, 1.1, 1.3), False),
+        ((0.8, 0.7, 0.9), False),
+        ((1.2, 0.0, np.inf), False),
+        ((np.nan, 0.0, np.inf), False),
+    ],
+)
+def test_controllers_are_alike_by_their_ratio_or_its_interval(ratio, same):
+    assert lessons.alike(SampleMean(*ratio)) is same
 
 
 def test_those_who_fall_behind_are_told():

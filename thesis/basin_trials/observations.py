@@ -29,6 +29,21 @@ def surely_below(ratios: Sequence[SampleMean]) -> str:
     return "yes" if all(s.high < 1.0 for s in ratios) else "undecided"
 
 
+def surely_between(m: SampleMean, low: float, high: float) -> str:
+    """Whether a mean lies between two limits with its whole interval; "no" if none of it does."""
+    if low < m.low and m.high < high:
+        return "yes"
+    return "no" if m.high <= low or m.low >= high else "undecided"
+
+
+def by_controller(words: Mapping[str, str]) -> str:
+    """The word of all controllers, or each word with its controllers."""
+    if len(set(words.values())) == 1:
+        return next(iter(words.values()))
+    grouped = {word: [c for c, w in words.items() if w == word] for word in words.values()}
+    return ", ".join(f"{word} ({', '.join(each)})" for word, each in grouped.items())
+
+
 def as_in_the_basin(found: TrialRuns, trial: int) -> dict[str, Runs]:
     """The runs of a trial with the guidance fault, as in the basin, and without."""
     name = TRIALS[trial].name
@@ -46,12 +61,12 @@ def below(found: TrialRuns, thesis: str, trial: int, number: str, *pairs: tuple[
 
 
 def held(found: TrialRuns, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
-    """Whether the mean of a number lies between two limits for every controller that kept up."""
+    """Whether the mean of a number surely lies between two limits, for each controller that kept up."""
     here, rows = {}, []
     for name, runs in as_in_the_basin(found, trial).items():
         means = {LABELS[c]: mean(each, number) for c, each in runs.items()}
-        known = [m.mean for m in means.values() if m.mean == m.mean]
-        here[name] = all(low < x < high for x in known) if known else None
+        known = {c: surely_between(m, low, high) for c, m in means.items() if m.mean == m.mean}
+        here[name] = by_controller(known) if known else None
         rows.append(f"{name}: {listed(means)}")
     return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
 
