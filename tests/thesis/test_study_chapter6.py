@@ -270,6 +270,21 @@ def test_observations_of_the_swift_ellipse():
     assert "with the fault: no run kept up" in observations.observations(found)[3].here
 
 
+def test_oscillations_have_increased_where_they_grow_more_than_those_of_the_path():
+    slow, _, fast, _ = trials.TRIALS
+    grown = trials.path_swing(fast) / trials.path_swing(slow)
+    assert 10.0 < grown < 40.0, "its harmonics move up into the band"
+    found = made_up()
+    for factor, said in ((0.9, "no"), (2.0, "yes")):
+        for each in (REGULAR, FAULTY):
+            for name, swing in ((slow.name, 0.001), (fast.name, factor * grown * 0.001)):
+                runs = found.trials[name, each]
+                runs.update({c: [r._replace(swing=swing) for r in runs[c]] for c in runs})
+        swings = observations.observations(found)[1]
+        assert swings.here == f"with the fault: {said}; without: {said}"
+        assert swings.numbers.endswith(f"that of the path itself ×{grown:.2g}")
+
+
 def test_any_ship_may_be_hidden(tmp_path):
     file = tmp_path / "ship.ssv"
     write_model(file, Model().plus({"delta_X_u": -2.0, "loss_bow": 0.2}))
