@@ -164,10 +164,11 @@ def test_a_push_is_told_where_it_is_beyond_the_noise_and_what_is_usual(seed, axi
     rng = np.random.default_rng(seed)
     count = 200
     middle = EVERY * np.arange(count)
-    left = rng.choice([-1.0, 1.0], (count, 3)) * rng.uniform(0.5, 1.5, (count, 3))
-    std = np.full((count, 3), level)
+    sizes = np.array([1.0, 3.0, 0.3])  # each axis has a size of its own
+    left = rng.choice([-1.0, 1.0], (count, 3)) * rng.uniform(0.5, 1.5, (count, 3)) * sizes
+    std = np.full((count, 3), level) * sizes
     usual = norm.ppf(0.75) ** -1 * np.median(np.abs(left), axis=0)
-    scale = max(NOISE_TOLERANCE * level, usual[axis])
+    scale = max(NOISE_TOLERANCE * level * sizes[axis], usual[axis])
     limit = norm.isf(CHANCE / left.size / 2.0)
     rows = slice(at - 3, at + 4)
     left[rows, axis] = factor * limit * scale
