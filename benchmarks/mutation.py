@@ -210,9 +210,9 @@ def fails(
 
 
 def judged(
-    mutant: Mutant, tests: Sequence[tuple[str, float]], cache: Path | None, copies: Path
+    mutant: Mutant, tests: Sequence[tuple[str, float]], cache: Path | None, limit: float, copies: Path
 ) -> dict[str, Any]:
-    """What becomes of a mutant by its tests, each with its seconds."""
+    """What becomes of a mutant by its tests, each with its seconds, in a limit of processor time [s]."""
     began, copy = time.monotonic(), loaded(copies)
     target, package = copy / mutant.module, mutant.module.partition("/")[0]
     whole, then = target.read_text(encoding="utf-8"), target.stat().st_mtime
@@ -223,7 +223,7 @@ def judged(
     target.write_text(mutant.text, encoding="utf-8")
     os.utime(target, (then, random.uniform(1e9, 1.2e9)))  # byte code is told apart by this time
     try:
-        found = (fails(copy, each, 60.0 + 5.0 * spent, cache, package) for each in batches if each)
+        found = (fails(copy, each, limit, cache, package) for each in batches if each)
         killers = next(filter(None, found), [])
     finally:
         target.write_text(whole, encoding="utf-8")
@@ -271,6 +271,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--mutants", type=int, default=300, help="of each package (300)")
     parser.add_argument("--seed", type=int, default=0, help="of the draw (0)")
     parser.add_argument("--seconds", type=float, default=20.0, help="tests of a mutant, without it (20)")
+    parser.add_argument("--limit", type=float, default=90.0, help="processor time of a mutant, s (90)")
     parser.add_argument("--processes", type=int, default=2, help="at the same time (2)")
     parser.add_argument("--out", type=Path, default=Path("results/mutation"), help="logs, and the tests")
     parser.add_argument("--again", action="store_true", help="the survivors of the log, not new mutants")
@@ -307,7 +308,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         copies = Path(folder)
         while mutants:
             tasks = [
-                pool.submit(judged, m, *covering.tests(*m[:2], options.seconds), copies) for m in mutants
+                pool.submit(judged, m, *covering.tests(*m[:2], options.seconds), options.limit, copies)
+                for m in mutants
             ]
             for task in as_completed(tasks):
                 row = task.result()

@@ -72,6 +72,7 @@ class Report:
             raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
         self.folder = folder
         self._pieces = [f"# {title}"]
+        self._tables: list[dict[str, Any]] = []
         self._results: dict[str, Any] = {"title": title, "seeds": list(seeds), "machine": machine()}
         ran = f"{seeds_line(seeds).capitalize()}. " if seeds else ""
         self.text(f"{ran}{machine()}.")
@@ -87,8 +88,10 @@ class Report:
         self._pieces.append("\n".join(f"- {' '.join(line.split())}" for line in lines))
 
     def table(self, header: Sequence[str], rows: Iterable[Sequence[Any]], words: bool = False) -> None:
-        """A table; all columns but the first stand to the right, unless they hold words."""
-        side = ":--" if words else "--:"
+        """A table, which ``results.json`` has too; columns are aligned right unless they hold words."""
+        side, rows = ":--" if words else "--:", [list(row) for row in rows]
+        plain = [[x if isinstance(x, (int, float)) else str(x) for x in row] for row in rows]
+        self._tables.append({"header": list(header), "rows": plain})
         lines = [header, [":--", *[side] * (len(header) - 1)], *([cell(c) for c in r] for r in rows)]
         self._pieces.append("\n".join(f"| {' | '.join(line)} |" for line in lines))
 
@@ -122,7 +125,7 @@ class Report:
 
     def write(self) -> Path:
         """Write ``results.json``, then ``report.md``; returns the latter's path."""
-        text = as_json(self._results)
+        text = as_json({**self._results, "tables": self._tables})
         for name, content in ((RESULTS, text), (REPORT, "\n\n".join(self._pieces))):
             with atomic_write(self.folder / name) as scratch:
                 scratch.write_text(content + "\n", encoding="utf-8")

@@ -4,12 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from diagnosis import Model
 from diagnosis.assessment.remainder import axis_remainders, level, span_windows, spans
 from diagnosis.assessment.settings import SETTINGS
-from diagnosis.predictors.uncertainty import SHARE_OF_COMMAND
-from diagnosis.predictors.weak_form import EVERY
+from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
+from diagnosis.predictors.weak_form import EVERY, OVERLAP
 
 SPAN = span_windows()
 K, NOISE = 100 * SPAN, 0.02
@@ -106,3 +109,23 @@ def test_runs_that_are_too_short_for_a_span_have_no_slow_part():
 
 def test_without_a_first_error_there_is_no_share():
     assert left(noise(), before=0.0)["X"].share == 0.0
+
+
+@given(st.integers(0, 99), st.floats(1.0, 1.6), st.lists(st.floats(0.3, 3.0), min_size=3, max_size=3))
+def test_the_two_p_values_are_those_of_chi_square(seed, level, sizes):
+    """Of all windows, four of which count as one, and of the means over spans; noise is known to 30 %."""
+    rng, count = np.random.default_rng(seed), 10 * SPAN
+    std = NOISE * rng.uniform(0.5, 2.0, (count, 3))
+    after = std * rng.normal(size=(count, 3)) * level * np.array(sizes)
+    found = axis_remainders([windows(count)], [after], [after], [std], Model())
+    for k, axis in enumerate("XYN"):
+        z = after[:, k] / std[:, k] / NOISE_TOLERANCE
+        by_size = chi2.sf(z @ z / OVERLAP, count / OVERLAP)
+        means = after[:, k].reshape(-1, SPAN).mean(axis=1)
+        variance = (std[:, k] ** 2).reshape(-1, SPAN).mean(axis=1) * SETTINGS.slow_noise * OVERLAP / SPAN
+        by_slowness = chi2.sf(np.sum(means**2 / variance) / NOISE_TOLERANCE**2, 10)
+        assert found[axis].p_value == pytest.approx(min(by_size, by_slowness), rel=1e-9, abs=1e-300)
+        assert found[axis].slow == pytest.approx(
+            max(np.mean(means**2 - variance), 0.0) ** 0.5, abs=1e-12
+        )
+        assert found[axis].share == pytest.approx(1.0)

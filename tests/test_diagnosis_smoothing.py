@@ -10,9 +10,10 @@ from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoot
 
 from diagnosis import InputError, Run, clean, read, smooth
 from diagnosis.runs.cleaning import FARTHEST
+from diagnosis.runs.smoothing import smoother
 from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
-from diagnosis.runs.smoothing.penalised import LinearSystem, Problem, Rates, Spline
+from diagnosis.runs.smoothing.penalised import LinearSystem, Problem, Rates, Spline, solve
 from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, roughness, third
 
 pytestmark = pytest.mark.numerical
@@ -297,3 +298,32 @@ def test_measured_runs_are_smoothed():
         assert (s.noise < (2e-4, 2e-4, 1e-3)).all(), "a tenth of a millimetre"
         assert np.nanmax(np.abs(s.nu)) < 2.0
         assert sum(s.counts[1:]) == s.counts.samples
+
+
+@pytest.mark.parametrize("period", [0.025, 0.1, 0.4])
+@pytest.mark.parametrize("every", [1, 3])
+def test_outliers_are_first_looked_for_with_a_spline_of_two_sampling_periods(period, every, monkeypatch):
+    """Through the filter 1 / (1 + (w / w0)^6) a sample counts w0 T / 3 for itself: a sixth at w0 = 1 / 2T.
+
+    The heading is measured in every row, or in every third.
+    """
+    time = np.arange(0.0, 400.0 * period, period)
+    pose = np.column_stack([0.1 * time, 0.05 * np.sin(0.3 * time), 0.02 * time])
+    pose += NOISE * np.random.default_rng(0).standard_normal(pose.shape)
+    track = clean(Run("even", time, pose, np.zeros_like(pose)))
+    track.fresh[:, 2] &= np.arange(time.size) % every == 0
+    seen = []
+
+    def first(p, local, *_):
+        seen.append((p, local))
+        raise LookupError
+
+    monkeypatch.setattr(smoother, "robust", first)
+    with pytest.raises(LookupError):
+        smoother._judged(track)
+    ((p, local),) = seen
+    weights = (p.share > 0.0).astype(float)
+    fit = solve(p, local, weights)
+    leverage = (p.share * p.spline.b.variance(fit.covariance) / p.sigma**2)[100:-100]
+    for k, rows in enumerate((p.share > 0.0)[100:-100].T):
+        assert np.mean(leverage[rows, k]) == pytest.approx(1.0 / 6.0, rel=0.05)

@@ -235,3 +235,31 @@ def test_a_region_of_data_holds_nearly_all_of_them():
     assert inside[:2] == pytest.approx(0.99, abs=1e-3)
     assert region.r == pytest.approx(0.06)
     assert OperatingRegion.of(np.full((3, 3), np.nan)) == pytest.approx(0.1 * np.array(OPERATING))
+
+
+@pytest.mark.parametrize("harmful", [False, True])
+@pytest.mark.parametrize("nominal_rests", [False, True])
+@pytest.mark.parametrize("learned_rests", [False, True])
+def test_a_ship_without_thrust_on_an_axis_is_judged_by_both_motions(
+    learned_rests, nominal_rests, harmful, monkeypatch
+):
+    """What the initial model does as well is from the start, unless the learned hull dissipates less."""
+    start = Model(ship=ship_with((), "kvlcc2"))
+    assert not start.ship.fully_actuated
+    learned = start.plus({"delta_X_u": 0.4 * abs(start.value("X_u")) if harmful else 0.0})
+    rests = {id(learned): learned_rests, id(start): nominal_rests}
+    monkeypatch.setattr(stability, "comes_to_rest", lambda model, *_: rests[id(model)])
+    monkeypatch.setattr(
+        stability,
+        "dissipation",
+        lambda model, nu, M: np.full(len(nu), 0.5 if model is learned and harmful else 1.0),
+    )
+    monkeypatch.setattr(stability, "_compare", lambda *_: None)
+    found = check_stability(learned, start)
+    assert found.bounded == learned_rests
+    neither = not learned_rests and not nominal_rests
+    assert (stability.NOR_NOMINAL in found.notes) == neither
+    assert found.from_start == (neither and not harmful)
+    assert (found.region is not None) == harmful
+    assert found.safe == (learned_rests or found.from_start)
+    assert not found.closed_loop

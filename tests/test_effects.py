@@ -4,6 +4,7 @@ import math
 import random
 import subprocess
 import sys
+from dataclasses import replace
 
 import fmpy
 import numpy as np
@@ -18,6 +19,7 @@ from support.project import ROOT
 from fmus.declare import flatten, packer, variables
 from fmus.effects import Loaded, Motion, Running, Thrust
 from fmus.effects.__main__ import table as effects_table
+from fmus.effects.effect import Search
 from fmus.effects.environment import surface
 from fmus.frames import rotate_to_earth
 from fmus.hull import Inertia, damping_force
@@ -548,3 +550,17 @@ def test_a_wrong_file_of_effects_is_told_in_one_line(tmp_path, text, told):
     assert told in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.glob("fmu/*"))
+
+
+@pytest.mark.parametrize("linear", [False, True])
+@pytest.mark.parametrize("declared", [None, False, True])
+@pytest.mark.parametrize("fitted", [None, (), ("one",)])
+def test_a_regression_finds_what_is_declared_or_follows_from_linearity(linear, declared, fitted):
+    effect = replace(
+        EFFECTS["X_uuu"], linear=linear, search=Search(differentiable=declared, fitted=fitted)
+    )
+    differentiable = linear if declared is None else declared
+    assert effect.differentiable is differentiable
+    default = effect.coefficients if differentiable else ()
+    assert effect.fitted == (default if fitted is None else fitted)
+    assert not set(effect.coefficients) & set(effect.shape_parameters)

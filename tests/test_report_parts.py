@@ -5,11 +5,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support.reported import diagnosis, effect, ranked, report_data
 
+from diagnosis import Model
 from diagnosis.assessment.covariates import HEADING, SPEED
 from diagnosis.assessment.regions import Profile
-from diagnosis.report import chart, figures, finding_text, formatting, headline, tracks
+from diagnosis.assessment.settings import SETTINGS
+from diagnosis.report import chart, figures, finding_text, formatting, headline, shape, tracks
+from diagnosis.report.reported_effect import ReportedCoefficient
 from diagnosis.report.shape import Curve
 from diagnosis.report.terminal import _number as terminal_number
 from diagnosis.report.terminal import _percent as terminal_percent
@@ -243,6 +248,43 @@ def test_a_curve_is_grey_where_no_data_are():
     assert np.nanmax(grey.x) == pytest.approx(0.2)
     assert (panel.x.label, panel.y.label, panel.ends()[0]) == ("over", "what", (0.0, 1.0))
     assert [*figures.curve(c).legend] == ["before", "learned"]
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(-9.0, 9.0),
+    st.one_of(st.none(), st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 5.0))),
+    st.booleans(),
+)
+@settings(max_examples=30, deadline=None)
+def test_a_curve_has_the_values_of_its_effect_and_covers_98_percent_of_the_data(
+    seed, value, about, given_ends
+):
+    """Its bounds are those of its coefficient, or itself; its axis is that given, or that of the data."""
+    rng, model, effect = np.random.default_rng(seed), Model(), ship().effects["X_uuu"]
+    runs = [rng.normal(m, 0.3, n) for m, n in ((0.0, 400), (1.0, 600))]
+    ci95 = None if about is None else (value - about[0], value + about[1])
+    coefficient = ReportedCoefficient(value, "N", ci95, None)
+    found = SimpleNamespace(coefficients={"delta_X_uuu": coefficient, "other": coefficient})
+    sweep = shape.Sweep(
+        "over",
+        "what",
+        lambda x, m: m.value("delta_X_uuu") * x**3,
+        lambda e: e,
+        (-2.0, 3.0) if given_ends else None,
+    )
+    curve = shape._curve(found, effect, sweep, runs, model)
+    data = np.sort(np.concatenate(runs))
+    ends = (-2.0, 3.0) if given_ends else (data[0], data[-1])
+    assert (curve.x[0], curve.x[-1]) == pytest.approx(ends)
+    np.testing.assert_allclose(curve.learned, value * curve.x**3, atol=1e-9)
+    np.testing.assert_array_equal(curve.nominal, 0.0)
+    for bound, at in zip(curve.sure, ci95 or (value, value), strict=True):
+        np.testing.assert_allclose(bound, at * curve.x**3, atol=1e-9)
+    low, high = curve.covered
+    share = SETTINGS.chance * data.size  # of each tail
+    assert abs(np.sum(data < low) - share) <= 1
+    assert abs(np.sum(data > high) - share) <= 1
 
 
 @pytest.mark.parametrize(

@@ -87,8 +87,8 @@ def headings(content: Content) -> tuple[np.ndarray, np.ndarray]:
 def turn(p_x: float, hidden: float, push: Push, seed: int) -> float:
     """Heading [rad] gained by a push to starboard less that by one to port, halved."""
     gained = []
-    for side in (1.0, -1.0):
-        t, psi = headings(scenario(p_x, hidden, push._replace(force=side * push.force), seed))
+    for k, side in enumerate((1.0, -1.0)):  # with a noise of its own, which does not cancel
+        t, psi = headings(scenario(p_x, hidden, push._replace(force=side * push.force), 2 * seed + k))
         # By the whole run, not by its last noisy sample: the turn grows with the square of time.
         gained.append(float(np.polyfit(t**2, psi - psi[0], 1)[0]) * t[-1] ** 2)
     return 0.5 * (gained[0] - gained[1])

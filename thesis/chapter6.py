@@ -21,7 +21,7 @@ from .basin_trials.chapter6_runs import FEW, Plant, folder, run
 from .basin_trials.found import FAULTY, Runs, label, lost, mean
 from .basin_trials.lessons import lessons
 from .basin_trials.observations import observations, other_sections
-from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS
+from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS, path_swing
 from .error_models.model_loops import parameters_of
 
 LEFT_OUT = "Experiments on spikes, stores and delay: not run for this ship (`--trials`)."
@@ -106,7 +106,9 @@ def study(
         "Means over the seeds with their 95 % intervals, over the runs that followed the target; "
         "`lost` is the number of the others. Position, its part along the ship, and z1_x over the "
         "second half, others from 20 s on. z1_x is the controller's, of the estimated pose, the "
-        "rest is true."
+        "rest is true. The swing has the yaw rate of the path in it, which is "
+        + ", ".join(f"{path_swing(t):.2g} rad/s ({t.name})" for t in TRIALS)
+        + "."
     )
     for key, runs in found.trials.items():
         table(report, key, runs)

@@ -130,7 +130,7 @@ def claims(found: Found) -> list[Verdict]:
             f"RMS of z1_x on the last lap, original over improved: {ratios}",
         ),
         Verdict(
-            "(7.1) alone, without the loss of thrust, takes the lag as well (7.5 names both)",
+            "(7.1) alone, without the loss of thrust, removes the lag in surge (7.5)",
             "yes" if all(abs(m.mean) < NO_LAG for m in alone.values()) else "no",
             f"mean z1_x of the last lap [m]: {listed(alone)}; error of ω̂_X over the improved one's: "
             f"{listed(known)}",

@@ -122,7 +122,8 @@ def aliases(fmu: Fmu) -> Iterator[str]:
             yield f"{called}: more than one of these can be set"
         if not constant and sum(v.start is not None for v in group) > 1:
             yield f"{called}: more than one of these has a start value"
-        if any(v.settable for v in group) and any(v.causality == "independent" for v in group):
+        independent = [v.causality == "independent" for v in group]
+        if any(independent) and any(v.settable for v in group if v.causality != "independent"):
             yield f"{called}: one is the independent variable, another can be set"
         if len({v.all.get("unit") for v in group}) > 1:
             yield f"{called}: they share one value, but not the unit"

@@ -48,6 +48,8 @@ def test_turn_is_half_of_what_both_sides_differ_by(pushed):
     push = Push(force=0.5, seconds=2.0)
     assert allocation.turn(0.1, 0.3, push, 0) == pytest.approx(0.1 * 0.5 * (0.3 + BIAS - 0.1) * 4.0)
     assert [content["events"][0]["value"] for content in pushed] == [0.5, -0.5]
+    allocation.turn(0.1, 0.3, push, 1)
+    assert [content["seed"] for content in pushed] == [0, 1, 2, 3], "the noise of two does not cancel"
     assert allocation.turn(0.3 + BIAS, 0.3, push, 0) == pytest.approx(0.0)
 
 

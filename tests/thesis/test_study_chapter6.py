@@ -23,7 +23,7 @@ from thesis.basin_trials import (
     trials,
 )
 from thesis.basin_trials.found import FAULTY, FRESH, PRINTED, REGULAR, TrialRuns, share
-from thesis.monte_carlo import shipped, vary
+from thesis.monte_carlo import SampleMean, shipped, vary
 from thesis.observers.estimates_replayed import parameters
 from thesis.tracking.outcome import missing, quick
 
@@ -223,8 +223,24 @@ def test_adaptive_backstepping_that_is_far_better_would_be_seen():
     better = {trials.ABS: {"position": 0.1}}
     assert lessons.adaptive(made_up(better, better)).here.startswith("in 0 of 8")
     assert "Fell behind for good: none." in lessons.adaptive(made_up()).numbers
-    fell = lessons.adaptive(made_up(faulty={trials.RBS: {"lost": 1.0}})).numbers
-    assert "ellipse 0.08, fault: 5 of RBS and 0 of ABS" in fell
+    fell = lessons.adaptive(made_up(faulty={trials.RBS: {"lost": 1.0}}))
+    assert "ellipse 0.08, fault: 5 of RBS and 0 of ABS" in fell.numbers
+    assert fell.here.startswith("in 4 of 8"), "a controller that is lost is not as good as the other"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "same"),
+    [
+        ((1.04, 1.03, 1.05), True),
+        ((1.2, 0.9, 1.6), True),
+        ((1.2, 1.1, 1.3), False),
+        ((0.8, 0.7, 0.9), False),
+        ((1.2, 0.0, np.inf), False),
+        ((np.nan, 0.0, np.inf), False),
+    ],
+)
+def test_controllers_are_alike_by_their_ratio_or_its_interval(ratio, same):
+    assert lessons.alike(SampleMean(*ratio)) is same
 
 
 def test_those_who_fall_behind_are_told():
@@ -252,6 +268,21 @@ def test_observations_of_the_swift_ellipse():
     assert improving.here.endswith("without: yes")
     found.trials[fast, FAULTY].update({trials.RBS: [sailed(lost=1.0)] * 5})
     assert "with the fault: no run kept up" in observations.observations(found)[3].here
+
+
+def test_oscillations_have_increased_where_they_grow_more_than_those_of_the_path():
+    slow, _, fast, _ = trials.TRIALS
+    grown = trials.path_swing(fast) / trials.path_swing(slow)
+    assert 10.0 < grown < 40.0, "its harmonics move up into the band"
+    found = made_up()
+    for factor, said in ((0.9, "no"), (2.0, "yes")):
+        for each in (REGULAR, FAULTY):
+            for name, swing in ((slow.name, 0.001), (fast.name, factor * grown * 0.001)):
+                runs = found.trials[name, each]
+                runs.update({c: [r._replace(swing=swing) for r in runs[c]] for c in runs})
+        swings = observations.observations(found)[1]
+        assert swings.here == f"with the fault: {said}; without: {said}"
+        assert swings.numbers.endswith(f"that of the path itself ×{grown:.2g}")
 
 
 def test_any_ship_may_be_hidden(tmp_path):

@@ -100,7 +100,7 @@ def test_surge_force_by_unit_of_force_is_told(found):
 def test_findings_have_their_numbers(found):
     three, products, sway = analysis_tables.findings(found)
     assert sway[1] == "no", "sway is as systematic as the others"
-    q2 = found["PLS3"].by_axis("q2")
+    q2 = found["PLS4"].by_axis("q2")
     assert sway[2].endswith(", ".join(f"{q2[a]:.3f}" for a in AXES))
     assert products[1] == "yes", "there are none in the truth"
     assert products[2].split(" ")[2] == "12"
@@ -120,7 +120,15 @@ def test_products_with_sway_are_significant_where_they_act():
     signs = np.column_stack([abs(a) * b for a in (u, v, r) for b in (v, r)])
     s.omega[:] += 5.0 * signs @ np.ones((6, 3))
     _, products, _ = analysis_tables.findings(analysis_tables.regressions(s))
-    assert products[1] == "no"
+    assert products[1].startswith("no: ")
+
+
+@pytest.mark.parametrize(
+    ("significant", "said"), [(0, "yes"), (1, "yes"), (3, "no: 3 of 12 are significant")]
+)
+def test_products_are_insignificant_if_no_more_are_significant_than_by_chance(significant, said):
+    unsure = np.arange(12).reshape(3, 4) >= significant
+    assert analysis_tables.insignificance(unsure) == said
 
 
 def test_pictures_of_the_regressions(found, tmp_path, drawn):

@@ -23,6 +23,7 @@ from thesis import estimators, observer_gains
 from thesis.observers import basin, claims
 from thesis.observers.claims import ahead
 from thesis.observers.estimates_replayed import (
+    LONGEST_LAG,
     OBSERVERS,
     SIGNALS,
     freezes,
@@ -78,6 +79,7 @@ def test_lag_is_found():
     log = {"time": t, "vessel.u": np.sin(t)}
     assert lag(log, {"u": np.sin(t - 0.23)}, "u") == pytest.approx(0.23)
     assert lag(log, {"u": np.sin(t)}, "u") == 0.0
+    assert np.isnan(lag(log, {"u": np.sin(t - LONGEST_LAG - 0.5)}, "u")), "beyond what is looked for"
 
 
 @pytest.mark.parametrize("gains", [(9.0, 1.0), (50.0, 0.7)])

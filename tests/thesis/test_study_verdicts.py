@@ -250,9 +250,23 @@ def test_richer_path_and_store():
     def sigma(path, condition, name):
         return (10.0 if path == "eight" else 1.0) * (5.0 if name.startswith("svd") else 1.0)
 
-    assert richer(by_path(sigma=sigma), "mdf").here == "store: reproduced; eight: reproduced"
-    other = richer(by_path(sigma=lambda *at: 1.0 / sigma(*at)), "mdf")
-    assert other.here == "store: not reproduced; eight: not reproduced"
+    def tracked(path, condition, name):
+        return 0.1 if name == "bs" else 0.05
+
+    as_told = by_path(sigma=sigma, position=tracked)
+    assert richer(as_told, "mdf").here == "store: reproduced; eight: reproduced"
+    assert richer(as_told, "mdf").numbers.endswith("Wound up: none")
+    other = richer(by_path(sigma=lambda *at: 1.0 / sigma(*at), position=tracked), "mdf")
+    assert other.here == "store: not reproduced; eight: reversed"
+    mixed = by_path(
+        sigma=lambda p, c, n: 1.0 if n.startswith("svd") and p == "eight" else 0.5,
+        position=lambda p, c, n: 0.2 if n.startswith("win") and p == "eight" else tracked(p, c, n),
+    )
+    told = richer(mixed, PRINTED)
+    assert (
+        told.here == "store: not reproduced; eight: with svd_eps, svd_z2; of runs that wound up in part"
+    )
+    assert told.numbers.endswith("Wound up: eight, win_eps; eight, win_z2")
 
 
 def test_smoothest_output():
@@ -427,7 +441,10 @@ def test_statements_on_the_slow_ellipse():
         cross_track=lambda k, f, c: 0.3 if c == "CLZ" else 0.2,
         omega_hat_X=lambda k, f, c: 0.1 if c == "CLE" else 0.0,
     )
-    assert answers(other, "6.4.2") == ["with the fault: no; without: no"] * 5
+    inside, *others, adapting = answers(other, "6.4.2")
+    assert inside.startswith("with the fault: no (RBS), yes (ABS, CLZ, CLE); without: no (RBS), yes")
+    assert others == ["with the fault: no; without: no"] * 3
+    assert adapting.startswith("with the fault: yes (RBS, ABS, CLZ), no (CLE); ")
 
 
 @pytest.mark.parametrize(
@@ -441,6 +458,27 @@ def test_statements_on_the_slow_ellipse():
 )
 def test_ratio_is_below_one_surely_or_not(ratios, said):
     assert observations.surely_below([SampleMean(*r) for r in ratios]) == said
+
+
+@pytest.mark.parametrize(
+    ("mean", "said"),
+    [
+        ((0.5, 0.1, 0.9), "yes"),
+        ((0.5, -0.1, 0.9), "undecided"),
+        ((0.5, 0.1, 1.1), "undecided"),
+        ((-0.5, -0.9, -0.1), "no"),
+        ((1.5, 1.1, 1.9), "no"),
+        ((0.5, -np.inf, np.inf), "undecided"),
+    ],
+)
+def test_a_mean_is_between_limits_with_its_whole_interval(mean, said):
+    assert observations.surely_between(SampleMean(*mean), 0.0, 1.0) == said
+
+
+def test_controllers_that_differ_are_named():
+    assert observations.by_controller({"RBS": "yes", "CLZ": "yes"}) == "yes"
+    differ = {"RBS": "yes", "ABS": "yes", "CLZ": "undecided", "CLE": "no"}
+    assert observations.by_controller(differ) == "yes (RBS, ABS), undecided (CLZ), no (CLE)"
 
 
 def test_statements_on_the_eights():

@@ -8,7 +8,7 @@ from studies.study_report import Verdict
 from ..monte_carlo import SampleMean
 from ..tracking.verdict import listed
 from .found import FAULTY, REGULAR, Runs, TrialRuns, lost, mean, share
-from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
+from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS, path_swing
 
 MUCH = 1.5  # times that count as "substantially"; chosen
 
@@ -29,6 +29,21 @@ def surely_below(ratios: Sequence[SampleMean]) -> str:
     return "yes" if all(s.high < 1.0 for s in ratios) else "undecided"
 
 
+def surely_between(m: SampleMean, low: float, high: float) -> str:
+    """Whether a mean lies between two limits with its whole interval; "no" if none of it does."""
+    if low < m.low and m.high < high:
+        return "yes"
+    return "no" if m.high <= low or m.low >= high else "undecided"
+
+
+def by_controller(words: Mapping[str, str]) -> str:
+    """The word of all controllers, or each word with its controllers."""
+    if len(set(words.values())) == 1:
+        return next(iter(words.values()))
+    grouped = {word: [c for c, w in words.items() if w == word] for word in words.values()}
+    return ", ".join(f"{word} ({', '.join(each)})" for word, each in grouped.items())
+
+
 def as_in_the_basin(found: TrialRuns, trial: int) -> dict[str, Runs]:
     """The runs of a trial with the guidance fault, as in the basin, and without."""
     name = TRIALS[trial].name
@@ -46,12 +61,12 @@ def below(found: TrialRuns, thesis: str, trial: int, number: str, *pairs: tuple[
 
 
 def held(found: TrialRuns, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
-    """Whether the mean of a number lies between two limits for every controller that kept up."""
+    """Whether the mean of a number surely lies between two limits, for each controller that kept up."""
     here, rows = {}, []
     for name, runs in as_in_the_basin(found, trial).items():
         means = {LABELS[c]: mean(each, number) for c, each in runs.items()}
-        known = [m.mean for m in means.values() if m.mean == m.mean]
-        here[name] = all(low < x < high for x in known) if known else None
+        known = {c: surely_between(m, low, high) for c, m in means.items() if m.mean == m.mean}
+        here[name] = by_controller(known) if known else None
         rows.append(f"{name}: {listed(means)}")
     return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
 
@@ -104,17 +119,18 @@ def settings(found: TrialRuns) -> dict[str, tuple[Runs, Runs]]:
     return {name: (slow[name], fast[name]) for name in slow}
 
 
-def grown(found: TrialRuns, thesis: str, number: str, unit: str) -> Verdict:
-    """Whether a number of every controller is much larger than at half the speed."""
+def grown(found: TrialRuns, thesis: str, number: str, unit: str, path: float = 1.0) -> Verdict:
+    """Whether a number of every controller grows much more than that of the path with the speed."""
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
         ratios = {c: share(fast[c], slow[c], number) for c in (RBS, ABS, CLZ, CLE)}
-        alive = [r.mean > MUCH for r in ratios.values() if r.mean == r.mean]
+        alive = [r.mean > MUCH * path for r in ratios.values() if r.mean == r.mean]
         here[name] = all(alive) if alive else None
         for c, r in ratios.items():
             size = f"{mean(slow[c], number).mean:.3g}→{mean(fast[c], number).mean:.3g} {unit}"
             fell = f", lost {lost(fast[c])} of {len(fast[c])}" if lost(fast[c]) else ""
             rows.append(f"{LABELS[c]} {name} {size} (×{r.mean:.2g}{fell})")
+    rows += [f"that of the path itself ×{path:.2g}"] if path != 1.0 else []
     return Verdict(thesis, answered(here), "; ".join(rows))
 
 
@@ -180,9 +196,10 @@ def sway(found: TrialRuns) -> Verdict:
 
 def observations(found: TrialRuns) -> list[Verdict]:
     """The observations in the order of 6.4.4."""
+    path = path_swing(TRIALS[2]) / path_swing(TRIALS[0])
     return [
         grown(found, "Tracking is substantially decreased", "position", "m"),
-        grown(found, "The oscillations have increased", "swing", "rad/s"),
+        grown(found, "The oscillations have increased", "swing", "rad/s", path),
         failing(found),
         improving(found),
         surge(found),

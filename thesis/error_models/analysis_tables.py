@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import binom, norm
 
 from studies.study_report import Report
 
@@ -16,6 +17,7 @@ RECIPES = ("PLS1", "PLS2", "PLS3", "PLS4")
 POINTS = 2000  # at most in a scatter plot; chosen
 MOST = 8  # factors of the curve of Fig. 7.6a; chosen
 NOTHING = 0.1  # Q² below which an axis has no model that factors could suffice for; chosen
+CHANCE = 0.05  # 1, up to which more significant coefficients than expected may be chance; chosen
 SUFFICES = 0.95  # of the best Q² that "suffices" means; chosen
 
 
@@ -60,7 +62,8 @@ def write_regressions(report: Report, found: Mapping[str, Regressed], name: str)
             axes = "".join(AXES[k] for k in part.axes)
             shares = part.r2_by_factors.mean(axis=1), part.by_factors.mean(axis=1)
             shown = analysis.share_of_variance(*shares, part.factors, "factors")
-            caption = f"{recipe}: explained variance, mean of {axes} (Fig. {figure}a)."
+            letter = "abc"[part.axes[0]] if len(part.axes) == 1 else "a"
+            caption = f"{recipe}: explained variance, mean of {axes} (Fig. {figure}{letter})."
             report.figure(f"{name}_{recipe}_variance_{axes}", shown, caption)
         points, labels = correlations(r, r.parts[len(r.parts) // 2])
         if points.shape[1] > 1:
@@ -92,6 +95,13 @@ def insignificant(B: np.ndarray, std: np.ndarray, sign_changes: np.ndarray) -> n
     return (np.abs(B) < 2.0 * std) | (sign_changes > 0)
 
 
+def insignificance(unsure: np.ndarray) -> str:
+    """Whether no more coefficients are significant than chance gives, at two standard deviations."""
+    count = int((~unsure).sum())
+    by_chance = float(binom.sf(count - 1, unsure.size, 2.0 * norm.sf(2.0)))
+    return "yes" if by_chance > CHANCE else f"no: {count} of {unsure.size} are significant"
+
+
 def unsystematic(q2: np.ndarray) -> str:
     """Whether Q² in sway is less than half of that in surge and in yaw, which have a model."""
     if min(q2[0], q2[2]) < NOTHING:
@@ -108,7 +118,7 @@ def findings(found: Mapping[str, Regressed]) -> list[list[str]]:
     by_v = [k for k, n in enumerate(wide.columns) if n.count("v") > 0 and "|" in n]
     part = wide.parts[0]
     unsure = insignificant(part.B[:, by_v], part.std[:, by_v], part.sign_changes[:, by_v])
-    q2 = np.array([found["PLS3"].by_axis("q2")[a] for a in AXES])
+    q2 = np.array([found["PLS4"].by_axis("q2")[a] for a in AXES])
     cells = ", ".join
     return [
         [
@@ -120,14 +130,14 @@ def findings(found: Mapping[str, Regressed]) -> list[list[str]]:
         ],
         [
             "Products with v are insignificant (Fig. 7.7)",
-            "yes" if unsure.mean() > 0.5 else "no",
+            insignificance(unsure),
             f"{int(unsure.sum())} of {unsure.size} coefficients within two of their standard deviations "
             "over the folds, or of changing sign",
         ],
         [
-            "ω in sway is unsystematic, in surge and yaw it is systematic (7.3)",
+            "ω in sway is unsystematic, in surge and yaw it is systematic (7.3, Fig. 7.9)",
             unsystematic(q2),
-            f"Q² of PLS3 in X, Y, N: {cells(f'{x:.3f}' for x in q2)}",
+            f"Q² of PLS4 in X, Y, N: {cells(f'{x:.3f}' for x in q2)}",
         ],
     ]
 

@@ -20,6 +20,7 @@ LOGGED = [f"observer.{name}" for name in INPUTS] + [f"vessel.{name}" for name in
 SETTLED = 10.0  # s; before, an observer is still finding the ship
 AFTER = 1.0  # s after an upset in which its consequences are looked for
 ABSURD = 10.0  # m/s, rad/s, m/s2, rad/s2; no estimate, as NaN is none
+LONGEST_LAG = 3.0  # s, up to which a lag is looked for; chosen: twice K_1/K_2 of the slowest observer
 # No pose can be said to be frozen before it has been the same for this long [s].
 FREEZE = 0.05
 
@@ -77,13 +78,14 @@ def errors(log: Log, estimate: Log) -> dict[str, float]:
 
 
 def lag(log: Log, estimate: Log, name: str) -> float:
-    """Time [s] by which the truth, delayed, comes closest to an estimate."""
+    """Time [s] by which the truth, delayed, comes closest to an estimate; NaN if that is the longest."""
     h = float(np.median(np.diff(log["time"])))
     settled = log["time"] >= SETTLED
     true, found = log[f"vessel.{name}"][settled], estimate[name][settled]
-    shifts = range(round(0.8 / h))
+    shifts = range(min(round(LONGEST_LAG / h), len(true) // 2))
     cost = [rms(found[k:] - true[: len(true) - k]) for k in shifts]
-    return int(np.argmin(cost)) * h
+    least = int(np.argmin(cost))
+    return least * h if least < len(cost) - 1 else float("nan")
 
 
 def roughness(log: Log, estimate: Log, name: str) -> float:

@@ -115,16 +115,24 @@ def richer(by_path: Paths, condition: str) -> Verdict:
     """Which path and which store give the larger smallest singular value."""
     sigma = {path: error(table[condition], "sigma") for path, table in by_path.items()}
     by_store = all(s["svd_eps"] > s["win_eps"] for s in sigma.values())
-    by_shape = all(sigma["eight"][n] > sigma["ellipse"][n] for n in ("svd_eps", "svd_z2"))
-    verdict = {True: "reproduced", False: "not reproduced"}
+    sense, _, _ = condition.partition(",")
+    plain = {path: error(table[sense])["bs"] for path, table in by_path.items()}
+    position = {path: error(table[condition]) for path, table in by_path.items()}
+    stores = [short(c) for c in FOUR]
+    larger = [n for n in stores if sigma["eight"][n] > sigma["ellipse"][n]]
+    wound = [f"{p}, {n}" for p, e in position.items() for n in stores if not e[n] < plain[p]]
+    by_shape = (
+        "reproduced" if larger == stores else f"with {', '.join(larger)}" if larger else "reversed"
+    )
     numbers = "; ".join(
         f"{p}, {n}: {x:.3g}" for p, each in sigma.items() for n, x in each.items() if "_" in n
     )
     return Verdict(
         "The SVD store has the larger singular values, the eight is richer than the ellipse (Fig. 5.7), "
         f"{condition}",
-        f"store: {verdict[by_store]}; eight: {verdict[by_shape]}",
-        f"σ_min at the end: {numbers}",
+        f"store: {'reproduced' if by_store else 'not reproduced'}; eight: {by_shape}"
+        f"{'; of runs that wound up in part' if wound else ''}",
+        f"σ_min at the end: {numbers}. Wound up: {'; '.join(wound) or 'none'}",
     )
 
 

@@ -1,0 +1,68 @@
+"""Commands that the thrusters cannot give: the axis that is named, and how often, by a count of the cells."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from diagnosis import Model, Run
+from diagnosis.assessment.command_check import beyond_thrusters
+from diagnosis.assessment.settings import SETTINGS
+from diagnosis.predictors.thrust import full_thrust
+
+MODEL = Model()
+FULL = full_thrust(MODEL).tolist()
+ROWS = 40
+
+
+def run_of(ratios):
+    """A run whose forces are some times (n, 3) what the thrusters give."""
+    tau = np.array(ratios) * FULL
+    return Run("made", 0.1 * np.arange(len(tau)), np.zeros_like(tau), tau)
+
+
+def expected(ratios):
+    """Axis and number of rows that are told, from cell to cell; None: nothing is."""
+    told = []
+    for k, full in enumerate(FULL):
+        cells = [abs(row[k]) * full for row in ratios]
+        false = [c for c in cells if c > SETTINGS.most_gain * full]
+        if false and sum(false) > SETTINGS.negligible * sum(cells):
+            told.append((max(cells) / full, k, len(false)))
+    return max(told)[1:] if told else None
+
+
+ratio = st.one_of(
+    st.floats(-1.0, 1.0),
+    st.sampled_from([0.0, 2.4, -2.4, 2.6, -2.6, 5.0, -7.0, 40.0]),
+)
+
+
+@given(st.lists(st.tuples(ratio, ratio, ratio), min_size=1, max_size=ROWS))
+def test_the_axis_farthest_beyond_its_thrust_is_named_with_its_rows(ratios):
+    text = beyond_thrusters(run_of(ratios), MODEL)
+    clear = expected(ratios)
+    if clear is None:
+        assert text is None
+        return
+    axis, rows = clear
+    ties = {max(abs(r[k]) for r in ratios) for k in range(3)}
+    if len(ties) == 3:
+        assert text.split(maxsplit=1)[0].endswith("XYN"[axis])
+        assert f"in {rows} of {len(ratios)} rows" in text
+        assert f"the {FULL[axis]:.4g} {'N.m' if axis == 2 else 'N'} that" in text
+    assert ("--ship" in text) == (2 * rows > len(ratios)) or len(ties) < 3
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_cell_that_is_larger_but_does_not_matter_is_not_the_one_named(axis):
+    """One cell far beyond, among many that are large, is less than the negligible share of an axis."""
+    other = (axis + 1) % 3
+    ratios = np.zeros((400, 3))
+    ratios[:, axis] = 2.4  # allowed
+    ratios[7, axis] = 30.0  # 30 of 990: 3 %
+    ratios[:, other] = 0.1
+    ratios[:20, other] = 2.7
+    text = beyond_thrusters(run_of(ratios), MODEL)
+    assert text.split(maxsplit=1)[0].endswith("XYN"[other])
+    assert "in 20 of 400 rows" in text

@@ -1,0 +1,112 @@
+"""Numbers of pages about studies are those of the results beside their reports."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from support.project import ROOT
+
+from studies.study_report import cell
+
+STUDIES = ROOT / "docs" / "studies"
+WITH_TABLES = [
+    path.parent
+    for path in sorted(STUDIES.glob("*/results.json"))
+    if '"tables"' in path.read_text("utf-8")
+]
+
+
+@pytest.fixture(scope="module")
+def ship():
+    """Results of the real ship."""
+    return json.loads((STUDIES / "measured_ship" / "results.json").read_text("utf-8"))
+
+
+@pytest.fixture(scope="module")
+def page():
+    """What the page of the studies says of it, in one line."""
+    return " ".join((ROOT / "studies" / "README.md").read_text("utf-8").split())
+
+
+def ends(values, digits):
+    """The least and the largest, as a page gives them."""
+    return f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
+
+
+def falls(ship, kind, axis):
+    return [f["axes"][axis]["out"] for f in ship["falls"].values() if f["kind"] == kind]
+
+
+def test_falls_of_the_model_error_are_those_of_the_results(ship, page):
+    held, hand = "dynamic positioning", "by hand"
+    surge, sway = falls(ship, held, "surge"), falls(ship, hand, "sway")
+    assert f"falls {surge[0]:.1f} and {surge[1]:.1f} times in surge in dynamic positioning" in page
+    assert f"{sway[0]:.1f} and {sway[1]:.1f} times in sway under manual control" in page
+    low, high = ends(falls(ship, held, "yaw") + falls(ship, hand, "yaw"), 1)
+    assert f"{low} to {high} times in yaw" in page
+    rise = sorted(1.0 / x for x in falls(ship, hand, "surge"))
+    assert f"In surge under manual control it rises (to {rise[0]:.1f} and {rise[1]:.1f} times)" in page
+
+
+def test_predictions_are_those_of_the_report(page):
+    text = (STUDIES / "measured_ship" / "report.md").read_text("utf-8")
+    part = text.split("## Prediction over 8 s")[1].split("\n## ")[0]
+    rows = [line.split(" | ")[1:] for line in part.splitlines() if re.match(r"\| \w+ \| [\d.]", line)]
+    before, after, _, psi_before, psi_after, _ = np.array(
+        [[float(x.strip(" |")) for x in r] for r in rows]
+    ).T
+    low, high = ends(before / after, 1)
+    assert f"positions after 8 s are {low} to {high} times better" in page
+    assert np.sum(psi_after > psi_before) == 1
+    assert "Headings are worse in one of four runs" in page
+    mean = np.exp(np.mean(np.log(psi_before / psi_after)))
+    assert f"{mean:.1f} times better in the geometric mean" in page
+
+
+def test_thrust_and_delay_are_those_of_the_results(ship, page):
+    found = ship["bollard"]["differences"]
+    everything, nominal = found["all runs"], found["nominal"]
+    assert f"differs by {everything['rms']:.3f} N from the bollard pulls" in page
+    assert f"nominal line {nominal['rms']:.3f} N" in page
+    low, high = ends([d["rms"] for n, d in found.items() if n.startswith("without")], 3)
+    assert f"{low} to {high} N if a run is left out" in page
+    assert (
+        f"factor it differs by {everything['scaled']:.3f} N (nominal {nominal['scaled']:.3f} N)" in page
+    )
+    low, high = ends(ship["late"].values(), 2)
+    assert f"{low} to {high} s in the four runs" in page
+    (delay,) = (row["came"] for row in ship["expected"] if row["expected"].startswith("delay"))
+    assert delay == ["no"] * 4
+    assert "None of the four learned models has one" in page
+
+
+def test_findings_are_those_of_the_results(ship, page):
+    folds = [d for name, d in ship["diagnoses"].items() if name.startswith("without")]
+    unexplained = [d for d in folds if d["verdict"] == "unexplained"]
+    assert len(folds) - len(unexplained) == 2
+    told = [e for d in folds for e in d["effects"]]
+    assert {e["id"] for e in told} == {"waves"}
+    low, high = sorted(f"{100 * e['confidence']:.0f}" for e in told)
+    assert f"the others name waves ({low} and {high} %)" in page
+    for d in folds:
+        named = {p["id"] for p in d["possibilities"]} | {s["name"] for s in d["suspect_coefficients"]}
+        assert {"Y_r", "N_r"} <= named
+        assert named & {"deadband", "curve_vsp_x(c)"}
+
+
+def test_share_of_the_residual_by_commands_is_that_of_the_results(ship, page):
+    axes = ship["falls"]["random_run1"]["axes"]
+    shares = [f"{100 * axes[a]['single']:.0f} %" for a in ("sway", "yaw")]
+    assert f"`random_run1` {shares[0]} of the residual in sway and {shares[1]} in yaw" in page
+
+
+@pytest.mark.parametrize("folder", WITH_TABLES, ids=lambda path: path.name)
+def test_tables_of_a_report_are_those_of_its_results(folder):
+    tables = json.loads((folder / "results.json").read_text("utf-8"))["tables"]
+    text = (folder / "report.md").read_text("utf-8")
+    for table in tables:
+        for row in [table["header"], *table["rows"]]:
+            assert f"| {' | '.join(cell(np.nan if c is None else c) for c in row)} |" in text
+    rules = len(re.findall(r"^\| :-- ", text, re.MULTILINE))
+    assert len(tables) == rules, "each table of the report is in the results"
