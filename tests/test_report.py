@@ -483,7 +483,9 @@ def test_terms_lead_to_the_glossary_of_the_page(report):
 
 
 def test_all_terms_of_the_glossary_can_be_linked():
-    rows = re.findall(r"^\| (?!term \|)([^|]+) \|", (ROOT / "docs" / "glossary.md").read_text("utf-8"), re.M)
+    rows = re.findall(
+        r"^\| (?!term \|)([^|]+) \|", (ROOT / "docs" / "glossary.md").read_text("utf-8"), re.M
+    )
     names = {t.name for t in glossary.terms().values()}
     assert names < set(rows)
     for name in names - glossary.EVERYDAY:

@@ -1,4 +1,4 @@
-"""Links from the words of a page to its glossary, which holds those terms of docs/glossary.md that it uses."""
+"""Links from words of a page to its glossary, which holds the terms of docs/glossary.md that it uses."""
 
 import re
 from functools import cache

@@ -71,7 +71,7 @@ def damping_sentence(f: Found) -> str:
     if moved == own and term != "uu":
         sense = "more" if force < 0.0 else "less"
         at = _at(moved, f.speeds)
-        return f"The ship has {sense} {drag} than the model: {number(force)} {unit} at {at}."
+        return f"The ship has {sense} {drag} than the model: {number(force)} {unit} {sense} at {at}."
     at = _at(moved, f.speeds, sides=True)
     what = "a moment" if axis == "N" else "a force"
     size = towards(force, unit, axis)
