@@ -98,7 +98,7 @@ def _ensemble(
 ) -> int:
     """Run the scenario with many ships; returns the exit code."""
     if options.ensemble is None or options.posterior is None:
-        raise InputError("--ensemble N and --posterior FILE go together")
+        raise InputError("--ensemble N needs --posterior FILE.json, and --posterior needs --ensemble")
     if options.realtime is not None:
         raise InputError("an ensemble does not run in real time: leave --realtime out")
     from .campaign.ensemble import run_ensemble, spread  # only now: pandas takes a second to import

@@ -71,7 +71,7 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
         shown.append(f"not used: {', '.join(found.unused)}")
     shown = list(map(printable, [*shown, *_blanks([found])]))
     if not found.needed:
-        return Done(0, [*shown, printable(f"no side-car (JSON file) is needed for '{path}'")])
+        return Done(0, [*shown, printable(f"no side-car is needed for '{path}'")])
     if found.layout == stated_layout(path):
         return Done(0, [*shown, printable(f"the side-car of '{path}' is complete")])
     return Done(0, [*shown, *_stated(target, found.needed, options.write)])

@@ -157,6 +157,7 @@ Finding 2: doubtful
 Possibly doubtful or other (60 % for doubtful): There is doubtful.
 X = doubtful
 confidence 60 %, explains 90 % of the squared error, unique contribution 25 %
+(no other effect explains it)
 Possibility: unlikely
 Possibly unlikely (20 % for unlikely): There is unlikely. However, something
 acts. It is not in the learned model.

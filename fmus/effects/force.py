@@ -115,8 +115,8 @@ def surge_curve_sentence(f: Found) -> str:
     place, value = peak(f)
     at = (2.0 * place - 1.0) * reach(f)
     return (
-        "The surge force follows another curve over the speed than in the model: "
-        f"{towards(value, 'N', 'X')} is missing at {at:.2g} m/s."
+        "The surge force over the speed differs from the model, most by "
+        f"{towards(value, 'N', 'X')} at {at:.2g} m/s."
     )
 
 

@@ -57,10 +57,10 @@ def refuse_time(
     rare = row > RAREST * scale.time
     if rare or row < OFTENEST:
         unit = likely_unit(row)
-        remedy = f" {_remedy(('time',), unit, called)}" if unit else ""
+        what_to_do = f" {remedy(('time',), unit, called)}" if unit else ""
         raise InputError(
             f"{where}: a sample each {row:.4g} s is too {'rare' if rare else 'frequent'}; "
-            f"is the time in another unit?{remedy}"
+            f"is the time in another unit?{what_to_do}"
         )
     if seconds > LARGEST:
         raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp is wrong")
