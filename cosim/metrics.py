@@ -54,14 +54,14 @@ examples:
         dest="start",
         metavar="T",
         type=float,
-        help="first time that is used [s] (as in the scenario)",
+        help="first time that is used [s] (default: as in the scenario)",
     )
     parser.add_argument(
         "--to",
         dest="stop",
         metavar="T",
         type=float,
-        help="last time that is used [s] (as in the scenario)",
+        help="last time that is used [s] (default: as in the scenario)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON only")
     parser.add_argument(

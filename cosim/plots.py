@@ -28,15 +28,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="results of a run")
     parser.add_argument(
-        "--out", metavar="DIR", type=Path, default=Path(), help="folder of the pictures (.)"
+        "--out", metavar="DIR", type=Path, default=Path(), help="folder of the pictures (default: .)"
     )
     usual = PictureOptions()
-    parser.add_argument("--format", choices=FORMATS, default=usual.format, help="(png)")
+    parser.add_argument("--format", choices=FORMATS, default=usual.format, help="(default: png)")
     parser.add_argument(
-        "--width", type=_positive, metavar="INCHES", default=usual.width, help=f"({usual.width:g})"
+        "--width",
+        type=_positive,
+        metavar="INCHES",
+        default=usual.width,
+        help=f"(default: {usual.width:g})",
     )
     parser.add_argument(
-        "--dpi", type=_positive, metavar="N", default=usual.dpi, help=f"pixels per inch ({usual.dpi:g})"
+        "--dpi",
+        type=_positive,
+        metavar="N",
+        default=usual.dpi,
+        help=f"pixels per inch (default: {usual.dpi:g})",
     )
     parser.add_argument("--style", metavar="NAME", help="style of matplotlib, or a style file")
     options = parser.parse_args(arguments)

@@ -98,7 +98,7 @@ def _ensemble(
 ) -> int:
     """Run the scenario with many ships; returns the exit code."""
     if options.ensemble is None or options.posterior is None:
-        raise InputError("--ensemble N and --posterior FILE go together")
+        raise InputError("--ensemble N needs --posterior FILE.json, and --posterior needs --ensemble")
     if options.realtime is not None:
         raise InputError("an ensemble does not run in real time: leave --realtime out")
     from .campaign.ensemble import run_ensemble, spread  # only now: pandas takes a second to import
@@ -219,23 +219,29 @@ def _parser() -> argparse.ArgumentParser:
         help="JSON file, or the name of a shipped one; or an SSP archive, an OSP directory or its "
         "OspSystemStructure.xml",
     )
-    parser.add_argument("--stop", type=positive, metavar="SECONDS", help="another end")
+    parser.add_argument(
+        "--stop",
+        type=positive,
+        metavar="SECONDS",
+        help="end of the run [s] (default: that of the scenario)",
+    )
     parser.add_argument(
         "--step",
         type=positive,
         metavar="SECONDS",
-        help="base step that replaces that of the scenario [s]",
+        help="base step [s] (default: that of the scenario)",
     )
     parser.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="another ship for FMUs with a bare name: a shipped one, or a file of your own",
+        help="ship for FMUs that the scenario names without a path: a shipped one, or a file of your "
+        "own (default: that of the scenario)",
     )
     parser.add_argument(
         "--seed",
         type=whole_number(0),
         metavar="N",
-        help="seed of noise and faults that replaces that of the scenario",
+        help="seed of noise and faults (default: that of the scenario)",
     )
     parser.add_argument(
         "--set",
@@ -249,7 +255,7 @@ def _parser() -> argparse.ArgumentParser:
         "--out",
         type=folder_name,
         metavar="DIR",
-        help="result folder (results/<name>; if it holds another run, results/<name>_2, ...)",
+        help="result folder (default: results/<name>; if it holds another run, results/<name>_2, ...)",
     )
     parser.add_argument(
         "--overwrite",
@@ -259,7 +265,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--log",
         choices=("all", "compact"),
-        help="signals in the log: all, or those that metrics, pictures and the diagnosis need",
+        help="signals in the log: all, or only those that metrics, pictures and the diagnosis need "
+        "(default: those of the scenario)",
     )
     parser.add_argument("--parquet", action="store_true", help="write log.parquet in place of log.csv")
     parser.add_argument(
@@ -267,8 +274,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.ssv",
         action="append",
         default=[],
-        help="SSP parameter set for the plant, whose values override the scenario's; may be given "
-        "several times",
+        help="SSP parameter set for the plant, the simulated ship; its values override those of the "
+        "scenario; may be given several times",
     )
     renamed_option(
         parser.add_mutually_exclusive_group(),
@@ -276,8 +283,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.ssv",
         action="append",
         default=[],
-        help="SSP parameter set of the plant for the controller models in controllers and observers; "
-        "may be given several times",
+        help="SSP parameter set, such as a learned model.ssv, for the model of the ship inside "
+        "controllers and observers; the simulated ship stays as it is; may be given several times",
     )
     parser.add_argument(
         "--ensemble",
@@ -289,15 +296,15 @@ def _parser() -> argparse.ArgumentParser:
         "--posterior",
         type=Path,
         metavar="FILE.json",
-        help="mean and covariance of parameters, from python -m diagnosis.learn",
+        help="mean and covariance of parameters, as the command learn writes it, for --ensemble",
     )
     parser.add_argument(
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to an FMU [s] (100 times its usual step, at least 30 s)",
+        help="longest time of a call to an FMU [s] (default: 100 times its usual step, at least 30 s)",
     )
-    parser.add_argument("--quiet", action="store_true", help="only errors")
+    parser.add_argument("--quiet", action="store_true", help="print only errors")
     parser.add_argument(
         "--verbose", action="store_true", help="also print which step loop ran, and the reason"
     )
@@ -314,7 +321,7 @@ def _parser() -> argparse.ArgumentParser:
         type=positive,
         const=1.0,
         metavar="FACTOR",
-        help="run in real time, FACTOR times as fast (1)",
+        help="run in real time, or FACTOR times as fast as real time (without FACTOR: 1)",
     )
     return parser
 

@@ -28,7 +28,9 @@ SECONDS = 150.0  # on the ellipse; chosen: three rounds, and the demo stays shor
 def main(arguments: list[str] | None = None) -> int:
     """Run it; returns the exit code."""
     parser = argparse.ArgumentParser(prog=program("cybership.demo"), description=__doc__)
-    parser.add_argument("--out", type=folder_name, metavar="DIR", help="result folder (results/demo)")
+    parser.add_argument(
+        "--out", type=folder_name, metavar="DIR", help="result folder (default: results/demo)"
+    )
     options = parser.parse_args(arguments)
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:

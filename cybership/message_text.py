@@ -74,13 +74,15 @@ def first_fault(
         whole: what stands for the place of a fault of the whole file.
     """
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    kind, loc, text = faults[0]["type"], faults[0]["loc"], faults[0]["msg"]
-    if own := special(kind, loc, faults[0]["input"]):
+    kind, loc, text, value = (faults[0][key] for key in ("type", "loc", "msg", "input"))
+    if own := special(kind, loc, value):
         text = own
     elif kind == "extra_forbidden":
         text = f"unknown key{hint(loc)}"
     elif kind == "missing":
         text = "is missing"
+    elif loc and text.startswith("Input") and isinstance(value, int | float | str):
+        text += f"; got {quoted(value)}"
     place = "" if loc else whole
     for part in loc:
         if isinstance(part, int):

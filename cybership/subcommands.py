@@ -37,7 +37,7 @@ SUBCOMMANDS = {
         "diagnosis.measure_trial", "measures of a manoeuvring trial, simulated or measured"
     ),
     "columns": Subcommand(
-        "diagnosis.propose_columns", "propose the side-car of a measurement of your own"
+        "diagnosis.propose_columns", "propose the JSON file that states how to read your measurement"
     ),
     "repair": Subcommand(
         "diagnosis.repair", "repair faults of a measurement that its redundant channels show"

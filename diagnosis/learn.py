@@ -238,7 +238,7 @@ def _parser() -> argparse.ArgumentParser:
     for option, what in (
         (
             "--validate",
-            "decide which effects are kept, and their confidence (folds of the training data)",
+            "decide which effects are kept, and their confidence (default: folds of the training data)",
         ),
         ("--test", "are predicted and decide nothing; they show how much the error falls"),
     ):
@@ -262,7 +262,8 @@ def _parser() -> argparse.ArgumentParser:
         type=prior,
         metavar="SHARE",
         help="relative standard deviation of every nominal coefficient, or, as in "
-        "mass=0.01,thrust=0.5, of groups and single ones; 0: exact (by the source of each value)",
+        "mass=0.01,thrust=0.5, of groups and single ones; 0: exact (default: by the source of each "
+        "value)",
     )
     made.add_argument(
         "--fit",
@@ -276,14 +277,15 @@ def _parser() -> argparse.ArgumentParser:
         "--method",
         metavar="NAME",
         default=DEFAULT,
-        help=f"method of identification: {', '.join(METHODS)}, or a FILE.py of your own ({DEFAULT})",
+        help=f"method that selects effects: {', '.join(METHODS)}, or a FILE.py of your own "
+        f"(default: {DEFAULT})",
     )
     made.add_argument(
         "--pruning",
         metavar="NAME",
         default=PAIRED,
         help=f"criterion by which effects are rejected: {', '.join(CRITERIA)}, or a FILE.py of your own "
-        f"({PAIRED})",
+        f"(default: {PAIRED})",
     )
     made.add_argument(
         "--parameters",

@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
         "--operating-point",
         Path,
         metavar="STATE.json",
-        help="start values, parameters and inputs by their names (start values of the FMU)",
+        help="start values, parameters and inputs by their names (default: start values of the FMU)",
     )
     where.add_argument("--run", type=Path, metavar="RUN", help="measured run that contains the state")
     made.add_argument("--time", type=float, metavar="SECONDS", help="time in that run [s]")
@@ -154,7 +154,8 @@ def _parser() -> argparse.ArgumentParser:
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="map of the FMU's variables to the columns, and its start values (guessed from names)",
+        help="map of the FMU's variables to the columns, and its start values (default: guessed from "
+        "names)",
     )
     ship_option(made)
     confinement_options(made)

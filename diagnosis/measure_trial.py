@@ -99,7 +99,10 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     ship_option(made)
     made.add_argument(
-        "--trial", choices=KINDS, help="kind of the trial (as the side-car or the log states)"
+        "--trial",
+        choices=KINDS,
+        help="kind of the trial (default: as stated in the log, or in the side-car, the JSON file next "
+        "to a CSV file)",
     )
     made.add_argument(
         "--from", dest="start", metavar="T", type=float, help="first time of the file that is used [s]"

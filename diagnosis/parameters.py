@@ -129,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="map of the FMU's variables to the columns (guessed from names)",
+        help="map of the FMU's variables to the columns (default: guessed from names)",
     )
     made.add_argument(
         "--runs",
@@ -137,14 +137,14 @@ def _parser() -> argparse.ArgumentParser:
         nargs="+",
         metavar="RUN",
         default=[],
-        help="measured runs: only parameters that they identify are written (all)",
+        help="measured runs: only parameters that they identify are written (default: all)",
     )
     made.add_argument(
         "--write",
         type=Path,
         metavar="FILE.json",
         default=Path("parameters.json"),
-        help="file that is written (parameters.json)",
+        help="file that is written (default: parameters.json)",
     )
     made.add_argument("--overwrite", action="store_true", help="replace an existing file")
     ship_option(made)

@@ -187,9 +187,10 @@ def _stated(target: Path, content: Mapping[str, Any], write: bool) -> list[Rende
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "diagnosis.propose_columns",
-        "Inspect measurements, and propose their side-car, a JSON file: names, units, separator, "
-        "decimal mark, lines before the names, encoding. Entries of an existing side-car are "
-        "kept. A signal without a column gets a blank name, and likely columns are listed.",
+        "Inspect measurements, and propose their side-car. This is a JSON file next to the CSV file,\n"
+        "which states how to read it: names of columns, units, separator, decimal mark, encoding.\n"
+        "Entries of an existing side-car are kept. A signal without a column gets a blank name, and\n"
+        "likely columns are listed.",
         "examples:  %(prog)s my.csv\n"
         "           %(prog)s my.csv --ship otter --write\n"
         "           %(prog)s folder/* --ship my_ship.toml --write\n"

@@ -57,8 +57,8 @@ def _parser() -> argparse.ArgumentParser:
         "--key",
         type=Path,
         metavar="FILE.pem",
-        help="public key (Ed25519) of the required signer (the key in the record, whose owner is not "
-        "known)",
+        help="public key (Ed25519) of the required signer (default: the key in the record, whose "
+        "owner is not known)",
     )
     made.add_argument(
         "--allow-missing",

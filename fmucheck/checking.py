@@ -140,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
         "files",
         nargs="*",
         metavar="FILE",
-        help="FMU, or the name of one of this project (all of this project)",
+        help="FMU, or the name of one of this project (default: all of this project)",
     )
     parser.add_argument("--json", action="store_true", help="print everything as JSON, no table")
     parser.add_argument("--list", action="store_true", help="print all rules as Markdown")
@@ -164,6 +164,6 @@ def _parser() -> argparse.ArgumentParser:
         type=_count,
         default=os.cpu_count() or 1,
         metavar="N",
-        help="number of FMUs at a time (processors)",
+        help="number of FMUs at a time (default: processors)",
     )
     return parser

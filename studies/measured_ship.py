@@ -105,7 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--prior",
         type=float,
         metavar="SHARE",
-        help="relative standard deviation of every damping coefficient (by the source of each value)",
+        help="relative standard deviation of every damping coefficient (default: by the source of each "
+        "value)",
     )
     options = parser.parse_args(arguments)
     run_study(partial(study, options.data, options.out, options.prior, options.quick))

@@ -89,7 +89,10 @@ def folds_command(
     )
     parser.add_argument("data", type=Path, metavar="DATA", help=data)
     parser.add_argument(
-        "--folds", type=int, metavar="N", help=f"number of folds that are left out (one for each {one})"
+        "--folds",
+        type=int,
+        metavar="N",
+        help=f"number of folds that are left out (default: one for each {one})",
     )
     parser.add_argument("--calibrate", action="store_true", help="search no effects: calibration only")
     options = parser.parse_args()

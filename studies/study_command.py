@@ -40,18 +40,22 @@ def study_parser(
     )
     out = Path("results") / f"study_{module.rpartition('.')[2]}"
     parser.add_argument(
-        "--out", type=folder_name, metavar="DIR", default=out, help=f"report folder ({out})"
+        "--out", type=folder_name, metavar="DIR", default=out, help=f"report folder (default: {out})"
     )
     if seeds is not None:
         parser.add_argument(
-            "--seeds", type=whole_number(1), metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"
+            "--seeds",
+            type=whole_number(1),
+            metavar="N",
+            default=seeds,
+            help=f"seeds 0 to N-1 (default: {seeds})",
         )
     if jobs:
         parser.add_argument(
             "--jobs",
             type=whole_number(1),
             metavar="N",
-            help="number of runs at a time (one for each core)",
+            help="number of runs at a time (default: one for each core)",
         )
     parser.add_argument(
         "--quick", action="store_true", help="few seeds and short runs, for a first look"

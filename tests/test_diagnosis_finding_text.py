@@ -73,7 +73,7 @@ def test_sentences(name, given, said):
 
 def test_force_of_a_damping_term_is_that_at_the_speeds_reached():
     said = sentence(Found(EFFECTS["X_|u|u"], {"delta_X_absu_u": -20.0}, (0.2, 0.0, 0.0)))
-    assert said == "The ship has more surge drag than the model: 0.8 N at 0.2 m/s."
+    assert said == "The ship has more surge drag than the model: 0.8 N more at 0.2 m/s."
 
 
 def test_an_effect_of_a_user_says_what_it_says_of_itself():

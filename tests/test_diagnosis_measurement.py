@@ -204,7 +204,7 @@ def test_lost_poses_are_kept_as_they_are(tmp_path):
         (lambda t: t.rename(columns={"tau_Y": "Tau_y"}), "no column 'tau_Y'; did you mean 'Tau_y'?"),
         (lambda t: t.drop(columns=list(TAU)), "has no commands: tau_X, tau_Y, tau_N, or u_vsp_x"),
         (lambda t: t.assign(x="north"), "x = 'north' is not a number"),
-        (lambda t: t.assign(u1=50.0, u2=0.0, u3=0.0, u4=0.0, u5=0.0), 'commands reach 50; allowed is -1 to 1; is their unit "unit": "%"?'),
+        (lambda t: t.assign(u1=50.0, u2=0.0, u3=0.0, u4=0.0, u5=0.0), 'commands reach 50; allowed is -1 to 1; are they in percent? Then put {"columns": {"u1": {"name": "u1", "unit": "%"}'),
     ],
 )  # fmt: skip
 def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
@@ -226,7 +226,7 @@ def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
         ({"colums": {}}, "colums: unknown key; did you mean 'columns'?"),
         ({"columns": {"x": {"unit": "m"}}}, "columns.x.name: is missing"),
         ({"columns": {"x": {"name": "x", "faktor": 2}}}, "columns.x.faktor: unknown key; did you mean 'factor'?"),
-        ({"columns": {"x": {"name": "x", "factor": 0}}}, "x.factor is not zero"),
+        ({"columns": {"x": {"name": "x", "factor": 0}}}, "x.factor is 0; give another number"),
         ([1], "valid dictionary"),
     ],
 )  # fmt: skip

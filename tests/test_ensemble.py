@@ -135,8 +135,8 @@ def test_posterior_that_is_none_is_refused_in_one_line(base, changes, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--ensemble", 3), "go together"),
-        (("--posterior", "posterior.json"), "go together"),
+        (("--ensemble", 3), "--ensemble N needs --posterior"),
+        (("--posterior", "posterior.json"), "--ensemble N needs --posterior"),
         (("--ensemble", 1, "--posterior", "posterior.json"), "from two on"),
         (("--ensemble", 3, "--posterior", "none.json"), "no such posterior"),
         (("--ensemble", 3, "--posterior", "base.json"), "names: is missing"),

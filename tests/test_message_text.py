@@ -41,7 +41,10 @@ def fault(content, **options):
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ({"parts": [{"size": 1.0}, {"size": 0}]}, "parts[1].size: Input should be greater than 0"),
+        (
+            {"parts": [{"size": 1.0}, {"size": 0}]},
+            "parts[1].size: Input should be greater than 0; got 0",
+        ),
         ({"parts": [{}]}, "parts[0].size: is missing"),
         (
             {"parts": [{"szie": 1.0}]},

@@ -1,4 +1,4 @@
-"""A user's effects and methods, those of CONTRIBUTING.md: each in one file, and found."""
+"""A user's effects and methods, those of docs/own_effects.md: each in one file, and found."""
 
 import re
 from pathlib import Path
@@ -23,12 +23,14 @@ from fmus.effects.text import Found
 from fmus.ship import ship
 
 BLOCKS = re.findall(
-    r"```python\n(.*?)```", (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text("utf-8"), re.DOTALL
+    r"```python\n(.*?)```",
+    (Path(__file__).parents[1] / "docs" / "own_effects.md").read_text("utf-8"),
+    re.DOTALL,
 )
 
 
 def example(name):
-    """The example of CONTRIBUTING.md that declares something of this name."""
+    """The example of docs/own_effects.md that declares something of this name."""
     (block,) = [b for b in BLOCKS if re.search(rf"^(def|class) {name}\b", b, re.MULTILINE)]
     return block
 

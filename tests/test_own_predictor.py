@@ -145,9 +145,9 @@ def test_a_function_that_runs_away_has_infinite_errors(runs):
 
 
 def test_a_class_with_motion_and_accelerations_is_a_predictor(runs, plain):
-    """That of CONTRIBUTING; what it lacks is all that moves the ship."""
+    """That of the page; what it lacks is all that moves the ship."""
     names = {}
-    exec(example("CONTRIBUTING.md", "class Adrift"), names)
+    exec(example("docs/own_effects.md", "class Adrift"), names)
     source = names["Adrift"]()
     assert isinstance(source, ModelSource)
     found = diagnosis.compare(runs, model=source)

@@ -18,6 +18,7 @@ import pytest
 from support import reported
 from support.cse1 import EFFECTS
 from support.measured import sail, smoothed
+from support.project import ROOT
 
 from diagnosis import Comparison, Model, PredictionError, evaluate_run
 from diagnosis.assessment.covariates import EAST, NORTH, SPEED, means_of_run
@@ -28,6 +29,7 @@ from diagnosis.report import (
     Curve,
     ReportData,
     curves,
+    glossary,
     page,
     tracks,
     write_coefficients,
@@ -465,3 +467,47 @@ def test_a_fall_stands_below_its_numbers_and_not_in_a_column_of_its_own(report):
     """Eleven columns of long numbers are wider than a page of 1,300 px; six are not."""
     head = report.read_text(encoding="utf-8").partition("<thead>")[2].partition("</thead>")[0]
     assert head.count("<th ") == 6
+
+
+def test_terms_lead_to_the_glossary_of_the_page(report):
+    """Each is linked at its first use only, has the sentence of docs/glossary.md, and none is left over."""
+    text = report.read_text("utf-8")
+    links = re.findall(r'<a class="term" href="#(term-[^"]+)" title="([^"]+)">([^<]+)</a>', text)
+    kept = re.findall(r'<div id="(term-[^"]+)"><dt>(?:[^<]*)</dt>\s*<dd>([^<]+)</dd>', text)
+    assert [anchor for anchor, _, _ in links] == [anchor for anchor, _ in kept]
+    assert {"confidence", "unique contribution", "explained error"} <= {words for *_, words in links}
+    glossary = (ROOT / "docs" / "glossary.md").read_text("utf-8").replace("`", "")
+    for (_, meaning, _), (_, shown) in zip(links, kept, strict=True):
+        assert f"| {html.unescape(meaning)} |" in glossary
+        assert shown.startswith(meaning)
+
+
+def test_all_terms_of_the_glossary_can_be_linked():
+    rows = re.findall(
+        r"^\| (?!term \|)([^|]+) \|", (ROOT / "docs" / "glossary.md").read_text("utf-8"), re.M
+    )
+    names = {t.name for t in glossary.terms().values()}
+    assert names < set(rows)
+    for name in names - glossary.EVERYDAY:
+        for word in set(name.split(", ")) - glossary.EVERYDAY:
+            page, used = glossary.linked(f"<p>Each {word} of <i>it</i>; {word} again.</p>")
+            assert (page.count("<a "), [t.name for t in used]) == (1, [name])
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        "<p><a href='#x'>confidence</a> <b>run</b></p>",
+        "<p class='equation'>noise = 3</p><th scope='row'>prior</th><td>prior</td><h2>Noise</h2>",
+        "<p>a_run run_2 noise=2 noise.csv prior(x) X_run</p>",
+        "<svg><text>confidence</text></svg><style>p > noise {}</style>",
+    ],
+)
+def test_names_code_and_links_stay_as_they_are(page):
+    assert glossary.linked(page) == (page, [])
+
+
+def test_a_hostile_name_stays_a_text_where_terms_are_linked():
+    page, (term,) = glossary.linked(f"<p>{html.escape(EVIL + ' noise ' + EVIL)}</p>")
+    assert term.name == "noise"
+    assert re.sub(r"</?a[^>]*>", "", page) == f"<p>{html.escape(EVIL + ' noise ' + EVIL)}</p>"

@@ -157,6 +157,7 @@ Finding 2: doubtful
 Possibly doubtful or other (60 % for doubtful): There is doubtful.
 X = doubtful
 confidence 60 %, explains 90 % of the squared error, unique contribution 25 %
+(no other effect explains it)
 Possibility: unlikely
 Possibly unlikely (20 % for unlikely): There is unlikely. However, something
 acts. It is not in the learned model.
@@ -343,9 +344,7 @@ def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
     given = compared(True)
     given.before.profiles, given.after = "first", SimpleNamespace(profiles="last")
     text = notebook.as_html(found(given, [effect("a<b", 0.6), EFFECTS[1]])).replace("\n", "")
-    assert (
-        "<b>An effect is missing, and its identification is uncertain</b></p><p>There is sure." in text
-    )
+    assert "<b>An effect is missing; which one is uncertain</b></p><p>There is sure." in text
     assert "There is a&lt;b.</p><p>Little is left.</p>" in text
     assert "<tr><td>a&lt;b</td><td>X = a&lt;b</td></tr><tr><td>sure</td><td>X = sure</td></tr>" in text
     assert "<th>position over 8 s [mm]</th><th>heading over 8 s [°]</th>" in text

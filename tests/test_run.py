@@ -333,7 +333,7 @@ def test_parameter_set_beats_the_scenario_with_a_notice(scenario, ellipse, tmp_p
     assert done.returncode == 0
     assert "vessel.delta_X_u = -4.0" in done.stderr
     assert "overrides -1.0" in done.stderr
-    assert "has values for a model 'other', which does not run here" in done.stderr
+    assert "has values for a model 'other', which is not in the scenario" in done.stderr
     log = cosim.read_log(tmp_path / "out")
     assert log["vessel.omega_X"] == pytest.approx(-4.0 * log["vessel.u"])
 

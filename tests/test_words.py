@@ -12,6 +12,7 @@ from support import texts
 from support.project import ROOT
 
 LONGEST = 35  # words a sentence, code not counted; 25 are the aim (CONTRIBUTING.md, "Words")
+LINES = 300  # of a page
 
 # Phrases that are private to this project, as regular expressions, with the field's.
 PRIVATE = {
@@ -126,6 +127,11 @@ def test_the_code_speaks_in_the_words_of_the_field(part):
 
 
 @pytest.mark.parametrize("page", sorted(PAGES))
+def test_a_page_is_not_two(page):
+    assert PAGES[page].read_text("utf-8").count("\n") <= LINES
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
 def test_a_page_is_in_the_words_of_the_field(page):
     assert faults(page) == []
 
@@ -180,17 +186,7 @@ def test_the_glossary_has_each_term_once_with_one_sentence():
 
 def test_spelling():
     """Of all pages, messages, docstrings and names; the words that codespell ignores are in pyproject.toml."""
-    packages = (
-        "cosim",
-        "cybership",
-        "diagnosis",
-        "fmucheck",
-        "fmus",
-        "studies",
-        "thesis",
-        "ships",
-        "scenarios",
-    )
+    packages = (*PACKAGES, "ships", "scenarios", "examples", "docs/studies", "docs/benchmarks")
     done = subprocess.run(
         [sys.executable, "-m", "codespell_lib", *PAGES, "CHANGELOG.md", *packages],
         cwd=ROOT, capture_output=True, text=True,

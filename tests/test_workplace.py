@@ -219,17 +219,22 @@ def test_beliefs_are_the_learned_model(ellipse, tmp_path, observer):
     assert controller["phi_0_6"] == -1.9  # N_r, of which the file says nothing: nominal
     assert ("X_u" in told["observer"]) == (observer == "observer_luenberger.fmu")
     assert told["vessel"] == ellipse["fmus"]["vessel"].get("parameters", {})  # the plant is what it was
-    assert any("no controller model here has vessel.V_n" in w for w in system.warnings)
+    assert any(
+        "no controller and no observer of the scenario uses vessel.V_n" in w for w in system.warnings
+    )
     system.close()
 
 
 def test_a_belief_that_nobody_can_have_is_refused(ellipse, tmp_path, chain):
     file = model_file(tmp_path / "model.ssv", delta_X_u=-2.0)
-    with pytest.raises(cosim.InputError, match="'vessel', which does not run here"):
+    with pytest.raises(cosim.InputError, match="'vessel', which is not in the scenario"):
         cosim.simulate(chain, tmp_path / "out", controller_model=[file])
     del ellipse["fmus"]["controller"], ellipse["fmus"]["observer"]
     ellipse |= {"connections": [], "faults": [], "events": []}
-    with pytest.raises(cosim.InputError, match="no controller model here has parameters of vessel"):
+    with pytest.raises(
+        cosim.InputError,
+        match="no controller and no observer of the scenario has parameters of the model vessel",
+    ):
         cosim.simulate(ellipse, tmp_path / "out", controller_model=[file])
 
 

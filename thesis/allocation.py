@@ -179,7 +179,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--hidden", type=float, nargs="+", default=list(HIDDEN), metavar="M", help="hidden offsets [m]"
     )
-    parser.add_argument("--force", type=float, default=Push().force, help="sway force [N] (%(default)s)")
+    parser.add_argument(
+        "--force", type=float, default=Push().force, help="sway force [N] (default: %(default)s)"
+    )
     options = parser.parse_args(arguments)
     seeds = range(1 if options.quick else options.seeds)
     push = Push(force=options.force)

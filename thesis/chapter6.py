@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--model",
         type=Path,
         metavar="FILE",
-        help="parameter set of the ship, as diagnosis.learn writes it (SYSID4)",
+        help="parameter set of the ship, as diagnosis.learn writes it (default: SYSID4)",
     )
     parser.add_argument(
         "--trials", action="store_true", help="the trials only, without the experiments on causes"

@@ -170,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         seeds=None,
     )
     parser.add_argument(
-        "--data", type=Path, metavar="DIR", help="folder with cse1/*.mat, measured runs (none)"
+        "--data", type=Path, metavar="DIR", help="folder with cse1/*.mat, measured runs (default: none)"
     )
     options = parser.parse_args(arguments)
     run_study(partial(study, options.out, 60.0 if options.quick else None, options.jobs, options.data))

@@ -28,7 +28,7 @@ def analysis_parser(
         choices=("smoothed", "mdf"),
         default=estimates,
         help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
-        f"derivative filter ({estimates})",
+        f"derivative filter (default: {estimates})",
     )
     anyway_option(made)
     out_options(made, Path("results", name))
@@ -49,7 +49,9 @@ def open_loop_parser(name: str, description: str, epilog: str) -> argparse.Argum
     made = command_parser(f"thesis.{name}", description, epilog)
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     made.add_argument(
-        "--observer", metavar="NAME", help="an observer of this project (the scenario's, or mdf)"
+        "--observer",
+        metavar="NAME",
+        help="an observer of this project (default: the scenario's, or mdf)",
     )
     made.add_argument(
         "--scenario",

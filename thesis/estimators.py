@@ -173,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "  python -m thesis.estimators --quick --out /tmp/estimators\n"
         "  python -m thesis.estimators --data ~/cse1",
     )
-    parser.add_argument("--data", type=Path, metavar="DIR", help="measured runs, *.mat (none)")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="measured runs, *.mat (default: none)")
     options = parser.parse_args(arguments)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:

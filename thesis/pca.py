@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         "--components",
         type=int,
         metavar="A",
-        help="components of the model (the fewest that explain 90 %%)",
+        help="components of the model (default: the fewest that explain 90 %%)",
     )
     return made
 

@@ -82,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
         "smoothed",
     )
     ship_option(made)
-    made.add_argument("--recipe", default="PLS3", metavar="NAME", help="recipe of X (PLS3)")
+    made.add_argument("--recipe", default="PLS3", metavar="NAME", help="recipe of X (default: PLS3)")
     made.add_argument(
         "--keep-outliers", action="store_true", help="do not remove outliers by PCA beforehand (7.3)"
     )

@@ -116,7 +116,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         jobs=False,
     )
     parser.add_argument(
-        "--seconds", type=float, default=20.0, metavar="S", help="simulated time of a run (%(default)s)"
+        "--seconds",
+        type=float,
+        default=20.0,
+        metavar="S",
+        help="simulated time of a run (default: %(default)s)",
     )
     parser.add_argument(
         "--factor", type=float, nargs="+", default=list(FACTORS), metavar="F", help="times real time"

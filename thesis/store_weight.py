@@ -106,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "  python -m thesis.store_weight\n  python -m thesis.store_weight --quick",
         seeds=None,
     )
-    parser.add_argument("--path", choices=PATHS, help="only this path (both)")
+    parser.add_argument("--path", choices=PATHS, help="only this path (default: both)")
     options = parser.parse_args(arguments)
     paths = (options.path,) if options.path else PATHS
     run_study(partial(study, options.out, paths, 60.0 if options.quick else None, options.jobs))

@@ -196,13 +196,14 @@ def _parser() -> argparse.ArgumentParser:
         "campaign", metavar="CAMPAIGN", type=Path, help="JSON file, see docs/campaign.md"
     )
     parser.add_argument(
-        "--out", type=folder_name, metavar="DIR", help="result folder (results/<file name>)"
+        "--out", type=folder_name, metavar="DIR", help="result folder (default: results/<file name>)"
     )
     parser.add_argument(
         "--workers",
         type=whole_number(0),
         metavar="N",
-        help=f"processes on this computer ({os.cpu_count()}); 0: run all in this process, without Dask",
+        help=f"processes on this computer (default: {os.cpu_count()}); 0: run all in this process, "
+        "without Dask",
     )
     parser.add_argument(
         "--scheduler", metavar="tcp://HOST:PORT", help="run on the workers of this Dask scheduler"
@@ -217,7 +218,7 @@ def _parser() -> argparse.ArgumentParser:
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to an FMU [s] (100 times its usual step, at least 30 s)",
+        help="longest time of a call to an FMU [s] (default: 100 times its usual step, at least 30 s)",
     )
     parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
     parser.add_argument(
@@ -242,9 +243,9 @@ def _parser() -> argparse.ArgumentParser:
         "--metrics",
         type=_names,
         metavar="M1,M2",
-        help=f"metrics for pictures and --compare ({','.join(USUAL)})",
+        help=f"metrics for pictures and --compare (default: {','.join(USUAL)})",
     )
-    parser.add_argument("--quiet", action="store_true", help="only errors")
+    parser.add_argument("--quiet", action="store_true", help="print only errors")
     return parser
 
 

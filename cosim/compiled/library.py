@@ -46,7 +46,7 @@ def asks_for_plain_loop() -> bool:
 
 NATIVE = (
     "compile the FMUs of the project and the step loop, or neither; results are the same "
-    "(compiled, if the system has a C compiler)"
+    "(default: compiled, if the system has a C compiler)"
 )
 
 

@@ -108,7 +108,7 @@ def read_parameters(path: Path) -> ParameterSet:
     except FileNotFoundError:
         raise InputError(f"no such parameter set: '{path}'") from None
     except (OSError, ElementTree.ParseError, LookupError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read as a parameter set: {error}") from None
+        raise InputError(f"'{path}' cannot be read as a parameter set (XML, .ssv): {error}") from None
     if root.tag != f"{{{SSV}}}ParameterSet":
         raise InputError(f"'{path}' is not an SSP 1.0 parameter set")
     values = _values(root, path)

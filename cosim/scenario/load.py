@@ -121,7 +121,7 @@ def _validate(content: Any, name: str, folder: Path) -> Scenario:
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line, with the number of further ones."""
     told = first_fault(error, _nearest_key, _is_internal, _special, whole="the content")
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    more = f" (and {error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
     return f"{name}: {told}{more}"
 
 

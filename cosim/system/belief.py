@@ -40,7 +40,9 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
     for model_name in given.values:
         plant = next((m for m in system.models.values() if m.name == model_name), None)
         if plant is None:
-            raise InputError(f"'{path}' has values for a model '{model_name}', which does not run here")
+            raise InputError(
+                f"'{path}' has values for a model '{model_name}', which is not in the scenario"
+            )
         model = _Believed(plant, path, given)
         for name, fmu in system.models.items():
             if fmu is plant:
@@ -51,11 +53,14 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
                 used.update((model_name, used_name) for used_name in names)
     if not believers:
         raise InputError(
-            f"'{path}': no controller model here has parameters of {', '.join(given.values)}"
+            f"'{path}': no controller and no observer of the scenario has parameters of the model "
+            f"{', '.join(given.values)}; --parameters sets those of the ship itself"
         )
     unused = [f"{m}.{n}" for m, values in given.values.items() for n in values if (m, n) not in used]
     if unused:
-        system.warnings.append(f"'{path}': no controller model here has {', '.join(unused)}")
+        system.warnings.append(
+            f"'{path}': no controller and no observer of the scenario uses {', '.join(unused)}"
+        )
 
 
 class _Believed:

@@ -63,7 +63,7 @@ def _merge_parameters(system: System, overrides: Overrides) -> Chosen:
             targets = [n for n, model in system.models.items() if model.name == model_name]
             if not targets:
                 system.warnings.append(
-                    f"'{path}' has values for a model '{model_name}', which does not run here"
+                    f"'{path}' has values for a model '{model_name}', which is not in the scenario"
                     f"{_models_hint(system, model_name)}"
                 )
             for name in targets:

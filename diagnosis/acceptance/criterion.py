@@ -59,7 +59,7 @@ class Criterion(BaseModel):
         description="confidence of the one-sided bound that decides, and of its interval",
     )
     runs: Annotated[list[str], Field(min_length=1)] | None = Field(
-        None, description="names of the runs that count (all)"
+        None, description="names of the runs that count (default: all)"
     )
     operating_range: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
         {}, description="lowest and highest mean of u, v, r, speed, drift or a command in a window [SI]"

@@ -83,7 +83,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         type=Path,
         metavar="FILE",
         help="initial model: a parameter set .ssv, an .fmu, a system, .ssp or scenario .json, or a "
-        "Python function .py (the nominal model)",
+        "Python function .py (default: the nominal model)",
     )
     made.add_argument(
         "--effects",
@@ -99,7 +99,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         "--horizon",
         type=float,
         metavar="SECONDS",
-        help="length of the prediction windows [s] (8 s, times the time scale of the ship)",
+        help="length of the prediction windows [s] (default: 8 s, times the time scale of the ship)",
     )
     return made
 
@@ -110,14 +110,14 @@ def fmu_options(made: argparse.ArgumentParser) -> None:
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="map of the FMU's variables to the signals (guessed from names and units)",
+        help="map of the FMU's variables to the signals (default: guessed from names and units)",
     )
     made.add_argument(
         "--step",
         type=positive,
         metavar="SECONDS",
-        help="step of the FMU [s] (its stepSize if it accepts no other, else the step that predictions "
-        "need)",
+        help="step of the FMU [s] (default: its stepSize if it accepts no other, else the step that "
+        "predictions need)",
     )
     confinement_options(made)
 
@@ -128,7 +128,7 @@ def confinement_options(made: argparse.ArgumentParser) -> None:
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to the FMU [s] (100 times its usual step, at least 30 s)",
+        help="longest time of a call to the FMU [s] (default: 100 times its usual step, at least 30 s)",
     )
     made.add_argument(
         "--unconfined",
@@ -150,7 +150,7 @@ def ship_option(made: argparse.ArgumentParser) -> None:
     made.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="the measured ship: a shipped one, or a file of your own (from the logs of the runs, else "
+        help="the measured ship: a shipped one, or a file of your own (default: that of the logs, else "
         "cse1)",
     )
 
@@ -171,7 +171,7 @@ def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
         "--out",
         type=folder_name,
         metavar="DIR",
-        help=f"result folder ({usual}; if it holds the result of other inputs, {usual}_2, ...)",
+        help=f"result folder (default: {usual}; if it holds the result of other inputs, {usual}_2, ...)",
     )
     made.add_argument(
         "--overwrite", action="store_true", help=f"use {usual}, and replace any result in it"

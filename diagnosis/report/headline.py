@@ -37,7 +37,7 @@ VERDICTS = {
     "none": "These data show no missing effect",
 }
 # Headings where one cause fits and is not sure, and where effects are possible and none is believed.
-UNSURE = "An effect is missing, and its identification is uncertain"
+UNSURE = "An effect is missing; which one is uncertain"
 
 
 def is_sure(e: ReportedEffect) -> bool:

@@ -15,6 +15,7 @@ from ..predictors.evaluation import Evaluation
 from . import figures, formatting, tracks
 from .chart import data_uri, themed
 from .content import coefficients, versions
+from .glossary import linked
 from .headline import boundedness, gain_of_search, headline, told, verdict_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
@@ -98,8 +99,13 @@ def write_report(
 
 
 def write_page(path: Path, template: str, **values: object) -> None:
-    """Write a page by a template of this folder; an older file is replaced when it is complete."""
-    text = rendered(template, **values)
+    """Write a page by a template of this folder, with the glossary of its terms.
+
+    An older file is replaced when the page is complete.
+    """
+    text, terms = linked(rendered(template, **values))
+    head, end, tail = text.rpartition("</main>")
+    text = f"{head}{rendered('glossary.html', terms=terms) if terms else ''}{end}{tail}"
     with cosim.atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
 

@@ -44,7 +44,8 @@ def show_calibration(calibrated: CalibratedModel, r: ReportData, out: str) -> It
     moved = calibrated.learned.moved
     furthest = sorted(moved, key=lambda name: -abs(moved[name]))[:SHOWN]
     by = (f"{n} is {_number(calibrated.model.value(n))} ({_number(moved[n], 2)})" for n in furthest)
-    yield from _lines("Coefficients with the largest changes, in standard deviations of the prior", by)
+    title = "Coefficients with the largest changes (the change in standard deviations of the prior)"
+    yield from _lines(title, by)
     yield from _errors(r)
     yield from _files(r, out)
 
@@ -169,7 +170,8 @@ def _effect(e: ReportedEffect) -> Iterator[str]:
     yield told(e)
     yield e.equation
     share = _percent(e.share_of_error)
-    alone = "" if e.share_unique is None else f", unique contribution {_percent(e.share_unique)}"
+    unique = f", unique contribution {_percent(e.share_unique)} (no other effect explains it)"
+    alone = "" if e.share_unique is None else unique
     yield f"confidence {_percent(e.confidence)}, explains {share} of the squared error{alone}"
     yield from filter(None, (e.separation, e.advice))
 

@@ -150,7 +150,7 @@ def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> li
     for run, path in zip(runs, paths, strict=True):
         content = np.column_stack([run.time, run.pose]).tobytes()
         if content in known:
-            again = f"'{path}' is given twice"
+            again = f"'{path}' is given twice; a run is training, validation or test data, once"
             same = f"'{path}' holds the same measurement as '{known[content]}'"
             raise InputError(again if Path(path) == Path(known[content]) else same)
         known[content] = path

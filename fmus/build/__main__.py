@@ -49,8 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           %(prog)s --verify fmu/vessel.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="copy the FMUs to this folder (cache of the user)")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (default: all)")
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="copy the FMUs to this folder (default: cache of the user)")
     parser.add_argument(
         "--overwrite",
         action="store_true",
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="ship of the FMUs: a shipped one, or a file of your own (cse1)",
+        help="ship of the FMUs: a shipped one, or a file of your own (default: cse1)",
     )
     parser.add_argument(
         "--parameters",

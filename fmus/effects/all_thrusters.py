@@ -131,7 +131,10 @@ loss_surge = _axis_loss(
     Wording(
         _axis_sentence("surge", "force"),
         PROPELLERS,
-        {"X_u": "pulse the speed instead of holding it", "mass": "run steady and accelerating legs"},
+        {
+            "X_u": "change the speed often, instead of holding it",
+            "mass": "run steady and accelerating legs",
+        },
     ),
 )
 loss_sway = _axis_loss(

@@ -31,7 +31,7 @@ SURGE_DRAG = Family(
     {
         "surge drag": "run three or more speeds, ahead and astern, from very slow to full",
         "body-fixed": "run astern as well",
-        "propellers": "pulse the speed instead of holding it",
+        "propellers": "change the speed often, instead of holding it",
         "earth-fixed": "run the same speeds on opposite headings",
     },
 )

@@ -71,7 +71,7 @@ def damping_sentence(f: Found) -> str:
     if moved == own and term != "uu":
         sense = "more" if force < 0.0 else "less"
         at = _at(moved, f.speeds)
-        return f"The ship has {sense} {drag} than the model: {number(force)} {unit} at {at}."
+        return f"The ship has {sense} {drag} than the model: {number(force)} {unit} {sense} at {at}."
     at = _at(moved, f.speeds, sides=True)
     what = "a moment" if axis == "N" else "a force"
     size = towards(force, unit, axis)
@@ -115,8 +115,8 @@ def surge_curve_sentence(f: Found) -> str:
     place, value = peak(f)
     at = (2.0 * place - 1.0) * reach(f)
     return (
-        "The surge force follows another curve over the speed than in the model: "
-        f"{towards(value, 'N', 'X')} is missing at {at:.2g} m/s."
+        "The surge force over the speed differs from the model, most by "
+        f"{towards(value, 'N', 'X')} at {at:.2g} m/s."
     )
 
 

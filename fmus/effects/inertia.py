@@ -22,7 +22,7 @@ def water_sentence(name: str, how: str, unit: str) -> Callable[[Found], str]:
     def sentence(f: Found) -> str:
         sense = "larger" if f[name] > 0.0 else "smaller"
         size = f"{number(f[name])} {unit}"
-        return f"The added mass in {how} is {sense} than in the model: {size}."
+        return f"The added mass in {how} is {size} {sense} than in the model."
 
     return sentence
 

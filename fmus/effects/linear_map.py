@@ -71,8 +71,9 @@ def _parameters() -> tuple[Variable, ...]:
 def sentence(f: Found) -> str:
     some = {n: f[n] for axis in AXES for r in REGRESSORS if f[n := parameter(axis, r)]}
     first = max(some, key=lambda n: abs(some[n]), default="")
-    text = f", {first} = {number(some[first])} the largest of them" if first else ""
-    return f"The model error is a linear map of velocity and force with {len(some)} coefficients{text}."
+    text = f"; the largest is {first} = {number(some[first])}" if first else ""
+    count = f"{len(some)} coefficients"
+    return f"The model error is a linear function of velocity and force with {count}{text}."
 
 
 @effect(

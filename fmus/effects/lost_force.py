@@ -160,7 +160,10 @@ def deadband(d: Devices, parts: Sequence[Devices] = (), name: str = "") -> Effec
         d,
         name,
         (parameter(name, "N", f"{d.label} force without effect", POSITIVE),),
-        lambda f: f"{who} nothing below {number(f[name])} N, and {number(f[name])} N less above.",
+        lambda f: (
+            f"{who} no force for commands below {number(f[name])} N, and {number(f[name])} N less than "
+            "commanded above."
+        ),
         pictures=tuple(part.picture("force given") for part in parts or (d,)),
         formula="f - clip(f, -d, d), of each actuator",
         symbol="d",

@@ -114,7 +114,10 @@ def low_pass(channel: str, symbol: str, coordinates: str) -> Effect:
         function=None,
         search=Search(differentiable=True),
         wording=Wording(
-            lambda f: f"The {channel} is measured behind a low-pass filter of {number(f[name])} s.",
+            lambda f: (
+                f"The {channel} is measured through a low-pass filter with a time constant of "
+                f"{number(f[name])} s."
+            ),
             FILTER,
         ),
     )

@@ -57,9 +57,9 @@ def command_curve(d: Devices, command: str) -> Effect:
     def sentence(f: Found) -> str:
         at, value = peak(f)
         return (
-            f"The force of the {d.title} follows another curve over its command than in the model: "
-            f"{percent(value)} {'less' if value < 0.0 else 'more'} at {percent(2.0 * at - 1.0)} of "
-            f"full {'ahead' if at >= 0.5 else 'astern'}."
+            f"The force of the {d.title} over the command differs from the model, most by "
+            f"{percent(value)} {'less' if value < 0.0 else 'more'} force at {percent(2.0 * at - 1.0)} "
+            f"of full {'ahead' if at >= 0.5 else 'astern'}."
         )
 
     @declared(
@@ -92,8 +92,8 @@ def force_curve(d: Devices, axis: str) -> Effect:
     def sentence(f: Found) -> str:
         at, value = peak(f)
         return (
-            f"The {way} force of the {d.title} follows another curve over its command than in the "
-            f"model: {towards(value, 'N', axis)} is missing at command "
+            f"The {way} force of the {d.title} over the command differs from the model, most by "
+            f"{towards(value, 'N', axis)} at command "
             f"{(2.0 * at - 1.0) * reach(f):.2g}."
         )
 
@@ -131,7 +131,7 @@ def thrust_curve(d: Devices) -> Effect:
         parts = [
             f"{percent(x)} {'more' if x > 0.0 else 'less'} force {way}" for way, x in change.items() if x
         ]
-        push = f"give {' and '.join(parts)} than the model" if parts else ""
+        push = f"give {' and '.join(parts)} than in the model" if parts else ""
         still = f"give no force at commands below {percent(f[band])}" if f[band] else ""
         return f"The {d.title} {' and '.join(filter(None, (push, still)))}."
 

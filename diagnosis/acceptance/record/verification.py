@@ -112,7 +112,9 @@ def _read(path: Path) -> tuple[bytes, Record]:
         json.loads(raw, object_pairs_hook=_once)
         content = Record.model_validate_json(raw, strict=True)
     except OSError as error:
-        raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
+        raise InputError(
+            f"'{path}' cannot be read: {error.strerror or error}; a record is a file validation.json"
+        ) from None
     except ValidationError as error:
         raise InputError(f"'{path}' is not a validation record: {first_fault(error)}") from None
     except (ValueError, RecursionError) as error:

@@ -235,7 +235,7 @@ def completed(
                 hint = nearest(column.name, variables)
                 raise InputError(f"{place}: the FMU has no variable {quoted(column.name)}{hint}")
             if column.factor == 0.0:
-                raise InputError(f"{place}.factor is not zero")
+                raise InputError(f"{place}.factor is 0; give another number")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
                 raise InputError(f"{place}: {quoted(column.unit)} is not a unit of {signal}{hint}")
@@ -309,7 +309,8 @@ def _with_unit(column: Column, v: FmuVariable, quantity: str, where: str) -> Col
         return column.model_copy(update={"unit": unit.name})
     if not _is_of(unit, quantity):
         raise InputError(
-            f"{where}: '{v.name}' is in '{unit.name}', which is not a unit of {quantity}; state its unit"
+            f"{where}: the FMU gives '{v.name}' in '{unit.name}', which is not a unit of {quantity}; "
+            'add "unit" to its entry, or name another variable'
         )
     scaled = {"factor": column.factor * unit.factor, "offset": column.offset * unit.factor + unit.offset}
     return column.model_copy(update=scaled)

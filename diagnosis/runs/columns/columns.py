@@ -159,7 +159,7 @@ class Layout(BaseModel):
     def _known(cls, value: dict[str, Column]) -> dict[str, Column]:
         for key, column in value.items():
             if column.factor == 0.0:
-                raise ValueError(f"{key}.factor is not zero")
+                raise ValueError(f"{key}.factor is 0; give another number")
             own = QUANTITY | outputs([key])
             # Which commands there are is known with the ship.
             possible = [own[key]] if key in own else OF_UNIT.values()

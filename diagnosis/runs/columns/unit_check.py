@@ -26,6 +26,7 @@ OTHERS: dict[str, tuple[str, dict[str, float]]] = {
     "angular acceleration": ("rad/s2", {"deg/s2": c.degree}),
 }
 UNITS = {quantity: {unit: 1.0, **others} for quantity, (unit, others) in OTHERS.items()}
+NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"
 # s between two samples, times the scale of the ship, whose own time constants are shorter (chosen)
 RAREST = 2.0
@@ -56,10 +57,10 @@ def refuse_time(
     rare = row > RAREST * scale.time
     if rare or row < OFTENEST:
         unit = likely_unit(row)
-        remedy = f" {_remedy(('time',), unit, called)}" if unit else ""
+        what_to_do = f" {remedy(('time',), unit, called)}" if unit else ""
         raise InputError(
             f"{where}: a sample each {row:.4g} s is too {'rare' if rare else 'frequent'}; "
-            f"is the time in another unit?{remedy}"
+            f"is the time in another unit?{what_to_do}"
         )
     if seconds > LARGEST:
         raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp is wrong")
@@ -77,7 +78,7 @@ def refuse_units(
     if far > LARGEST:
         raise InputError(f"{where} is {far:.3g} m or rad from its origin: probably another column")
     for signals, unit, reason in () if anyway else doubts(time, pose):
-        raise InputError(f"{where} {reason} {_remedy(signals, unit, called)}; {GO_ON}")
+        raise InputError(f"{where} {reason} {remedy(signals, unit, called)}; {GO_ON}")
 
 
 def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
@@ -103,7 +104,7 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
         yield Doubt(("psi",), "deg", reason)
 
 
-def _remedy(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
+def remedy(signals: Sequence[str], unit: str, called: Mapping[str, str] = NAMED_SO) -> str:
     """The line that states a unit."""
     columns = {s: {"name": called.get(s, s), "unit": unit} for s in signals}
     return f"Then put {json.dumps({'columns': columns})} into its side-car, the .json file next to it"

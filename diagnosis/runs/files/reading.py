@@ -35,7 +35,7 @@ from ..columns.columns import (
     signals,
     to_si,
 )
-from ..columns.unit_check import LARGEST, UNITS
+from ..columns.unit_check import LARGEST, UNITS, remedy
 from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
 from .tables import column_names, date_stamps, numbers, table_of_file
@@ -237,7 +237,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         most = float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(
-                f'{where}: commands reach {most:g}; allowed is -1 to 1; is their unit "unit": "%"?'
+                f"{where}: commands reach {most:g}; allowed is -1 to 1; are they in percent? "
+                f"{remedy(own, '%')}"
             )
     if power is not None and power.max(initial=0.0) > LARGEST:
         raise InputError(f"{where}: power reaches {power.max():g} times the full thrust; allowed is 1")

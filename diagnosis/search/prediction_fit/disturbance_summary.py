@@ -55,7 +55,7 @@ class Unrecorded:
         text = "No disturbance is detected. "
         if told:
             text = f"A disturbance remains, with size and correlation time: {', '.join(told)}. "
-            text += "Intervals and bands include it. "
+            text += "Intervals and bands are wider by its uncertainty. "
         if self.differing:
             text += (
                 "The difference is significant: the fit to the model error and the fit to "
