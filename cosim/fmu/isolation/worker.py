@@ -29,6 +29,8 @@ class Worker:
     def __init__(self, channel: Channel, model: FmuModel | None = None) -> None:
         self._channel = channel
         self._known = model
+        # Nobody reads what a confined FMU logs, but for the reason of an error, which is part of that.
+        self._listener = self._log if model is None else None
         self._calls = {
             "start": self._start,
             "bind": self._bind,
@@ -62,7 +64,7 @@ class Worker:
 
     def _start(self, name: str, path: str, folder: str) -> None:
         self._model = self._known or FmuModel(Path(path), Path(folder))
-        self._instance = LocalInstance(name, self._model, self._log)
+        self._instance = LocalInstance(name, self._model, self._listener)
 
     def _log(self, _: str, status: int, text: str) -> None:
         self._channel.send_json(LOG, [status, text])
@@ -124,7 +126,7 @@ class Worker:
         return told.hex()
 
     def _reset(self) -> None:
-        self._instance.reset(self._log)
+        self._instance.reset(self._listener)
 
     def _free(self) -> None:
         self._instance.free()
