@@ -38,19 +38,9 @@ def one(path: Path, s: ForeignSystem, cause: str, seed: int, folder: Path) -> di
     runs = []
     for k in range(3):
         runs.append(folder / f"run{k}.csv")
-        measured(path, s, cause, 10 * seed + k).to_csv(runs[-1], index=False)
-    content = {
-        "inputs": {n: n for n in s.inputs},
-        "outputs": {s.output: s.output},
-        "start": dict(s.start),
-        "disturbance_inputs": [s.force] if s.stated else [],
-    }
-    given = [
-        {"name": n, "value": v, "log": v > 0.0, "prior": {"rel_std": share}}
-        for n, (v, share) in s.parameters.items()
-    ]
-    (folder / "map.json").write_text(json.dumps(content))
-    (folder / "parameters.json").write_text(json.dumps({"parameters": given}))
+        run = measured(path, s, truth(s, cause), cause in PHYSICS, 10 * seed + k)
+        run.to_csv(runs[-1], index=False)
+    s.write_inputs(folder)
     options = {"model": path, "map": folder / "map.json", "parameters": folder / "parameters.json"}
     named = [str(x) for name, value in options.items() for x in (f"--{name}", value)]
     began = time.perf_counter()
@@ -111,7 +101,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 for cause in CAUSES:
                     for seed in options.seeds:
                         r = one(path, s, cause, seed, folder)
-                        results.append({"group": group, "system": s.name, "cause": cause, "seed": seed} | r)
+                        results.append(
+                            {"group": group, "system": s.name, "cause": cause, "seed": seed} | r
+                        )
                         cells = [", ".join(r.get(key, [])) for key in ("moved", "forces")]
                         right = "yes" if r["right"] else "NO"
                         shown.add_row(s.name, cause, str(seed), r["verdict"], *cells, right,

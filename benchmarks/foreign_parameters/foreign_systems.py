@@ -1,5 +1,6 @@
 """The systems: what is measured of each, what is off, and which force is missing."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -48,6 +49,21 @@ class ForeignSystem(NamedTuple):
         """The missing force where ``lacks`` has the value y."""
         power = self.lacks[1]
         return self.size * (y * abs(y) ** (power - 1) if power else 1.0)
+
+    def write_inputs(self, folder: Path) -> None:
+        """Write ``map.json`` and ``parameters.json``."""
+        content = {
+            "inputs": {n: n for n in self.inputs},
+            "outputs": {self.output: self.output},
+            "start": dict(self.start),
+            "disturbance_inputs": [self.force] if self.stated else [],
+        }
+        given = [
+            {"name": n, "value": v, "log": v > 0.0, "prior": {"rel_std": share}}
+            for n, (v, share) in self.parameters.items()
+        ]
+        (folder / "map.json").write_text(json.dumps(content))
+        (folder / "parameters.json").write_text(json.dumps({"parameters": given}))
 
 
 N, M, V = Quantity(0.0, "N"), Quantity(0.0, "m"), Quantity(0.0, "m/s")
@@ -132,6 +148,7 @@ CASES = (
                   {"M": (4.0, 0.1), "l": (1.2, 0.1), "d": (3.0, 0.5)},
                   "f", ("v", 2), -3.0),
 )  # fmt: skip
+
 
 def built(system: ForeignSystem, folder: Path) -> Path:
     """Path of the FMU of one of the systems that are written here."""

@@ -18,15 +18,25 @@ NOISE, FACTOR = 0.01, 1.25  # of the output's spread; of a parameter that is off
 PARAMETER, PHYSICS = ("parameter", "both"), ("physics", "both")  # causes
 
 
-def measured(path: Path, s: ForeignSystem, cause: str, seed: int) -> pd.DataFrame:
-    """A run with noise."""
+def measured(
+    path: Path, s: ForeignSystem, values: dict[str, float], forced: bool, seed: int
+) -> pd.DataFrame:
+    """A run with noise.
+
+    Args:
+        path: of the FMU.
+        s: the system.
+        values: of its parameters.
+        forced: whether the missing force acts.
+        seed: of inputs, start and noise.
+    """
     rng = np.random.default_rng(seed)
     held = rng.integers(15, 60, s.samples)
     steps = {n: np.repeat(rng.uniform(-1.0, 1.0, s.samples), held)[: s.samples] for n in s.inputs}
     inputs = {n: s.inputs_at_rest + s.inputs[n] * x for n, x in steps.items()}
-    values = truth(s, cause) | {n: rng.uniform(*ends) for n, ends in s.starts.items()}
+    values = values | {n: rng.uniform(*ends) for n, ends in s.starts.items()}
     simulate = _by_rates if s.force.startswith("der(") else _by_steps
-    clean = simulate(path, s, cause in PHYSICS, values, inputs)
+    clean = simulate(path, s, forced, values, inputs)
     noisy = clean + NOISE * clean.std() * rng.standard_normal(s.samples)
     return pd.DataFrame({"time": s.step * np.arange(s.samples), **inputs, s.output: noisy})
 
