@@ -429,3 +429,17 @@ def test_interrupted_or_refused_calls_leave_nothing(fmu, work, capsys):
         assert learn.main([*arguments, "--out", "out"]) == 2
         assert message in " ".join(capsys.readouterr().err.split())
         assert not (work / "out").exists()
+
+
+@pytest.mark.slow
+def test_values_with_which_the_fmu_fails_in_a_fit_are_stated(work, capsys):
+    """The truth lies where the FMU fails: nothing is explained, and the report states why."""
+    fmu = build_oscillator(work, "fragile", habit="if (p[V_c] > 11.0) return 3;")
+    run = measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0})
+    own = written(work / "parameters.json", some())
+    options = ["--model", str(fmu), "--map", written(work / "map.json", MAP), "--parameters", own]
+    assert learn.main([run, *options, "--out", "out"]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["verdict"] == "unexplained"
+    assert all(p["value"] <= 11.0 for p in found["parameters"] if p["name"] == "c")
+    assert "The FMU fails with" in " ".join(capsys.readouterr().out.split())
