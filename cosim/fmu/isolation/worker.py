@@ -12,7 +12,6 @@ import json
 import os
 import signal
 import sys
-from math import isfinite
 from pathlib import Path
 
 from ...errors import InputError, SimulationError
@@ -20,7 +19,20 @@ from ...process.spawned import end_with_parent
 from ..fmu_model import FmuModel, Value
 from ..local import LocalInstance
 from ..memory import DoubleMemory, Port
-from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, FeedbackTerm
+from .channel import (
+    DIVERGED,
+    DONE,
+    FAILED,
+    GET,
+    LOG,
+    MOVE,
+    MOVE_HEAD,
+    PUT,
+    REFUSED,
+    STEP,
+    Channel,
+    FeedbackTerm,
+)
 
 
 class Worker:
@@ -99,7 +111,7 @@ class Worker:
     def _whole_run(
         self, start: dict[str, Value], inputs: str, terms: list[FeedbackTerm], steps: int, h: float
     ) -> str:
-        """The outputs at the start of a run and after each step, up to one that is not finite."""
+        """The outputs at the start of a run and after each step, up to one that has diverged."""
         self._instance.set_up(steps * h)
         for name, value in start.items():
             self._set_value(name, value)
@@ -120,7 +132,8 @@ class Worker:
             self._access.put()
             self._access.step(k * h)
             told += self._outputs
-            if not all(map(isfinite, seen)):
+            # Some tools integrate for hours once a state is infinite.
+            if not all(abs(y) < DIVERGED for y in seen):
                 return told.hex()
         self._instance.terminate()
         return told.hex()
