@@ -19,7 +19,7 @@ PUT, STEP, GET = 1, 2, 4
 _FRAME = struct.Struct("<BI")
 LONGEST = 2**28  # bytes of a frame; chosen: 33 million doubles, beyond any FMU
 
-# Size of an output, in its unit, from which on a prediction has diverged; its square is still finite. Chosen.
+# Size of an output, in its unit, of a prediction that has diverged; chosen: its square is still finite.
 DIVERGED = 1e50
 
 
