@@ -68,7 +68,7 @@ def written(
             values = {v.parameter.name: v.value for v in found.values}
             forces, h = [a.force for a in found.forces], parts["train"].windows[0].course.h
             report.notes.append(write_found(new, report.model, report.map, values, forces, h))
-            report.files += [name for name in (FOUND, MAP) if (new / name).exists()]
+            report.files.extend(name for name in (FOUND, MAP) if (new / name).exists())
         report.write(new, origin, plots_of(parts, report.result, names))
     return report
 
