@@ -148,7 +148,7 @@ def addition(
     )
 
 
-class Term(NamedTuple):
+class AddedTerm(NamedTuple):
     """A force on one input of an FMU, as a function of one of its outputs.
 
     Attributes:
@@ -165,7 +165,7 @@ class Term(NamedTuple):
     coefficient: float
 
 
-def added_terms(starts: Sequence[float], outputs: int, terms: Sequence[Term]) -> Component:
+def added_terms(starts: Sequence[float], outputs: int, terms: Sequence[AddedTerm]) -> Component:
     """Inputs of an FMU with forces added to them; what it gets is what acts over the next step.
 
     Args:

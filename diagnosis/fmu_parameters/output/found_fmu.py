@@ -17,7 +17,7 @@ from ...predictors.predictor import FOUND, MAP
 from ..additional_force import AdditionalForce
 
 FOREIGN, ADDED = "model", "found"  # instances of the container, as in that of a ship
-SOURCE = """from fmus.addition import Term, added_terms
+SOURCE = """from fmus.addition import AddedTerm, added_terms
 
 COMPONENT = added_terms({starts!r}, {count}, [{terms}])
 """
@@ -45,9 +45,9 @@ def write_found(
     seen = [*dict.fromkeys(f.output for f in forces if f.output)]
     inputs_kept = [n for n in values if model.variables[n].causality == "input"]
     if inputs_kept:
-        return f"No {FOUND} is written: calibrated inputs, {', '.join(inputs_kept)}, are no parameters."
+        return f"No {FOUND} is written: calibrated values are inputs: {', '.join(inputs_kept)}."
     starts = [float(model.variables[n].start or 0.0) for n in driven]
-    terms = ", ".join(f"Term{tuple(f.term(driven, seen))!r}" for f in forces)
+    terms = ", ".join(f"AddedTerm{tuple(f.term(driven, seen))!r}" for f in forces)
     wires = [(f"{FOREIGN}.{n}", f"{ADDED}.from_{k}") for k, n in enumerate(seen)]
     wires += [(f"{ADDED}.sum_{k}", f"{FOREIGN}.{n}") for k, n in enumerate(driven)]
     start = {
