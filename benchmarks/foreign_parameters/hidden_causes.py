@@ -54,6 +54,7 @@ def _opened(
     """An FMU in its initialization mode, its value references, and its description."""
     description = read_model_description(str(path), validate=False)
     mode = description.modelExchange if kind is FMU2Model else description.coSimulation
+    assert mode is not None
     place = {v.name: v.valueReference for v in description.modelVariables}
     with tempfile.TemporaryDirectory() as folder:
         extract(str(path), folder)
@@ -82,6 +83,7 @@ def _by_steps(
 ) -> np.ndarray:
     """Output of a co-simulation, with the missing force on an input."""
     with _opened(path, FMU2Slave, values) as (fmu, place, description):
+        assert isinstance(fmu, FMU2Slave)
         steps = _own_step(description, s.step)
         h, y, rest = s.step / steps, [], values.get(s.force, 0.0)
 
@@ -114,7 +116,8 @@ def _by_rates(
         fmu.exitInitializationMode()
         steps = _own_step(description, s.step)
         h, y, n = s.step / steps, [], description.numberOfContinuousStates
-        states = [u.variable.derivative.name for u in description.derivatives]
+        rates = [getattr(u.variable, "derivative", None) for u in description.derivatives]
+        states = [x.name for x in rates if x is not None]
         x, rate = (c_double * n)(), (c_double * n)()
         signs = (c_double * description.numberOfEventIndicators)()
 
