@@ -10,7 +10,7 @@ s being the state, the strokes marking the changed model; nu_dot in the last ter
 itself, over its last step. An acceleration input gets M^-1 of that.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from .declare import Component, Fields, Variable, bundle, flatten, group_of, packer, variables, width
@@ -142,6 +142,73 @@ def addition(
         state=state,
         inputs=inputs,
         outputs=outputs,
+        init=init,
+        step=step,
+        hold_nonfinite=False,
+    )
+
+
+class AddedTerm(NamedTuple):
+    """A force on one input of an FMU, as a function of one of its outputs.
+
+    Attributes:
+        input, output: their numbers.
+        power: 0: constant; else of the output, with its sign.
+        rate: whether it is a function of the output's derivative by time.
+        coefficient: in units of both.
+    """
+
+    input: int
+    output: int
+    power: int
+    rate: bool
+    coefficient: float
+
+
+def added_terms(starts: Sequence[float], outputs: int, terms: Sequence[AddedTerm]) -> Component:
+    """Inputs of an FMU with forces added to them; what it gets is what acts over the next step.
+
+    Args:
+        starts: start value of each input.
+        outputs: number of outputs that forces are functions of.
+        terms: the forces.
+    """
+    n = len(starts)
+    inputs = group_of(
+        "Inputs",
+        [
+            *(Variable(f"to_{k}", "1", "input without the forces", x) for k, x in enumerate(starts)),
+            *(Variable(f"from_{k}", "1", "output of the FMU", 0.0) for k in range(outputs)),
+        ],
+    )
+    given = group_of("Outputs", [Variable(f"sum_{k}", "1", "to the FMU", 0.0) for k in range(n)])
+    names = [*(f"last_{k}" for k in range(outputs)), "begun"]
+    state = group_of("State", [Variable(name, "1", "of the last step", 0.0) for name in names])
+
+    def init(i: Fields, p: Params) -> Fields:
+        return packer(state)([0.0] * len(names))
+
+    def step(s: Fields, i: Fields, p: Params, h: Number) -> tuple[Fields, Fields]:
+        values, before = flatten(i), flatten(s)
+        sums, seen, begun = [*values[:n]], values[n:], (before[-1] > 0.5) & (h > LEAST)
+        for slot, place, power, rate, coefficient in terms:
+            y = seen[place] if power else 1.0
+            if rate:
+                y = where(begun, (y - before[place]) / fmax(h, LEAST), 0.0)
+            size = 1.0
+            for _ in range(power - 1):
+                size = size * abs(y)
+            sums[slot] = sums[slot] + coefficient * y * size
+        new = [where(h > LEAST, a, b) for a, b in zip([*seen, 1.0], before, strict=True)]
+        return packer(state)(new), packer(given)(sums)
+
+    return Component(
+        name="found",
+        description="Findings added to an FMU",
+        params=Params,
+        state=state,
+        inputs=inputs,
+        outputs=given,
         init=init,
         step=step,
         hold_nonfinite=False,

@@ -359,6 +359,7 @@ def test_other_packages_use_public_names_of_cosim(package, allowed):
 MEASURE_PARTS = (
     "benchmarks.calibration",
     "benchmarks.fit_drivers",
+    "benchmarks.foreign_parameters.coverage",
     "benchmarks.learning_time",
     "benchmarks.sensitivity.on_evidence",
 )

@@ -18,6 +18,7 @@ from diagnosis.fmu_parameters.additional_force import AdditionalForce
 from diagnosis.fmu_parameters.fmu_playback import InputCourse, Playback, PlaybackRequest, Processes
 from diagnosis.fmu_parameters.force_search import candidates
 from diagnosis.fmu_parameters.measured_system import MeasuredRun, noise_of, noises, windows_of
+from diagnosis.fmu_parameters.output.found_fmu import write_found
 from diagnosis.fmu_parameters.parameter_file import (
     CalibratedParameter,
     Prior,
@@ -250,6 +251,27 @@ def test_fmu_whose_states_cannot_be_set_is_refused(work, capsys):
     assert "no state of 'closed.fmu' can be set" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("force", [DRAG, AdditionalForce("f", "x", 0, True, -1.0), AdditionalForce("f")])
+def test_found_fmu_moves_as_the_fit_has_it(fmu, work, force):
+    inputs, values = np.repeat([2.0, -1.0, 0.5], 20)[:, None], {"c": 12.0, "m": 2.1}
+    given = {"inputs": {"force": "f"}, "outputs": {"position": "x"}, "start": START}
+    sentence = write_found(work, FmuModel(fmu), given, values, [force], H)
+    assert sentence.startswith("found.fmu is oscillator.fmu with")
+    new = json.loads((work / "map.json").read_text())
+    assert new["start"] == {"position": "model.x0", "der(position)": "model.v0"}
+    found = []
+    for path, driven, seen, set_to in (
+        (fmu, "f", ["x", "v"], values),
+        (work / "found.fmu", new["inputs"]["force"], ["model.x", "model.v"], {}),
+    ):
+        forces = [force] if set_to else []
+        with Processes(ConfinedFmu(FmuModel(path)), [driven], seen, [InputCourse(H, {}, inputs)]) as p:
+            found += p.run([PlaybackRequest(0, set_to, forces)])
+    assert np.abs(found[0].outputs).max() > 0.1
+    assert found[1].outputs == pytest.approx(found[0].outputs, abs=1e-12)
+
+
 # Commands
 
 
@@ -327,6 +349,7 @@ def test_verdict(fmu, work, name):
     error = held_out["outputs"]["x"]
     assert error["after"] == pytest.approx(NOISE, rel=0.2)
     assert (error["after"] < error["before"]) == (verdict != "none")
+    assert (work / "out/found.fmu").exists() == (work / "out/map.json").exists() == bool(forces)
     ssv = cosim.read_parameters(work / "out/model.ssv").values
     fitted = {p["name"]: p["value"] for p in found["parameters"]}
     own = {n: v.value for n, v in ssv.get("oscillator", {}).items()}
@@ -429,3 +452,17 @@ def test_interrupted_or_refused_calls_leave_nothing(fmu, work, capsys):
         assert learn.main([*arguments, "--out", "out"]) == 2
         assert message in " ".join(capsys.readouterr().err.split())
         assert not (work / "out").exists()
+
+
+@pytest.mark.slow
+def test_values_with_which_the_fmu_fails_in_a_fit_are_stated(work, capsys):
+    """The truth lies where the FMU fails: nothing is explained, and the report states why."""
+    fmu = build_oscillator(work, "fragile", habit="if (p[V_c] > 11.0) return 3;")
+    run = measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0})
+    own = written(work / "parameters.json", some())
+    options = ["--model", str(fmu), "--map", written(work / "map.json", MAP), "--parameters", own]
+    assert learn.main([run, *options, "--out", "out"]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert found["verdict"] == "unexplained"
+    assert all(p["value"] <= 11.0 for p in found["parameters"] if p["name"] == "c")
+    assert "The FMU fails with" in " ".join(capsys.readouterr().out.split())

@@ -1,6 +1,9 @@
 """The systems: what is measured of each, what is off, and which force is missing."""
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from .c_fmu import CSystem, Quantity, build_c_fmu
@@ -13,14 +16,18 @@ class ForeignSystem(NamedTuple):
         name: of the file, without its ending.
         inputs: variable -> size of its random steps.
         output: variable that is measured.
-        off: parameter that is off, to ``factor`` times its value.
+        off: parameter that is off, to ``FACTOR`` times its value.
         parameters: all that are calibrated -> start value and relative standard deviation of the prior.
-        force: input on which a force acts; empty: there is none.
+        force: input on which a force acts, or ``der(state)``, a rate that it changes.
         lacks: output that the missing force goes with, and its power, as y |y|^(power - 1); power 0:
             constant.
         size: coefficient of the force.
         step: from sample to sample [s].
         inputs_at_rest: values of the inputs about which they step.
+        samples: of a run.
+        stated: whether the map names ``force``: without it the missing force cannot be found.
+        starts: state -> range of its random start value.
+        start: the map's start values.
     """
 
     name: str
@@ -28,11 +35,35 @@ class ForeignSystem(NamedTuple):
     output: str
     off: str
     parameters: dict[str, tuple[float, float]]
-    force: str = ""
-    lacks: tuple[str, int] = ("", 0)
-    size: float = 0.0
+    force: str
+    lacks: tuple[str, int]
+    size: float
     step: float = 0.05
     inputs_at_rest: float = 0.0
+    samples: int = 600
+    stated: bool = True
+    starts: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    start: Mapping[str, str] = MappingProxyType({})
+
+    def missing(self, y: float) -> float:
+        """The missing force where ``lacks`` has the value y."""
+        power = self.lacks[1]
+        return self.size * (y * abs(y) ** (power - 1) if power else 1.0)
+
+    def write_inputs(self, folder: Path) -> None:
+        """Write ``map.json`` and ``parameters.json``."""
+        content = {
+            "inputs": {n: n for n in self.inputs},
+            "outputs": {self.output: self.output},
+            "start": dict(self.start),
+            "disturbance_inputs": [self.force] if self.stated else [],
+        }
+        given = [
+            {"name": n, "value": v, "log": v > 0.0, "prior": {"rel_std": share}}
+            for n, (v, share) in self.parameters.items()
+        ]
+        (folder / "map.json").write_text(json.dumps(content))
+        (folder / "parameters.json").write_text(json.dumps({"parameters": given}))
 
 
 N, M, V = Quantity(0.0, "N"), Quantity(0.0, "m"), Quantity(0.0, "m/s")
@@ -116,20 +147,6 @@ CASES = (
     ForeignSystem("crane", {"f": 4.0}, "x", "d",
                   {"M": (4.0, 0.1), "l": (1.2, 0.1), "d": (3.0, 0.5)},
                   "f", ("v", 2), -3.0),
-)  # fmt: skip
-# By other tools: damped_oscillator (eta-utility, BSD-2-Clause, Dymola 2021), the others (gemseo-fmu,
-# LGPL-3.0, OpenModelica). The subsystems export parameters as inputs, and have no force input.
-OTHERS = (
-    ForeignSystem("damped_oscillator", {"f": 3.0}, "s", "springDamper.c",
-                  {"mass.m": (2.0, 0.1), "springDamper.c": (10.0, 0.3), "springDamper.d": (1.0, 0.5)},
-                  "f", ("v", 2), -3.0, 0.1),
-    ForeignSystem("Mass_Damper", {"f": 50.0}, "y", "damper.d",
-                  {"mass.m": (1.0, 0.1), "damper.d": (10.0, 0.5), "spring.c": (1e4, 0.3)},
-                  "f", ("", 0), 20.0, 0.002),
-    ForeignSystem("MassSpringSubSystem1", {"x2": 0.5}, "x1", "k1",
-                  {"k1": (1.0, 0.3), "k2": (1.0, 0.3), "m1": (1.0, 0.1)}),
-    ForeignSystem("MassSpringSubSystem2", {"x1": 0.5}, "x2", "k3",
-                  {"k2": (1.0, 0.3), "k3": (1.0, 0.3), "m2": (1.0, 0.1)}),
 )  # fmt: skip
 
 

@@ -97,7 +97,7 @@ class FmuComponent:
     Args:
         name: instance name.
         model: what to run.
-        on_message: receives the messages that the FMU logs.
+        on_message: receives the messages that the FMU logs; None: it logs errors only.
 
     Attributes:
         slave: FMPy's face of the library.
@@ -113,7 +113,7 @@ class FmuComponent:
         InputError: no binary for this platform, or instantiation refused.
     """
 
-    def __init__(self, name: str, model: FmuModel, on_message: OnMessage) -> None:
+    def __init__(self, name: str, model: FmuModel, on_message: OnMessage | None) -> None:
         self.name = name
         self.model = model
         folder = model.unpack()
@@ -157,7 +157,8 @@ class FmuComponent:
             text = " ".join(text.split())
             if status > 0:
                 self.complaint = text
-            self.on_message(name, status, text)
+            if self.on_message is not None:
+                self.on_message(name, status, text)
 
         self._modules: list[ModuleType] = []
         self._classes: list[type] = []
@@ -182,7 +183,8 @@ class FmuComponent:
             uri.encode(),
             ctypes.byref(self._callbacks),
             fmi2.fmi2False,
-            fmi2.fmi2True,
+            # Debug logging of some tools takes more time than their model.
+            fmi2.fmi2False if self.on_message is None else fmi2.fmi2True,
         )
         self.slave.component = pointer
         if own:

@@ -19,13 +19,13 @@ class LocalInstance:
     Args:
         name: instance name.
         model: what to run.
-        on_message: receives the messages that the FMU logs.
+        on_message: receives the messages that the FMU logs; None: it logs errors only.
 
     Raises:
         InputError: no binary for this platform, or instantiation refused.
     """
 
-    def __init__(self, name: str, model: FmuModel, on_message: OnMessage) -> None:
+    def __init__(self, name: str, model: FmuModel, on_message: OnMessage | None) -> None:
         self.name = name
         self.model = model
         self.component = FmuComponent(name, model, on_message)
@@ -101,7 +101,7 @@ class LocalInstance:
         if self.component.worst_status < ERROR:
             self._call("fmi2Terminate", self._slave.terminate)
 
-    def reset(self, on_message: OnMessage) -> None:
+    def reset(self, on_message: OnMessage | None) -> None:
         """Return to the state after instantiation, for another run (fmi2Reset).
 
         Args:

@@ -152,8 +152,9 @@ class Playback:
             return PlayedBack(outputs)
         self.close()  # a reset may not cure it
         k = len(known) - 1
-        name = self.outputs[int(np.flatnonzero(~np.isfinite(outputs[k]))[0])]
-        return PlayedBack(outputs, f"{name} is not finite at t = {k * course.h:.6g} s")
+        place = int(np.argmax(np.nan_to_num(np.abs(outputs[k]), nan=np.inf)))
+        how = "diverges" if np.isfinite(outputs[k, place]) else "is not finite"
+        return PlayedBack(outputs, f"{self.outputs[place]} {how} at t = {k * course.h:.6g} s")
 
 
 class Processes:

@@ -16,6 +16,8 @@ TRIED = 4  # candidates that are fitted with all else, of those that promise mos
 SAME = 0.999  # chosen
 PROBABLE = 0.05  # of a candidate that belongs to the set of those that cannot be told apart; chosen
 ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
+# Central, forward, backward: how an FMU integrates decides which difference its own rate is.
+RATES = (np.gradient, lambda y: np.diff(y, append=y[-1]), lambda y: np.diff(y, prepend=y[0]))
 SMALL = 1e-2  # of an input's usual size, a force by which the unit of a coefficient is found; chosen
 
 
@@ -134,12 +136,18 @@ def _promising(
     ranked.sort(key=lambda x: -x[0])
     kept, same = [], {}
     for entry in ranked:
-        twin = next((k for k in kept if abs(float(k[3] @ entry[3])) > SAME), None)
+        twin = next((k for k in kept if _same(k[0], float(k[3] @ entry[3]))), None)
         if twin is not None:
             same.setdefault(twin[1].id, []).append(entry[1].id)
         elif len(kept) < TRIED:
             kept.append(entry)
     return [entry[:3] for entry in kept], same
+
+
+def _same(gain: float, correlation: float) -> bool:
+    """Whether the runs do not discriminate two forces: the second would gain hardly less."""
+    lost = gain * (1.0 - correlation**2)
+    return abs(correlation) > SAME and lost < -2.0 * float(np.log(PROBABLE))
 
 
 def _with_prior(at: ParameterFit) -> np.ndarray:
@@ -156,12 +164,18 @@ def _distinct(
     wanted = {(f.output, f.rate) for f in possible if f.output}
     for name, rate in sorted(wanted, key=lambda key: (key[1], r.processes.outputs.index(key[0]))):
         k = r.processes.outputs.index(name)
-        parts = [np.gradient(y[:, k]) if rate else y[:, k] for y in outputs]
-        y = np.concatenate([part - part.mean() for part in parts])
-        size = float(np.linalg.norm(y))
-        if size > 0.0 and all(abs(float(y @ x)) < SAME * size for x in signals.values() if x.size):
-            signals[name, rate] = y / size
+        each = [_unit([along(y[:, k]) for y in outputs]) for along in (RATES if rate else (np.array,))]
+        known = [x for x in signals.values() if x.size]
+        if each[0].any() and all(abs(float(y @ x)) < SAME for y in each for x in known):
+            signals[name, rate] = each[0]
     return [f for f in possible if (f.output, f.rate) in signals]
+
+
+def _unit(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Signals about their means, as one of length 1; zero where they are constant."""
+    y = np.concatenate([part - part.mean() for part in parts])
+    size = float(np.linalg.norm(y))
+    return y / size if size > 0.0 else y
 
 
 def _scaled(

@@ -64,6 +64,9 @@ class WindowResiduals:
         parameters: that are calibrated.
         lines: (2, m), gain and offset that make of an output what is measured; None: it is that.
         angles: numbers of the outputs that are angles [rad].
+
+    Attributes:
+        failed: values with which the FMU failed in a fit, and why.
     """
 
     def __init__(
@@ -81,6 +84,7 @@ class WindowResiduals:
         m = noise.size
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
         self._known: dict[Setting, np.ndarray] = {}
+        self.failed: list[tuple[dict[str, float], str]] = []
         self._whitening: list[Whitening] | None = None
         sizes = [w.measured.size for w in windows]
         ends = np.cumsum([0, *sizes])
@@ -90,6 +94,18 @@ class WindowResiduals:
         """Calibrate other parameters."""
         self.parameters = parameters
         self._known.clear()
+
+    @property
+    def failures(self) -> str:
+        """Where the FMU failed in a fit, in a sentence; empty: nowhere."""
+        if not self.failed:
+            return ""
+        values, why = self.failed[0]
+        at = ", ".join(f"{name} = {x:.4g}" for name, x in values.items())
+        return (
+            f"The FMU fails with {len(self.failed)} of the values that the fit tried, which it avoids; "
+            f"the first at {at}: {why}"
+        )
 
     @property
     def size(self) -> int:
@@ -120,6 +136,9 @@ class WindowResiduals:
         """Of each setting the residuals (size,) in units of the noise; NaN where the FMU fails."""
         new = [s for s in dict.fromkeys(settings) if s not in self._known]
         for s, each in zip(new, self.predict(new), strict=True):
+            why = next((p.fault for p in each if p.fault), "")
+            if why:
+                self.failed.append((self.values(s), why))
             off = [self._off(w, p) for w, p in zip(self.windows, each, strict=True)]
             self._known[s] = np.concatenate(off)
         found = [self._known[s] for s in settings]

@@ -151,7 +151,7 @@ def calibrate(
         best,
         covariance,
         errors,
-        (*before.faults, *best.faults),
+        (*before.faults, *best.faults, *filter(None, [train.failures])),
     )
 
 

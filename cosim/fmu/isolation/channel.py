@@ -19,6 +19,9 @@ PUT, STEP, GET = 1, 2, 4
 _FRAME = struct.Struct("<BI")
 LONGEST = 2**28  # bytes of a frame; chosen: 33 million doubles, beyond any FMU
 
+# Size of an output, in its unit, of a prediction that has diverged; chosen: its square is still finite.
+DIVERGED = 1e50
+
 
 class FeedbackTerm(NamedTuple):
     """What is added to an input before each step: ``coefficient`` times ``y |y|^(power - 1)``.

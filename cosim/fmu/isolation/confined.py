@@ -20,7 +20,6 @@ from cybership.scratch_folder import Scratch
 
 from ...errors import SimulationError
 from ..fmu_model import FmuModel
-from ..instance import OnMessage
 from .confinement import MEANS, available, needed_folders
 from .isolated import EXIT_TIMEOUT, START_TIMEOUT, IsolatedInstance
 from .opened_files import OpenedFiles
@@ -115,18 +114,15 @@ class ConfinedFmu:
         """What an error says, with the file of the FMU in place of its copy."""
         return str(error).replace(str(self._archive), str(self.model.path))
 
-    def instance(self, on_message: OnMessage = lambda *_: None) -> IsolatedInstance:
+    def instance(self) -> IsolatedInstance:
         """A new instance, in a process that has run nothing of the FMU.
-
-        Args:
-            on_message: receives the messages that the FMU logs.
 
         Raises:
             SimulationError: its process cannot be started.
         """
         if self._closed:
             raise SimulationError(f"{NAME}: its process cannot be started: it has been closed")
-        return IsolatedInstance(NAME, self._model, on_message, self._timeout, self._fork, self._keep)
+        return IsolatedInstance(NAME, self._model, _ignore, self._timeout, self._fork, self._keep)
 
     def _fork(self) -> ForkedProcess | StartedProcess:
         folder = self._folder()
@@ -160,6 +156,10 @@ class ConfinedFmu:
             self._complaints.finish()
         self._model.close()
         self._scratch.remove()
+
+
+def _ignore(*_: object) -> None:
+    """Messages of an FMU that nobody reads."""
 
 
 def _environment() -> dict[str, str]:

@@ -12,7 +12,6 @@ import json
 import os
 import signal
 import sys
-from math import isfinite
 from pathlib import Path
 
 from ...errors import InputError, SimulationError
@@ -20,7 +19,20 @@ from ...process.spawned import end_with_parent
 from ..fmu_model import FmuModel, Value
 from ..local import LocalInstance
 from ..memory import DoubleMemory, Port
-from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, FeedbackTerm
+from .channel import (
+    DIVERGED,
+    DONE,
+    FAILED,
+    GET,
+    LOG,
+    MOVE,
+    MOVE_HEAD,
+    PUT,
+    REFUSED,
+    STEP,
+    Channel,
+    FeedbackTerm,
+)
 
 
 class Worker:
@@ -29,6 +41,8 @@ class Worker:
     def __init__(self, channel: Channel, model: FmuModel | None = None) -> None:
         self._channel = channel
         self._known = model
+        # Nobody reads what a confined FMU logs, but for the reason of an error, which is part of that.
+        self._listener = self._log if model is None else None
         self._calls = {
             "start": self._start,
             "bind": self._bind,
@@ -62,7 +76,7 @@ class Worker:
 
     def _start(self, name: str, path: str, folder: str) -> None:
         self._model = self._known or FmuModel(Path(path), Path(folder))
-        self._instance = LocalInstance(name, self._model, self._log)
+        self._instance = LocalInstance(name, self._model, self._listener)
 
     def _log(self, _: str, status: int, text: str) -> None:
         self._channel.send_json(LOG, [status, text])
@@ -97,7 +111,7 @@ class Worker:
     def _whole_run(
         self, start: dict[str, Value], inputs: str, terms: list[FeedbackTerm], steps: int, h: float
     ) -> str:
-        """The outputs at the start of a run and after each step, up to one that is not finite."""
+        """The outputs at the start of a run and after each step, up to one that has diverged."""
         self._instance.set_up(steps * h)
         for name, value in start.items():
             self._set_value(name, value)
@@ -118,13 +132,14 @@ class Worker:
             self._access.put()
             self._access.step(k * h)
             told += self._outputs
-            if not all(map(isfinite, seen)):
+            # Some tools integrate for hours once a state is infinite.
+            if not all(abs(y) < DIVERGED for y in seen):
                 return told.hex()
         self._instance.terminate()
         return told.hex()
 
     def _reset(self) -> None:
-        self._instance.reset(self._log)
+        self._instance.reset(self._listener)
 
     def _free(self) -> None:
         self._instance.free()

@@ -7,15 +7,15 @@ from pathlib import Path
 from ...execution.progress import Advance
 from ...execution.result_folder import together
 from ...predictors import WRITTEN, Execution
+from ...predictors.predictor import FOUND, MAP
 from ..residuals import WindowResiduals
 from ..sensitivity import refuse_unknown, sensitivities
 from ..ship_task import ship_task
 from ..system_calibration import calibrate
 from ..system_task import SystemTask, system_task
-from .system_content import CalibrationReport
+from .system_content import FILES, CalibrationReport
 from .system_plots import plots_of
 
-FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
 OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.csv", "coefficients.tex")
 
 
@@ -60,7 +60,15 @@ def written(
 ) -> CalibrationReport:
     """Write a report; files of an older result go away."""
     advance("report")
+    found = report.result
     with together(out, [*dict.fromkeys((*FILES, *OTHERS, *WRITTEN))]) as new:
+        if found.changed and found.forces:
+            from .found_fmu import write_found  # only now: it takes a while to import
+
+            values = {v.parameter.name: v.value for v in found.values}
+            forces, h = [a.force for a in found.forces], parts["train"].windows[0].course.h
+            report.notes.append(write_found(new, report.model, report.map, values, forces, h))
+            report.files.extend(name for name in (FOUND, MAP) if (new / name).exists())
         report.write(new, origin, plots_of(parts, report.result, names))
     return report
 

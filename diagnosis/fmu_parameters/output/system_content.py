@@ -1,7 +1,7 @@
 """A calibration as JSON, as a parameter set, as text for the terminal, and as a page."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from ...report.document import Table as PageTable
 from ..force_search import Accepted
 from ..system_calibration import MOST_MOVED, CalibratedValue, SystemCalibration
 
+FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
 Z95 = float(norm.ppf(0.975))
 SENTENCES = {
     "parameters": "Parameters of the FMU differ from their values, and no other error is detected.",
@@ -41,6 +42,7 @@ class CalibrationReport:
         samples: number of measured values that were learned from.
         units: output -> unit.
         notes: what a reader should know of how it was done.
+        files: that are written.
     """
 
     result: SystemCalibration
@@ -49,7 +51,8 @@ class CalibrationReport:
     use: Mapping[str, str]
     samples: int
     units: Mapping[str, str]
-    notes: Sequence[str] = ()
+    notes: list[str]
+    files: list[str] = field(default_factory=lambda: [*FILES])
 
     @property
     def model(self) -> FmuModel:
@@ -176,10 +179,9 @@ class CalibrationReport:
         """Share of the first sum of squares that the learned model explains."""
         return 1.0 - float(np.mean([o.share for o in self.result.remainder.outputs]))
 
-    def write(self, folder: Path, origin: Mapping[str, str], plots: Sequence[Plot]) -> list[str]:
-        """Write all files; returns their names."""
+    def write(self, folder: Path, origin: Mapping[str, str], plots: Sequence[Plot]) -> None:
+        """Write all files but those of an FMU."""
         write_json(folder / "diagnosis.json", self.content())
-        files = ["diagnosis.json", "model.ssv", "posterior.json", "report.html"]
         own = {v.parameter.name: v for v in self.result.values} if self.result.changed else {}
         values = {
             n: cosim.Parameter(v.value, None if v.parameter.unit == "1" else v.parameter.unit)
@@ -202,7 +204,6 @@ class CalibrationReport:
         )
         write_json(folder / "posterior.json", self._posterior())
         write_document(folder / "report.html", self._document(origin, plots))
-        return files
 
     def _posterior(self) -> dict[str, Any]:
         r = self.result
@@ -265,7 +266,7 @@ class CalibrationReport:
             if text := advice(f):
                 yield text
         yield from self._notes
-        yield f"Files in {out}: diagnosis.json, model.ssv, posterior.json, report.html"
+        yield f"Files in {out}: {', '.join(self.files)}"
 
     def _document(self, origin: Mapping[str, str], plots: Sequence[Plot]) -> Document:
         r = self.result

@@ -1,0 +1,110 @@
+"""An FMU with its calibrated parameters and the forces that were found in addition, as one FMU."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import cosim
+from cosim.export import export_fmu
+from cosim.fmu import FmuModel
+from cosim.process import scratch_folder
+from cosim.system import prepare
+from fmus.build import BuildError, build, native_targets
+
+from ...predictors.fmu.variable_map import write_map
+from ...predictors.predictor import FOUND, MAP
+from ..additional_force import AdditionalForce
+
+FOREIGN, ADDED = "model", "found"  # instances of the container, as in that of a ship
+SOURCE = """from fmus.addition import AddedTerm, added_terms
+
+COMPONENT = added_terms({starts!r}, {count}, [{terms}])
+"""
+
+
+def write_found(
+    folder: Path,
+    model: FmuModel,
+    given: Mapping[str, Any],
+    values: Mapping[str, float],
+    forces: Sequence[AdditionalForce],
+    h: float,
+) -> str:
+    """Write ``found.fmu`` and its ``map.json``; returns what was written, or why it was not.
+
+    Args:
+        folder: where to write.
+        model: the FMU.
+        given: its map, as JSON has it.
+        values: of its calibrated parameters.
+        forces: with their coefficients.
+        h: length of a step [s].
+    """
+    driven = [*dict.fromkeys([*map(_name, given["inputs"].values()), *(f.input for f in forces)])]
+    seen = [*dict.fromkeys(f.output for f in forces if f.output)]
+    inputs_kept = [n for n in values if model.variables[n].causality == "input"]
+    if inputs_kept:
+        return f"No {FOUND} is written: calibrated values are inputs: {', '.join(inputs_kept)}."
+    starts = [float(model.variables[n].start or 0.0) for n in driven]
+    terms = ", ".join(f"AddedTerm{tuple(f.term(driven, seen))!r}" for f in forces)
+    wires = [(f"{FOREIGN}.{n}", f"{ADDED}.from_{k}") for k, n in enumerate(seen)]
+    wires += [(f"{ADDED}.sum_{k}", f"{FOREIGN}.{n}") for k, n in enumerate(driven)]
+    start = {
+        key: c
+        for key, c in given.get("start", {}).items()
+        if model.variables[_name(c)].causality == "parameter"
+    }
+    exposed = [f"{FOREIGN}.{_name(c)}" for c in start.values()]
+    try:
+        with scratch_folder() as scratch:
+            source = scratch / f"{ADDED}.py"
+            source.write_text(SOURCE.format(starts=starts, count=len(seen), terms=terms))
+            content: dict[str, Any] = {
+                "name": "wrapper",
+                "step": h,
+                "stop": 1000 * h,
+                "fmus": {
+                    ADDED: {"path": str(_built(source, scratch))},
+                    FOREIGN: {"path": str(model.path), "parameters": dict(values)},
+                },
+                "connections": wires,
+                "transformations": {target: {"factor": 1.0} for _, target in wires},
+            }
+            with closing(prepare(cosim.load_scenario(content))) as system:
+                export_fmu(system, folder / FOUND, overwrite=True, expose=exposed)
+    except (cosim.InputError, BuildError) as error:
+        return f"No {FOUND} is written: {error}."
+    inside = {n: f"{FOREIGN}.{n}" for n in model.variables}
+    new = {
+        "inputs": _renamed(given["inputs"], {n: f"{ADDED}.to_{k}" for k, n in enumerate(driven)}),
+        "outputs": _renamed(given["outputs"], inside),
+        "start": _renamed(start, inside),
+        **{key: given[key] for key in ("window", "run_in") if key in given},
+    }
+    write_map(folder / MAP, new)
+    return f"{FOUND} is {model.path.name} with its calibrated parameters and the additional forces."
+
+
+def _name(channel: Any) -> str:
+    return str(channel["name"] if isinstance(channel, dict) else channel)
+
+
+def _renamed(channels: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    """The channels of a map with other names of variables; constants stay."""
+    found = {}
+    for key, c in channels.items():
+        if isinstance(c, dict):
+            found[key] = {**c, "name": names[c["name"]]}
+        else:
+            found[key] = names[c] if isinstance(c, str) else c
+    return found
+
+
+def _built(source: Path, folder: Path) -> Path:
+    """The component as an FMU: compiled where there is a compiler."""
+    try:
+        (made,) = build(source, folder, native=native_targets())
+    except BuildError:
+        (made,) = build(source, folder)
+    return made
