@@ -6,9 +6,7 @@ test, ``KIND_DATE_TIME.csv``, with the columns named below. It is not part of th
 
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from functools import partial
-from itertools import product
 from math import degrees, nan
 from pathlib import Path
 from typing import NamedTuple
@@ -74,62 +72,62 @@ class Learned(NamedTuple):
     disturbance: ForceDisturbance
 
 
-Errors = dict[str, list[tuple[float, float]]]  # of each run: position [m], heading [deg] by horizon
+Errors = dict[str, list[tuple[float, float, float]]]  # see :func:`errors`
 
 
-def errors(runs: Sequence[WeakWindows], model: Model) -> Errors:
-    """Prediction errors in the windows of each run, of each horizon; NaN where it has none."""
+def errors(runs: Sequence[WeakWindows], model: Model, fit: Learned | None = None) -> Errors:
+    """What a model misses by in the windows of each run, of each horizon.
+
+    Args:
+        runs: all are predicted at once.
+        model: that predicts.
+        fit: what gives it its bands; None: it has none.
+
+    Returns:
+        Of each run, by horizon: position [m], heading [deg], share of the samples inside the 90 % bands;
+        NaN where it has no window.
+    """
     found: Errors = {w.run.name: [] for w in runs}
     for seconds in HORIZONS:
-        of_all = diagnosis.Windows([w.smoothed for w in runs], seconds).errors(model)
+        together = diagnosis.Windows([w.smoothed for w in runs], seconds)
+        left = together.residuals(model)
+        summary, of = together.summary(left), together.run[together.sample_window]
         for k, w in enumerate(runs):
-            position, heading = of_all.over_all(k)
-            found[w.run.name].append((float(position), degrees(float(heading))))
+            position, heading = summary.over_all(k)
+            inside = nan
+            if fit is not None and (of == k).any():
+                own = diagnosis.Windows([w.smoothed], seconds)
+                bands = prediction_bands(w.smoothed, own, model, fit.posterior, fit.disturbance)
+                inside = nan if bands is None else bands.coverage(left[of == k])
+            found[w.run.name].append((float(position), degrees(float(heading)), inside))
     return found
 
 
-def coverage(runs: Sequence[WeakWindows], fit: Learned) -> dict[str, list[float]]:
-    """Share of the samples of each run inside the 90 % bands, of each horizon; NaN without a window."""
-    shares: dict[str, list[float]] = {w.run.name: [] for w in runs}
-    for w, seconds in product(runs, HORIZONS):
-        with suppress(InputError):  # the run has no window of this length
-            windows = diagnosis.Windows([w.smoothed], seconds)
-            bands = prediction_bands(w.smoothed, windows, *fit)
-            if bands is not None:
-                shares[w.run.name].append(bands.coverage(windows.residuals(fit.model)))
-                continue
-        shares[w.run.name].append(nan)
-    return shares
-
-
-def table(report: Report, name: str, found: Errors, inside: dict[str, list[float]]) -> np.ndarray:
+def table(report: Report, name: str, found: Errors) -> np.ndarray:
     """Geometric means over the tests, by kind and of all; returns those of all (horizons, 2).
 
     Args:
         report: that gets the table, and every number in its results.
         name: of the model.
         found: its errors.
-        inside: share within its bands, of each run by horizon; empty: it has no bands.
     """
     values, kinds = np.array([*found.values()]), np.array([kind_of(run) for run in found])
-    shares = np.array([inside.get(run, [np.nan] * len(HORIZONS)) for run in found])
+    has_bands = bool(np.isfinite(values[..., 2]).any())
     rows, means = [], np.zeros((len(HORIZONS), 2))
     for kind in (*KINDS, ""):
-        chosen = (kinds == kind) | (kind == "")
-        if not chosen.any():
+        chosen = values[(kinds == kind) | (kind == "")]
+        if not len(chosen):
             continue
-        means = np.exp(np.nanmean(np.log(values[chosen]), axis=0))
+        means = np.exp(np.nanmean(np.log(chosen[..., :2]), axis=0))
         cells = [f"{x:.3g}" for pair in means for x in pair]
-        within = np.nanmean(shares[chosen], axis=0) if inside else []
-        rows.append([kind or "all", int(chosen.sum()), *cells, *(f"{100.0 * x:.0f}" for x in within)])
+        if has_bands:
+            cells += [f"{100.0 * x:.0f}" for x in np.nanmean(chosen[..., 2], axis=0)]
+        rows.append([kind or "all", len(chosen), *cells])
     what = ("position", "m"), ("heading", "°")
     units = [f"{name}, {seconds:.0f} s [{unit}]" for seconds in HORIZONS for name, unit in what]
-    bands = [f"in the bands, {seconds:.0f} s [%]" for seconds in HORIZONS] if inside else []
+    bands = [f"in the bands, {seconds:.0f} s [%]" for seconds in HORIZONS] if has_bands else []
     report.table(["kind", "tests", *units, *bands], rows)
-    each = zip(found.items(), shares.tolist(), strict=True)
-    report.result(
-        name, [{"run": run, "errors": pairs, "in_bands": share} for (run, pairs), share in each]
-    )
+    report.result(name, found)
     return means
 
 
@@ -165,9 +163,9 @@ def study(data: Path, out: Path, folds: int, search: bool, quick: bool) -> Path:
     )
     report.heading("The published model")
     report.text("The description is the published model, term by term, from the same initial states.")
-    first = table(report, "description", errors(runs, model), {})
+    first = table(report, "description", errors(runs, model))
     report.heading("The same without the measured wind")
-    table(report, "no wind", errors(runs, Model(ship=unaware)), {})
+    table(report, "no wind", errors(runs, Model(ship=unaware)))
     if folds:
         report.heading("Learned, with tests left out in turn")
         report.text(
@@ -177,13 +175,11 @@ def study(data: Path, out: Path, folds: int, search: bool, quick: bool) -> Path:
             f"{MOVED:g} standard deviations of their prior, and by how many."
         )
         after: Errors = {}
-        inside: dict[str, list[float]] = {}
         for left_out in dealt(runs, folds):
             fit, told = learn([w for w in runs if w not in left_out], model, search)
-            after |= errors(left_out, fit.model)
-            inside |= coverage(left_out, fit)
+            after |= errors(left_out, fit.model, fit)
             report.text(f"Without {', '.join(w.run.name for w in left_out)}: {told}.")
-        ratios = table(report, "learned", after, inside) / first
+        ratios = table(report, "learned", after) / first
         told = (
             f"{r[0]:.2f} in position and {r[1]:.2f} in heading over {seconds:.0f} s"
             for r, seconds in zip(ratios, HORIZONS, strict=True)
