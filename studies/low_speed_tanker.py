@@ -5,23 +5,19 @@ test, ``KIND_DATE_TIME.csv``, with the columns named below. It is not part of th
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import degrees, nan
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Model, WeakWindows
+from diagnosis import Model, Smoothed, WeakWindows, Windows
 from diagnosis.execution.progress import silent
 from diagnosis.predictors import ship_with
-from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
-from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
-from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
-from diagnosis.session import begin
 from fmus.ship import ship
 
 from .ship_folds import read
@@ -64,18 +60,17 @@ def dealt(runs: Sequence[WeakWindows], folds: int) -> list[list[WeakWindows]]:
     return found
 
 
-class Learned(NamedTuple):
-    """A model, the posterior of its fitted values, and the disturbance that it leaves."""
+class LearnedFit(NamedTuple):
+    """A learned model, and what gives the bands about its predictions of a run in some windows."""
 
     model: Model
-    posterior: JointPosterior
-    disturbance: ForceDisturbance
+    bands: Callable[[Smoothed, Windows], Any]
 
 
 Errors = dict[str, list[tuple[float, float, float]]]  # see :func:`errors`
 
 
-def errors(runs: Sequence[WeakWindows], model: Model, fit: Learned | None = None) -> Errors:
+def errors(runs: Sequence[WeakWindows], model: Model, fit: LearnedFit | None = None) -> Errors:
     """What a model misses by in the windows of each run, of each horizon.
 
     Args:
@@ -97,7 +92,7 @@ def errors(runs: Sequence[WeakWindows], model: Model, fit: Learned | None = None
             inside = nan
             if fit is not None and (of == k).any():
                 own = diagnosis.Windows([w.smoothed], seconds)
-                bands = prediction_bands(w.smoothed, own, model, fit.posterior, fit.disturbance)
+                bands = fit.bands(w.smoothed, own)
                 inside = nan if bands is None else bands.coverage(left[of == k])
             found[w.run.name].append((float(position), degrees(float(heading)), inside))
     return found
@@ -131,19 +126,19 @@ def table(report: Report, name: str, found: Errors) -> np.ndarray:
     return means
 
 
-def learn(rest: Sequence[WeakWindows], model: Model, search: bool) -> tuple[Learned, str]:
+def learn(rest: Sequence[WeakWindows], model: Model, search: bool) -> tuple[LearnedFit, str]:
     """What some tests say of a model, with the search for effects or as ``learn --quick``; in words."""
     if search:
         found = diagnosis.diagnose(rest, model=model, advance=silent)
         chosen = found.learned.model if found.changed else model
         effects = ", ".join(f.id for f in found.learned.effects) or "no effect"
-        return Learned(chosen, found.posterior, found.unrecorded.push), f"{found.verdict}, {effects}"
-    fit = begin(rest, model=model).calibration
+        return LearnedFit(chosen, found.bands), f"{found.verdict}, {effects}"
+    fit = diagnosis.begin(rest, model=model).calibration
     if fit is None:
         raise InputError("these tests do not determine the coefficients")
     moved = {n: x for n, x in fit.findings.moved.items() if abs(x) > MOVED}
     told = ", ".join(f"{n} {x:+.1f}" for n, x in sorted(moved.items(), key=lambda m: -abs(m[1])))
-    return Learned(fit.findings.model, fit.posterior, fit.unrecorded.push), told
+    return LearnedFit(fit.findings.model, fit.bands), told
 
 
 def study(data: Path, out: Path, folds: int, search: bool, quick: bool) -> Path:
