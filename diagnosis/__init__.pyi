@@ -46,4 +46,6 @@ from .search import method as method
 from .session import CalibratedModel as CalibratedModel
 from .session import Comparison as Comparison
 from .session import Diagnosis as Diagnosis
+from .session import Session as Session
+from .session import begin as begin
 from .session import evaluate as evaluate

@@ -34,7 +34,6 @@ from .search import DEFAULT, Findings, Method, Prior, method
 from .search.gram import PARTS
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
-from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
@@ -370,9 +369,8 @@ def _predicted(
     final = learned if verdict.changed else None
     found = _compared(predictor.in_windows(), runs[:decide], final, runs[decide:], advance)
     uses = ["train"] * len(data.train) + ["validate"] * len(data.validate) + ["test"] * len(runs)
-    known = learned, verdict.posterior, verdict.unrecorded.push
     evaluations = [
-        replace(e, bands=prediction_bands(e.smoothed, e.windows, *known), use=use)
+        replace(e, bands=verdict.bands(e.smoothed, e.windows), use=use)
         for e, use in zip(found.evaluations, uses, strict=False)
     ]
     return replace(found, evaluations=evaluations, predictor=predictor)

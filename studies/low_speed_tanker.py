@@ -5,21 +5,22 @@ test, ``KIND_DATE_TIME.csv``, with the columns named below. It is not part of th
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from math import degrees
+from math import degrees, nan
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Model, WeakWindows
+from diagnosis import Model, Smoothed, WeakWindows, Windows
 from diagnosis.execution.progress import silent
 from diagnosis.predictors import ship_with
 from fmus.ship import ship
 
-from .ship_folds import NoSearch, read
+from .ship_folds import read
 from .study_command import run_study, study_parser
 from .study_report import Report
 
@@ -36,6 +37,7 @@ COLUMNS = {
 }
 KINDS = ("turn", "zigzag", "random", "berthing")
 HORIZONS = (20.0, 60.0)  # s, of the windows that publications on these tests have
+MOVED = 1.5  # prior standard deviations from which on a coefficient is named; chosen
 
 
 def kind_of(run: str) -> str:
@@ -58,66 +60,126 @@ def dealt(runs: Sequence[WeakWindows], folds: int) -> list[list[WeakWindows]]:
     return found
 
 
-def errors(w: WeakWindows, model: Model) -> list[tuple[float, float]]:
-    """Position [m] and heading [deg] in the windows of a run, of each horizon; NaN where it has none."""
-    found = []
+class LearnedFit(NamedTuple):
+    """A learned model, and what gives the bands about its predictions of a run in some windows."""
+
+    model: Model
+    bands: Callable[[Smoothed, Windows], Any]
+
+
+Errors = dict[str, list[tuple[float, float, float]]]  # see :func:`errors`
+
+
+def errors(runs: Sequence[WeakWindows], model: Model, fit: LearnedFit | None = None) -> Errors:
+    """What a model misses by in the windows of each run, of each horizon.
+
+    Args:
+        runs: all are predicted at once.
+        model: that predicts.
+        fit: what gives it its bands; None: it has none.
+
+    Returns:
+        Of each run, by horizon: position [m], heading [deg], share of the samples inside the 90 % bands;
+        NaN where it has no window.
+    """
+    found: Errors = {w.run.name: [] for w in runs}
     for seconds in HORIZONS:
-        try:
-            windows = diagnosis.Windows([w.smoothed], seconds)
-        except InputError:
-            found.append((np.nan, np.nan))
-            continue
-        position, heading = windows.errors(model).over_all()
-        found.append((float(position), degrees(float(heading))))
+        together = diagnosis.Windows([w.smoothed for w in runs], seconds)
+        left = together.residuals(model)
+        summary, of = together.summary(left), together.run[together.sample_window]
+        for k, w in enumerate(runs):
+            position, heading = summary.over_all(k)
+            inside = nan
+            if fit is not None and (of == k).any():
+                own = diagnosis.Windows([w.smoothed], seconds)
+                bands = fit.bands(w.smoothed, own)
+                inside = nan if bands is None else bands.coverage(left[of == k])
+            found[w.run.name].append((float(position), degrees(float(heading)), inside))
     return found
 
 
-def table(report: Report, name: str, found: dict[str, list[tuple[float, float]]]) -> None:
-    """Geometric means over the tests, by kind and of all."""
-    rows, values = [], np.array(list(found.values()))  # (runs, horizons, 2)
-    kinds = np.array([kind_of(run) for run in found])
+def table(report: Report, name: str, found: Errors) -> np.ndarray:
+    """Geometric means over the tests, by kind and of all; returns those of all (horizons, 2).
+
+    Args:
+        report: that gets the table, and every number in its results.
+        name: of the model.
+        found: its errors.
+    """
+    values, kinds = np.array([*found.values()]), np.array([kind_of(run) for run in found])
+    has_bands = bool(np.isfinite(values[..., 2]).any())
+    rows, means = [], np.zeros((len(HORIZONS), 2))
     for kind in (*KINDS, ""):
         chosen = values[(kinds == kind) | (kind == "")]
         if not len(chosen):
             continue
-        means = np.exp(np.nanmean(np.log(chosen), axis=0))
+        means = np.exp(np.nanmean(np.log(chosen[..., :2]), axis=0))
         cells = [f"{x:.3g}" for pair in means for x in pair]
+        if has_bands:
+            cells += [f"{100.0 * x:.0f}" for x in np.nanmean(chosen[..., 2], axis=0)]
         rows.append([kind or "all", len(chosen), *cells])
-        report.result(f"{name}, {kind or 'all'}", means)
     what = ("position", "m"), ("heading", "°")
     units = [f"{name}, {seconds:.0f} s [{unit}]" for seconds in HORIZONS for name, unit in what]
-    report.table(["kind", "tests", *units], rows)
+    bands = [f"in the bands, {seconds:.0f} s [%]" for seconds in HORIZONS] if has_bands else []
+    report.table(["kind", "tests", *units, *bands], rows)
+    report.result(name, found)
+    return means
 
 
-def study(data: Path, out: Path, folds: int, quick: bool) -> Path:
-    """The description on all tests, and what calibration makes of it on those left out in turn."""
+def learn(rest: Sequence[WeakWindows], model: Model, search: bool) -> tuple[LearnedFit, str]:
+    """What some tests say of a model, with the search for effects or as ``learn --quick``; in words."""
+    if search:
+        found = diagnosis.diagnose(rest, model=model, advance=silent)
+        chosen = found.learned.model if found.changed else model
+        effects = ", ".join(f.id for f in found.learned.effects) or "no effect"
+        return LearnedFit(chosen, found.bands), f"{found.verdict}, {effects}"
+    fit = diagnosis.begin(rest, model=model).calibration
+    if fit is None:
+        raise InputError("these tests do not determine the coefficients")
+    moved = {n: x for n, x in fit.findings.moved.items() if abs(x) > MOVED}
+    told = ", ".join(f"{n} {x:+.1f}" for n, x in sorted(moved.items(), key=lambda m: -abs(m[1])))
+    return LearnedFit(fit.findings.model, fit.bands), told
+
+
+def study(data: Path, out: Path, folds: int, search: bool, quick: bool) -> Path:
+    """The description on all tests, and what is learned of it on those left out in turn."""
     files = [f for kind in KINDS for f in sorted(data.glob(f"{kind}_*.csv"))[:: 4 if quick else 1]]
     if not files:
         raise InputError(f"no tests KIND_DATE_TIME.csv in '{data}'; kinds are {', '.join(KINDS)}")
     model = Model(ship=ship_with((), "esso_osaka"))
     unaware = ship(description=model.ship.description._replace(wind_measured=False))
-    runs = diagnosis.gather([read(f, COLUMNS, model) for f in files], model=model, anyway=True)
+    read_runs = [read(f, COLUMNS, model) for f in files]
+    runs = diagnosis.gather(read_runs, model=model, anyway=True, horizon=HORIZONS[-1])
     report = Report(out, "Esso Osaka, a tanker of 3 m: free-running tests in wind")
     report.text(
         f"{len(runs)} tests. Each number is the geometric mean, over the tests of a kind, of the root "
         "mean square prediction error in consecutive windows that start from the smoothed state. "
         "Data: Wakita et al. (2022), Miyauchi et al. (2022), CC BY-NC 4.0."
     )
-    report.heading("The published description")
-    table(report, "description", {w.run.name: errors(w, model) for w in runs})
+    report.heading("The published model")
+    report.text("The description is the published model, term by term, from the same initial states.")
+    first = table(report, "description", errors(runs, model))
     report.heading("The same without the measured wind")
-    table(report, "no wind", {w.run.name: errors(w, Model(ship=unaware)) for w in runs})
+    table(report, "no wind", errors(runs, Model(ship=unaware)))
     if folds:
-        report.heading("Calibrated, with tests left out in turn")
-        after = {}
-        for k, left_out in enumerate(dealt(runs, folds)):
-            rest = [w for w in runs if w not in left_out]
-            learned = diagnosis.diagnose(
-                rest, left_out, model=model, advance=silent, by=NoSearch()
-            ).model
-            after |= {w.run.name: errors(w, learned) for w in left_out}
-            report.text(f"Fold {k + 1} leaves out {', '.join(w.run.name for w in left_out)}.")
-        table(report, "calibrated", after)
+        report.heading("Learned, with tests left out in turn")
+        report.text(
+            "With the search for effects: the verdict of each fold."
+            if search
+            else "Coefficients alone, as `learn --quick`. After each fold: those that move by more than "
+            f"{MOVED:g} standard deviations of their prior, and by how many."
+        )
+        after: Errors = {}
+        for left_out in dealt(runs, folds):
+            fit, told = learn([w for w in runs if w not in left_out], model, search)
+            after |= errors(left_out, fit.model, fit)
+            report.text(f"Without {', '.join(w.run.name for w in left_out)}: {told}.")
+        ratios = table(report, "learned", after) / first
+        told = (
+            f"{r[0]:.2f} in position and {r[1]:.2f} in heading over {seconds:.0f} s"
+            for r, seconds in zip(ratios, HORIZONS, strict=True)
+        )
+        report.text(f"Relative to the published model, all tests: {'; '.join(told)}.")
     return report.write()
 
 
@@ -127,7 +189,7 @@ def main() -> None:
     parser = study_parser(
         "studies.low_speed_tanker",
         "Predict the free-running tests of the Esso Osaka with its published description.",
-        f"{command}\n{command} --folds 3",
+        f"{command}\n{command} --folds 4 --calibrate",
         seeds=None,
         jobs=False,
     )
@@ -137,10 +199,14 @@ def main() -> None:
         type=int,
         metavar="N",
         default=0,
-        help="calibrate, and leave out this number of folds in turn (0: no)",
+        help="learn, and leave out this number of folds in turn (0: no)",
+    )
+    parser.add_argument(
+        "--calibrate", action="store_true", help="search no effects: coefficients only, as learn --quick"
     )
     options = parser.parse_args()
-    run_study(partial(study, options.data, options.out, options.folds, options.quick))
+    search = not options.calibrate
+    run_study(partial(study, options.data, options.out, options.folds, search, options.quick))
 
 
 if __name__ == "__main__":

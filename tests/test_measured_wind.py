@@ -19,6 +19,9 @@ from diagnosis.predictors import weak_windows
 from diagnosis.predictors.weak_form import omega
 from diagnosis.runs import prepare, read_frame
 from diagnosis.runs.measured_wind import air_along
+from diagnosis.search.findings import Findings
+from diagnosis.search.prediction_fit.coefficient_calibration import Calibrator
+from diagnosis.search.prior import NominalPrior
 from fmus.declare import DeclarationError, packer
 from fmus.effects import Motion
 from fmus.frames import air_velocity, rotate_to_body
@@ -84,6 +87,23 @@ def test_only_a_ship_with_a_measured_wind_has_it_as_an_input():
     assert SHIP.vessel.inputs is ForceInWind
     for name in ("cse1", "gunnerus"):
         assert ship(description=SHIPS[name]).vessel.inputs is Force
+
+
+def test_only_a_measured_wind_has_coefficients_with_a_prior(tmp_path):
+    groups = {n: known.group for n, known in SHIP.coefficients.items()}
+    assert {n for n, group in groups.items() if group == "wind"} == set(
+        regression(1.0, 1.0, Superstructure())
+    )
+    without = ship(description=TANKER._replace(wind_measured=False))
+    assert "wind" not in {known.group for known in without.coefficients.values()}
+    text = find_ship("esso_osaka").read_text(encoding="utf-8").partition("[wind]")[0]
+    of_drag = (
+        "frontal_area = { value = 0.1, rel_std = 0.0 }\nlateral_drag = { value = 1.1, rel_std = 0.2 }"
+    )
+    (tmp_path / "mine.toml").write_text(f"{text}[wind]\nmeasured = true\n{of_drag}\n", encoding="utf-8")
+    known = ship(description=read_ship(tmp_path / "mine.toml")).coefficients
+    assert "frontal_area" not in known
+    assert known["lateral_drag"].deviation(1.1) == pytest.approx(0.22)
 
 
 def test_a_measured_wind_is_the_wind_of_the_effect():
@@ -187,6 +207,19 @@ def test_predictions_take_the_measured_wind(measured):
     assert missed(true, without)[0] > 5.0 * with_wind
     left, blown = (np.abs(omega(weak_windows(true), m)).mean(axis=0) for m in (nominal, without))
     assert (left[1:] < 0.3 * blown[1:]).all()
+
+
+@pytest.mark.slow
+def test_calibration_finds_the_force_of_a_measured_wind(measured):
+    """From a force that is a third too large sideways, all else known, it returns to the simulated one."""
+    run = weak_windows(smoothed(measured, "wind_speed_relative", "wind_direction_relative"))
+    true = SHIP.parameters["vessel"]["wind_Y_1"].start
+    start = Model(ship=SHIP).plus({"wind_Y_1": 0.35 * true})
+    others = {known.group for known in SHIP.coefficients.values()} - {"wind"}
+    prior = NominalPrior.of(start, dict.fromkeys(others, 0.0))
+    fit = Calibrator(Findings(model=start, searched=prior), [run], start, prior).coefficients()
+    assert fit.findings.model.value("wind_Y_1") == pytest.approx(true, rel=0.1)
+    assert start.value("wind_Y_1") > 1.3 * true
 
 
 @pytest.mark.slow

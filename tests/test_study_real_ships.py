@@ -445,13 +445,14 @@ def test_the_description_of_the_esso_osaka_predicts_a_zig_zag_and_needs_the_wind
     ]
     runs = [ship_folds.read(f, low_speed_tanker.COLUMNS, model) for f in files]
     data = diagnosis.gather(runs, model=model, anyway=True)
-    for w in data:
-        (position, heading), _ = low_speed_tanker.errors(w, model)
+    errors = low_speed_tanker.errors(data, model)
+    for (position, heading, _), _ in errors.values():
         assert position < 1.0
         assert heading < 10.0
     calm = Model(ship=ship(description=model.ship.description._replace(wind_measured=False)))
-    (with_wind, _), _ = low_speed_tanker.errors(data[1], model)
-    (without, _), _ = low_speed_tanker.errors(data[1], calm)
+    blind = low_speed_tanker.errors(data, calm)
+    (with_wind, *_), _ = errors[data[1].run.name]
+    (without, *_), _ = blind[data[1].run.name]
     assert with_wind < without
     with pytest.raises(InputError, match="no tests KIND_DATE_TIME"):
-        low_speed_tanker.study(TANKER, ESSO, 0, True)
+        low_speed_tanker.study(TANKER, ESSO, 0, True, True)

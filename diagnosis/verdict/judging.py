@@ -12,9 +12,13 @@ from ..assessment.remainder import Remainder, noise_of, remainder_sentence, rema
 from ..assessment.stability import OperatingRegion, drives_on
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows, omega
+from ..predictors.evaluation import Bands
+from ..predictors.windows import Windows
+from ..runs import Smoothed
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
+from ..search.prediction_fit.predicted_bands import prediction_bands
 from ..search.prediction_fit.refit import to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
@@ -62,6 +66,11 @@ class DecidedFindings:
     def calibrated(self) -> bool:
         """Whether the learned model has other coefficients, and these are no explanation."""
         return self.refitted and self.verdict == "unexplained"
+
+    def bands(self, smoothed: Smoothed, windows: Windows | None) -> Bands | None:
+        """The bands about the learned model's predictions of a run; None: it has no window."""
+        push = self.unrecorded.push
+        return prediction_bands(smoothed, windows, self.learned.model, self.posterior, push)
 
     @property
     def believed(self) -> list[bool]:

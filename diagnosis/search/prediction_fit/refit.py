@@ -6,7 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...predictors import WeakWindows
+from ...predictors.evaluation import Bands
 from ...predictors.uncertainty import omega_std
+from ...predictors.windows import Windows
+from ...runs import Smoothed
 from ..candidates import model_error
 from ..conclusion import interval, laplace_std, suspected
 from ..findings import Findings
@@ -16,6 +19,7 @@ from .disturbance import estimate
 from .disturbance_summary import Unrecorded, unrecorded
 from .fit import fit_predictions, shootings
 from .joint_posterior import JointPosterior
+from .predicted_bands import prediction_bands
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,11 @@ class RefitOutcome:
     findings: Findings
     posterior: JointPosterior
     unrecorded: Unrecorded
+
+    def bands(self, smoothed: Smoothed, windows: Windows | None) -> Bands | None:
+        """The bands about the predictions of a run, see :func:`.predicted_bands.prediction_bands`."""
+        push = self.unrecorded.push
+        return prediction_bands(smoothed, windows, self.findings.model, self.posterior, push)
 
     def about(self, found: Findings) -> "RefitOutcome":
         """Other findings with the covariance of this fit, by the same parameters."""
