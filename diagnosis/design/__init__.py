@@ -1,0 +1,1 @@
+"""What to run next: the manoeuvre that discriminates the candidates that a diagnosis leaves."""
