@@ -24,7 +24,7 @@ SECONDS = 40.0  # s, of a search at the most; a design with its check takes at m
 LOG_POINTS = 6  # of the number of Sobol points, to the base 2; chosen: a few seconds
 EVOLVED = 160  # points tried by evolution at the most; chosen: some ten seconds
 POPULATION = 12  # best points that evolve
-PIECE = 60.0  # s, times the time scale, of a manoeuvre of a plan: some ten times a change of speed (chosen)
+PIECE = 60.0  # s, times the time scale, of a manoeuvre: some ten changes of speed; chosen
 MOST_PIECES = 6
 FASTER = 1.5  # times the fastest measured motion: as far as a model is used beyond its data (chosen)
 FORBIDDEN = 1e3  # of a criterion, for each unit by which a limit is exceeded
@@ -41,7 +41,7 @@ class Limits:
         seconds: length of a run [s].
         basin: for the whole hull; None: as far as the measured runs reach, and a ship's length more.
         size: north and east length of a basin about the middle of the measured tracks [m].
-        margin: least distance of the hull from the walls beyond the spread [m]; None: a tenth of the ship.
+        margin: least distance of the hull from the walls [m]; None: a tenth of the ship.
     """
 
     seconds: float

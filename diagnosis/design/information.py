@@ -87,7 +87,7 @@ class Knowledge:
 
     @cached_property
     def log_evidence(self) -> np.ndarray:
-        """(h,), log of the probability of the data so far by each hypothesis, but for a constant [nats]."""
+        """(h,), log probability of the data so far by each hypothesis, but for a constant [nats]."""
         found = []
         for h, e in zip(self.hypotheses, self.estimates, strict=True):
             s, m = h.columns, e.mean[h.columns]
@@ -104,7 +104,7 @@ def _inverse(A: np.ndarray) -> np.ndarray:
 
 
 def projected(k: Knowledge, i: int, j: int, z: np.ndarray, G: np.ndarray) -> float:
-    """Squared distance that hypothesis j leaves of the data that i gives, all of j's parameters refitted.
+    """Squared distance of hypothesis j from the data that i gives, all of j's parameters refitted.
 
     With d = z - z_j it is min over z_j of d^T G d + (z_j - mu)^T P (z_j - mu): of the Fisher information
     the Schur complement of what j has. In units of the noise's variance, [1].
@@ -212,10 +212,10 @@ def a_optimal(k: Knowledge, G: np.ndarray) -> float:
 def certainty(k: Knowledge, G: np.ndarray) -> float:
     """Probability that a run raises the true hypothesis above SURE against its worst rival [1].
 
-    The log ratio of a pair is taken as normal, see :meth:`Prediction.log_ratio`. Parts of a hundredth lead
-    the way where this is zero or one everywhere: the mean of 1 - exp(-ratio) over all pairs, and by how
-    much the effects' own parameters become narrower (D_s-optimality: A. C. Atkinson and A. N. Donev,
-    Optimum Experimental Designs, 1992).
+    The log ratio of a pair is taken as normal, see :meth:`Prediction.log_ratio`. Hundredths are added, by
+    which the search proceeds where this is zero or one everywhere: the mean of 1 - exp(-ratio) over all
+    pairs, and by how much the effects' own parameters become narrower (D_s-optimality: A. C. Atkinson and
+    A. N. Donev, Optimum Experimental Designs, 1992).
     """
     p, n, after = Prediction.of(k, G), len(k.hypotheses), k.plus(G)
     worst, gain = np.ones(n), 0.0
@@ -252,9 +252,9 @@ def expected(k: Knowledge, G: np.ndarray, seed: int, draws: int = DRAWS) -> np.n
     """
     p, rng = Prediction.of(k, G), np.random.default_rng(seed)
     factors = np.linalg.cholesky(p.covariance)
-    logs = np.log(np.maximum(k.weights, SMALLEST)) - np.log(
-        np.diagonal(factors, axis1=1, axis2=2)
-    ).sum(axis=1)
+    logs = np.log(np.maximum(k.weights, SMALLEST)) - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(
+        axis=1
+    )
     true = rng.choice(len(k.weights), draws, p=k.weights)
     found = np.empty((draws, 2))
     for n, i in enumerate(true):

@@ -139,7 +139,9 @@ def circle(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     a, b = smaller * a, smaller * b
     phi = moved(t, 2.0 * np.pi * turns, T, _rise(0.5, r))
     course = np.unwrap(np.arctan2(b * np.sin(phi), a * np.cos(phi)))
-    return along * np.column_stack([a * np.sin(phi), side * b * (1.0 - np.cos(phi)), side * along * course])
+    return along * np.column_stack(
+        [a * np.sin(phi), side * b * (1.0 - np.cos(phi)), side * along * course]
+    )
 
 
 @manoeuvre("rotation")

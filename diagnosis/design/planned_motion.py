@@ -94,7 +94,9 @@ def load(tau: np.ndarray, model: Model) -> float:
     layout, p = model.drive.effects.layout, model.drive.params
     # The allocation is linear below its limits: a small force shows what a large one would ask.
     small = 1e-3 * np.array(layout.full(p))
-    unit = np.array([np.ravel(layout.allocate(tuple(row), p)) for row in np.diag(small)]) / small[:, None]
+    unit = (
+        np.array([np.ravel(layout.allocate(tuple(row), p)) for row in np.diag(small)]) / small[:, None]
+    )
     limits = np.array([[float(low), float(high)] for low, high in layout.limits(p)])
     return float(np.max(np.maximum(tau @ unit / limits[:, 1], tau @ unit / limits[:, 0])))
 
@@ -114,7 +116,15 @@ def as_windows(motion: Motion, tau: np.ndarray, like: Smoothed, name: str = PLAN
     no, yes = np.zeros(n, bool), np.ones(n, bool)
     every = np.ones((n, 3), bool)
     track = replace(
-        old, run=run, pose=motion.eta, fresh=every, frozen=no, dropped=no, between=no, period=period, out=0
+        old,
+        run=run,
+        pose=motion.eta,
+        fresh=every,
+        frozen=no,
+        dropped=no,
+        between=no,
+        period=period,
+        out=0,
     )
     std = {
         name: np.tile(np.median(getattr(like, name)[known], axis=0), (n, 1))
@@ -134,5 +144,3 @@ def as_windows(motion: Motion, tau: np.ndarray, like: Smoothed, name: str = PLAN
         **std,
     )
     return weak_windows(smoothed)
-
-

@@ -1,0 +1,119 @@
+"""From a diagnosis to the plan of the next runs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim import InputError
+
+from ..execution.progress import Advance, silent
+from ..predictors import Model, WeakWindows
+from ..report.finding_text import tell_apart
+from ..search import Prior
+from ..search.prior import NominalPrior
+from .designing import Designer, Limits, Scored, likely
+from .hypotheses import knowledge, rivals
+from .information import Knowledge
+from .manoeuvres import USUAL
+from .plan import MOST_RUNS, Plan, PlannedRun, sure_of
+from .spread import STEP, spread
+
+TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
+NO_SPREAD = (
+    "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
+    "basin, fewer minutes or a smaller margin"
+)
+
+
+def plan_next(
+    data: Sequence[WeakWindows],
+    content: Mapping[str, Any],
+    start: Model,
+    prior: Prior,
+    limits: Limits,
+    runs: int = 1,
+    seed: int = 0,
+    criterion: str = "certainty",
+    advance: Advance = silent,
+    ship: str | None = None,
+) -> Plan:
+    """Design the runs that discriminate the candidates of a diagnosis.
+
+    Args:
+        data: its training runs.
+        content: what ``diagnosis.json`` holds.
+        start: the initial model.
+        prior: of its coefficients.
+        limits: of each run.
+        runs: how many, each designed after the one before.
+        seed: of the search and of all draws.
+        criterion: name of one of :data:`.information.CRITERIA`; where one candidate is left, D-optimality.
+        advance: progress callback.
+        ship: as scenarios name it.
+
+    Raises:
+        InputError: no run keeps the limits, or the ship cannot follow a pose.
+    """
+    if not 1 <= runs <= MOST_RUNS:
+        raise InputError(f"the number of runs must be from 1 to {MOST_RUNS}; got {runs}")
+    advance("candidates and their weights")
+    space, k = knowledge(data, start, NominalPrior.of(start, prior), rivals(content))
+    decided = len(k.hypotheses) == 1
+    used = "d-optimal" if decided else criterion
+    best = int(np.argmax(k.weights))
+    model = space.model(k.hypotheses[best], k.estimates[best].mean)
+    designer = Designer(data, space, model, limits, used, advance)
+    planned: list[PlannedRun] = []
+    pairs: list[tuple[int, int]] = []
+    now = k
+    for n in range(runs):
+        found = designer.search(now, seed + n)
+        usual = {name: designer.usual(now, name) for name in USUAL}
+        if n == 0:
+            pairs = designer.inseparable(k)
+        run = checked(designer, now, found, seed + n)
+        sure = {name: (sure_of(now, s.gram, seed), s) for name, s in usual.items()}
+        planned.append(PlannedRun(designer, *run, sure_of(now, run[0].gram, seed), sure))
+        now = now.plus(run[0].gram)
+    named = [(k.hypotheses[i].ids, k.hypotheses[j].ids) for i, j in pairs]
+    advice = [_advice(start, a, b) for a, b in named]
+    if decided:
+        advice.append(
+            f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of all values "
+            "(D-optimality)."
+        )
+    return Plan(planned, k, space, named, advice, seed, used, ship)
+
+
+def checked(designer: Designer, k: Knowledge, found: Scored, seed: int) -> tuple[Scored, Knowledge, Any]:
+    """The best plan that keeps the basin with the spread of all likely hypotheses.
+
+    Raises:
+        InputError: none does.
+    """
+    others = sorted((s for s in designer.tried if s.excess == 0.0), key=lambda s: -s.score)
+    for s in [found, *(s for s in others if s is not found)][:TRIES]:
+        motion = designer.motion(s.steps, s.size, STEP * designer.scale)
+        of = spread(
+            designer.space,
+            k,
+            likely(k),
+            motion,
+            designer.basin,
+            designer.outline,
+            seed,
+            designer.advance,
+        )
+        if of.margin.min() > 0.0:
+            return s, k, of
+    raise InputError(NO_SPREAD)
+
+
+def _advice(start: Model, a: Sequence[str], b: Sequence[str]) -> str:
+    """What would separate two hypotheses that no manoeuvre does, by the texts of their effects."""
+    effects = start.ship.effects
+    one, other = ([i for i in x if i not in y] for x, y in ((a, b), (b, a)))
+    texts = dict.fromkeys(tell_apart(effects[i], effects[j]) for i in one for j in other)
+    what = "; ".join(texts) or "a higher speed, another sensor, or a longer run"
+    return f"To discriminate {' + '.join(a) or 'none'} from {' + '.join(b) or 'none'} otherwise: {what}."
