@@ -22,6 +22,7 @@ from .execution.progress import Advance
 from .execution.result_folder import together
 
 DIAGNOSIS, POSTERIOR, PLAN = "diagnosis.json", "posterior.json", "next.json"
+MOST = 9  # runs; chosen
 NO_RUNS = (
     "'{}' does not state the runs that the diagnosis was made of, or is not there: no run is designed; "
     "the advice is that of the diagnosis"
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def design(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    folder: Path = options.run
+    folder: Path = options.diagnosis
     content = _json(folder / DIAGNOSIS)
     task = _task(folder / POSTERIOR)
     if task is None:
@@ -63,12 +64,12 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     if start is None:
         return _advised(options, content, folder)
     runs = gather(task.runs, advance, task.anyway, start, task.horizon)
-    of = dict(seed=options.seed, criterion=options.criterion, advance=advance, ship=task.ship)
+    of = {"seed": options.seed, "criterion": options.criterion, "advance": advance, "ship": task.ship}
     if options.simulate is not None:
         return _played(options, (runs, content, start, task.prior, limits), of)
     from .design import plan_next
 
-    plan = plan_next(runs, content, start, task.prior, limits, options.runs, **of)
+    plan = plan_next(runs, content, start, task.prior, limits, options.count, **of)
     written = plan.write(options.out)
     return Done(0, [*plan.lines(), f"{', '.join(written)} in {options.out}"])
 
@@ -77,7 +78,7 @@ def _played(options: argparse.Namespace, known: tuple[Any, ...], of: dict[str, A
     """The whole sequence on a simulated ship."""
     from .design.sequential import play
 
-    rounds = play(*known, options.simulate, options.out, options.runs, **of)
+    rounds = play(*known, options.simulate, options.out, options.count, **of)
     shown, told = [], []
     for n, r in enumerate(rounds, 1):
         effects = ", ".join(f"{name} {c:.0%}" for name, c in r.effects.items()) or "no effect"
@@ -134,29 +135,49 @@ def _task(path: Path) -> Task | None:
         raise InputError(f"'{path}' is not JSON: {error}") from None
 
 
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= MOST:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to {MOST}, not '{text}'")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**31:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 0 to {2**31 - 1}, not '{text}'")
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.next_run",
         "Design the run that discriminates the candidate causes that a diagnosis leaves.",
         "examples:  %(prog)s results/diagnosis\n"
         "           %(prog)s results/diagnosis --minutes 4 --basin 6x4\n"
-        '           %(prog)s results/diagnosis --basin basin.json    {"north": [0, 10], "east": [-3, 3]}\n'
+        "           %(prog)s results/diagnosis --basin basin.json\n"
         "           %(prog)s results/diagnosis --runs 3 --out results/plan\n"
         "           %(prog)s results/diagnosis --simulate truth.ssv --runs 4\n"
-        "exit codes: 0 done, 2 bad input, 130 interrupted",
+        'basin.json:  {"north": [0, 10], "east": [-3, 3]}\n'
+        "exit codes:  0 done, 2 bad input, 130 interrupted",
     )
-    made.add_argument("run", type=Path, metavar="DIAGNOSIS", help="result folder of cybership learn")
+    made.add_argument(
+        "diagnosis", type=Path, metavar="DIAGNOSIS", help="result folder of cybership learn"
+    )
     made.add_argument(
         "--minutes", type=positive, default=4.0, metavar="M", help="length of a run [min] (4)"
     )
     made.add_argument(
         "--basin",
         metavar="WxH|FILE",
-        help="length to the north and to the east [m] about the middle of the measured tracks, or a JSON "
-        "file with the walls (what the runs have used, and a ship's length more)",
+        help="length to the north and to the east [m] about the middle of the measured tracks, or a "
+        "JSON file with the walls (what the runs have used, and a ship's length more)",
     )
     made.add_argument(
-        "--runs", type=int, default=1, metavar="N", help="runs to design, or rounds to simulate (1)"
+        "--runs",
+        type=_count,
+        default=1,
+        dest="count",
+        metavar="N",
+        help="runs to design, or rounds to simulate (1)",
     )
     made.add_argument(
         "--criterion",
@@ -164,7 +185,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="certainty, box-hill, buzzi-ferraris, d-optimal or a-optimal (certainty)",
     )
-    made.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (0)")
+    made.add_argument("--seed", type=_seed, default=0, metavar="N", help="of everything random (0)")
     made.add_argument(
         "--simulate",
         type=Path,

@@ -212,10 +212,10 @@ def a_optimal(k: Knowledge, G: np.ndarray) -> float:
 def certainty(k: Knowledge, G: np.ndarray) -> float:
     """Probability that a run raises the true hypothesis above SURE against its worst rival [1].
 
-    The log ratio of a pair is taken as normal, see :meth:`Prediction.log_ratio`. Hundredths are added, by
-    which the search proceeds where this is zero or one everywhere: the mean of 1 - exp(-ratio) over all
-    pairs, and by how much the effects' own parameters become narrower (D_s-optimality: A. C. Atkinson and
-    A. N. Donev, Optimum Experimental Designs, 1992).
+    The log ratio of a pair is taken as normal, see :meth:`Prediction.log_ratio`. Hundredths are added,
+    by which the search proceeds where this is zero or one everywhere: the mean of 1 - exp(-ratio) over
+    all pairs, and by how much the effects' own parameters become narrower (D_s-optimality: A. C.
+    Atkinson and A. N. Donev, Optimum Experimental Designs, 1992).
     """
     p, n, after = Prediction.of(k, G), len(k.hypotheses), k.plus(G)
     worst, gain = np.ones(n), 0.0

@@ -61,8 +61,8 @@ def moved(t: np.ndarray, distance: float, seconds: float, rise: float) -> np.nda
 def visits(t: np.ndarray, places: Sequence[float], speed: float, rise: float, T: float) -> np.ndarray:
     """One coordinate that goes from place to place, from 0 and back to it, all in T [s].
 
-    The duration of each move is in proportion to what it needs at the speed. Where T is too short for the
-    distances, these are less.
+    The duration of each move is in proportion to what it needs at the speed. Where T is too short, the
+    distances are less.
     """
     steps = np.diff([0.0, *places, 0.0])
     way = np.abs(steps).sum() / speed
@@ -211,7 +211,7 @@ def steps(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 
 
 class Step(NamedTuple):
-    """One manoeuvre of a plan: its name, its numbers from 0 to 1, its duration [s], its first heading."""
+    """One manoeuvre of a plan: name, numbers from 0 to 1, duration [s], first heading [rad]."""
 
     name: str
     numbers: tuple[float, ...]

@@ -48,7 +48,7 @@ def plan_next(
         limits: of each run.
         runs: how many, each designed after the one before.
         seed: of the search and of all draws.
-        criterion: name of one of :data:`.information.CRITERIA`; where one candidate is left, D-optimality.
+        criterion: one of :data:`.information.CRITERIA`; where one candidate is left, D-optimality.
         advance: progress callback.
         ship: as scenarios name it.
 
@@ -80,8 +80,8 @@ def plan_next(
     advice = [_advice(start, a, b) for a, b in named]
     if decided:
         advice.append(
-            f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of all values "
-            "(D-optimality)."
+            f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of "
+            "all values (D-optimality)."
         )
     return Plan(planned, k, space, named, advice, seed, used, ship)
 
@@ -92,21 +92,13 @@ def checked(designer: Designer, k: Knowledge, found: Scored, seed: int) -> tuple
     Raises:
         InputError: none does.
     """
-    others = sorted((s for s in designer.tried if s.excess == 0.0), key=lambda s: -s.score)
+    of, basin = designer, designer.basin
+    others = sorted((s for s in of.tried if s.excess == 0.0), key=lambda s: -s.score)
     for s in [found, *(s for s in others if s is not found)][:TRIES]:
-        motion = designer.motion(s.steps, s.size, STEP * designer.scale)
-        of = spread(
-            designer.space,
-            k,
-            likely(k),
-            motion,
-            designer.basin,
-            designer.outline,
-            seed,
-            designer.advance,
-        )
-        if of.margin.min() > 0.0:
-            return s, k, of
+        motion = of.motion(s.steps, s.size, STEP * of.scale)
+        tracks = spread(of.space, k, likely(k), motion, basin, of.outline, seed, of.advance)
+        if tracks.margin.min() > 0.0:
+            return s, k, tracks
     raise InputError(NO_SPREAD)
 
 

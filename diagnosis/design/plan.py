@@ -87,7 +87,7 @@ class PlannedRun:
         return min(found)
 
     def intervals(self) -> list[dict[str, Any]]:
-        """Half widths of the 95 % intervals of the effects' parameters: before, after, after usual runs."""
+        """Half widths of the effects' 95 % intervals: before, after, and after usual runs."""
         space, found = self.designer.space, []
         after = {"after": self.scored.gram} | {name: s.gram for name, (_, s) in self.usual.items()}
         for n in self.spread.ids:
@@ -170,22 +170,18 @@ class Plan:
         shown = ["Candidates"]
         shown += [f"  {w:6.1%}  {h.name}" for h, w in zip(k.hypotheses, k.weights, strict=True)]
         if self.inseparable:
-            named = (
-                f"{' + '.join(a) or 'none'} and {' + '.join(b) or 'none'}" for a, b in self.inseparable
-            )
-            shown += ["No run within the limits discriminates", *(f"  {text}" for text in named)]
+            shown.append("No run within the limits discriminates")
+            for pair in self.inseparable:
+                shown.append("  " + " and ".join(" + ".join(ids) or "no effect" for ids in pair))
         shown += list(self.advice)
         for n, r in enumerate(self.runs, 1):
             shown.append(f"Run {n}: {r.minutes:.3g} min")
             shown += [f"  {s.seconds:5.0f} s  {TEXTS[s.name]}" for s in r.scored.steps]
             least = float(r.spread.margin.min())
             shown.append(f"  least distance from the walls, under any likely candidate: {least:.2f} m")
-            shown.append(
-                f"  the right candidate is above {SURE:.0%} afterwards with probability {r.sure:.0%}"
-            )
-            shown += [
-                f"    {sure:4.0%} after a usual run: {name}" for name, (sure, _) in r.usual.items()
-            ]
+            shown.append(f"  probability that the right candidate is above {SURE:.0%} afterwards")
+            each = {"this run": r.sure} | {name: sure for name, (sure, _) in r.usual.items()}
+            shown += [f"    {sure:4.0%}  {name}" for name, sure in each.items()]
         return shown
 
     def __repr__(self) -> str:
@@ -208,7 +204,7 @@ class Plan:
 
 
 def write_run(r: PlannedRun, number: int, folder: Path, ship: str | None) -> None:
-    """Write the scenario of a run and its set points, which are the commands for a real ship's controller.
+    """Write the scenario of a run, and its set points, which the controller of a real ship can take.
 
     The columns tau_X, tau_Y and tau_N are the force that the likeliest model needs: feed-forward.
     """
@@ -253,12 +249,13 @@ def page(plan: Plan) -> str:
             f"![Track of run {n}]({picture_file(n)})",
             "",
             f"- Simulate it: `python -m cosim.run {scenario_file(n)}`.",
-            f"- Set points for the controller of a real ship, and the force that the likeliest model needs: "
-            f"`{commands_file(n)}`.",
-            f"- Log pose and commands at {1.0 / like.period:.3g} Hz or more, from rest at the first set point.",
-            f"- Basin: north {basin.north[0]:.2f} to {basin.north[1]:.2f} m, east {basin.east[0]:.2f} to "
-            f"{basin.east[1]:.2f} m. The hull keeps {r.spread.margin.min():.2f} m from the walls under every "
-            "candidate above 5 %.",
+            f"- `{commands_file(n)}` has the set points for the controller of a real ship, and the force "
+            "that the likeliest model needs.",
+            f"- Begin at rest at the first set point. Log pose and commands at {1.0 / like.period:.3g} Hz, "
+            "the rate of the runs so far.",
+            f"- Basin: north {basin.north[0]:.2f} to {basin.north[1]:.2f} m, east {basin.east[0]:.2f} "
+            f"to {basin.east[1]:.2f} m. The hull keeps {r.spread.margin.min():.2f} m from the walls "
+            "under every candidate above 5 %.",
             "",
             "| parameter | half of the 95 % interval before | after | " + " | ".join(USUAL) + " |",
             "|---|--:|--:|" + "--:|" * len(USUAL),

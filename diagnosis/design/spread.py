@@ -1,4 +1,4 @@
-"""Where the ship may be during a plan: the closed loop for many models at once, drawn from the posterior."""
+"""Where the ship may be during a plan: the closed loop of many models drawn from the posterior."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,9 +75,8 @@ def followed(models: Sequence[Model], motion: Motion) -> np.ndarray:
         s, out = ship.begin(craft.vessel.inputs())
         c = t = None
         for k, row in enumerate(targets):
-            found[:, k] = np.column_stack(np.broadcast_arrays(*out.pose[:3], np.zeros(len(models))))[
-                :, :3
-            ]
+            for axis in range(3):
+                found[:, k, axis] = out.pose[axis]
             v = out.velocity
             known = Estimate(*out.pose[:3], v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
             given = Inputs(known, Target(*map(float, row)))
