@@ -13,7 +13,7 @@ from fmus.ships.naming import DEFAULT as DEFAULT_SHIP
 
 from . import session
 from .assessment.gathering import gather
-from .design import Plan, plan_next
+from .design import Plan, Question, plan_next
 from .design.limits import limits_of
 from .execution.progress import Advance, silent
 from .predictors import (
@@ -240,8 +240,8 @@ class ShownDiagnosis(session.Diagnosis):
         data = [e.weak_windows for e in self.comparison.evaluations if not e.held_out]
         limits, name = limits_of(minutes, basin), self.start.ship.name
         ship = None if name == DEFAULT_SHIP else name
-        known = data, self.content, self.start, self.prior, limits
-        return plan_next(*known, runs, seed, criterion, advance, ship)
+        known = Question(data, self.content, self.start, self.prior, limits, criterion, ship)
+        return plan_next(known, runs, seed, advance)
 
     def __repr__(self) -> str:
         return summary(self._report)

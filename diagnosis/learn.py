@@ -200,12 +200,11 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
 def _task(options: argparse.Namespace) -> dict[str, object]:
     """What a diagnosis is made of, for ``cybership next``; paths are absolute."""
     ship, files = options.ship, [*options.train, *options.validate]
-    is_file = ship is not None and ship.endswith(".toml")
     return {
         "runs": [str(path.resolve()) for path in files],
         "model": None if options.model is None else str(options.model.resolve()),
         "effects": [str(path.resolve() if path.exists() else path) for path in options.effects],
-        "ship": str(Path(ship).resolve()) if is_file else ship,
+        "ship": str(Path(ship).resolve()) if ship and ship.endswith(".toml") else ship,
         "prior": options.prior,
         "horizon": options.horizon,
         "anyway": options.anyway,

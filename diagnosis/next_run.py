@@ -9,7 +9,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, Field, ValidationError
 
@@ -20,6 +20,9 @@ from cybership.message_text import first_fault
 from .commands.command_line import Done, out_options, run
 from .execution.progress import Advance
 from .execution.result_folder import together
+
+if TYPE_CHECKING:
+    from .design import Question
 
 DIAGNOSIS, POSTERIOR, PLAN = "diagnosis.json", "posterior.json", "next.json"
 MOST = 9  # runs; chosen
@@ -55,6 +58,7 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
         return _advised(options, content, folder)
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model
+    from .design import Question, plan_next
     from .design.limits import limits_of
     from .predictors import DEFAULT_EXECUTION, ship_of_model, ship_with
 
@@ -64,21 +68,19 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     if start is None:
         return _advised(options, content, folder)
     runs = gather(task.runs, advance, task.anyway, start, task.horizon)
-    of = {"seed": options.seed, "criterion": options.criterion, "advance": advance, "ship": task.ship}
+    q = Question(runs, content, start, task.prior, limits, options.criterion, task.ship)
     if options.simulate is not None:
-        return _played(options, (runs, content, start, task.prior, limits), of)
-    from .design import plan_next
-
-    plan = plan_next(runs, content, start, task.prior, limits, options.count, **of)
+        return _played(options, q, advance)
+    plan = plan_next(q, options.count, options.seed, advance)
     written = plan.write(options.out)
     return Done(0, [*plan.lines(), f"{', '.join(written)} in {options.out}"])
 
 
-def _played(options: argparse.Namespace, known: tuple[Any, ...], of: dict[str, Any]) -> Done:
+def _played(options: argparse.Namespace, q: "Question", advance: Advance) -> Done:
     """The whole sequence on a simulated ship."""
     from .design.sequential import play
 
-    rounds = play(*known, options.simulate, options.out, options.count, **of)
+    rounds = play(q, options.simulate, options.out, options.count, options.seed, advance)
     shown, told = [], []
     for n, r in enumerate(rounds, 1):
         effects = ", ".join(f"{name} {c:.0%}" for name, c in r.effects.items()) or "no effect"

@@ -165,12 +165,7 @@ class Designer:
 
     def scored(self, k: Knowledge, steps: Sequence[Step]) -> Scored:
         """A plan, evaluated at the largest speeds at which it keeps the limits."""
-        for size in SMALLER:
-            motion = self.motion(steps, size, EVERY * self.scale)
-            tau = motion.thrust(self.model)
-            excess = self.excess(motion, tau)
-            if excess == 0.0:
-                break
+        size, motion, tau, excess = self._fitting(steps)
         gram, score = np.zeros_like(k.G), -FORBIDDEN * excess
         if excess == 0.0:
             gram = self.space.gram([as_windows(motion, tau, self.data[0].smoothed)])
@@ -178,6 +173,16 @@ class Designer:
         found = Scored(steps, size, motion, gram, excess, score)
         self.tried.append(found)
         return found
+
+    def _fitting(self, steps: Sequence[Step]) -> tuple[tuple[float, float], Motion, np.ndarray, float]:
+        """The first size with which a plan keeps the limits, else the last: motion, force and excess."""
+        for size in SMALLER:
+            motion = self.motion(steps, size, EVERY * self.scale)
+            tau = motion.thrust(self.model)
+            excess = self.excess(motion, tau)
+            if excess == 0.0 or size == SMALLER[-1]:
+                return size, motion, tau, excess
+        raise AssertionError
 
     def excess(self, motion: Motion, tau: np.ndarray) -> float:
         """By how much a motion with a force (n, 3) exceeds basin, actuators and speeds [1]."""
@@ -197,7 +202,7 @@ class Designer:
         """
         T, end = self.limits.seconds, time.monotonic() + SECONDS
         pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
-        points = qmc.Sobol(DIMENSIONS * pieces, seed=seed).random_base2(LOG_POINTS)
+        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(LOG_POINTS)
         found: list[tuple[Scored, np.ndarray]] = []
 
         def cost(point: np.ndarray) -> float:
@@ -212,7 +217,7 @@ class Designer:
                 cost(point)
             first = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:POPULATION]])
             spans = [(0.0, 1.0)] * len(points[0])
-            differential_evolution(cost, spans, init=first, seed=seed, polish=False)
+            differential_evolution(cost, spans, init=first, rng=seed, polish=False)  # pyright: ignore
         best = max((s for s, _ in found), key=lambda s: s.score)
         if best.excess > 0.0:
             raise InputError(

@@ -26,8 +26,9 @@ def draw(run: PlannedRun, path: Path) -> None:
     for colour, (n, tracks) in enumerate(zip(run.spread.ids, run.spread.eta, strict=True)):
         name = f"under {run.before.hypotheses[n].name}"
         for m, track in enumerate(tracks):
-            label = {} if m else {"label": name}
-            axes.plot(track[:, 1], track[:, 0], color=f"C{colour}", alpha=0.4, linewidth=0.7, **label)
+            label = "_" if m else name  # matplotlib leaves a label with an underscore out
+            colour_of = {"color": f"C{colour}", "alpha": 0.4, "linewidth": 0.7}
+            axes.plot(track[:, 1], track[:, 0], label=label, **colour_of)
     axes.plot(eta[:, 1], eta[:, 0], "k--", linewidth=0.8, label="target")
     for k in np.linspace(0, len(eta) - 1, OUTLINES).astype(int):
         c, s = np.cos(eta[k, 2]), np.sin(eta[k, 2])

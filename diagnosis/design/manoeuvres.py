@@ -7,7 +7,7 @@ two where the next one begins with another heading.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def manoeuvre(name: str) -> Callable[[Course], Course]:
     return register
 
 
-def moved(t: np.ndarray, distance: float, seconds: float, rise: float) -> np.ndarray:
+def moved(t: Any, distance: float, seconds: float, rise: float) -> Any:
     """From 0 to a distance in some seconds, at a constant speed but for smooth ramps at both ends."""
     rise = min(rise, 0.5 * seconds)
     start, stop = ramp(t, rise).integral, ramp(t - (seconds - rise), rise).integral
@@ -128,7 +128,7 @@ def stairs(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 
 @manoeuvre("circle")
 def circle(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
-    """Circles or ellipses to one side, ahead or astern, also with a drift angle"""
+    """Circles or ellipses to one side, ahead or astern"""
     side, along = (1.0 if x[0] < 0.5 else -1.0), (1.0 if x[1] < 0.7 else -1.0)
     a = 0.5 * r.room * _between(0.25, 1.0, x[2])
     b = a * _between(0.5, 1.0, x[3])
@@ -146,7 +146,7 @@ def circle(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 
 @manoeuvre("rotation")
 def rotation(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
-    """Rotation on the spot to both sides, about a point between stern and bow actuators"""
+    """Rotation to both sides about a point between stern and bow"""
     rate, rise = r.rate * _between(0.25, 1.0, x[0]), _rise(x[1], r)
     psi = visits(t, there_and_back(np.pi * _between(0.3, 1.0, x[2]), rate, rise, T), rate, rise, T)
     pivot = _between(r.stern, r.bow, x[3])
@@ -166,7 +166,7 @@ def headings(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarra
 
 @manoeuvre("zigzag")
 def zigzag(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
-    """Zig-zag: legs on which the heading, and with it the course, swings to both sides"""
+    """Zig-zag: legs on which heading and course swing to both sides"""
     pose = _straight(t, T, x, r, 0.0)
     period = r.time * _between(10.0, 30.0, x[3])
     amplitude = min(np.radians(_between(10.0, 40.0, x[4])), r.rate * period / (2.0 * np.pi))
@@ -182,7 +182,7 @@ SINES = np.array([[0.11, 0.31], [0.13, 0.37], [0.17, 0.43]])
 
 @manoeuvre("multisine")
 def multisine(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
-    """Multisine of surge, sway and yaw at once, which moves all actuators"""
+    """Multisine of surge, sway and yaw at once"""
     omega = SINES * _between(0.8, 2.0, x[0]) / r.time
     limit = np.array([r.speed, r.speed, r.rate]) * np.array([x[1], x[2], x[3]])
     share = np.array([1.0, x[4]]) / (1.0 + x[4])
@@ -193,7 +193,7 @@ def multisine(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarr
 
 @manoeuvre("steps")
 def steps(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
-    """Steps of the force of one actuator after the other: quick short moves ahead, aside and about"""
+    """Steps of surge, sway and yaw force in turn: short moves"""
     rise = r.time * RISE
     size = np.array([r.speed, 0.7 * r.speed, r.rate]) * _between(0.3, 1.0, x[0]) * rise
     long = 1.0 + 2.0 * x[1]  # of a move, over the time of its ramps

@@ -1,6 +1,7 @@
 """From a diagnosis to the plan of the next runs."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,31 +27,37 @@ NO_SPREAD = (
 )
 
 
-def plan_next(
-    data: Sequence[WeakWindows],
-    content: Mapping[str, Any],
-    start: Model,
-    prior: Prior,
-    limits: Limits,
-    runs: int = 1,
-    seed: int = 0,
-    criterion: str = "certainty",
-    advance: Advance = silent,
-    ship: str | None = None,
-) -> Plan:
-    """Design the runs that discriminate the candidates of a diagnosis.
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What a design starts from.
 
-    Args:
-        data: its training runs.
+    Attributes:
+        data: training runs of a diagnosis.
         content: what ``diagnosis.json`` holds.
         start: the initial model.
         prior: of its coefficients.
         limits: of each run.
+        criterion: one of :data:`.information.CRITERIA`; where one candidate is left, D-optimality.
+        ship: as scenarios name it; None: the default ship.
+    """
+
+    data: Sequence[WeakWindows]
+    content: Mapping[str, Any]
+    start: Model
+    prior: Prior
+    limits: Limits
+    criterion: str = "certainty"
+    ship: str | None = None
+
+
+def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = silent) -> Plan:
+    """Design the runs that discriminate the candidates of a diagnosis.
+
+    Args:
+        q: the diagnosis and the limits.
         runs: how many, each designed after the one before.
         seed: of the search and of all draws.
-        criterion: one of :data:`.information.CRITERIA`; where one candidate is left, D-optimality.
         advance: progress callback.
-        ship: as scenarios name it.
 
     Raises:
         InputError: no run keeps the limits, or the ship cannot follow a pose.
@@ -58,12 +65,12 @@ def plan_next(
     if not 1 <= runs <= MOST_RUNS:
         raise InputError(f"the number of runs must be from 1 to {MOST_RUNS}; got {runs}")
     advance("candidates and their weights")
-    space, k = knowledge(data, start, NominalPrior.of(start, prior), rivals(content))
+    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior), rivals(q.content))
     decided = len(k.hypotheses) == 1
-    used = "d-optimal" if decided else criterion
+    used = "d-optimal" if decided else q.criterion
     best = int(np.argmax(k.weights))
     model = space.model(k.hypotheses[best], k.estimates[best].mean)
-    designer = Designer(data, space, model, limits, used, advance)
+    designer = Designer(q.data, space, model, q.limits, used, advance)
     planned: list[PlannedRun] = []
     pairs: list[tuple[int, int]] = []
     now = k
@@ -77,13 +84,13 @@ def plan_next(
         planned.append(PlannedRun(designer, *run, sure_of(now, run[0].gram, seed), sure))
         now = now.plus(run[0].gram)
     named = [(k.hypotheses[i].ids, k.hypotheses[j].ids) for i, j in pairs]
-    advice = [_advice(start, a, b) for a, b in named]
+    advice = [_advice(q.start, a, b) for a, b in named]
     if decided:
         advice.append(
             f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of "
             "all values (D-optimality)."
         )
-    return Plan(planned, k, space, named, advice, seed, used, ship)
+    return Plan(planned, k, space, named, advice, seed, used, q.ship)
 
 
 def checked(designer: Designer, k: Knowledge, found: Scored, seed: int) -> tuple[Scored, Knowledge, Any]:

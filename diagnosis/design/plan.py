@@ -249,10 +249,10 @@ def page(plan: Plan) -> str:
             f"![Track of run {n}]({picture_file(n)})",
             "",
             f"- Simulate it: `python -m cosim.run {scenario_file(n)}`.",
-            f"- `{commands_file(n)}` has the set points for the controller of a real ship, and the force "
-            "that the likeliest model needs.",
-            f"- Begin at rest at the first set point. Log pose and commands at {1.0 / like.period:.3g} Hz, "
-            "the rate of the runs so far.",
+            f"- `{commands_file(n)}` has the set points for the controller of a real ship, and the "
+            "force that the likeliest model needs.",
+            "- Begin at rest at the first set point. Log pose and commands at "
+            f"{1.0 / like.period:.3g} Hz, the rate of the runs so far.",
             f"- Basin: north {basin.north[0]:.2f} to {basin.north[1]:.2f} m, east {basin.east[0]:.2f} "
             f"to {basin.east[1]:.2f} m. The hull keeps {r.spread.margin.min():.2f} m from the walls "
             "under every candidate above 5 %.",

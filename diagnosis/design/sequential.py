@@ -1,6 +1,6 @@
 """Design, run, learn, again: the whole sequence on a simulated ship whose truth is known."""
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,14 +9,11 @@ from cosim import InputError
 
 from ..assessment.gathering import gather
 from ..execution.progress import Advance, silent
-from ..predictors import Model, WeakWindows
 from ..report.content import file_content
 from ..report.report_data import ReportData
-from ..search import Prior
 from ..session import begin
-from .designing import Limits
 from .information import SURE
-from .next_plan import plan_next
+from .next_plan import Question, plan_next
 from .plan import Plan, scenario_file
 
 
@@ -47,35 +44,24 @@ def confidences(content: dict[str, Any]) -> dict[str, float]:
 
 
 def play(
-    data: Sequence[WeakWindows],
-    content: dict[str, Any],
-    start: Model,
-    prior: Prior,
-    limits: Limits,
-    truth: Path,
-    out: Path,
-    rounds: int,
-    seed: int = 0,
-    criterion: str = "certainty",
-    advance: Advance = silent,
-    ship: str | None = None,
+    q: Question, truth: Path, out: Path, rounds: int, seed: int = 0, advance: Advance = silent
 ) -> list[Round]:
     """Design a run, simulate it with a true ship, learn from all runs, until every effect is certain.
 
     Args:
-        data, content, start, prior, limits, criterion, advance, ship: as of :func:`.plan_next`.
+        q: the first diagnosis and the limits.
         truth: parameter set of the true ship.
         out: folder; each round gets ``round_1``, ... in it, with plan and log.
         rounds: at the most.
         seed: of the first round; the next one has the next.
+        advance: progress callback.
 
     Raises:
         InputError: no run keeps the limits, or the truth is not a parameter set.
     """
     found: list[Round] = []
-    runs = list(data)
     for n in range(rounds):
-        plan = plan_next(runs, content, start, prior, limits, 1, seed + n, criterion, advance, ship)
+        plan = plan_next(q, 1, seed + n, advance)
         folder = out / f"round_{n + 1}"
         plan.write(folder)
         advance(f"simulating round {n + 1}")
@@ -86,11 +72,11 @@ def play(
         )
         if result.status != "done":
             raise InputError(f"the run of round {n + 1} {result.status}: {result.message}")
-        runs += gather([log], model=start)
-        task = begin(runs, prior=prior, model=start, advance=advance)
+        runs = [*q.data, *gather([log], model=q.start)]
+        task = begin(runs, prior=q.prior, model=q.start, advance=advance)
         content = file_content(ReportData.of(task.diagnose()))
         found.append(Round(plan, log, content["verdict"], confidences(content)))
         if found[-1].certain or not plan.runs:
             break
-        runs = list(task.train)  # with names of their own
+        q = replace(q, data=task.train, content=content)
     return found

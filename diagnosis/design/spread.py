@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,7 @@ def followed(models: Sequence[Model], motion: Motion) -> np.ndarray:
         motion: the target, at equal steps.
     """
     of, h = stacked(models), float(motion.time[1] - motion.time[0])
-    columns = {
+    columns: dict[str, dict[str, Any]] = {
         part: {n: x[:, 0] if isinstance(x, np.ndarray) else x for n, x in getattr(of, part).items()}
         for part in ("vessel", "thrusters")
     }
@@ -73,12 +74,14 @@ def followed(models: Sequence[Model], motion: Motion) -> np.ndarray:
     found = np.empty((len(models), len(targets), 3))
     with np.errstate(all="ignore"):  # a ship that runs away gives infinities, which count as outside
         s, out = ship.begin(craft.vessel.inputs())
-        c = t = None
+        c: Any = None
+        t: Any = None
         for k, row in enumerate(targets):
             for axis in range(3):
                 found[:, k, axis] = out.pose[axis]
             v = out.velocity
-            known = Estimate(*out.pose[:3], v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
+            x, y, psi = out.pose[:3]
+            known = Estimate(x, y, psi, v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
             given = Inputs(known, Target(*map(float, row)))
             c, demand = controller.begin(given) if c is None else controller.advance(c, given, h)
             asked = craft.thrusters.inputs(demand.tau, v)
