@@ -224,7 +224,7 @@ class ShownDiagnosis(session.Diagnosis):
         Args:
             minutes: length of each run.
             basin: length to the north and to the east [m] about the middle of the measured tracks, or
-                the path of a JSON file with its walls; None: what the runs have used, and a ship's
+                the path of a JSON file with its walls. None is what the runs have used, and a ship's
                 length more.
             runs: how many.
             seed: of everything random.

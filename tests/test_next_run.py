@@ -12,7 +12,7 @@ from support.measured import sail
 import cosim
 import diagnosis
 from cosim import InputError
-from diagnosis import Model, next_run
+from diagnosis import Model, design_run
 from diagnosis.design import Basin, Limits, Question, plan_next
 from diagnosis.design.designing import Designer, likely
 from diagnosis.design.hypotheses import knowledge, rivals
@@ -30,8 +30,8 @@ from diagnosis.design.information import (
     projected,
 )
 from diagnosis.design.limits import limits_of
-from diagnosis.design.manoeuvres import LIBRARY, NUMBERS, Reach, Step, poses, sequence, usual
-from diagnosis.design.planned_motion import Motion
+from diagnosis.design.manoeuvre_library import LIBRARY, NUMBERS, PlanStep, Reach, poses, sequence, usual
+from diagnosis.design.planned_motion import PlannedMotion
 from diagnosis.design.spread import STEP, drawn, followed, spread
 from diagnosis.search.prior import NominalPrior
 
@@ -234,7 +234,7 @@ def test_running_astern_discriminates_what_running_ahead_does_not(designer):
     d, k = designer
     assert {h.ids for h in k.hypotheses} == {("X_|u|u",), ("X_uu",)}
     assert k.weights == pytest.approx(0.5, abs=1e-3)
-    astern = d.scored(k, [Step("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
+    astern = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
     around = d.scored(k, usual("circle", 120.0))
     assert astern.excess == around.excess == 0.0
     assert astern.score > 0.9 > 0.1 > around.score
@@ -248,7 +248,7 @@ def test_what_the_actuators_cannot_do_is_not_proposed(designer):
     d, k = designer
     fast = replace(d, tried=[])
     fast.reach = d.reach._replace(speed=3.0, rate=3.0)
-    found = fast.scored(k, [Step("legs", (1.0,) * NUMBERS, 120.0, 0.0)])
+    found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, 120.0, 0.0)])
     assert found.excess > 0.0
     assert found.score < -100.0
     assert not found.gram.any()
@@ -261,7 +261,7 @@ def test_the_planned_motion_is_what_its_thrust_gives():
     from fmus.vessel import vessel
 
     basin, h, model = Basin((0.0, 9.0), (0.0, 9.0)), 0.01, Model()
-    motion = Motion.of([Step("zigzag", (0.5,) * NUMBERS, 40.0, 0.4)], 40.0, h, REACH, basin)
+    motion = PlannedMotion.of([PlanStep("zigzag", (0.5,) * NUMBERS, 40.0, 0.4)], 40.0, h, REACH, basin)
     tau = motion.thrust(model)
     s = vessel.State._make([*map(float, motion.eta[0]), 0.0, 0.0, 0.0, 0.0])
     for row in tau[:1000]:
@@ -272,8 +272,8 @@ def test_the_planned_motion_is_what_its_thrust_gives():
 def test_the_loop_of_many_models_is_that_of_each_alone(designer):
     d, k = designer
     models = drawn(d.space, k, 0, np.random.default_rng(0))[:3]
-    motion = d.motion([Step("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), STEP)
-    short = Motion(*(x[:60] for x in (motion.time, motion.eta, motion.eta_dot, motion.eta_ddot)))
+    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), STEP)
+    short = PlannedMotion(*(x[:60] for x in (motion.time, motion.eta, motion.eta_dot, motion.eta_ddot)))
     together = followed(models, short)
     for n, model in enumerate(models):
         assert followed([model], short)[0] == pytest.approx(together[n], abs=1e-9)
@@ -322,7 +322,7 @@ def folder(tmp_path):
 
 
 def test_without_a_posterior_the_advice_is_that_of_the_diagnosis(folder):
-    done = command(next_run.main, folder, "--out", folder / "plan")
+    done = command(design_run.main, folder, "--out", folder / "plan")
     assert done.returncode == 0
     assert "run astern" in done.stdout
     told = json.loads((folder / "plan" / "next.json").read_text())
@@ -345,7 +345,7 @@ def test_without_a_posterior_the_advice_is_that_of_the_diagnosis(folder):
 def test_bad_input_is_one_message(folder, task, options, words):
     if task is not None:
         (folder / "posterior.json").write_text(json.dumps({"task": task}))
-    done = command(next_run.main, folder, "--out", folder / "plan", *options)
+    done = command(design_run.main, folder, "--out", folder / "plan", *options)
     assert done.returncode == 2
     assert words in done.stderr
     assert "Traceback" not in done.stderr
@@ -353,7 +353,7 @@ def test_bad_input_is_one_message(folder, task, options, words):
 
 
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
-    done = command(next_run.main, tmp_path, "--out", tmp_path / "plan")
+    done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
     assert done.returncode == 2
     assert "diagnosis.json" in done.stderr
 

@@ -17,8 +17,8 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from .hypotheses import LIKELY, Space
 from .information import CRITERIA, Knowledge, inseparable
-from .manoeuvres import DIMENSIONS, Reach, Step, sequence, usual
-from .planned_motion import EVERY, MOST_THRUST, Basin, Motion, as_windows, load
+from .manoeuvre_library import DIMENSIONS, PlanStep, Reach, sequence, usual
+from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
 LOG_POINTS = 6  # of the number of Sobol points, to the base 2; chosen: a few seconds
@@ -51,7 +51,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
+class ScoredPlan:
     """A plan that was evaluated.
 
     Attributes:
@@ -63,9 +63,9 @@ class Scored:
         score: by the criterion, less what it exceeds.
     """
 
-    steps: Sequence[Step]
+    steps: Sequence[PlanStep]
     size: tuple[float, float]
-    motion: Motion
+    motion: PlannedMotion
     gram: np.ndarray
     excess: float
     score: float
@@ -89,7 +89,7 @@ class Designer:
     limits: Limits
     criterion: str = "certainty"
     advance: Advance = silent
-    tried: list[Scored] = field(default_factory=list)
+    tried: list[ScoredPlan] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if self.criterion not in CRITERIA:
@@ -156,25 +156,27 @@ class Designer:
         rate = max(FASTER * rate, FASTER * speed / max(0.5 * room, half))
         return Reach(float(FASTER * speed), float(rate), room, self.scale, -half, half)
 
-    def motion(self, steps: Sequence[Step], size: tuple[float, float], h: float) -> Motion:
+    def motion(self, steps: Sequence[PlanStep], size: tuple[float, float], h: float) -> PlannedMotion:
         """The target of a plan every h [s], at shares of the largest speeds and of the room."""
         pace, room = size
         r = self.reach
         smaller = r._replace(speed=pace * r.speed, rate=pace * r.rate, room=room * r.room)
-        return Motion.of(steps, self.limits.seconds, h, smaller, self.basin)
+        return PlannedMotion.of(steps, self.limits.seconds, h, smaller, self.basin)
 
-    def scored(self, k: Knowledge, steps: Sequence[Step]) -> Scored:
+    def scored(self, k: Knowledge, steps: Sequence[PlanStep]) -> ScoredPlan:
         """A plan, evaluated at the largest speeds at which it keeps the limits."""
         size, motion, tau, excess = self._fitting(steps)
         gram, score = np.zeros_like(k.G), -FORBIDDEN * excess
         if excess == 0.0:
             gram = self.space.gram([as_windows(motion, tau, self.data[0].smoothed)])
             score = CRITERIA[self.criterion](k, gram)
-        found = Scored(steps, size, motion, gram, excess, score)
+        found = ScoredPlan(steps, size, motion, gram, excess, score)
         self.tried.append(found)
         return found
 
-    def _fitting(self, steps: Sequence[Step]) -> tuple[tuple[float, float], Motion, np.ndarray, float]:
+    def _fitting(
+        self, steps: Sequence[PlanStep]
+    ) -> tuple[tuple[float, float], PlannedMotion, np.ndarray, float]:
         """The first size with which a plan keeps the limits, else the last: motion, force and excess."""
         for size in SMALLER:
             motion = self.motion(steps, size, EVERY * self.scale)
@@ -184,7 +186,7 @@ class Designer:
                 return size, motion, tau, excess
         raise AssertionError
 
-    def excess(self, motion: Motion, tau: np.ndarray) -> float:
+    def excess(self, motion: PlannedMotion, tau: np.ndarray) -> float:
         """By how much a motion with a force (n, 3) exceeds basin, actuators and speeds [1]."""
         nu = np.abs(motion.nu)
         speed = float(np.hypot(nu[:, 0], nu[:, 1]).max() / self.reach.speed)
@@ -194,7 +196,7 @@ class Designer:
         share = load(tau, self.model) / MOST_THRUST
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
-    def search(self, k: Knowledge, seed: int) -> Scored:
+    def search(self, k: Knowledge, seed: int) -> ScoredPlan:
         """The best plan that is found, by the same seed the same unless time is short.
 
         Raises:
@@ -203,7 +205,7 @@ class Designer:
         T, end = self.limits.seconds, time.monotonic() + SECONDS
         pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
         points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(LOG_POINTS)
-        found: list[tuple[Scored, np.ndarray]] = []
+        found: list[tuple[ScoredPlan, np.ndarray]] = []
 
         def cost(point: np.ndarray) -> float:
             if time.monotonic() > end or len(found) >= len(points) + EVOLVED:
@@ -226,7 +228,7 @@ class Designer:
             )
         return best
 
-    def usual(self, k: Knowledge, name: str) -> Scored:
+    def usual(self, k: Knowledge, name: str) -> ScoredPlan:
         """A usual run of the same length."""
         return self.scored(k, usual(name, self.limits.seconds))
 

@@ -34,7 +34,7 @@ class Rival(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class EffectParameters:
     """Parameters of one effect, about a point.
 
     Attributes:
@@ -61,7 +61,7 @@ class Space:
 
     start: Model
     prior: NominalPrior
-    blocks: Mapping[str, Block]
+    blocks: Mapping[str, EffectParameters]
     sigma: np.ndarray
 
     @property
@@ -147,7 +147,7 @@ def space_of(
     """The parameters of some effects on measured runs; prior precision (p, p) and mean (p,) of all."""
     base = model_error(data, start)
     noise = np.sqrt(np.mean(np.concatenate([omega_std(w, start) for w in data]) ** 2, axis=0))
-    blocks: dict[str, Block] = {}
+    blocks: dict[str, EffectParameters] = {}
     for name in ids:
         shapes = candidate(data, start, base, start.ship.effects[name]).shapes
         if shapes:
@@ -181,12 +181,12 @@ def _left(s: CandidateShape, y: np.ndarray, noise: np.ndarray) -> float:
     return float(np.sum((rest - fit) ** 2))
 
 
-def _block(start: Model, s: CandidateShape, base: np.ndarray) -> Block:
+def _block(start: Model, s: CandidateShape, base: np.ndarray) -> EffectParameters:
     """The parameters of an effect about a shape: those that scale it, and those that make it."""
     names = tuple(dict.fromkeys([*s.fitted, *s.given]))
     unit = [start.unit(n) for n in names]
     steps = [abs(s.given[n]) or u if n in s.given else u for n, u in zip(names, unit, strict=True)]
-    return Block(dict(s.given), names, tuple(steps))
+    return EffectParameters(dict(s.given), names, tuple(steps))
 
 
 def knowledge(

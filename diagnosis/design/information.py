@@ -40,7 +40,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class HypothesisEstimate:
     """Parameters of a hypothesis by some data: mean (p,), zero where it has none, covariance (s, s)."""
 
     mean: np.ndarray
@@ -72,18 +72,18 @@ class Knowledge:
         return replace(self, G=self.G + G, b=self.b + G @ mean)
 
     @cached_property
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[HypothesisEstimate]:
         """Of each hypothesis, by the data so far."""
         return [self.estimate(h) for h in self.hypotheses]
 
-    def estimate(self, h: Hypothesis) -> Estimate:
+    def estimate(self, h: Hypothesis) -> HypothesisEstimate:
         """The parameters of a hypothesis by the data so far."""
         s = h.columns
         P = self.precision[np.ix_(s, s)]
         C = _inverse(self.G[np.ix_(s, s)] + P)
         mean = np.zeros(self.prior.size)
         mean[s] = C @ (self.b[s] + P @ self.prior[s])
-        return Estimate(mean, C)
+        return HypothesisEstimate(mean, C)
 
     @cached_property
     def log_evidence(self) -> np.ndarray:

@@ -13,11 +13,11 @@ from ..predictors import Model, WeakWindows
 from ..report.finding_text import tell_apart
 from ..search import Prior
 from ..search.prior import NominalPrior
-from .designing import Designer, Limits, Scored, likely
+from .designing import Designer, Limits, ScoredPlan, likely
 from .hypotheses import knowledge, rivals
 from .information import Knowledge
-from .manoeuvres import USUAL
-from .plan import MOST_RUNS, Plan, PlannedRun, sure_of
+from .manoeuvre_library import USUAL
+from .run_plan import MOST_RUNS, Plan, PlannedRun, sure_of
 from .spread import STEP, spread
 
 TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
@@ -50,6 +50,20 @@ class Question:
     ship: str | None = None
 
 
+def prepared(q: Question, advance: Advance = silent) -> tuple[Designer, Knowledge]:
+    """What searches plans for a question, and what is known before them.
+
+    Raises:
+        InputError: the ship cannot follow a pose, basin or minutes are too small, no such criterion.
+    """
+    advance("candidates and their weights")
+    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior), rivals(q.content))
+    used = "d-optimal" if len(k.hypotheses) == 1 else q.criterion
+    best = int(np.argmax(k.weights))
+    model = space.model(k.hypotheses[best], k.estimates[best].mean)
+    return Designer(q.data, space, model, q.limits, used, advance), k
+
+
 def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = silent) -> Plan:
     """Design the runs that discriminate the candidates of a diagnosis.
 
@@ -64,13 +78,8 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
     """
     if not 1 <= runs <= MOST_RUNS:
         raise InputError(f"the number of runs must be from 1 to {MOST_RUNS}; got {runs}")
-    advance("candidates and their weights")
-    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior), rivals(q.content))
+    designer, k = prepared(q, advance)
     decided = len(k.hypotheses) == 1
-    used = "d-optimal" if decided else q.criterion
-    best = int(np.argmax(k.weights))
-    model = space.model(k.hypotheses[best], k.estimates[best].mean)
-    designer = Designer(q.data, space, model, q.limits, used, advance)
     planned: list[PlannedRun] = []
     pairs: list[tuple[int, int]] = []
     now = k
@@ -90,10 +99,12 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
             f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of "
             "all values (D-optimality)."
         )
-    return Plan(planned, k, space, named, advice, seed, used, q.ship)
+    return Plan(planned, k, designer.space, named, advice, seed, designer.criterion, q.ship)
 
 
-def checked(designer: Designer, k: Knowledge, found: Scored, seed: int) -> tuple[Scored, Knowledge, Any]:
+def checked(
+    designer: Designer, k: Knowledge, found: ScoredPlan, seed: int
+) -> tuple[ScoredPlan, Knowledge, Any]:
     """The best plan that keeps the basin with the spread of all likely hypotheses.
 
     Raises:

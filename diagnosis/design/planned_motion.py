@@ -11,7 +11,7 @@ from fmus.vessel import vessel
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..runs import Run, Smoothed
-from .manoeuvres import Reach, Step, poses
+from .manoeuvre_library import PlanStep, Reach, poses
 
 EVERY = 0.2  # s, times the time scale: samples of a planned motion; ten in the shortest ramp
 MOST_THRUST = 0.8  # 1, of the limit of an actuator: the rest is for control and for what is not known
@@ -49,7 +49,7 @@ class Basin:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class PlannedMotion:
     """A target over time, with derivatives by central differences.
 
     Attributes:
@@ -63,7 +63,9 @@ class Motion:
     eta_ddot: np.ndarray
 
     @classmethod
-    def of(cls, plan: Sequence[Step], seconds: float, h: float, reach: Reach, basin: Basin) -> "Motion":
+    def of(
+        cls, plan: Sequence[PlanStep], seconds: float, h: float, reach: Reach, basin: Basin
+    ) -> "PlannedMotion":
         """The target of a plan every h [s], about the middle of the basin."""
         eta = poses(plan, seconds, h, reach)
         low, high = eta[:, :2].min(axis=0), eta[:, :2].max(axis=0)
@@ -101,7 +103,9 @@ def load(tau: np.ndarray, model: Model) -> float:
     return float(np.max(np.maximum(tau @ unit / limits[:, 1], tau @ unit / limits[:, 0])))
 
 
-def as_windows(motion: Motion, tau: np.ndarray, like: Smoothed, name: str = PLANNED) -> WeakWindows:
+def as_windows(
+    motion: PlannedMotion, tau: np.ndarray, like: Smoothed, name: str = PLANNED
+) -> WeakWindows:
     """The motion as a smoothed run of the same ship and measurement as a measured one.
 
     Args:

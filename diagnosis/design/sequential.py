@@ -14,7 +14,7 @@ from ..report.report_data import ReportData
 from ..session import begin
 from .information import SURE
 from .next_plan import Question, plan_next
-from .plan import Plan, scenario_file
+from .run_plan import Plan, scenario_file
 
 
 class Round(NamedTuple):

@@ -16,7 +16,7 @@ from ..predictors import Model
 from ..predictors.prediction import stacked
 from .hypotheses import Space
 from .information import Knowledge
-from .planned_motion import Basin, Motion
+from .planned_motion import Basin, PlannedMotion
 
 STEP = 0.2  # s, times the time scale: of this loop, a tenth of the shortest ramp; chosen
 MEMBERS = 20  # drawn from each hypothesis: of these the outermost is the 95 % spread on either side
@@ -51,7 +51,7 @@ def drawn(space: Space, k: Knowledge, n: int, rng: np.random.Generator) -> list[
     return found
 
 
-def followed(models: Sequence[Model], motion: Motion) -> np.ndarray:
+def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
     """(p, n, 3), poses of models that a controller keeps on a target, started on it at rest.
 
     The controller gets the true motion: noise of the measurement moves a ship much less than its margin.
@@ -95,7 +95,7 @@ def spread(
     space: Space,
     k: Knowledge,
     ids: Sequence[int],
-    motion: Motion,
+    motion: PlannedMotion,
     basin: Basin,
     outline: np.ndarray,
     seed: int,

@@ -210,7 +210,7 @@ def steps(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     return np.column_stack([of(0), of(1), of(2)])
 
 
-class Step(NamedTuple):
+class PlanStep(NamedTuple):
     """One manoeuvre of a plan: name, numbers from 0 to 1, duration [s], first heading [rad]."""
 
     name: str
@@ -224,7 +224,7 @@ class Step(NamedTuple):
         return told | {"heading": self.heading, "numbers": [round(x, 4) for x in self.numbers]}
 
 
-def poses(plan: Sequence[Step], seconds: float, h: float, r: Reach) -> np.ndarray:
+def poses(plan: Sequence[PlanStep], seconds: float, h: float, r: Reach) -> np.ndarray:
     """(n, 3), target of a sequence of manoeuvres every h [s], over all seconds.
 
     Turns on the spot join two headings; what they take, up to half of the time, is taken from the
@@ -255,7 +255,7 @@ def poses(plan: Sequence[Step], seconds: float, h: float, r: Reach) -> np.ndarra
 DIMENSIONS = NUMBERS + 2  # of a manoeuvre: which one, how it begins, its numbers
 
 
-def sequence(point: np.ndarray, seconds: float) -> list[Step]:
+def sequence(point: np.ndarray, seconds: float) -> list[PlanStep]:
     """The plan at a point of the unit cube, DIMENSIONS numbers for each manoeuvre."""
     rows = point.reshape(-1, DIMENSIONS)
     names, each = list(LIBRARY), seconds / len(rows)
@@ -263,7 +263,7 @@ def sequence(point: np.ndarray, seconds: float) -> list[Step]:
     bends = np.where(rows[:, 1] < 0.5, 0.0, 2.0 * np.pi * (rows[:, 1] - 0.75))
     bends[0] = 2.0 * np.pi * rows[0, 1]
     return [
-        Step(
+        PlanStep(
             names[min(int(x[0] * len(names)), len(names) - 1)],
             tuple(map(float, x[2:])),
             each,
@@ -282,7 +282,7 @@ USUAL: Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]] = {
 }
 
 
-def usual(name: str, seconds: float) -> list[Step]:
+def usual(name: str, seconds: float) -> list[PlanStep]:
     """A usual run as a plan."""
     parts = USUAL[name]
-    return [Step(m, numbers, seconds / len(parts), 0.0) for m, numbers in parts]
+    return [PlanStep(m, numbers, seconds / len(parts), 0.0) for m, numbers in parts]

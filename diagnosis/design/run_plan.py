@@ -12,12 +12,12 @@ from cosim.scenario import find_scenario
 
 from ..execution.result_folder import together
 from ..report.formatting import as_json, finite
-from .designing import Designer, Scored
-from .drawing import draw
+from .designing import Designer, ScoredPlan
 from .hypotheses import Space
 from .information import CRITERIA, SURE, Knowledge, expected, pairs, projected
-from .manoeuvres import TEXTS, USUAL
+from .manoeuvre_library import TEXTS, USUAL
 from .spread import Spread
+from .track_picture import draw
 
 JSON, PAGE = "next.json", "plan.md"
 MOST_RUNS = 9  # of a plan; chosen
@@ -63,11 +63,11 @@ class PlannedRun:
     """
 
     designer: Designer
-    scored: Scored
+    scored: ScoredPlan
     before: Knowledge
     spread: Spread
     sure: float
-    usual: Mapping[str, tuple[float, Scored]]
+    usual: Mapping[str, tuple[float, ScoredPlan]]
 
     @property
     def minutes(self) -> float:
@@ -197,7 +197,7 @@ class Plan:
         with together(Path(out), files(MOST_RUNS)) as new:
             for n, r in enumerate(self.runs, 1):
                 write_run(r, n, new, self.ship)
-                draw(r, new / picture_file(n))
+                draw(r.designer, r.before, r.scored.motion, r.spread, new / picture_file(n))
             (new / PAGE).write_text(page(self), encoding="utf-8")
             (new / JSON).write_text(as_json(finite(self.content())) + "\n", encoding="utf-8")
         return written

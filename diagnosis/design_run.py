@@ -1,4 +1,4 @@
-"""Design the next run: ``python -m diagnosis.next_run results/diagnosis``."""
+"""Design the next run: ``python -m diagnosis.design_run results/diagnosis``."""
 
 if __name__ == "__main__":
     from cosim.supervision import supervised
@@ -151,7 +151,7 @@ def _seed(text: str) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
-        "diagnosis.next_run",
+        "diagnosis.design_run",
         "Design the run that discriminates the candidate causes that a diagnosis leaves.",
         "examples:  %(prog)s results/diagnosis\n"
         "           %(prog)s results/diagnosis --minutes 4 --basin 6x4\n"

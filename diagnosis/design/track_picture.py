@@ -1,30 +1,29 @@
 """The picture of a planned run: its track with the spread under every likely candidate."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .plan import PlannedRun
+from .designing import Designer
+from .information import Knowledge
+from .planned_motion import PlannedMotion
+from .spread import Spread
 
 OUTLINES = 12  # of the ship along the track; chosen
 
 
-def draw(run: PlannedRun, path: Path) -> None:
+def draw(d: Designer, k: Knowledge, motion: PlannedMotion, spread: Spread, path: Path) -> None:
     """Draw a run: basin, target, tracks under each likely hypothesis, outlines of the ship."""
     from matplotlib.figure import Figure
 
-    d, eta = run.designer, run.scored.motion.eta
+    eta = motion.eta
     basin = d.basin
     figure = Figure(figsize=(8.0, 6.0), dpi=120)
     axes = figure.add_subplot()
     (south, north), (west, east) = basin.north, basin.east
     axes.plot([west, east, east, west, west], [south, south, north, north, south], "k", label="basin")
-    for colour, (n, tracks) in enumerate(zip(run.spread.ids, run.spread.eta, strict=True)):
-        name = f"under {run.before.hypotheses[n].name}"
+    for colour, (n, tracks) in enumerate(zip(spread.ids, spread.eta, strict=True)):
+        name = f"under {k.hypotheses[n].name}"
         for m, track in enumerate(tracks):
             label = "_" if m else name  # matplotlib leaves a label with an underscore out
             colour_of = {"color": f"C{colour}", "alpha": 0.4, "linewidth": 0.7}
