@@ -48,6 +48,7 @@ SUBCOMMANDS = {
     "criteria": Subcommand("diagnosis.criteria", "a template of criteria for compare --criteria"),
     "verify": Subcommand("diagnosis.verify", "check a validation record that compare has written"),
     "learn": Subcommand("diagnosis.learn", "find the physical effect that a model lacks"),
+    "next": Subcommand("diagnosis.design_run", "design the run that discriminates candidate causes"),
     "parameters": Subcommand("diagnosis.parameters", "parameters of an FMU that can be calibrated"),
     "linearise": Subcommand("diagnosis.linearise", "A, B, C, D of an FMU in a state"),
     "campaign": Subcommand("cosim.campaign", "many runs: grids and samples, one table, differences"),

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim import InputError
+from fmus.ships.naming import DEFAULT as DEFAULT_SHIP
 
 from . import session
 from .assessment.gathering import gather
+from .design import Plan, Question, plan_next
+from .design.limits import limits_of
 from .execution.progress import Advance, silent
 from .predictors import (
     Model,
@@ -206,6 +209,39 @@ class ShownDiagnosis(session.Diagnosis):
     def write_report(self, path: str | Path = "report.html") -> Path:
         """Write the report of ``python -m diagnosis.learn``: one HTML file that needs no other."""
         return write_report(path, self._report)
+
+    def next(
+        self,
+        minutes: float = 4.0,
+        basin: tuple[float, float] | str | Path | None = None,
+        runs: int = 1,
+        seed: int = 0,
+        criterion: str = "certainty",
+        advance: Advance = silent,
+    ) -> Plan:
+        """Design the runs that discriminate the candidate causes that are left.
+
+        Args:
+            minutes: length of each run.
+            basin: length to the north and to the east [m] about the middle of the measured tracks, or
+                the path of a JSON file with its walls. None is what the runs have used, and a ship's
+                length more.
+            runs: how many.
+            seed: of everything random.
+            criterion: ``certainty``, ``box-hill``, ``buzzi-ferraris``, ``d-optimal`` or ``a-optimal``.
+            advance: receives the name of each step when it begins.
+
+        Returns:
+            The plan; ``plan.write(folder)`` writes its scenarios, set points and pictures.
+
+        Raises:
+            InputError: no run keeps the limits, or the ship cannot follow a pose.
+        """
+        data = [e.weak_windows for e in self.comparison.evaluations if not e.held_out]
+        limits, name = limits_of(minutes, basin), self.start.ship.name
+        ship = None if name == DEFAULT_SHIP else name
+        known = Question(data, self.content, self.start, self.prior, limits, criterion, ship)
+        return plan_next(known, runs, seed, advance)
 
     def __repr__(self) -> str:
         return summary(self._report)

@@ -182,7 +182,7 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
                 learned = diagnosis.learned.model
                 notes = predictor.write(new, learned, [*task.train, *task.validate])
                 if predictor.parametric:
-                    diagnosis.posterior.write(new / POSTERIOR, learned.learned_from)
+                    diagnosis.posterior.write(new / POSTERIOR, learned.learned_from, _task(options))
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         early = [name for name in EARLY if (options.out / name).exists()]
@@ -195,6 +195,20 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
     if refused:
         return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
     return Done(0, shown)
+
+
+def _task(options: argparse.Namespace) -> dict[str, object]:
+    """What a diagnosis is made of, for ``cybership next``; paths are absolute."""
+    ship, files = options.ship, [*options.train, *options.validate]
+    return {
+        "runs": [str(path.resolve()) for path in files],
+        "model": None if options.model is None else str(options.model.resolve()),
+        "effects": [str(path.resolve() if path.exists() else path) for path in options.effects],
+        "ship": str(Path(ship).resolve()) if ship and ship.endswith(".toml") else ship,
+        "prior": options.prior,
+        "horizon": options.horizon,
+        "anyway": options.anyway,
+    }
 
 
 def _origin(options: argparse.Namespace) -> dict[str, object]:

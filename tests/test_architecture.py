@@ -45,6 +45,7 @@ DIAGNOSIS_LAYERS = (
     ("verdict",),
     ("session",),
     ("report",),
+    ("design",),
     ("acceptance",),
     ("fmu_parameters",),
     ("commands",),
@@ -52,6 +53,7 @@ DIAGNOSIS_LAYERS = (
     (
         "compare",
         "criteria",
+        "design_run",
         "learn",
         "linearise",
         "measure_trial",
@@ -141,6 +143,7 @@ PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
     "diagnosis.assessment",
     "diagnosis.commands",
+    "diagnosis.design",
     "diagnosis.execution",
     "diagnosis.execution.progress",
     "diagnosis.moved",

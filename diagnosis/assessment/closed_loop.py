@@ -81,12 +81,12 @@ def closed_loop(
     """
     length, h_path = model.ship.scale.length, SETTINGS.step * model.ship.scale.time
     start = {name: length * x for name, x in reference.start.items()}
-    ship = _Part(model.ship.vessel, {**model.vessel, **start})
+    ship = LoopPart(model.ship.vessel, {**model.vessel, **start})
     serving = model.ship.serving
-    path = _Part(serving(reference.guidance), {})
-    observer = _Part(serving(mdf.COMPONENT), reference.observer)
-    controller = _Part(serving(adaptive.COMPONENT), {})
-    drive, told = _Part(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
+    path = LoopPart(serving(reference.guidance), {})
+    observer = LoopPart(serving(mdf.COMPONENT), reference.observer)
+    controller = LoopPart(serving(adaptive.COMPONENT), {})
+    drive, told = LoopPart(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
     pushed = model.ship.vessel.inputs
     s, vessel = ship.begin(pushed())
     g, target = path.begin(Nothing())
@@ -113,7 +113,7 @@ def closed_loop(
     return first, step
 
 
-class _Part:
+class LoopPart:
     """A component with a set of parameters."""
 
     def __init__(self, component: Component, values: Mapping[str, float]) -> None:

@@ -38,6 +38,7 @@ INPUTS = (
     "parameters",
     "effects",
     "criteria",
+    "diagnosis",
 )
 RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 

@@ -1,7 +1,7 @@
 """What is known of all fitted values together: mean and covariance, by the names of ``model.ssv``."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,13 +73,24 @@ class JointPosterior:
         groups = [[n for n, g in zip(self.names, group, strict=True) if g == k] for k in range(count)]
         return [members for members in groups if len(members) > 1]
 
-    def write(self, path: Path, learned_from: Sequence[Fingerprint] = ()) -> None:
-        """Write ``posterior.json``, with the runs of which the values were learned."""
+    def write(
+        self,
+        path: Path,
+        learned_from: Sequence[Fingerprint] = (),
+        task: Mapping[str, object] | None = None,
+    ) -> None:
+        """Write ``posterior.json``, with the runs of which the values were learned.
+
+        Args:
+            path: of the file.
+            learned_from: these runs.
+            task: files and options by which they are read again; None: not known.
+        """
         content = {
             "names": list(self.names),
             "units": list(self.units),
             "mean": self.mean.tolist(),
             "covariance": self.covariance.tolist(),
             "learned_from": [f.content() for f in learned_from],
-        }
+        } | ({} if task is None else {"task": task})
         path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

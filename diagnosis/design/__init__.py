@@ -1,0 +1,28 @@
+"""What to run next: the manoeuvre that discriminates the candidates that a diagnosis leaves."""
+
+from .designing import Designer, Limits, ScoredPlan
+from .information import SURE, Knowledge
+from .manoeuvre_library import DIMENSIONS, sequence
+from .next_plan import Question, checked, plan_next, prepared
+from .planned_motion import Basin
+from .run_plan import Plan, PlannedRun, scenario_file, sure_of, write_run
+
+__all__ = [
+    "DIMENSIONS",
+    "SURE",
+    "Basin",
+    "Designer",
+    "Knowledge",
+    "Limits",
+    "Plan",
+    "PlannedRun",
+    "Question",
+    "ScoredPlan",
+    "checked",
+    "plan_next",
+    "prepared",
+    "scenario_file",
+    "sequence",
+    "sure_of",
+    "write_run",
+]

@@ -1,0 +1,246 @@
+"""The search for the plan that discriminates best: Sobol points over the library, then evolution."""
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from scipy.stats import qmc
+
+from cosim import InputError
+from cosim.errors import nearest
+
+from ..execution.progress import Advance, silent
+from ..predictors import Model, WeakWindows
+from .hypotheses import LIKELY, Space
+from .information import CRITERIA, Knowledge, inseparable
+from .manoeuvre_library import DIMENSIONS, PlanStep, Reach, sequence, usual
+from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
+
+SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
+LOG_POINTS = 6  # of the number of Sobol points, to the base 2; chosen: a few seconds
+EVOLVED = 160  # points tried by evolution at the most; chosen: some ten seconds
+POPULATION = 12  # best points that evolve
+PIECE = 60.0  # s, times the time scale, of a manoeuvre: some ten changes of speed; chosen
+MOST_PIECES = 6
+FASTER = 1.5  # times the fastest measured motion: as far as a model is used beyond its data (chosen)
+FORBIDDEN = 1e3  # of a criterion, for each unit by which a limit is exceeded
+# Shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
+SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
+ROUNDED = 1.3  # times the largest speeds, which ramps and turned axes exceed a little (chosen)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a plan must keep.
+
+    Attributes:
+        seconds: length of a run [s].
+        basin: for the whole hull; None: as far as the measured runs reach, and a ship's length more.
+        size: north and east length of a basin about the middle of the measured tracks [m].
+        margin: least distance of the hull from the walls [m]; None: a tenth of the ship.
+    """
+
+    seconds: float
+    basin: Basin | None = None
+    size: tuple[float, float] | None = None
+    margin: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredPlan:
+    """A plan that was evaluated.
+
+    Attributes:
+        steps: the manoeuvres.
+        size: shares of the largest speeds and of the room.
+        motion: the target.
+        gram: (p, p), information of a run along it; zero where it cannot be carried out.
+        excess: by how much it exceeds limits, zero where it keeps them [1].
+        score: by the criterion, less what it exceeds.
+    """
+
+    steps: Sequence[PlanStep]
+    size: tuple[float, float]
+    motion: PlannedMotion
+    gram: np.ndarray
+    excess: float
+    score: float
+
+
+@dataclass(eq=False)
+class Designer:
+    """Plans for a ship within limits, and what they would show.
+
+    Attributes:
+        data: measured training runs.
+        space: the parameters.
+        model: the likeliest model, by which thrust is computed.
+        limits: to keep.
+        criterion: name of one of :data:`.information.CRITERIA`.
+    """
+
+    data: Sequence[WeakWindows]
+    space: Space
+    model: Model
+    limits: Limits
+    criterion: str = "certainty"
+    advance: Advance = silent
+    tried: list[ScoredPlan] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if self.criterion not in CRITERIA:
+            raise InputError(
+                f"no criterion '{self.criterion}'{nearest(self.criterion, CRITERIA)}; "
+                f"there are {', '.join(CRITERIA)}"
+            )
+        if not self.model.ship.fully_actuated:
+            raise InputError(
+                f"a run is designed for ships whose actuators give a force on all three axes; "
+                f"{self.model.ship.name} cannot"
+            )
+        room = self.basin.size - 2.0 * (self.margin + np.ptp(self.outline[:, 0]) / 2.0)
+        if room.min() <= 0.0:
+            need = self.basin.size - room
+            raise InputError(
+                f"the basin of {self.basin.size[0]:.3g} m by {self.basin.size[1]:.3g} m is too small: "
+                f"ship and margin need more than {need[0]:.3g} m"
+            )
+        shortest = PIECE * self.scale / 2.0
+        if not shortest <= self.limits.seconds:
+            raise InputError(f"a run takes {shortest / 60.0:.2g} minutes or more for this ship")
+
+    @property
+    def scale(self) -> float:
+        """Time scale of the ship."""
+        return self.model.ship.scale.time
+
+    @property
+    def outline(self) -> np.ndarray:
+        """(k, 2), corners of the hull [m]."""
+        return np.array(self.model.ship.description.outline)
+
+    @property
+    def margin(self) -> float:
+        """Least distance from the walls [m]."""
+        return 0.1 * np.ptp(self.outline[:, 0]) if self.limits.margin is None else self.limits.margin
+
+    @cached_property
+    def measured(self) -> tuple[np.ndarray, np.ndarray]:
+        """Poses and velocities (n, 3) of all measured runs."""
+        eta = np.concatenate([w.smoothed.eta[w.known] for w in self.data])
+        return eta, np.concatenate([w.smoothed.nu[w.known] for w in self.data])
+
+    @cached_property
+    def basin(self) -> Basin:
+        """The basin that is given, or what the runs have used and a ship's length more."""
+        if self.limits.basin is not None:
+            return self.limits.basin
+        low, high = (f(self.measured[0][:, :2], axis=0) for f in (np.min, np.max))
+        half = 0.5 * (high - low) + 1.5 * np.ptp(self.outline[:, 0])
+        if self.limits.size is not None:
+            half = 0.5 * np.array(self.limits.size)
+        (x0, y0), (x1, y1) = 0.5 * (low + high) - half, 0.5 * (low + high) + half
+        return Basin((float(x0), float(x1)), (float(y0), float(y1)))
+
+    @cached_property
+    def reach(self) -> Reach:
+        """Speeds and room that manoeuvres may use."""
+        nu = np.abs(self.measured[1])
+        speed, rate = np.quantile(np.hypot(nu[:, 0], nu[:, 1]), 0.99), np.quantile(nu[:, 2], 0.99)
+        half = np.abs(self.outline[:, 0]).max()
+        room = float(self.basin.size.min() - 2.0 * (half + self.margin))
+        rate = max(FASTER * rate, FASTER * speed / max(0.5 * room, half))
+        return Reach(float(FASTER * speed), float(rate), room, self.scale, -half, half)
+
+    def motion(self, steps: Sequence[PlanStep], size: tuple[float, float], h: float) -> PlannedMotion:
+        """The target of a plan every h [s], at shares of the largest speeds and of the room."""
+        pace, room = size
+        r = self.reach
+        smaller = r._replace(speed=pace * r.speed, rate=pace * r.rate, room=room * r.room)
+        return PlannedMotion.of(steps, self.limits.seconds, h, smaller, self.basin)
+
+    def scored(self, k: Knowledge, steps: Sequence[PlanStep]) -> ScoredPlan:
+        """A plan, evaluated at the largest speeds at which it keeps the limits."""
+        size, motion, tau, excess = self._fitting(steps)
+        gram, score = np.zeros_like(k.G), -FORBIDDEN * excess
+        if excess == 0.0:
+            gram = self.space.gram([as_windows(motion, tau, self.data[0].smoothed)])
+            score = CRITERIA[self.criterion](k, gram)
+        found = ScoredPlan(steps, size, motion, gram, excess, score)
+        self.tried.append(found)
+        return found
+
+    def _fitting(
+        self, steps: Sequence[PlanStep]
+    ) -> tuple[tuple[float, float], PlannedMotion, np.ndarray, float]:
+        """The first size with which a plan keeps the limits, else the last: motion, force and excess."""
+        for size in SMALLER:
+            motion = self.motion(steps, size, EVERY * self.scale)
+            tau = motion.thrust(self.model)
+            excess = self.excess(motion, tau)
+            if excess == 0.0 or size == SMALLER[-1]:
+                return size, motion, tau, excess
+        raise AssertionError
+
+    def excess(self, motion: PlannedMotion, tau: np.ndarray) -> float:
+        """By how much a motion with a force (n, 3) exceeds basin, actuators and speeds [1]."""
+        nu = np.abs(motion.nu)
+        speed = float(np.hypot(nu[:, 0], nu[:, 1]).max() / self.reach.speed)
+        fast = max(speed, float(nu[:, 2].max() / self.reach.rate)) / ROUNDED
+        margin = float(self.basin.margin(motion.eta, self.outline).min())
+        outside = (self.margin - margin) / float(np.ptp(self.outline[:, 0]))
+        share = load(tau, self.model) / MOST_THRUST
+        return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
+
+    def search(self, k: Knowledge, seed: int) -> ScoredPlan:
+        """The best plan that is found, by the same seed the same unless time is short.
+
+        Raises:
+            InputError: no plan keeps the limits.
+        """
+        T, end = self.limits.seconds, time.monotonic() + SECONDS
+        pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
+        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(LOG_POINTS)
+        found: list[tuple[ScoredPlan, np.ndarray]] = []
+
+        def cost(point: np.ndarray) -> float:
+            if time.monotonic() > end or len(found) >= len(points) + EVOLVED:
+                raise _OutOfTimeError
+            self.advance(f"searching a plan: {len(found)} of {len(points) + EVOLVED}")
+            found.append((self.scored(k, sequence(np.clip(point, 0.0, 1.0 - 1e-9), T)), point))
+            return -found[-1][0].score
+
+        with suppress(_OutOfTimeError):
+            for point in points:
+                cost(point)
+            first = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:POPULATION]])
+            spans = [(0.0, 1.0)] * len(points[0])
+            differential_evolution(cost, spans, init=first, rng=seed, polish=False)  # pyright: ignore
+        best = max((s for s, _ in found), key=lambda s: s.score)
+        if best.excess > 0.0:
+            raise InputError(
+                "no manoeuvre of the library keeps the limits of basin, actuators and speeds; give a "
+                "larger basin or more minutes"
+            )
+        return best
+
+    def usual(self, k: Knowledge, name: str) -> ScoredPlan:
+        """A usual run of the same length."""
+        return self.scored(k, usual(name, self.limits.seconds))
+
+    def inseparable(self, k: Knowledge) -> list[tuple[int, int]]:
+        """Pairs that no plan tried so far separates, see :func:`.information.inseparable`."""
+        return inseparable(k, [s.gram for s in self.tried if s.excess == 0.0])
+
+
+class _OutOfTimeError(Exception):
+    """The time of a search is over."""
+
+
+def likely(k: Knowledge) -> list[int]:
+    """Numbers of the hypotheses that count for the basin."""
+    return [n for n, w in enumerate(k.weights) if w > LIKELY] or [int(np.argmax(k.weights))]

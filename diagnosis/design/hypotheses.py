@@ -1,0 +1,237 @@
+"""The candidate causes that a diagnosis leaves, and what their parameters do to the model error."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..predictors import Model, WeakWindows
+from ..predictors.uncertainty import independent, omega_std
+from ..predictors.weak_form import OVERLAP
+from ..search.candidates import SMALL, CandidateShape, candidate, model_error
+from ..search.prior import NominalPrior
+from .information import Hypothesis, Knowledge
+
+MOST = 8  # hypotheses, the likeliest; chosen: criteria grow with their square
+FIRST = 4  # of the ranking, where a diagnosis names no effect; chosen
+WIDE = 3.0  # prior standard deviations of an effect: multiples of the size that explains all (chosen)
+EXACT = 1e9  # 1/1, prior precision of what is not fitted
+LIKELY = 0.05  # 1, weight from which on a hypothesis counts for the basin; the issue's 5 %
+
+
+class Rival(NamedTuple):
+    """An effect that a diagnosis accepted, and what the data cannot discriminate from it.
+
+    Attributes:
+        ids: the effect, then the others; an empty id: nothing at all.
+        confidence: of the effect; NaN: not known.
+    """
+
+    ids: tuple[str, ...]
+    confidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class EffectParameters:
+    """Parameters of one effect, about a point.
+
+    Attributes:
+        given: values of the effect at the point, as additions to the model.
+        names: parameters with a slope there.
+        steps: of their finite differences.
+    """
+
+    given: Mapping[str, float]
+    names: tuple[str, ...]
+    steps: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """All parameters of all hypotheses, and the noise by which they are weighed.
+
+    Attributes:
+        start: the model that all are additions to.
+        prior: of the nominal coefficients.
+        blocks: effect -> its parameters.
+        sigma: (3,), noise of the model error that counts for one window [N, N, N m].
+    """
+
+    start: Model
+    prior: NominalPrior
+    blocks: Mapping[str, EffectParameters]
+    sigma: np.ndarray
+
+    @property
+    def nuisance(self) -> list[str]:
+        """The nominal coefficients that are not known exactly."""
+        return [n for n, s in self.prior.std.items() if s > 0.0]
+
+    def columns(self, data: Sequence[WeakWindows]) -> np.ndarray:
+        """(3 K, p): change of the model error by one unit of each parameter, in units of the noise.
+
+        Of a nominal coefficient the unit is its prior standard deviation. Each effect has first what it
+        gives at its point, then its slopes there by their steps.
+        """
+        base = model_error(data, self.start)
+        found = [
+            (base - model_error(data, self.start.plus({n: SMALL * self.prior.std[n]}))) / SMALL
+            for n in self.nuisance
+        ]
+        for block in self.blocks.values():
+            model = self.start.plus(block.given)
+            at = model_error(data, model) if block.given else base
+            found.append(base - at)
+            for n, h in zip(block.names, block.steps, strict=True):
+                found.append((at - model_error(data, model.plus({n: SMALL * h}))) / SMALL)
+        return np.stack([(c / self.sigma).ravel() for c in found], axis=1)
+
+    def gram(self, data: Sequence[WeakWindows]) -> np.ndarray:
+        """(p, p), Gram matrix of the columns."""
+        A = self.columns(data)
+        return A.T @ A
+
+    def places(self) -> dict[str, np.ndarray]:
+        """Effect -> indices of its parameters."""
+        found, first = {}, len(self.nuisance)
+        for name, block in self.blocks.items():
+            found[name] = np.arange(first, first + 1 + len(block.names))
+            first += 1 + len(block.names)
+        return found
+
+    def model(self, h: Hypothesis, z: np.ndarray) -> Model:
+        """The model of a hypothesis with the parameters z (p,)."""
+        changes = {
+            n: float(x) * self.prior.std[n] for n, x in zip(self.nuisance, z, strict=False) if x != 0.0
+        }
+        for name in h.ids:
+            block, own = self.blocks[name], z[self.places()[name]]
+            for n in block.given:
+                changes[n] = changes.get(n, 0.0) + block.given[n]
+            for n, x, step in zip(block.names, own[1:], block.steps, strict=True):
+                changes[n] = changes.get(n, 0.0) + float(x) * step
+        return self.start.plus({n: _within(self.start, n, x) for n, x in changes.items()})
+
+
+def _within(start: Model, name: str, addition: float) -> float:
+    """An addition with which a parameter stays within its declared range."""
+    span, present = start.declared(name).range, start.value(name)
+    low = -np.inf if span.min is None else span.min
+    high = np.inf if span.max is None else span.max
+    return float(np.clip(present + addition, low, high) - present)
+
+
+def rivals(content: Mapping[str, Any]) -> list[Rival]:
+    """The effects and their rivals by the content of ``diagnosis.json``."""
+    found = []
+    for key in ("effects", "possibilities"):
+        for e in content[key]:
+            ids = (e["id"], *e["indistinguishable"], *([""] if key == "possibilities" else []))
+            found.append(Rival(ids, np.nan if e["confidence"] is None else e["confidence"]))
+    if not found and content["verdict"] == "unexplained":
+        found = [Rival((*(r["id"] for r in content["ranking"][:FIRST]), ""), np.nan)]
+    return found
+
+
+def usable(model: Model, name: str) -> bool:
+    """Whether an effect can be designed for: it has parameters that do not depend on the run's clock."""
+    e = model.ship.effects.get(name)
+    return not name or (e is not None and e.search.by == "regression" and not e.search.times)
+
+
+def space_of(
+    data: Sequence[WeakWindows], start: Model, prior: NominalPrior, ids: Sequence[str]
+) -> tuple[Space, np.ndarray, np.ndarray]:
+    """The parameters of some effects on measured runs; prior precision (p, p) and mean (p,) of all."""
+    base = model_error(data, start)
+    noise = np.sqrt(np.mean(np.concatenate([omega_std(w, start) for w in data]) ** 2, axis=0))
+    blocks: dict[str, EffectParameters] = {}
+    for name in ids:
+        shapes = candidate(data, start, base, start.ship.effects[name]).shapes
+        if shapes:
+            blocks[name] = _block(start, min(shapes, key=lambda s: _left(s, base / noise, noise)), base)
+    A = Space(start, prior, blocks, noise).columns(data)
+    fit = A @ np.linalg.lstsq(A, (base / noise).ravel(), rcond=1e-8)[0]
+    left = base - fit.reshape(base.shape) * noise
+    spread = np.maximum(noise, np.sqrt(np.mean(left**2, axis=0)))
+    space = Space(start, prior, blocks, spread * np.sqrt(OVERLAP * independent(data, left)))
+    size = np.linalg.norm(base / space.sigma)
+    precision, mean = [np.eye(len(space.nuisance))], [np.zeros(len(space.nuisance))]
+    columns = space.columns(data)
+    for name, place in space.places().items():
+        norms = np.linalg.norm(columns[:, place[1:]], axis=0)
+        width = WIDE * size / np.maximum(norms, 1e-6 * max(norms.max(initial=0.0), size))
+        precision.append(np.diag([EXACT, *(1.0 / width**2)]))
+        mean.append(np.array([1.0 if blocks[name].given else 0.0, *np.zeros(len(width))]))
+    whole = np.zeros((columns.shape[1],) * 2)
+    first = 0
+    for P in precision:
+        whole[first : first + len(P), first : first + len(P)] = P
+        first += len(P)
+    return space, whole, np.concatenate(mean)
+
+
+def _left(s: CandidateShape, y: np.ndarray, noise: np.ndarray) -> float:
+    """Sum of squares that a shape leaves of the model error y (K, 3), in units of the noise."""
+    rest = (y if s.offset is None else y - s.offset / noise).ravel()
+    A = (s.columns / noise[:, None]).reshape(rest.size, -1)
+    fit = A @ np.linalg.lstsq(A, rest, rcond=None)[0] if A.shape[1] else 0.0
+    return float(np.sum((rest - fit) ** 2))
+
+
+def _block(start: Model, s: CandidateShape, base: np.ndarray) -> EffectParameters:
+    """The parameters of an effect about a shape: those that scale it, and those that make it."""
+    names = tuple(dict.fromkeys([*s.fitted, *s.given]))
+    unit = [start.unit(n) for n in names]
+    steps = [abs(s.given[n]) or u if n in s.given else u for n, u in zip(names, unit, strict=True)]
+    return EffectParameters(dict(s.given), names, tuple(steps))
+
+
+def knowledge(
+    data: Sequence[WeakWindows], start: Model, prior: NominalPrior, found: Sequence[Rival]
+) -> tuple[Space, Knowledge]:
+    """The hypotheses of a diagnosis on the runs that it was made of.
+
+    Weights are the confidences of the diagnosis; what these leave open among the rivals of an effect is
+    shared by the evidence of the runs.
+
+    Args:
+        data: training runs.
+        start: the initial model.
+        prior: of its coefficients.
+        found: the effects and their rivals.
+    """
+    sets = [tuple(i for i in r.ids if usable(start, i)) for r in found]
+    ids = [*dict.fromkeys(i for s in sets for i in s if i)]
+    space, precision, mean = space_of(data, start, prior, ids)
+    chosen = [
+        tuple(dict.fromkeys(i for i in each if i in space.blocks))
+        for each in product(*[s for s in sets if s])
+    ]
+    A, q, places = space.columns(data), len(space.nuisance), space.places()
+    y = (model_error(data, start) / space.sigma).ravel()
+    hypotheses = []
+    for names in dict.fromkeys(chosen or [()]):
+        own = np.concatenate([np.zeros(0, int), *(places[n] for n in names)])
+        hypotheses.append(Hypothesis(names, np.concatenate([np.arange(q), own]), own))
+    even = np.full(len(hypotheses), 1.0 / len(hypotheses))
+    k = Knowledge(hypotheses, even, A.T @ A, A.T @ y, precision, mean)
+    weights = _weights(k, found)
+    best = np.argsort(-weights, kind="stable")[:MOST]
+    kept = weights[best] / weights[best].sum()
+    return space, Knowledge([hypotheses[n] for n in best], kept, k.G, k.b, precision, mean)
+
+
+def _weights(k: Knowledge, found: Sequence[Rival]) -> np.ndarray:
+    """(h,), the confidence of each accepted effect, its rest shared among its rivals by evidence."""
+    evidence = np.exp(k.log_evidence - k.log_evidence.max())
+    weights = evidence / evidence.sum()
+    for r in found:
+        has = np.array([r.ids[0] in h.ids for h in k.hypotheses])
+        if np.isfinite(r.confidence) and has.any() and not has.all():
+            for part, share in ((has, r.confidence), (~has, 1.0 - r.confidence)):
+                total = weights[part].sum()
+                weights[part] = share * (weights[part] / total if total > 0.0 else 1.0 / part.sum())
+    return weights / weights.sum()

@@ -1,0 +1,129 @@
+"""From a diagnosis to the plan of the next runs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cosim import InputError
+
+from ..execution.progress import Advance, silent
+from ..predictors import Model, WeakWindows
+from ..report.finding_text import tell_apart
+from ..search import Prior
+from ..search.prior import NominalPrior
+from .designing import Designer, Limits, ScoredPlan, likely
+from .hypotheses import knowledge, rivals
+from .information import Knowledge
+from .manoeuvre_library import USUAL
+from .run_plan import MOST_RUNS, Plan, PlannedRun, sure_of
+from .spread import STEP, spread
+
+TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
+NO_SPREAD = (
+    "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
+    "basin, fewer minutes or a smaller margin"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What a design starts from.
+
+    Attributes:
+        data: training runs of a diagnosis.
+        content: what ``diagnosis.json`` holds.
+        start: the initial model.
+        prior: of its coefficients.
+        limits: of each run.
+        criterion: one of :data:`.information.CRITERIA`; where one candidate is left, D-optimality.
+        ship: as scenarios name it; None: the default ship.
+    """
+
+    data: Sequence[WeakWindows]
+    content: Mapping[str, Any]
+    start: Model
+    prior: Prior
+    limits: Limits
+    criterion: str = "certainty"
+    ship: str | None = None
+
+
+def prepared(q: Question, advance: Advance = silent) -> tuple[Designer, Knowledge]:
+    """What searches plans for a question, and what is known before them.
+
+    Raises:
+        InputError: the ship cannot follow a pose, basin or minutes are too small, no such criterion.
+    """
+    advance("candidates and their weights")
+    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior), rivals(q.content))
+    used = "d-optimal" if len(k.hypotheses) == 1 else q.criterion
+    best = int(np.argmax(k.weights))
+    model = space.model(k.hypotheses[best], k.estimates[best].mean)
+    return Designer(q.data, space, model, q.limits, used, advance), k
+
+
+def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = silent) -> Plan:
+    """Design the runs that discriminate the candidates of a diagnosis.
+
+    Args:
+        q: the diagnosis and the limits.
+        runs: how many, each designed after the one before.
+        seed: of the search and of all draws.
+        advance: progress callback.
+
+    Raises:
+        InputError: no run keeps the limits, or the ship cannot follow a pose.
+    """
+    if not 1 <= runs <= MOST_RUNS:
+        raise InputError(f"the number of runs must be from 1 to {MOST_RUNS}; got {runs}")
+    designer, k = prepared(q, advance)
+    decided = len(k.hypotheses) == 1
+    planned: list[PlannedRun] = []
+    pairs: list[tuple[int, int]] = []
+    now = k
+    for n in range(runs):
+        found = designer.search(now, seed + n)
+        usual = {name: designer.usual(now, name) for name in USUAL}
+        if n == 0:
+            pairs = designer.inseparable(k)
+        run = checked(designer, now, found, seed + n)
+        sure = {name: (sure_of(now, s.gram, seed), s) for name, s in usual.items()}
+        planned.append(PlannedRun(designer, *run, sure_of(now, run[0].gram, seed), sure))
+        now = now.plus(run[0].gram)
+    named = [(k.hypotheses[i].ids, k.hypotheses[j].ids) for i, j in pairs]
+    advice = [_advice(q.start, a, b) for a, b in named]
+    if decided:
+        advice.append(
+            f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of "
+            "all values (D-optimality)."
+        )
+    return Plan(planned, k, designer.space, named, advice, seed, designer.criterion, q.ship)
+
+
+def checked(
+    designer: Designer, k: Knowledge, found: ScoredPlan, seed: int
+) -> tuple[ScoredPlan, Knowledge, Any]:
+    """The best plan that keeps the basin with the spread of all likely hypotheses.
+
+    Raises:
+        InputError: none does.
+    """
+    of, basin = designer, designer.basin
+    others = sorted((s for s in of.tried if s.excess == 0.0), key=lambda s: -s.score)
+    for s in [found, *(s for s in others if s is not found)][:TRIES]:
+        motion = of.motion(s.steps, s.size, STEP * of.scale)
+        tracks = spread(of.space, k, likely(k), motion, basin, of.outline, seed, of.advance)
+        if tracks.margin.min() > 0.0:
+            return s, k, tracks
+    raise InputError(NO_SPREAD)
+
+
+def _advice(start: Model, a: Sequence[str], b: Sequence[str]) -> str:
+    """What would separate two hypotheses that no manoeuvre does, by the texts of their effects."""
+    effects = start.ship.effects
+    one, other = ([i for i in x if i not in y] for x, y in ((a, b), (b, a)))
+    texts = dict.fromkeys(tell_apart(effects[i], effects[j]) for i in one for j in other)
+    what = "; ".join(texts) or "a higher speed, another sensor, or a longer run"
+    return f"To discriminate {' + '.join(a) or 'none'} from {' + '.join(b) or 'none'} otherwise: {what}."

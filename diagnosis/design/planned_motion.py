@@ -1,0 +1,150 @@
+"""The motion of a plan as a run that was never measured, and the thrust that it needs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fmus.frames import rotate_to_body
+from fmus.signals import Force
+from fmus.vessel import vessel
+
+from ..predictors import Model, WeakWindows, weak_windows
+from ..runs import Run, Smoothed
+from .manoeuvre_library import PlanStep, Reach, poses
+
+EVERY = 0.2  # s, times the time scale: samples of a planned motion; ten in the shortest ramp
+MOST_THRUST = 0.8  # 1, of the limit of an actuator: the rest is for control and for what is not known
+PLANNED = "planned run"
+
+
+@dataclass(frozen=True)
+class Basin:
+    """A rectangle for the whole hull: lowest and highest north and east [m]."""
+
+    north: tuple[float, float]
+    east: tuple[float, float]
+
+    @property
+    def middle(self) -> np.ndarray:
+        return np.array([sum(self.north), sum(self.east)]) / 2.0
+
+    @property
+    def size(self) -> np.ndarray:
+        return np.array([self.north[1] - self.north[0], self.east[1] - self.east[0]])
+
+    def margin(self, eta: np.ndarray, outline: np.ndarray) -> np.ndarray:
+        """(n,), least distance of a ship from the walls [m], negative where it is outside.
+
+        Args:
+            eta: (n, 3), pose.
+            outline: (k, 2), corners of the hull in the body frame [m].
+        """
+        c, s = np.cos(eta[:, 2:]), np.sin(eta[:, 2:])
+        north = eta[:, :1] + c * outline[:, 0] - s * outline[:, 1]
+        east = eta[:, 1:2] + s * outline[:, 0] + c * outline[:, 1]
+        walls = [north - self.north[0], self.north[1] - north]
+        walls += [east - self.east[0], self.east[1] - east]
+        return np.min(walls, axis=(0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMotion:
+    """A target over time, with derivatives by central differences.
+
+    Attributes:
+        time: (n,) [s].
+        eta, eta_dot, eta_ddot: (n, 3), in the basin.
+    """
+
+    time: np.ndarray
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+
+    @classmethod
+    def of(
+        cls, plan: Sequence[PlanStep], seconds: float, h: float, reach: Reach, basin: Basin
+    ) -> "PlannedMotion":
+        """The target of a plan every h [s], about the middle of the basin."""
+        eta = poses(plan, seconds, h, reach)
+        low, high = eta[:, :2].min(axis=0), eta[:, :2].max(axis=0)
+        eta[:, :2] += basin.middle - 0.5 * (low + high)
+        first = np.gradient(eta, h, axis=0)
+        return cls(h * np.arange(len(eta)), eta, first, np.gradient(first, h, axis=0))
+
+    @property
+    def nu(self) -> np.ndarray:
+        """(n, 3), body-fixed velocity."""
+        u, v = rotate_to_body(self.eta[:, 2], self.eta_dot[:, 0], self.eta_dot[:, 1])
+        return np.column_stack([u, v, self.eta_dot[:, 2]])
+
+    def thrust(self, model: Model) -> np.ndarray:
+        """(n, 3), force that a model needs for the motion [N, N, N m]."""
+        nu = self.nu
+        u, v = rotate_to_body(self.eta[:, 2], self.eta_ddot[:, 0], self.eta_ddot[:, 1])
+        r = nu[:, 2]
+        nu_dot = np.column_stack([u + r * nu[:, 1], v - r * nu[:, 0], self.eta_ddot[:, 2]])
+        state = vessel.State._make([*self.eta.T, *nu.T, self.time])
+        free = vessel.disturbed(state, Force(0.0, 0.0, 0.0), model.hull)
+        needed = (nu_dot - np.column_stack(np.broadcast_arrays(*free))) @ model.mass.T
+        return needed @ np.linalg.inv(model.effective_thrust).T
+
+
+def load(tau: np.ndarray, model: Model) -> float:
+    """The largest share of its limit that a force (n, 3) [N, N, N m] asks of an actuator."""
+    layout, p = model.drive.effects.layout, model.drive.params
+    # The allocation is linear below its limits: a small force shows what a large one would ask.
+    small = 1e-3 * np.array(layout.full(p))
+    unit = (
+        np.array([np.ravel(layout.allocate(tuple(row), p)) for row in np.diag(small)]) / small[:, None]
+    )
+    limits = np.array([[float(low), float(high)] for low, high in layout.limits(p)])
+    return float(np.max(np.maximum(tau @ unit / limits[:, 1], tau @ unit / limits[:, 0])))
+
+
+def as_windows(
+    motion: PlannedMotion, tau: np.ndarray, like: Smoothed, name: str = PLANNED
+) -> WeakWindows:
+    """The motion as a smoothed run of the same ship and measurement as a measured one.
+
+    Args:
+        motion: of the ship.
+        tau: (n, 3), commanded force [N, N, N m].
+        like: a measured run, whose noise and uncertainty the new one gets.
+        name: of the run.
+    """
+    n, period = motion.time.size, float(motion.time[1] - motion.time[0])
+    old, known = like.track, np.isfinite(like.nu[:, 0])
+    run = Run(name, motion.time, motion.eta, tau, ship=old.run.ship, signals=old.run.signals)
+    no, yes = np.zeros(n, bool), np.ones(n, bool)
+    every = np.ones((n, 3), bool)
+    track = replace(
+        old,
+        run=run,
+        pose=motion.eta,
+        fresh=every,
+        frozen=no,
+        dropped=no,
+        between=no,
+        period=period,
+        out=0,
+    )
+    std = {
+        name: np.tile(np.median(getattr(like, name)[known], axis=0), (n, 1))
+        for name in ("eta_std", "eta_dot_std", "eta_ddot_std", "nu_std")
+    }
+    smoothed = replace(
+        like,
+        track=track,
+        spikes=~yes,
+        agrees=every,
+        eta=motion.eta,
+        eta_dot=motion.eta_dot,
+        eta_ddot=motion.eta_ddot,
+        nu=motion.nu,
+        noise=like.noise * np.sqrt(old.period / period),
+        sensors=None,
+        **std,
+    )
+    return weak_windows(smoothed)

@@ -1,0 +1,272 @@
+"""A plan that can be carried out: what is expected of it, and its files."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.scenario import find_scenario
+
+from ..execution.result_folder import together
+from ..report.formatting import as_json, finite
+from .designing import Designer, ScoredPlan
+from .hypotheses import Space
+from .information import CRITERIA, SURE, Knowledge, expected, pairs, projected
+from .manoeuvre_library import TEXTS, USUAL
+from .spread import Spread
+from .track_picture import draw
+
+JSON, PAGE = "next.json", "plan.md"
+MOST_RUNS = 9  # of a plan; chosen
+STEP = 0.02  # s, times the time scale: base step of the scenarios
+TARGET = [f"{axis}_t{order}" for order in ("", "_dot", "_ddot") for axis in ("x", "y", "psi")]
+POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
+Z95 = 1.96
+
+
+def files(count: int) -> list[str]:
+    """The names of all files of a plan with so many runs."""
+    each = range(1, count + 1)
+    return [
+        JSON,
+        PAGE,
+        *(f for n in each for f in (scenario_file(n), commands_file(n), picture_file(n))),
+    ]
+
+
+def scenario_file(n: int) -> str:
+    return f"scenario_{n}.json"
+
+
+def commands_file(n: int) -> str:
+    return f"commands_{n}.csv"
+
+
+def picture_file(n: int) -> str:
+    return f"track_{n}.png"
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedRun:
+    """One run of a plan.
+
+    Attributes:
+        designer: by which it was found.
+        scored: its target and information.
+        before: what is known before it.
+        spread: its tracks.
+        sure: probability that the right candidate has more than SURE afterwards [1].
+        usual: usual run of the same length -> the same probability, and its information.
+    """
+
+    designer: Designer
+    scored: ScoredPlan
+    before: Knowledge
+    spread: Spread
+    sure: float
+    usual: Mapping[str, tuple[float, ScoredPlan]]
+
+    @property
+    def minutes(self) -> float:
+        return self.designer.limits.seconds / 60.0
+
+    @property
+    def worst(self) -> float:
+        """Least squared distance of a pair after refitting, over posterior samples of the truth [1]."""
+        k, rng, G = self.before, np.random.default_rng(0), self.before.G + self.scored.gram
+        found = [np.inf]
+        for i, j in pairs(k):
+            h, e = k.hypotheses[i], k.estimates[i]
+            for x in rng.multivariate_normal(e.mean[h.columns], e.covariance, 8, method="eigh"):
+                z = np.zeros(e.mean.size)
+                z[h.columns] = x
+                found.append(projected(k, i, j, z, G))
+        return min(found)
+
+    def intervals(self) -> list[dict[str, Any]]:
+        """Half widths of the effects' 95 % intervals: before, after, and after usual runs."""
+        space, found = self.designer.space, []
+        after = {"after": self.scored.gram} | {name: s.gram for name, (_, s) in self.usual.items()}
+        for n in self.spread.ids:
+            h = self.before.hypotheses[n]
+            stds = {"before": self._std(n, np.zeros_like(self.scored.gram))}
+            stds |= {name: self._std(n, gram) for name, gram in after.items()}
+            for effect in h.ids:
+                block, place = space.blocks[effect], space.places()[effect][1:]
+                for name, step, at in zip(block.names, block.steps, place, strict=True):
+                    unit = space.start.declared(name).unit
+                    half = {key: Z95 * step * float(std[at]) for key, std in stds.items()}
+                    found.append({"hypothesis": h.name, "name": name, "unit": unit, "half_width": half})
+        return found
+
+    def _std(self, n: int, gram: np.ndarray) -> np.ndarray:
+        h, std = self.before.hypotheses[n], np.zeros(len(gram))
+        std[h.columns] = np.sqrt(np.diag(self.before.plus(gram).estimate(h).covariance))
+        return std
+
+    def content(self, number: int) -> dict[str, Any]:
+        """For ``next.json``."""
+        k, ids = self.before, self.spread.ids
+        return {
+            "scenario": scenario_file(number),
+            "commands": commands_file(number),
+            "minutes": self.minutes,
+            "sure": self.sure,
+            "usual": {name: sure for name, (sure, _) in self.usual.items()},
+            "manoeuvres": [s.content() for s in self.scored.steps],
+            "criteria": {name: of(k, self.scored.gram) for name, of in CRITERIA.items()},
+            "worst_distance": self.worst,
+            "margin": {
+                k.hypotheses[n].name: float(m) for n, m in zip(ids, self.spread.margin, strict=True)
+            },
+            "intervals": self.intervals(),
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan:
+    """What to run next.
+
+    Attributes:
+        runs: in their order; none: there is nothing that a run can decide.
+        knowledge: the hypotheses and their weights before all of them.
+        space: the parameters.
+        inseparable: pairs of names that no manoeuvre within the limits separates.
+        advice: what would separate them, or what to do where no run is designed, a line each.
+        seed, criterion: by which it was found.
+        ship: as a scenario names it; None: the default ship.
+    """
+
+    runs: Sequence[PlannedRun]
+    knowledge: Knowledge
+    space: Space
+    inseparable: Sequence[tuple[tuple[str, ...], tuple[str, ...]]]
+    advice: Sequence[str]
+    seed: int
+    criterion: str
+    ship: str | None = None
+
+    def content(self) -> dict[str, Any]:
+        """The content of ``next.json``."""
+        k = self.knowledge
+        return {
+            "runs": [r.content(n) for n, r in enumerate(self.runs, 1)],
+            "inseparable": [sorted({*a, *b}) for a, b in self.inseparable],
+            "advice": list(self.advice),
+            "hypotheses": [
+                {"ids": list(h.ids), "weight": float(w)}
+                for h, w in zip(k.hypotheses, k.weights, strict=True)
+            ],
+            "criterion": self.criterion,
+            "seed": self.seed,
+        }
+
+    def lines(self) -> list[str]:
+        """The plan for a terminal."""
+        k = self.knowledge
+        shown = ["Candidates"]
+        shown += [f"  {w:6.1%}  {h.name}" for h, w in zip(k.hypotheses, k.weights, strict=True)]
+        if self.inseparable:
+            shown.append("No run within the limits discriminates")
+            for pair in self.inseparable:
+                shown.append("  " + " and ".join(" + ".join(ids) or "no effect" for ids in pair))
+        shown += list(self.advice)
+        for n, r in enumerate(self.runs, 1):
+            shown.append(f"Run {n}: {r.minutes:.3g} min")
+            shown += [f"  {s.seconds:5.0f} s  {TEXTS[s.name]}" for s in r.scored.steps]
+            least = float(r.spread.margin.min())
+            shown.append(f"  least distance from the walls, under any likely candidate: {least:.2f} m")
+            shown.append(f"  probability that the right candidate is above {SURE:.0%} afterwards")
+            each = {"this run": r.sure} | {name: sure for name, (sure, _) in r.usual.items()}
+            shown += [f"    {sure:4.0%}  {name}" for name, sure in each.items()]
+        return shown
+
+    def __repr__(self) -> str:
+        return "\n".join(self.lines())
+
+    def write(self, out: str | Path) -> list[str]:
+        """Write all files into a folder, all or none; returns their names.
+
+        Raises:
+            InputError: nothing can be written there.
+        """
+        written = files(len(self.runs))
+        with together(Path(out), files(MOST_RUNS)) as new:
+            for n, r in enumerate(self.runs, 1):
+                write_run(r, n, new, self.ship)
+                draw(r.designer, r.before, r.scored.motion, r.spread, new / picture_file(n))
+            (new / PAGE).write_text(page(self), encoding="utf-8")
+            (new / JSON).write_text(as_json(finite(self.content())) + "\n", encoding="utf-8")
+        return written
+
+
+def write_run(r: PlannedRun, number: int, folder: Path, ship: str | None) -> None:
+    """Write the scenario of a run, and its set points, which the controller of a real ship can take.
+
+    The columns tau_X, tau_Y and tau_N are the force that the likeliest model needs: feed-forward.
+    """
+    d = r.designer
+    h = STEP * d.scale
+    fine = d.motion(r.scored.steps, r.scored.size, h)
+    table = np.column_stack([fine.time, fine.eta, fine.eta_dot, fine.eta_ddot, fine.thrust(d.model)])
+    header = ",".join(["time", *TARGET, "tau_X", "tau_Y", "tau_N"])
+    np.savetxt(folder / commands_file(number), table, "%.7g", delimiter=",", header=header, comments="")
+    content = json.loads(find_scenario("ellipse").read_text(encoding="utf-8"))
+    del content["fmus"]["guidance"]
+    x, y, psi = map(float, fine.eta[0])
+    noise = [float(s) for s in d.data[0].smoothed.noise]
+    content["fmus"]["vessel"]["parameters"] = {"x_0": x, "y_0": y, "psi_0": psi}
+    content |= {
+        "name": f"next_{number}",
+        "description": "Designed by cybership next",
+        "step": h,
+        "stop": round(round(d.limits.seconds / h) * h, 9),
+        "connections": [c for c in content["connections"] if not c[0].startswith("guidance.")],
+        "recordings": [
+            {"path": commands_file(number), "inputs": {f"controller.{n}": n for n in TARGET}}
+        ],
+        "roles": {"target": [f"controller.{n}" for n in TARGET[:3]]},
+        "faults": [{"kind": "noise", "signals": POSE, "std": noise}],
+        "metrics": {},
+    }
+    if ship is not None:
+        content["ship"] = ship
+    (folder / scenario_file(number)).write_text(as_json(content) + "\n", encoding="utf-8")
+
+
+def page(plan: Plan) -> str:
+    """The plan on one page, as Markdown."""
+    parts = ["# What to run next", "", "```", *plan.lines(), "```", ""]
+    for n, r in enumerate(plan.runs, 1):
+        like = r.designer.data[0].smoothed.track
+        basin = r.designer.basin
+        parts += [
+            f"## Run {n}",
+            "",
+            f"![Track of run {n}]({picture_file(n)})",
+            "",
+            f"- Simulate it: `python -m cosim.run {scenario_file(n)}`.",
+            f"- `{commands_file(n)}` has the set points for the controller of a real ship, and the "
+            "force that the likeliest model needs.",
+            "- Begin at rest at the first set point. Log pose and commands at "
+            f"{1.0 / like.period:.3g} Hz, the rate of the runs so far.",
+            f"- Basin: north {basin.north[0]:.2f} to {basin.north[1]:.2f} m, east {basin.east[0]:.2f} "
+            f"to {basin.east[1]:.2f} m. The hull keeps {r.spread.margin.min():.2f} m from the walls "
+            "under every candidate above 5 %.",
+            "",
+            "| parameter | half of the 95 % interval before | after | " + " | ".join(USUAL) + " |",
+            "|---|--:|--:|" + "--:|" * len(USUAL),
+        ]
+        for row in r.intervals():
+            cells = " | ".join(f"{x:.3g}" for x in row["half_width"].values())
+            parts.append(f"| {row['name']} [{row['unit']}] of {row['hypothesis']} | {cells} |")
+        parts.append("")
+    return "\n".join(parts)
+
+
+def sure_of(k: Knowledge, gram: np.ndarray, seed: int) -> float:
+    """Probability that the right hypothesis has more than SURE after a run [1]."""
+    return float(np.mean(expected(k, gram, seed)[:, 0] > SURE))

@@ -1,0 +1,203 @@
+"""Design the next run: ``python -m diagnosis.design_run results/diagnosis``."""
+
+if __name__ == "__main__":
+    from cosim.supervision import supervised
+
+    supervised()  # before all other imports, which take a while
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, Field, ValidationError
+
+from cosim import InputError
+from cosim.command import command_parser, positive, run_command
+from cybership.message_text import first_fault
+
+from .commands.command_line import Done, out_options, run
+from .execution.progress import Advance
+from .execution.result_folder import together
+
+if TYPE_CHECKING:
+    from .design import Question
+
+DIAGNOSIS, POSTERIOR, PLAN = "diagnosis.json", "posterior.json", "next.json"
+MOST = 9  # runs; chosen
+NO_RUNS = (
+    "'{}' does not state the runs that the diagnosis was made of, or is not there: no run is designed; "
+    "the advice is that of the diagnosis"
+)
+
+
+class Task(BaseModel):
+    """What a diagnosis was made of, in ``posterior.json``; paths are absolute."""
+
+    runs: list[Path] = Field(min_length=1)
+    model: Path | None = None
+    effects: list[str] = []
+    ship: str | None = None
+    prior: float | dict[str, float] | None = None
+    horizon: float | None = None
+    anyway: bool = False
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(design, _parser().parse_args(arguments))
+
+
+def design(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    folder: Path = options.diagnosis
+    content = _json(folder / DIAGNOSIS)
+    task = _task(folder / POSTERIOR)
+    if task is None:
+        return _advised(options, content, folder)
+    from .assessment.gathering import gather  # only now: it takes a while to import
+    from .commands.initial_model import initial_model
+    from .design import Question, plan_next
+    from .design.limits import limits_of
+    from .predictors import DEFAULT_EXECUTION, ship_of_model, ship_with
+
+    limits = limits_of(options.minutes, options.basin)
+    craft = ship_with([Path(e) for e in task.effects], task.ship or ship_of_model(task.model))
+    start = initial_model(task.model, None, craft, DEFAULT_EXECUTION).start
+    if start is None:
+        return _advised(options, content, folder)
+    runs = gather(task.runs, advance, task.anyway, start, task.horizon)
+    q = Question(runs, content, start, task.prior, limits, options.criterion, task.ship)
+    if options.simulate is not None:
+        return _played(options, q, advance)
+    plan = plan_next(q, options.count, options.seed, advance)
+    written = plan.write(options.out)
+    return Done(0, [*plan.lines(), f"{', '.join(written)} in {options.out}"])
+
+
+def _played(options: argparse.Namespace, q: "Question", advance: Advance) -> Done:
+    """The whole sequence on a simulated ship."""
+    from .design.sequential import play
+
+    rounds = play(q, options.simulate, options.out, options.count, options.seed, advance)
+    shown, told = [], []
+    for n, r in enumerate(rounds, 1):
+        effects = ", ".join(f"{name} {c:.0%}" for name, c in r.effects.items()) or "no effect"
+        shown += [f"Round {n}", *(f"  {line}" for line in r.plan.lines()), f"  learned: {effects}"]
+        told.append({"folder": f"round_{n}", "verdict": r.verdict, "confidence": r.effects})
+    certain = rounds[-1].certain
+    end = "Every effect found is certain." if certain else "The effects do not become certain."
+    content = rounds[0].plan.content() | {"rounds": told, "certain": certain}
+    with together(options.out, [PLAN]) as new:
+        (new / PLAN).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    return Done(0, [*shown, end, f"{PLAN} and a folder for each round in {options.out}"])
+
+
+def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path) -> Done:
+    """The written advice of a diagnosis, where nothing can be designed."""
+    effects = [*content["effects"], *content["possibilities"]]
+    lines = [e["advice"] for e in effects if e["advice"]]
+    lines = lines or ["The diagnosis leaves no candidates that a run could discriminate."]
+    told = {"runs": [], "inseparable": [], "advice": lines}
+    with together(options.out, [PLAN]) as new:
+        (new / PLAN).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"no diagnosis: '{path}' cannot be read: {error.strerror}; give the result folder of "
+            "cybership learn"
+        ) from None
+    except ValueError as error:
+        raise InputError(f"'{path}' is not JSON: {error}") from None
+    if not isinstance(content, dict) or not {"effects", "possibilities", "verdict"} <= content.keys():
+        raise InputError(f"'{path}' is not the result of cybership learn")
+    return content
+
+
+def _task(path: Path) -> Task | None:
+    """What a diagnosis was made of; None: the file does not state it.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return Task.model_validate(content["task"]) if "task" in content else None
+    except OSError:
+        return None
+    except ValidationError as error:
+        raise InputError(f"'{path}', task: {first_fault(error)}") from None
+    except (ValueError, TypeError) as error:
+        raise InputError(f"'{path}' is not JSON: {error}") from None
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= MOST:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to {MOST}, not '{text}'")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) >= 2**31:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 0 to {2**31 - 1}, not '{text}'")
+    return int(text)
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = command_parser(
+        "diagnosis.design_run",
+        "Design the run that discriminates the candidate causes that a diagnosis leaves.",
+        "examples:  %(prog)s results/diagnosis\n"
+        "           %(prog)s results/diagnosis --minutes 4 --basin 6x4\n"
+        "           %(prog)s results/diagnosis --basin basin.json\n"
+        "           %(prog)s results/diagnosis --runs 3 --out results/plan\n"
+        "           %(prog)s results/diagnosis --simulate truth.ssv --runs 4\n"
+        'basin.json:  {"north": [0, 10], "east": [-3, 3]}\n'
+        "exit codes:  0 done, 2 bad input, 130 interrupted",
+    )
+    made.add_argument(
+        "diagnosis", type=Path, metavar="DIAGNOSIS", help="result folder of cybership learn"
+    )
+    made.add_argument(
+        "--minutes", type=positive, default=4.0, metavar="M", help="length of a run [min] (4)"
+    )
+    made.add_argument(
+        "--basin",
+        metavar="WxH|FILE",
+        help="length to the north and to the east [m] about the middle of the measured tracks, or a "
+        "JSON file with the walls (what the runs have used, and a ship's length more)",
+    )
+    made.add_argument(
+        "--runs",
+        type=_count,
+        default=1,
+        dest="count",
+        metavar="N",
+        help="runs to design, or rounds to simulate (1)",
+    )
+    made.add_argument(
+        "--criterion",
+        default="certainty",
+        metavar="NAME",
+        help="certainty, box-hill, buzzi-ferraris, d-optimal or a-optimal (certainty)",
+    )
+    made.add_argument("--seed", type=_seed, default=0, metavar="N", help="of everything random (0)")
+    made.add_argument(
+        "--simulate",
+        type=Path,
+        metavar="TRUTH.ssv",
+        help="simulate the designed runs with a ship of these parameters, and learn again after each, "
+        "until every effect is certain",
+    )
+    out_options(made, Path("results", "next"))
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)

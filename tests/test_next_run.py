@@ -1,0 +1,379 @@
+"""The design of the next run: information of rival hypotheses, library of manoeuvres, plan, command."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+from support.command import command
+from support.measured import sail
+
+import cosim
+import diagnosis
+from cosim import InputError
+from diagnosis import Model, design_run
+from diagnosis.design import Basin, Limits, Question, plan_next
+from diagnosis.design.designing import Designer, likely
+from diagnosis.design.hypotheses import knowledge, rivals
+from diagnosis.design.information import (
+    Hypothesis,
+    Knowledge,
+    Prediction,
+    a_optimal,
+    box_hill,
+    buzzi_ferraris,
+    certainty,
+    d_optimal,
+    expected,
+    inseparable,
+    projected,
+)
+from diagnosis.design.limits import limits_of
+from diagnosis.design.manoeuvre_library import LIBRARY, NUMBERS, PlanStep, Reach, poses, sequence, usual
+from diagnosis.design.planned_motion import PlannedMotion
+from diagnosis.design.spread import STEP, drawn, followed, spread
+from diagnosis.search.prior import NominalPrior
+
+Q, OWN = 3, 2  # nuisance parameters, and those of each of two hypotheses
+REACH = Reach(0.15, 0.2, 2.5, 1.0, -0.5, 0.5)
+
+
+def regressors(rng, rows):
+    return rng.standard_normal((rows, Q + 2 * OWN))
+
+
+def linear(seed=0, rows=12, alike=False):
+    """Two hypotheses on old data of a linear problem, and the regressors and data of it."""
+    rng = np.random.default_rng(seed)
+    X = regressors(rng, rows)
+    if alike:
+        X[:, Q + OWN :] = X[:, Q : Q + OWN]
+    y = X[:, : Q + OWN] @ rng.standard_normal(Q + OWN) + rng.standard_normal(rows)
+    nuisance, first = np.arange(Q), np.arange(Q, Q + OWN)
+    own = [first, first + OWN]
+    h = [Hypothesis((n,), np.concatenate([nuisance, o]), o) for n, o in zip("ab", own, strict=True)]
+    precision = np.diag([*[1.0] * Q, *[0.1] * (2 * OWN)])
+    prior = np.zeros(len(precision))
+    return Knowledge(h, np.array([0.5, 0.5]), X.T @ X, X.T @ y, precision, prior), X, y, rng
+
+
+def gram(rng, rows=20, alike=False):
+    X = regressors(rng, rows)
+    if alike:
+        X[:, Q + OWN :] = X[:, Q : Q + OWN]
+    return X.T @ X
+
+
+def test_the_evidence_is_the_density_of_the_data():
+    k, X, y, _ = linear()
+    direct = []
+    for h in k.hypotheses:
+        A, s = X[:, h.columns], h.columns
+        V = np.eye(len(y)) + A @ np.linalg.inv(k.precision[np.ix_(s, s)]) @ A.T
+        direct.append(multivariate_normal(np.zeros(len(y)), V).logpdf(y))
+    assert np.diff(k.log_evidence) == pytest.approx(np.diff(direct), rel=1e-9)
+
+
+def test_the_projection_is_the_refit_by_brute_force():
+    k, X, _, rng = linear()
+    new = regressors(rng, 20)
+    z = rng.standard_normal(X.shape[1])
+    together = np.concatenate([X, new])
+    for i, j in ((0, 1), (1, 0)):
+        data = together[:, k.hypotheses[i].own] @ z[k.hypotheses[i].own]
+        s = k.hypotheses[j].columns
+        # The prior of the rival's parameters as further rows.
+        A = np.concatenate([together[:, s], np.sqrt(k.precision[np.ix_(s, s)])])
+        b = np.concatenate([data, np.zeros(s.size)])
+        left = b - A @ np.linalg.lstsq(A, b, rcond=None)[0]
+        assert projected(k, i, j, z, together.T @ together) == pytest.approx(left @ left, rel=1e-9)
+
+
+def test_identical_candidates_cannot_be_discriminated():
+    k, _, _, rng = linear(alike=True)
+    G = gram(rng, alike=True)
+    p = Prediction.of(k, G)
+    assert p.log_ratio(0, 1) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert box_hill(k, G) == pytest.approx(0.0, abs=1e-9)
+    z = k.estimates[0].mean
+    assert projected(k, 0, 1, z, np.zeros_like(G)) < 1e-9
+    assert inseparable(k, [G]) == [(0, 1)]
+    weights = expected(k, G, 0)
+    assert weights == pytest.approx(0.5, abs=1e-6)
+    different = gram(rng, 4000)
+    assert inseparable(k, [different]) == []
+    assert certainty(k, different) > 0.9 > 0.1 > certainty(k, G)
+
+
+def test_information_grows_with_each_run():
+    k, _, _, rng = linear()
+    G, more = gram(rng), gram(rng)
+    assert 0.0 < d_optimal(k, G) < d_optimal(k, G + more)
+    assert -1.0 < a_optimal(k, G) < a_optimal(k, G + more) < 0.0
+    assert 0.0 < box_hill(k, G) < box_hill(k, G + more)
+    assert d_optimal(k, np.zeros_like(G)) == pytest.approx(0.0, abs=1e-12)
+    assert a_optimal(k, np.zeros_like(G)) == pytest.approx(-1.0)
+    z = k.estimates[0].mean
+    assert projected(k, 0, 1, z, k.G) <= projected(k, 0, 1, z, k.G + G) + 1e-12
+
+
+def test_precision_criteria_agree_with_the_posterior_of_stacked_rows():
+    k, X, _, rng = linear()
+    new = regressors(rng, 20)
+    k = replace(k, weights=np.array([0.9, 0.1]))
+    s = k.hypotheses[0].columns
+    P = k.precision[np.ix_(s, s)]
+    rows = [X[:, s], np.concatenate([X, new])[:, s]]
+    before, after = (np.linalg.inv(A.T @ A + P) for A in rows)
+    volume = 0.5 * np.log(np.linalg.det(before) / np.linalg.det(after))
+    assert d_optimal(k, new.T @ new) == pytest.approx(volume, rel=1e-9)
+    ratio = np.mean(np.diag(after) / np.diag(before))
+    assert a_optimal(k, new.T @ new) == pytest.approx(-ratio, rel=1e-9)
+
+
+def test_the_log_ratio_and_t_agree_with_all_rows_of_the_run():
+    k, _, _, rng = linear()
+    new = regressors(rng, 9)
+    p = Prediction.of(k, new.T @ new)
+    means, covariances = [], []
+    for h, e in zip(k.hypotheses, k.estimates, strict=True):
+        A = new[:, h.columns]
+        means.append(new @ e.mean)
+        covariances.append(np.eye(len(new)) + A @ e.covariance @ A.T)
+    y = rng.multivariate_normal(means[0], covariances[0], 40000)
+    first, second = (
+        multivariate_normal(m, V).logpdf(y) for m, V in zip(means, covariances, strict=True)
+    )
+    mean, std = p.log_ratio(0, 1)
+    assert mean == pytest.approx(np.mean(first - second), abs=5.0 * std / 200.0)
+    assert std == pytest.approx(np.std(first - second), rel=0.05)
+    d, S = means[0] - means[1], np.linalg.inv(sum(covariances))
+    # Rows outside the span of the regressors have the noise alone: each adds 1 to the trace.
+    r = len(p.mean[0])
+    direct = (d @ S @ d + 2.0 * np.trace(S) - (len(new) - r)) / r
+    assert buzzi_ferraris(k, new.T @ new) == pytest.approx(direct, rel=1e-9)
+
+
+def test_simulated_outcomes_are_calibrated():
+    k, _, _, rng = linear()
+    weights = expected(k, gram(rng, 3), 1, draws=4000)
+    # The largest weight is the probability of being right: on average the truth has it so often.
+    right = weights[:, 0] == weights[:, 1]
+    assert right.mean() == pytest.approx(weights[:, 1].mean(), abs=0.03)
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_every_manoeuvre_goes_from_rest_to_rest_within_its_speeds(name):
+    h, T = 0.05, 90.0
+    t = np.arange(0.0, T + h, h)
+    for seed in range(5):
+        numbers = np.random.default_rng(seed).random(NUMBERS)
+        pose = LIBRARY[name](t, T, numbers, REACH)
+        assert pose.shape == (t.size, 3)
+        assert np.isfinite(pose).all()
+        assert pose[0] == pytest.approx(0.0, abs=1e-9)
+        rate = np.gradient(pose, h, axis=0)
+        assert np.hypot(rate[:, 0], rate[:, 1]).max() < 1.6 * REACH.speed
+        assert np.abs(rate[:, 2]).max() < 1.6 * REACH.rate
+        for end in (rate[0], rate[-1]):
+            assert end == pytest.approx(0.0, abs=0.02 * REACH.rate)
+        assert np.hypot(*(pose[-1, :2])) < 0.02  # where it began
+
+
+def test_a_sequence_takes_all_the_time_without_a_jump():
+    for seed in range(10):
+        plan = sequence(np.random.default_rng(seed).random(4 * (NUMBERS + 2)), 240.0)
+        pose = poses(plan, 240.0, 0.1, REACH)
+        assert len(pose) == 2401
+        steps = np.abs(np.diff(pose, axis=0)).max(axis=0)
+        assert (steps < 0.1 * 2.0 * np.array([REACH.speed, REACH.speed, REACH.rate])).all()
+
+
+def test_the_margin_is_that_of_the_corners_of_the_hull():
+    basin = Basin((0.0, 6.0), (-2.0, 2.0))
+    hull = np.array([[1.0, 0.5], [-1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]])
+    eta = np.array([[3.0, 0.0, 0.0], [3.0, 0.0, np.pi / 2.0], [5.5, 0.0, 0.0]])
+    assert basin.margin(eta, hull) == pytest.approx([1.5, 1.0, -0.5])
+
+
+def content(first="X_|u|u", others=("X_uu",), confidence=0.5):
+    effect = {"id": first, "indistinguishable": list(others), "confidence": confidence}
+    effect["advice"] = f"To discriminate {first} from {others[0]}: run astern."
+    return {"verdict": "ambiguous", "effects": [effect], "possibilities": [], "ranking": []}
+
+
+def ahead(t):
+    return np.column_stack([0.3 + 0.1 * np.sin(0.3 * t), 0.0 * t, 0.05 * np.sin(0.2 * t)])
+
+
+@pytest.fixture(scope="module")
+def question():
+    """Two candidates that a run ahead leaves open: drag by |u|u and by uu."""
+    run, _ = sail(64.0, h=0.05, ship={"delta_X_absu_u": -4.0}, given=ahead)
+    data = diagnosis.load(diagnosis_frame(run))
+    return Question(data, content(), Model(), 0.1, Limits(120.0, size=(6.0, 6.0)))
+
+
+def diagnosis_frame(run):
+    import pandas as pd
+
+    columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+    return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=columns)
+
+
+@pytest.fixture(scope="module")
+def designer(question):
+    prior = NominalPrior.of(question.start, question.prior)
+    space, k = knowledge(question.data, question.start, prior, rivals(question.content))
+    model = space.model(k.hypotheses[0], k.estimates[0].mean)
+    return Designer(question.data, space, model, question.limits), k
+
+
+def test_running_astern_discriminates_what_running_ahead_does_not(designer):
+    d, k = designer
+    assert {h.ids for h in k.hypotheses} == {("X_|u|u",), ("X_uu",)}
+    assert k.weights == pytest.approx(0.5, abs=1e-3)
+    astern = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
+    around = d.scored(k, usual("circle", 120.0))
+    assert astern.excess == around.excess == 0.0
+    assert astern.score > 0.9 > 0.1 > around.score
+    d.tried[:] = [around]
+    assert d.inseparable(k) == [(0, 1)]
+    d.tried[:] = [around, astern]
+    assert d.inseparable(k) == []
+
+
+def test_what_the_actuators_cannot_do_is_not_proposed(designer):
+    d, k = designer
+    fast = replace(d, tried=[])
+    fast.reach = d.reach._replace(speed=3.0, rate=3.0)
+    found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, 120.0, 0.0)])
+    assert found.excess > 0.0
+    assert found.score < -100.0
+    assert not found.gram.any()
+
+
+def test_the_planned_motion_is_what_its_thrust_gives():
+    """A ship that is pushed by the computed force alone follows the target."""
+    from diagnosis.predictors.prediction import moved
+    from fmus.signals import Force
+    from fmus.vessel import vessel
+
+    basin, h, model = Basin((0.0, 9.0), (0.0, 9.0)), 0.01, Model()
+    motion = PlannedMotion.of([PlanStep("zigzag", (0.5,) * NUMBERS, 40.0, 0.4)], 40.0, h, REACH, basin)
+    tau = motion.thrust(model)
+    s = vessel.State._make([*map(float, motion.eta[0]), 0.0, 0.0, 0.0, 0.0])
+    for row in tau[:1000]:
+        s = moved(s, Force(*map(float, row)), model.hull, h)
+    assert (s.x, s.y, s.psi) == pytest.approx(motion.eta[1000], abs=0.01)
+
+
+def test_the_loop_of_many_models_is_that_of_each_alone(designer):
+    d, k = designer
+    models = drawn(d.space, k, 0, np.random.default_rng(0))[:3]
+    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), STEP)
+    short = PlannedMotion(*(x[:60] for x in (motion.time, motion.eta, motion.eta_dot, motion.eta_ddot)))
+    together = followed(models, short)
+    for n, model in enumerate(models):
+        assert followed([model], short)[0] == pytest.approx(together[n], abs=1e-9)
+
+
+@pytest.mark.slow
+def test_no_simulated_ship_leaves_the_basin(designer):
+    """Plans that keep the basin with the spread of their draws keep it with draws of another seed."""
+    d, k = designer
+    rng, checked = np.random.default_rng(3), 0
+    while checked < 3:
+        s = d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), 120.0))
+        if s.excess > 0.0:
+            continue
+        motion = d.motion(s.steps, s.size, STEP)
+        known = spread(d.space, k, likely(k), motion, d.basin, d.outline, 0)
+        if known.margin.min() <= 0.0:
+            continue
+        fresh = [m for n in likely(k) for m in drawn(d.space, k, n, np.random.default_rng(99))]
+        for track in followed(fresh, motion):
+            assert d.basin.margin(track, d.outline).min() > 0.0
+        checked += 1
+
+
+@pytest.mark.slow
+def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path):
+    plan = plan_next(question)
+    assert plan.runs[0].sure > 0.9
+    assert plan.runs[0].spread.margin.min() > 0.0
+    assert plan.inseparable == []
+    files = plan.write(tmp_path)
+    assert sorted(files) == sorted(p.name for p in tmp_path.iterdir())
+    told = json.loads((tmp_path / "next.json").read_text())
+    assert set(told) >= {"runs", "inseparable"}
+    assert set(told["runs"][0]) >= {"scenario", "commands", "minutes", "sure"}
+    result = cosim.simulate(tmp_path / "scenario_1.json", tmp_path / "run", stop=10.0, pictures=False)
+    assert result.status == "done"
+    assert result.metrics["e_pos_max"] < 0.2
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Result of a diagnosis that does not state its runs."""
+    (tmp_path / "diagnosis.json").write_text(json.dumps(content()))
+    return tmp_path
+
+
+def test_without_a_posterior_the_advice_is_that_of_the_diagnosis(folder):
+    done = command(design_run.main, folder, "--out", folder / "plan")
+    assert done.returncode == 0
+    assert "run astern" in done.stdout
+    told = json.loads((folder / "plan" / "next.json").read_text())
+    assert told["runs"] == []
+    assert told["advice"] == [content()["effects"][0]["advice"]]
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "words"),
+    [
+        (None, ["--minutes", "-1"], "minutes"),
+        (None, ["--runs", "0"], "from 1 to 9"),
+        ({"runs": []}, [], "task"),
+        ({"runs": ["missing.csv"]}, [], "missing.csv"),
+        ({"runs": ["missing.csv"]}, ["--basin", "6x"], "basin"),
+        ({"runs": ["missing.csv"]}, ["--basin", "6x-4"], "basin"),
+        ({"runs": ["missing.csv"]}, ["--basin", "none.json"], "none.json"),
+    ],
+)
+def test_bad_input_is_one_message(folder, task, options, words):
+    if task is not None:
+        (folder / "posterior.json").write_text(json.dumps({"task": task}))
+    done = command(design_run.main, folder, "--out", folder / "plan", *options)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (folder / "plan").exists()
+
+
+def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
+    done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
+    assert done.returncode == 2
+    assert "diagnosis.json" in done.stderr
+
+
+def test_basins_by_size_and_by_file(tmp_path):
+    assert limits_of(4.0, "6x4").size == (6.0, 4.0)
+    assert limits_of(4.0, (6, 4)).size == (6.0, 4.0)
+    file = tmp_path / "basin.json"
+    file.write_text('{"north": [0, 10], "east": [-3, 3]}')
+    assert limits_of(2.0, file).basin == Basin((0.0, 10.0), (-3.0, 3.0))
+    for bad in ('{"north": [10, 0], "east": [-3, 3]}', '{"north": [0, 1]}', "{"):
+        file.write_text(bad)
+        with pytest.raises(InputError, match=r"basin\.json"):
+            limits_of(2.0, file)
+
+
+def test_a_basin_smaller_than_the_ship_and_an_unknown_criterion_are_refused(question):
+    with pytest.raises(InputError, match="too small"):
+        plan_next(replace(question, limits=Limits(120.0, size=(1.0, 1.0))))
+    with pytest.raises(InputError, match="certainty"):
+        plan_next(replace(question, criterion="certain"))
+    with pytest.raises(InputError, match="minutes or more"):
+        plan_next(replace(question, limits=Limits(5.0)))
