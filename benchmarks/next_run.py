@@ -8,7 +8,7 @@ one ellipse of 100 s at noise n4. Of the cells in a random order those count in 
 import argparse
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -75,7 +75,7 @@ def learned(q: Question, data: Sequence) -> dict:
     return diagnosis.diagnose(data, prior=q.prior, model=q.start).content
 
 
-def judged(content: dict, hidden: Sequence[Draw]) -> tuple[str, float, str, float]:
+def judged(content: Mapping, hidden: Sequence[Draw]) -> tuple[str, float, str, float]:
     """Right, wrong or open; largest confidence, what was found, half width of the first interval."""
     certain = [e for e in content["effects"] if (e["confidence"] or 0.0) >= SURE]
     first = max((e["confidence"] or 0.0 for e in content["effects"]), default=0.0)
