@@ -20,7 +20,7 @@ def lazy_names(
 
     Args:
         package: its ``__name__``.
-        file: its ``__file__``; the stub beside it holds lines ``from .module import name as name``, or
+        file: its ``__file__``; the stub next to it holds lines ``from .module import name as name``, or
             ``from . import module as module``.
     """
     homes: dict[str, str] = {}

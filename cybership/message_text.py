@@ -74,7 +74,8 @@ def first_fault(
         whole: what stands for the place of a fault of the whole file.
     """
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    kind, loc, text, value = (faults[0][key] for key in ("type", "loc", "msg", "input"))
+    kind, loc, text = faults[0]["type"], faults[0]["loc"], faults[0]["msg"]
+    value = faults[0]["input"]
     if own := special(kind, loc, value):
         text = own
     elif kind == "extra_forbidden":

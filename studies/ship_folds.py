@@ -155,7 +155,7 @@ def write_folds(report: Report, folds: Sequence[ShipFold]) -> None:
     report.text(_windows(report, folds))
     report.heading("Findings of each fold")
     report.table(
-        ["left out", "verdict", "in the model", "withdrawn", "identifiable only together"],
+        ["left out", "verdict", "in the model", "rejected", "identifiable only together"],
         [
             [
                 ", ".join(fold.left_out),

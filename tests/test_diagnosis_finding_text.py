@@ -6,7 +6,14 @@ from itertools import combinations
 import pytest
 from support.cse1 import EFFECTS
 
-from diagnosis.report.finding_text import advice, equation, sentence, separation_note, tell_apart, unit
+from diagnosis.report.finding_text import (
+    advice,
+    discriminating_run,
+    equation,
+    sentence,
+    separation_note,
+    unit,
+)
 from fmus.effects import Effect
 from fmus.effects.families import UNKNOWN
 from fmus.effects.text import Found
@@ -83,7 +90,7 @@ def test_an_effect_of_a_user_says_what_it_says_of_itself():
         == "The ship has an effect that the model lacks: A moment that I suspect."
     )
     assert mine.wording.family is UNKNOWN
-    assert UNKNOWN.excite in tell_apart(mine, EFFECTS["mass"])
+    assert UNKNOWN.excite in discriminating_run(mine, EFFECTS["mass"])
 
 
 @pytest.mark.parametrize("name", [e.id for e in EFFECTS.values() if e.search.by != "given"])
@@ -102,9 +109,9 @@ def test_equation_has_every_number_with_its_unit(name):
 def test_every_effect_has_a_family_and_every_pair_an_advice():
     assert all(e.wording.family is not UNKNOWN for e in EFFECTS.values())
     for a, b in combinations(EFFECTS.values(), 2):
-        assert tell_apart(a, b)
+        assert discriminating_run(a, b)
         same_family = a.wording.family is b.wording.family
-        assert tell_apart(a, b) == tell_apart(b, a) or not same_family
+        assert discriminating_run(a, b) == discriminating_run(b, a) or not same_family
 
 
 def test_what_tells_effects_apart_names_effects_and_families_that_there_are():
@@ -116,7 +123,7 @@ def test_what_tells_effects_apart_names_effects_and_families_that_there_are():
 
 def test_known_pairs():
     def apart(a, b):
-        return tell_apart(EFFECTS[a], EFFECTS[b])
+        return discriminating_run(EFFECTS[a], EFFECTS[b])
 
     assert "astern" in apart("X_u", "body_bias")
     assert "sync pulse" in apart("delay", "clock_offset")

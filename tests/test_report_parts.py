@@ -95,14 +95,17 @@ def test_what_is_sure_is_a_fact_and_comes_first():
     assert headline.is_sure(sure)
     assert not headline.is_sure(effect("lag", headline.FOUND - 0.01))
     assert not headline.is_sure(effect("lag", np.nan))
-    assert headline.told(sure) == "There is lag."
-    assert headline.told(unsure) == (
+    assert headline.finding_sentence(sure) == "There is lag."
+    assert headline.finding_sentence(unsure) == (
         "Possibly delay or lag or deadband (50 % for delay): There is delay. "
         "However, it is at its limit. It is not in the learned model."
     )
-    assert headline.told(effect("lag", np.nan)) == "Possibly lag: There is lag."
+    assert headline.finding_sentence(effect("lag", np.nan)) == "Possibly lag: There is lag."
     both = report_data(None, diagnosis(verdict="found"), [unsure, sure])
-    assert headline.headline(both) == f"{headline.told(sure)} {headline.told(unsure)}"
+    assert (
+        headline.headline(both)
+        == f"{headline.finding_sentence(sure)} {headline.finding_sentence(unsure)}"
+    )
 
 
 def test_headline_of_each_verdict():

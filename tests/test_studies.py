@@ -131,7 +131,7 @@ def test_options_of_studies_are_those_that_make_sense():
         "python -m studies.nothing",
         "What it does.",
         "examples:\nan example",
-        "(10)",
+        "(default: 10)",
         "0 done, 2 bad input",
     ):
         assert part in text

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 
 import pytest
 from markdown_it import MarkdownIt
@@ -134,6 +135,43 @@ def test_a_page_is_not_two(page):
 @pytest.mark.parametrize("page", sorted(PAGES))
 def test_a_page_is_in_the_words_of_the_field(page):
     assert faults(page) == []
+
+
+PRINTED = sorted(
+    p.relative_to(ROOT).as_posix()
+    for f in ("studies", "benchmarks")
+    for p in ROOT.glob(f"docs/{f}/*/*.md")
+)
+AGREE = 0.96  # share of word pairs; chosen: old pages had less, and names that are filled in make some
+
+
+def neighbours(text):
+    """Pairs of words that follow each other, without names and numbers between them."""
+    for piece in re.split(r"\S*[\d_]\S*|[^\w\s'’-]+|\n|\b(?:[A-Z]+|[b-z]|psi)\b|(?<!\w)-", text):
+        words = piece.split()
+        yield from pairwise(words)
+
+
+@cache
+def printed_pairs():
+    """Those of all texts of the code, from which scripts make their pages."""
+    return {
+        pair
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.py")
+        for _, text in texts.module_texts(path, fewest=1)
+        for pair in neighbours(text.replace("``", " 0 "))
+    }
+
+
+@pytest.mark.parametrize("page", PRINTED)
+def test_a_page_of_a_long_run_has_the_words_that_its_script_prints_today(page):
+    text = (ROOT / page).read_text("utf-8")
+    prose = "\n".join(line for line in text.splitlines() if line[:1] != "|")
+    pairs = [*neighbours(re.sub(r"`[^`]*`|\]\([^)]*\)", " 0 ", prose))]
+    strange = [" ".join(p) for p in pairs if p not in printed_pairs()]
+    assert len(strange) <= (1.0 - AGREE) * len(pairs), strange
+    assert [m[0] for m in PHRASES.finditer(text)] == []
 
 
 def test_a_text_of_the_code_is_seen(tmp_path):

@@ -56,7 +56,7 @@ def lines(rows: Rows) -> list[tuple[str, str, str]]:
         ("median size of the reported set", "<= 3", _median(len(r.reported) for r in one if r.found)),
         ("separable, exact, n1: found at confidence >= 0.95", ">= 80 %", doubt(exact)),
         ("two effects, both separable, found in 2 steps, exact", ">= 90 %", both(two, "exact")),
-        ("the same, coefficients wrong", "told", both(two, "wrong")),
+        ("the same, coefficients wrong", "reported", both(two, "wrong")),
         ("two effects, all", "", share(two, lambda r: r.right)),
         (
             "foreign physics: reported as unexplained, nothing wrong at >= 0.9",

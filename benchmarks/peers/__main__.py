@@ -133,7 +133,7 @@ def write(folder: Path, runs: Sequence[str]) -> Path:
     report = Report(folder, "Established methods", [SEED])
     packages = sorted({p for n, p in PEERS.items() if (folder / f"{n}.json").exists()})
     report.text(
-        """Errors in the project's windows of the run that nobody learned from, from the same start
+        """Errors in the project's windows of the run left out of the training data, from the same start
         states; behind them geometric means of nominal over own error, and processor time for a run left
         out [s], search included. """
         f"{', '.join(f'{p} {version(p)}' for p in packages)}."

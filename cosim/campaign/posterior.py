@@ -75,7 +75,7 @@ def read_posterior(path: Path) -> Posterior:
     """What a diagnosis knows of the values that it fitted.
 
     Args:
-        path: ``posterior.json`` beside ``model.ssv``.
+        path: ``posterior.json`` next to ``model.ssv``.
 
     Raises:
         InputError: no such file, or no mean with a covariance; says what is wrong.

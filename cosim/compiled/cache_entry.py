@@ -12,7 +12,7 @@ from pathlib import Path
 
 from cybership.scratch_folder import atomic_write
 
-SEAL = ".sha256"  # ends the name of the file beside an entry with its size [bytes] and SHA-256
+SEAL = ".sha256"  # ends the name of the file next to an entry with its size [bytes] and SHA-256
 
 
 def is_whole(path: Path) -> bool:

@@ -11,7 +11,7 @@ from .run_state import CALLS, INSTANCE, LATE, NAMED, NOTHING, STATE, STEPS, TAKE
 # Longest wall time of one call where none is given: so many seconds, or so many times what a step has
 # taken on average. Chosen: a garbage collector or a busy computer stops a program for less.
 TIMEOUT, TIMES_USUAL = 30.0, 100.0
-LOOK = 0.5  # wall time between two looks [s]; chosen: short beside the timeout
+LOOK = 0.5  # wall time between two looks [s]; chosen: short compared with the timeout
 
 
 class CallWatch:

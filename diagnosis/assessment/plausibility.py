@@ -40,7 +40,7 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
         model: the initial one.
 
     Raises:
-        InputError: with the likeliest mistake, and the line for the file beside the measurement.
+        InputError: with the likeliest mistake, and the line for the file next to the measurement.
     """
     for w in runs:
         with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers

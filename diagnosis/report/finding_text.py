@@ -1,4 +1,4 @@
-"""A finding in words: a sentence, an equation, and what to run to tell effects apart."""
+"""A finding in words: a sentence, an equation, and what to run to discriminate effects."""
 
 from collections.abc import Mapping, Sequence
 
@@ -60,8 +60,8 @@ def _digits(low: float, high: float) -> int:
     return int(np.clip(np.ceil(np.log10(size / width)) + 2.0, 3.0, 9.0))
 
 
-def tell_apart(one: Effect, other: Effect) -> str:
-    """What to run so that two effects can be told apart.
+def discriminating_run(one: Effect, other: Effect) -> str:
+    """What to run so that two effects can be discriminated.
 
     Either effect may know, or else the family of either; else both are excited.
     """
@@ -77,7 +77,7 @@ def tell_apart(one: Effect, other: Effect) -> str:
 
 
 def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
-    """What to run next, for an effect and those that the data cannot tell from it; empty if none.
+    """What to run next, for an effect and those that the data cannot discriminate from it; else empty.
 
     Args:
         name: id of the effect.
@@ -86,7 +86,7 @@ def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
     """
     texts: dict[str, list[str]] = {}
     for other in alike[:SHOWN]:
-        texts.setdefault(tell_apart(effects[name], effects[other]), []).append(other)
+        texts.setdefault(discriminating_run(effects[name], effects[other]), []).append(other)
     parts = [f"To discriminate {name} from {listed(ids)}: {text}." for text, ids in texts.items()]
     if len(alike) > SHOWN:
         parts.append(
@@ -104,5 +104,5 @@ def listed(names: Sequence[str], joined: str = "or") -> str:
 
 
 def separation_note(name: str, alike: Sequence[str]) -> str:
-    """Which effects these data cannot tell from one; empty if none."""
+    """Which effects these data cannot discriminate from one; empty if none."""
     return f"These data cannot discriminate {name} from {listed(alike)}." if alike else ""

@@ -12,7 +12,7 @@ EVERYDAY = {"order", "work", "reading", "log"}  # words that sentences use in an
 LINKED, LEFT = {"p", "li", "th", "figcaption"}, {"a", "b"}  # elements with links, and parts without
 
 
-class Term(NamedTuple):
+class GlossaryTerm(NamedTuple):
     """A row of the glossary."""
 
     name: str
@@ -28,13 +28,13 @@ class Term(NamedTuple):
 
 
 @cache
-def terms() -> dict[str, Term]:
+def terms() -> dict[str, GlossaryTerm]:
     """Each word with its term; a term may have several words, such as surge, sway and yaw."""
     text = next(file for file in FILES if file.is_file()).read_text("utf-8")
     found = {}
     for heading, rows in re.findall(r"^## (.+)\n\n\|.*\n\|-.*\n((?:\|.*\n)+)", text, re.MULTILINE):
         for row in rows.splitlines() if heading in SECTIONS else ():
-            term = Term(*(cell.strip().replace("`", "") for cell in row.strip("|").split("|")))
+            term = GlossaryTerm(*(cell.strip().replace("`", "") for cell in row.strip("|").split("|")))
             found |= dict.fromkeys(set(term.name.split(", ")) - EVERYDAY, term)
     return found
 
@@ -46,7 +46,7 @@ def _words() -> re.Pattern[str]:
     return re.compile(rf"(?<![\w.-])({'|'.join(map(re.escape, longest))})s?(?![\w(=-]|\.\w)", re.I)
 
 
-def linked(page: str) -> tuple[str, list[Term]]:
+def linked(page: str) -> tuple[str, list[GlossaryTerm]]:
     """Link the first use of each term in the sentences and the column headings of a page.
 
     Args:
@@ -55,7 +55,7 @@ def linked(page: str) -> tuple[str, list[Term]]:
     Returns:
         The page, and its terms in their order; each link leads to the anchor of a term.
     """
-    used: list[Term] = []
+    used: list[GlossaryTerm] = []
 
     def link(m: re.Match[str]) -> str:
         term = next(t for word, t in terms().items() if word.lower() == m[1].lower())

@@ -50,7 +50,7 @@ def surest_first(effects: Sequence[ReportedEffect]) -> list[ReportedEffect]:
     return sorted(effects, key=lambda e: not is_sure(e))
 
 
-def told(e: ReportedEffect) -> str:
+def finding_sentence(e: ReportedEffect) -> str:
     """A finding in a sentence: a fact, or a possibility with its rivals and its probability."""
     if is_sure(e):
         return e.sentence
@@ -111,7 +111,7 @@ def headline(r: ReportData) -> str:
     if d is None:
         return ""
     if r.effects:
-        return " ".join(map(told, surest_first(r.effects)))
+        return " ".join(map(finding_sentence, surest_first(r.effects)))
     if d.verdict == "coefficients":
         names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
         above = f", mainly {listed(names, 'and')}" if names else ""

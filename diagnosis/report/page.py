@@ -16,7 +16,7 @@ from . import figures, formatting, tracks
 from .chart import data_uri, themed
 from .content import coefficients, versions
 from .glossary import linked
-from .headline import boundedness, gain_of_search, headline, told, verdict_title
+from .headline import boundedness, finding_sentence, gain_of_search, headline, verdict_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
 
@@ -122,7 +122,9 @@ def rendered(template: str, **values: object) -> str:
         lstrip_blocks=True,
     )
     f = formatting
-    made.filters |= {x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, told, boundedness)}
+    made.filters |= {
+        x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, finding_sentence, boundedness)
+    }
     made.globals |= {"times": f.times, "degrees": degrees(1.0)}
     return made.get_template(template).render(values)
 

@@ -15,11 +15,11 @@ from .finding_text import SHOWN
 from .formatting import number, percent
 from .headline import (
     boundedness,
+    finding_sentence,
     gain_of_calibration,
     gain_of_search,
     headline,
     surest_first,
-    told,
     verdict_title,
 )
 from .report_data import ReportData, seconds, trial_rows
@@ -94,7 +94,9 @@ def summary(r: ReportData) -> str:
     first = [*surest_first(r.effects), *r.possibilities][:SHOWN]
     runs = r.evaluations if len(r.evaluations) <= SHOWN else r.evaluations[: SHOWN - 1]
     lines = [f"{d.verdict}: {verdict_title(r)}"]
-    lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in first] or [f"  {headline(r)}"]
+    lines += [f"  {finding_sentence(e)} [{_percent(e.confidence)}]" for e in first] or [
+        f"  {headline(r)}"
+    ]
     lines += [f"  {d.remainder.sentence}"]
     over = f"prediction error over {_number(r.lengths[0])} s"
     for e in runs:
@@ -167,7 +169,7 @@ def channel_table(
 
 
 def _effect(e: ReportedEffect) -> Iterator[str]:
-    yield told(e)
+    yield finding_sentence(e)
     yield e.equation
     share = _percent(e.share_of_error)
     unique = f", unique contribution {_percent(e.share_unique)} (no other effect explains it)"

@@ -17,7 +17,7 @@ from cybership.scratch_folder import atomic_write, sweep_parts
 
 from .finding import BuildError
 
-SEAL = ".sha256"  # ends the name of the file beside an entry with its size [bytes] and SHA-256
+SEAL = ".sha256"  # ends the name of the file next to an entry with its size [bytes] and SHA-256
 
 
 def cache_folder() -> Path:

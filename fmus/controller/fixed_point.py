@@ -24,7 +24,7 @@ from ..ops import Condition, Number, choose, fmax, when
 from .parametrisation import B, Parametrisation
 from .smoothing import LearningSample
 
-# w T; w h stays below this part of 1, so that a step is short beside the filter.
+# w T; w h stays below this part of 1, so that a step is short compared with the filter.
 SETTLES = 6.0
 FAST = 0.5
 STILL = (0.0, 0.0, 0.0)

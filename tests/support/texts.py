@@ -20,7 +20,7 @@ NAMES = r"\w+(?:, \w+)*"  # of arguments, before their text
 PARSED = re.compile(r"\ndef main\((?:.*\n)*.*\.parse_(?:intermixed_)?args\(")
 
 
-def module_texts(path: Path) -> Iterator[tuple[int, str]]:
+def module_texts(path: Path, fewest: int = FEWEST) -> Iterator[tuple[int, str]]:
     """(line, text) of each string of a module that is no docstring; `` is in place of what is filled in.
 
     These are messages, warnings and notes, sentences of reports, labels, descriptions of variables and
@@ -43,7 +43,7 @@ def module_texts(path: Path) -> Iterator[tuple[int, str]]:
         strings = [p.value for p in parts if isinstance(p, ast.Constant) and isinstance(p.value, str)]
         if strings and id(node) not in docstrings:
             text = "".join(p.value if isinstance(p, ast.Constant) else "``" for p in parts)
-            if len(text.split()) >= FEWEST:
+            if len(text.split()) >= fewest:
                 yield node.lineno, text
 
 

@@ -95,7 +95,7 @@ def other_sections(found: TrialRuns) -> dict[str, Sequence[Verdict]]:
             below(found, "Oscillations are stronger with concurrent learning", 0, "swing", *both),
             below(found, "IAEWWT does not show them: it is less with CL", 0, "iaewwt", *ways),
             below(found, "CLZ tracks best", 0, "cross_track", *((CLZ, c) for c in (RBS, ABS, CLE))),
-            held(found, "Nobody adapts in surge at all", 0, "omega_hat_X", -1e-12, 1e-12),
+            held(found, "No controller adapts in surge", 0, "omega_hat_X", -1e-12, 1e-12),
         ),
         "The eight at 0.16 (6.4.3)": (
             follow(found, 1),

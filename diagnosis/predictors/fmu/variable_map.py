@@ -1,6 +1,6 @@
 """Which variable of an FMU is which signal of a run: told by names and units, or by a map file.
 
-A map has the form of the file beside a measurement, once for inputs, outputs and start values::
+A map has the form of the file next to a measurement, once for inputs, outputs and start values::
 
     {
         "inputs": {"tau_X": "Thrust.X", "rudder.delta": {"name": "delta", "unit": "deg", "flip": true}},

@@ -14,7 +14,7 @@ called, in which unit it is, and how its axis lies::
     }
 
 Columns that it does not name keep their names and SI units. ``columns.json`` in a folder says the same
-of all files there, and the file beside a measurement goes over it. What each signal means:
+of all files there, and the file next to a measurement goes over it. What each signal means:
 docs/measurements.md.
 """
 

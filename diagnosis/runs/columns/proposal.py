@@ -88,7 +88,7 @@ class Proposal(NamedTuple):
     """How a measurement seems to be meant.
 
     Attributes:
-        layout: the content of the file beside it, what is stated there kept; names of signals of which
+        layout: the content of the file next to it, what is stated there kept; names of signals of which
             no column is known are blank.
         unused: names of columns that are no signals, as far as is known.
         run: the measurement, read so; None where a name is blank.

@@ -123,7 +123,7 @@ def read(
 
     Args:
         path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
-        layout: in place of what the file beside it says.
+        layout: in place of what the file next to it says.
         of: the ship that was measured; None: the default ship.
         also: names of other columns [SI] that are kept in :attr:`Run.measured` where there are such.
 
