@@ -88,12 +88,9 @@ SOURCES = {
     "Dahlquist": Source(
         PATHSIM, f"{REFERENCE}/Dahlquist.fmu",
         "64fa89cb6f8435a57d4026cdaa730dd2015a77c2c51abdbe598a945e223f8dfc", *ASSOCIATION),
-    "BouncingBall": Source(
-        PATHSIM, f"{REFERENCE}/BouncingBall.fmu",
-        "1604856668b4c6081109e2ef0b778ef725a285095373bd7a54b24c7a9d6faad4", *ASSOCIATION),
 }  # fmt: skip
 # The subsystems export parameters as inputs; their masses are weighed, as only ratios show otherwise.
-# The last three have no input: their missing force changes a rate, and no map can name it.
+# The last two have no input: their missing force changes a rate, and no map can name it.
 OTHERS = (
     ForeignSystem("damped_oscillator", {"f": 3.0}, "s", "springDamper.c",
                   {"mass.m": (2.0, 0.1), "springDamper.c": (10.0, 0.3), "springDamper.d": (1.0, 0.5)},
@@ -121,8 +118,6 @@ OTHERS = (
     ForeignSystem("Dahlquist", {}, "x", "k", {"k": (1.0, 0.3)},
                   "der(x)", ("x", 2), -0.5, 0.1, samples=60, stated=False,
                   starts={"x": (0.5, 2.0)}, start={"x": "x"}),
-    ForeignSystem("BouncingBall", {}, "h", "e", {"g": (-9.81, 0.1), "e": (0.7, 0.1)},
-                  "der(v)", ("v", 2), -0.2, 0.01, samples=300, stated=False),
 )  # fmt: skip
 
 

@@ -156,10 +156,10 @@ class FmuModel:
 
     @cached_property
     def exact(self) -> frozenset[str]:
-        """Local variables whose start value the FMU begins with: states that can be set (2.2.7)."""
+        """Local variables and outputs that begin with their start value: states to be set (2.2.7)."""
         listed = self.description.modelVariables
         exact = (v for v in listed if v.initial == "exact" and v.variability != "constant")
-        return frozenset(v.name for v in exact if (v.causality or "local") == "local")
+        return frozenset(v.name for v in exact if (v.causality or "local") in ("local", "output"))
 
     def can_be_set(self, variable: FmuVariable) -> bool:
         """Whether a variable takes a value before the simulation."""
