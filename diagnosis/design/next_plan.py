@@ -10,7 +10,7 @@ from cosim import InputError
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
-from ..report.finding_text import tell_apart
+from ..report.finding_text import discriminating_run
 from ..search import Prior
 from ..search.prior import NominalPrior
 from .designing import Designer, Limits, ScoredPlan, likely
@@ -124,6 +124,6 @@ def _advice(start: Model, a: Sequence[str], b: Sequence[str]) -> str:
     """What would separate two hypotheses that no manoeuvre does, by the texts of their effects."""
     effects = start.ship.effects
     one, other = ([i for i in x if i not in y] for x, y in ((a, b), (b, a)))
-    texts = dict.fromkeys(tell_apart(effects[i], effects[j]) for i in one for j in other)
+    texts = dict.fromkeys(discriminating_run(effects[i], effects[j]) for i in one for j in other)
     what = "; ".join(texts) or "a higher speed, another sensor, or a longer run"
     return f"To discriminate {' + '.join(a) or 'none'} from {' + '.join(b) or 'none'} otherwise: {what}."

@@ -329,6 +329,7 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
 
 def _motion(w: WeakWindows, model: Model) -> np.ndarray:
     """True pose and velocity (2, n, 3) behind the measured ones."""
-    motion = true_motion(*(part.T for part in before_filters(w.smoothed, model)), model)
+    eta, eta_dot = before_filters(w.smoothed, model)
+    motion = true_motion(eta.T, eta_dot.T, model)
     # Columns in one piece each: all that is computed of them goes along time.
     return np.array([np.where(w.known, np.concatenate(part), 0.0) for part in motion]).swapaxes(1, 2)
