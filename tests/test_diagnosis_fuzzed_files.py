@@ -249,7 +249,7 @@ def test_singular_equations_are_told_as_a_matter_of_the_data(tmp_path, monkeypat
     def singular(*_):
         raise np.linalg.LinAlgError("Singular matrix")
 
-    monkeypatch.setattr("diagnosis.session.evaluate_run", singular)
+    monkeypatch.setattr("diagnosis.session.evaluate_runs", singular)
     with pytest.raises(InputError, match="do not determine the requested values: Singular matrix"):
         diagnosis.evaluate(runs)
 

@@ -8,6 +8,7 @@ from .evaluation import Bands as Bands
 from .evaluation import Evaluation as Evaluation
 from .evaluation import PredictionError as PredictionError
 from .evaluation import evaluate_run as evaluate_run
+from .evaluation import evaluate_runs as evaluate_runs
 from .fmu.foreign_fmu import Fmu as Fmu
 from .fmu.ship_of_fmu import ship_of_model as ship_of_model
 from .fmu.variable_map import write_map as write_map

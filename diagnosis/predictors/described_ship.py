@@ -63,8 +63,9 @@ class DescribedShip:
         return windows_of(runs, length)
 
     def residuals(self, windows: Windows, learned: Sequence[Model] = ()) -> list[np.ndarray]:
-        run = windows.runs[0].track.run.name
-        return windows.residuals_of_each([m.during(run) for m in (self.model, *learned)])
+        first, *others = dict.fromkeys(smoothed.track.run.name for smoothed in windows.runs)
+        models = (self.model, *learned)
+        return windows.residuals_of_each(models if others else [m.during(first) for m in models])
 
     def free_runs(
         self, smoothed: Smoothed, learned: Model | None = None, begin: float = -np.inf

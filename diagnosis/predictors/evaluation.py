@@ -1,5 +1,6 @@
 """Evaluation of a model on a measured run, before and after something was learned."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -173,15 +174,46 @@ def evaluate_run(
         InputError: the predictor fails, or the run is shorter than its run-in.
     """
     predictor = DescribedShip(before) if isinstance(before, Model) else before
-    windows = predictor.windows([w.smoothed], w.horizon)
+    return evaluate_runs([w], predictor, after, [held_out])[0]
+
+
+def evaluate_runs(
+    runs: Sequence[WeakWindows], predictor: Predictor, after: Model | None, held_out: Sequence[bool]
+) -> list[Evaluation]:
+    """Evaluate one model, or two, on some runs of one ship, which are predicted at once where that goes.
+
+    Arguments and errors as of :func:`evaluate_run`, the first and the last one for each run.
+    """
     learned = [] if after is None else [after]
     models = [predictor.model, *learned]
-    missed = [np.zeros((0, 3))] * len(models)
-    if windows is not None:
-        missed = predictor.residuals(windows, learned)
-    errors = [
-        PredictionError(omega(w, model), off, windows and windows.summary(off))
-        for model, off in zip(models, missed, strict=True)
-    ]
-    use: DataUse = "test" if held_out else "train"
-    return Evaluation(predictor, w, windows, errors[0], errors[-1], None, after, use)
+    windows = [predictor.windows([w.smoothed], w.horizon) for w in runs]
+    found = []
+    for w, own, held, missed in zip(
+        runs, windows, held_out, _missed(runs, windows, predictor, learned), strict=True
+    ):
+        errors = [
+            PredictionError(omega(w, model), off, own and own.summary(off))
+            for model, off in zip(models, missed, strict=True)
+        ]
+        use: DataUse = "test" if held else "train"
+        found.append(Evaluation(predictor, w, own, errors[0], errors[-1], None, after, use))
+    return found
+
+
+def _missed(
+    runs: Sequence[WeakWindows],
+    windows: Sequence[Windows | None],
+    predictor: Predictor,
+    learned: Sequence[Model],
+) -> list[list[np.ndarray]]:
+    """Of each run the residuals (samples, 3) of each model in its windows; empty where it has none."""
+    none = [np.zeros((0, 3))] * (1 + len(learned))
+    usable = [(w, own) for w, own in zip(runs, windows, strict=True) if own is not None]
+    if not predictor.parametric or len(usable) < 2 or len({w.horizon for w in runs}) > 1:
+        return [none if own is None else predictor.residuals(own, learned) for own in windows]
+    together = predictor.windows([w.smoothed for w, _ in usable], runs[0].horizon)
+    assert together is not None  # each of them has windows
+    edges = np.cumsum([own.since.size for _, own in usable])[:-1]
+    by_model = [np.split(off, edges) for off in predictor.residuals(together, learned)]
+    each = iter([*zip(*by_model, strict=True)])
+    return [none if own is None else [*next(each)] for own in windows]
