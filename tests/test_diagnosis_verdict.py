@@ -31,7 +31,7 @@ from diagnosis.verdict.confidence import confidence_of, probability
 from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.paired_errors import harm
 from diagnosis.verdict.pruning import prune, without
-from diagnosis.verdict.validation_data import Fold, Losses, ValidationData
+from diagnosis.verdict.validation_data import Fold, Losses, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
@@ -258,9 +258,10 @@ def test_less_dissipation_needs_unseen_data_that_show_it():
 def test_the_stretches_of_a_run_miss_together_what_it_misses():
     (w, *_), sigma = voyages(**SHORT), np.array([0.1, 0.2, 0.05])
     model = Model().plus({"delta_X_u": -1.0})
-    (whole,) = Fold(w).losses([model], sigma)
+    (whole,) = fold_losses([Fold(w)], [model], sigma)
     assert whole.omega.sum() == pytest.approx(np.sum((omega(w, model) / sigma) ** 2))
-    parts = [Fold(w, blocks).losses([model], sigma)[0] for blocks in block_folds([w])]
+    folds = [Fold(w, blocks) for blocks in block_folds([w])]
+    parts = fold_losses(folds, [model] * len(folds), sigma)
     assert np.concatenate([p.omega for p in parts]) == pytest.approx(whole.omega)
     positions = np.concatenate([p.position for p in parts])
     assert 0 < positions.size < whole.position.size, (

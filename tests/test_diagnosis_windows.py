@@ -114,6 +114,21 @@ def test_several_runs_at_once_are_each_one_alone():
         assert together.over_all(k) == pytest.approx(alone.over_all())
 
 
+def test_runs_with_models_of_their_own_are_predicted_as_alone():
+    """Hull, effects, thrusters and lags differ; runs of one step are predicted at once."""
+    runs = [smoothed(sail(40.0, h=h, seed=seed)[0]) for seed, h in ((2, 0.05), (3, 0.05), (4, 0.02))]
+    models = [
+        Model({"delta_X_u": -1.0, "N_r": -0.7}, {"plant_F_vsp": 0.9}),
+        Model({"delta_X_u": 0.5, "body_bias_Y": 0.1}, {"lag": 0.3}),
+        Model(),
+    ]
+    alone = [Windows([run]) for run in runs]
+    found = Windows.joined(alone).residuals_by_run(models)
+    expected = [w.residuals(m) for w, m in zip(alone, models, strict=True)]
+    np.testing.assert_allclose(found, np.concatenate(expected), atol=1e-12)
+    assert not np.allclose(found, Windows.joined(alone).residuals_by_run(models[:1] * 3), atol=1e-4)
+
+
 def test_no_sample_is_further_than_a_window_from_its_start():
     since = (
         np.concatenate([smooth_base().time[smooth_base().used]])

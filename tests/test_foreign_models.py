@@ -232,7 +232,7 @@ WRONG = {
     "no such variable": ('{"inputs": {"tau_X": "tau_XX"}}', "did you mean 'tau_X'"),
     "no such unit": ('{"inputs": {"tau_X": {"name": "tau_X", "unit": "kg"}}}', "is not a unit"),
     "other quantity": ('{"outputs": {"x": "u"}}', "which is not a unit of length"),
-    "factor zero": ('{"inputs": {"tau_X": {"name": "tau_X", "factor": 0}}}', "is not zero"),
+    "factor zero": ('{"inputs": {"tau_X": {"name": "tau_X", "factor": 0}}}', "factor is 0"),
     "list": ("[]", "'"),
     "group is a list": ('{"inputs": ["tau_X"]}', "inputs"),
     "incomplete": (

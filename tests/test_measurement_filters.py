@@ -11,6 +11,7 @@ from support.measured import sail, smoothed
 from diagnosis import Model, Windows, diagnose
 from diagnosis.predictors.prediction import before_filters, filtered, true_motion
 from diagnosis.predictors.shooting import Shooting
+from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.predictors.weak_form import HORIZON, weak_windows
 
 LAGS = {"position_lag": 0.7, "heading_lag": 0.4}
@@ -107,6 +108,24 @@ def test_forward_and_back_are_inverse():
     starts = (x[at][:, None] for x in (between, sine.eta, sine.eta_dot))
     found = BOTH.filters.behind(poses, *starts, t[1])
     np.testing.assert_allclose(found[:, :, 0, 0], sine.eta[at:], atol=1e-4)
+
+
+@pytest.mark.parametrize("gain", [0.02, 0.05, 0.1])
+def test_the_first_response_of_a_tracker_is_the_gain_of_an_alpha_beta_filter(gain):
+    """Kalata's relation gives the speed gain of a steady filter, and T = h / sqrt(beta)."""
+    h, beta = 0.1, 2.0 * (2.0 - gain) - 4.0 * np.sqrt(1.0 - gain)
+    model = Model(measurement={"heading_tracker": h / np.sqrt(beta), "position_lag": 0.4})
+    place, _, heading = model.filters.first_response(h)
+    assert heading == pytest.approx(gain, rel=0.3 * gain)
+    assert place == pytest.approx(1.0 - np.exp(-h / 0.4))
+
+
+def test_noise_before_a_filter_counts_in_full():
+    """The noise of a filtered channel is what is left of it from sample to sample."""
+    (w,) = [weak_windows(smoothed(behind_filters(sail(60.0, h=0.1, noise=10.0)[0], heading_lag=0.4)))]
+    h = w.smoothed.track.period
+    plain, behind = (omega_std(w, m)[:, 2] for m in (Model(), Model(measurement={"heading_lag": 0.4})))
+    assert np.median(behind / plain) == pytest.approx(1.0 / (1.0 - np.exp(-h / 0.4)), rel=0.3)
 
 
 def test_poses_and_rates_become_body_fixed_speeds():

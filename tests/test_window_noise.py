@@ -117,7 +117,7 @@ def test_noise_of_a_window_is_what_its_samples_leave_through_the_kernel(
     std = np.sqrt(noise**2 * period * corner / 3.0) * np.ones((n, 3))  # R w0 / 3
     smoothed = SimpleNamespace(
         scale=SimpleNamespace(time=unit, forces=np.array([unit, unit, unit**2])),
-        track=SimpleNamespace(period=period),
+        track=SimpleNamespace(period=period, usual_rounding=np.zeros(3)),
         time=time,
         used=counts,
         noise=noise,

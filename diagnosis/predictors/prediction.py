@@ -140,7 +140,26 @@ def predict(starts: WindowStarts, model: Model) -> np.ndarray:
         each = zip(starts.runs, names, strict=True)
         parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
         return np.concatenate(parts, axis=-1)
-    thrust = arriving(starts, model)
+    return _predicted(starts, model, arriving(starts, model))
+
+
+def predict_each(starts: WindowStarts, models: Sequence[Model]) -> np.ndarray:
+    """The measured pose (steps + 1, 3, 1, w) of runs, as a model of its own predicts each.
+
+    Args:
+        starts: where to begin.
+        models: one for each of the runs, single ones, measured alike.
+    """
+    alone = [replace(starts, runs=(run,)) for run in starts.runs]
+    models = [m.during(s.track.run.name) for m, (s, _) in zip(models, starts.runs, strict=True)]
+    thrust = [arriving(one, m) for one, m in zip(alone, models, strict=True)]
+    given, acting = (np.concatenate(part, axis=-1) for part in zip(*thrust, strict=True))
+    counts = [rows.size for _, rows in starts.runs]
+    return _predicted(starts, merged(models, lambda x: np.repeat(x, counts)[None]), (given, acting))
+
+
+def _predicted(starts: WindowStarts, model: Model, thrust: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """See :func:`predict`; thrust as of :func:`propagate`."""
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
         states = _states_of_one(starts, model, thrust) or [*propagate(starts, model, thrust)]
         x, y, psi, *_ = zip(*states, strict=True)
@@ -230,13 +249,18 @@ def by_measurement(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]
 
 def stacked(models: Sequence[Model]) -> Model:
     """Several models, measured alike, as one whose parameters are arrays (p, 1) where they differ."""
+    return merged(models, lambda x: x[:, None])
+
+
+def merged(models: Sequence[Model], spread: Callable[[np.ndarray], np.ndarray]) -> Model:
+    """Several models as one; of parameters that differ, the values (p,) are spread over an array."""
 
     def together(part: str) -> dict[str, Any]:
         values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
         names = dict.fromkeys(name for each in values for name in each)
         of = models[0].ship.parameters[part]
         columns = {n: np.array([v.get(n, of[n].start) for v in values]) for n in names}
-        return {n: x[:, None] if np.ptp(x) else float(x[0]) for n, x in columns.items()}
+        return {n: spread(x) if np.ptp(x) else float(x[0]) for n, x in columns.items()}
 
     return replace(models[0], vessel=together("vessel"), thrusters=together("thrusters"))
 

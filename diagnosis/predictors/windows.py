@@ -17,7 +17,7 @@ from fmus.ops import wrap
 
 from ..runs import Smoothed
 from ..runs.cleaning import BRIEF
-from .prediction import WindowStarts, by_measurement, predict
+from .prediction import WindowStarts, by_measurement, predict, predict_each
 from .ship_model import Model
 from .thrust import LONGEST_STEP
 from .weak_form import BLOCK, BLOCKS, HORIZON
@@ -183,6 +183,42 @@ class Windows:
             found[:, mine] = self.measured[mine] - pose
         found[..., 2] = wrap(found[..., 2])
         return found
+
+    @classmethod
+    def joined(cls, parts: Sequence["Windows"]) -> "Windows":
+        """The windows of several that have one run each, in which each counts as a run of its own."""
+        kept = copy(parts[0])
+        kept.runs = tuple(smoothed for part in parts for smoothed in part.runs)
+        sizes = [part.run.size for part in parts]
+        before = np.cumsum([0, *sizes[:-1]])
+        kept.run = np.repeat(np.arange(len(parts)), sizes)
+        kept.start = np.concatenate([part.start for part in parts])
+        kept.sample_window = np.concatenate(
+            [p.sample_window + n for p, n in zip(parts, before, strict=True)]
+        )
+        kept.measured = np.concatenate([part.measured for part in parts])
+        kept.since = np.concatenate([part.since for part in parts])
+        kinds: dict[object, list[tuple[WindowStarts, np.ndarray]]] = {}
+        for part, n in zip(parts, before, strict=True):
+            ((starts, windows),) = part._groups
+            kind = starts.h, starts.steps, starts.runs[0][0].track.run.signals
+            kinds.setdefault(kind, []).append((starts, windows + n))
+        kept._groups = [
+            (
+                replace(each[0][0], runs=tuple(run for starts, _ in each for run in starts.runs)),
+                np.concatenate([windows for _, windows in each]),
+            )
+            for each in kinds.values()
+        ]
+        return kept
+
+    def residuals_by_run(self, models: Sequence[Model]) -> np.ndarray:
+        """Residuals (samples, 3), predicted by a model for each run; these have the same measurement."""
+        of = {
+            id(starts): [models[k] for k in dict.fromkeys(self.run[windows].tolist())]
+            for starts, windows in self._groups
+        }
+        return self.residuals_by(lambda starts: predict_each(starts, of[id(starts)]))[0]
 
     def residuals_of_each(self, models: Sequence[Model]) -> list[np.ndarray]:
         """Residuals (samples, 3) of some models, many predicted at once."""

@@ -52,27 +52,38 @@ class Fold:
         self._span = (-np.inf, np.inf) if whole else (first, last)
 
     @cached_property
-    def _windows(self) -> Windows | None:
+    def windows(self) -> Windows | None:
         """The windows that begin here; None: none has enough samples."""
         with suppress(InputError):
             return Windows([self.data.smoothed], self.data.horizon).within(*self._span)
         return None
 
-    def losses(self, models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
-        """Losses of some models here, sigma (3,) being what a model error is divided by."""
-        found, models = [], [m.during(self.data.run.name) for m in models]
-        for model, (position, heading) in zip(models, self._predicted(models), strict=True):
-            squares = np.sum((omega(self.data, model)[self._rows] / sigma) ** 2, axis=1)
-            of_block = np.bincount(self._block, squares)
-            found.append(Losses(of_block[np.unique(self._block)], position, heading))
-        return found
+    def omega_loss(self, model: Model, sigma: np.ndarray) -> np.ndarray:
+        """(blocks,), see :class:`Losses`; sigma (3,) is what a model error is divided by."""
+        model = model.during(self.data.run.name)
+        squares = np.sum((omega(self.data, model)[self._rows] / sigma) ** 2, axis=1)
+        return np.bincount(self._block, squares)[np.unique(self._block)]
 
-    def _predicted(self, models: Sequence[Model]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Mean square errors in the windows that begin here, of each model."""
-        if self._windows is None:
-            return [(np.zeros(0), np.zeros(0))] * len(models)
-        errors = self._windows.summary(np.stack(self._windows.residuals_of_each(models)))
-        return list(zip(errors.position**2, errors.heading**2, strict=True))
+
+def fold_losses(folds: Sequence[Fold], models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
+    """Losses of folds, each of a model of its own; models that are measured alike predict at once."""
+    squares = [(np.zeros(0), np.zeros(0))] * len(folds)
+    together: dict[object, list[tuple[int, Windows, Model]]] = {}
+    for k, (fold, model) in enumerate(zip(folds, models, strict=True)):
+        if fold.windows is not None:
+            alike = model.clock, model.filters, id(model.given), fold.data.horizon
+            together.setdefault(alike, []).append((k, fold.windows, model))
+    for each in together.values():
+        places, parts, of = zip(*each, strict=True)
+        windows = Windows.joined(parts)
+        errors = windows.summary(windows.residuals_by_run(of))
+        for n, k in enumerate(places):
+            own = windows.run == n
+            squares[k] = errors.position[own] ** 2, errors.heading[own] ** 2
+    return [
+        Losses(fold.omega_loss(model, sigma), *of)
+        for fold, model, of in zip(folds, models, squares, strict=True)
+    ]
 
 
 class ValidationData:
@@ -122,12 +133,18 @@ class ValidationData:
         if any(id(f) in due for f in found):
             variants = [self._models(f) for f in due.values()]
 
-            def of_fold(k: int) -> list[Losses]:
-                return self._folds[k].losses([models[k] for models in variants], self.sigma)
+            def of_some(which: Sequence[int]) -> list[list[Losses]]:
+                folds = [self._folds[k] for k in which]
+                return [
+                    fold_losses(folds, [models[k] for k in which], self.sigma) for models in variants
+                ]
 
-            by_fold = for_each(of_fold, range(len(self._folds)))
-            for f, parts in zip(due.values(), zip(*by_fold, strict=True), strict=True):
-                self._known[id(f)] = f, Losses(*map(np.concatenate, zip(*parts, strict=True)))
+            count = len(self._folds)
+            halves = [range(first, count, 2) for first in range(min(2, count))]
+            parts = for_each(of_some, halves)
+            for n, f in enumerate(due.values()):
+                by_fold = [parts[k % 2][n][k // 2] for k in range(count)]
+                self._known[id(f)] = f, Losses(*map(np.concatenate, zip(*by_fold, strict=True)))
         return [self._known[id(f)][1] for f in found]
 
     def _models(self, found: Findings | Model) -> Sequence[Model]:
