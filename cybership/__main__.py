@@ -53,10 +53,12 @@ def main() -> int:
         runpy.run_module(modules[name], run_name="__main__")
     except ModuleNotFoundError as error:
         from cosim.command import BAD_INPUT, complain, missing_extra
+        from cosim.process.run_state import STATE
 
         if (line := missing_extra(error)) is None:
             raise
         complain(line)
+        STATE.end(BAD_INPUT)  # the process did not die: it has nothing to do
         return BAD_INPUT
     return 0
 

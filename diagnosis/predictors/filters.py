@@ -4,7 +4,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from fmus.ops import wrap
 
@@ -103,7 +102,9 @@ def _tracking(p: np.ndarray, off: np.ndarray, rate: np.ndarray, T: float, h: flo
     """
     found, slopes = np.array(p), np.diff(p, axis=0) / h
     found[0] -= off
-    (bb, bw), (wb, ww) = expm(h * np.array([[-2.0 * DAMPING / T, 1.0], [-1.0 / T**2, 0.0]]))
+    a = DAMPING / T  # rad/s, frequency and decay of the oscillation
+    decay, cos, sin = np.exp(-a * h), np.cos(a * h), np.sin(a * h)
+    bb, bw, wb, ww = decay * (cos - sin), decay * sin / a, -2.0 * a * decay * sin, decay * (cos + sin)
     velocity = rate - 2.0 * DAMPING / T * off
     for n, slope in enumerate(slopes, start=1):
         slow = slope - velocity
