@@ -21,15 +21,15 @@ class Reach(NamedTuple):
         speed, rate: largest speed [m/s] and yaw rate [rad/s].
         room: length of the basin for the origin of the ship [m].
         time: time scale of the ship, over that of CyberShip Enterprise 1 [1].
-        stern, bow: body-fixed x of the last and the first actuator [m].
+        aft, fore: body-fixed x of the last and the first actuator [m].
     """
 
     speed: float
     rate: float
     room: float
     time: float
-    stern: float
-    bow: float
+    aft: float
+    fore: float
 
 
 # Time (n,) [s], duration [s], numbers from 0 to 1, limits -> pose (n, 3) from rest to rest [m, m, rad].
@@ -146,10 +146,10 @@ def circle(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 
 @manoeuvre("rotation")
 def rotation(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
-    """Rotation to both sides about a point between stern and bow"""
+    """Rotation to both sides about a point between the last and the first actuator"""
     rate, rise = r.rate * _between(0.25, 1.0, x[0]), _rise(x[1], r)
     psi = visits(t, there_and_back(np.pi * _between(0.3, 1.0, x[2]), rate, rise, T), rate, rise, T)
-    pivot = _between(r.stern, r.bow, x[3])
+    pivot = _between(r.aft, r.fore, x[3])
     return np.column_stack([pivot * (1.0 - np.cos(psi)), -pivot * np.sin(psi), psi])
 
 

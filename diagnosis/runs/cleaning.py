@@ -235,17 +235,22 @@ def continued(run: Run) -> Run:
     from where it was: rows that only come late have times of their own.
     """
     time, notes = np.array(run.time), []
-    for row in np.flatnonzero(np.diff(time) < 0.0) + 1:
-        back, period = time[row - 1] - time[row], float(np.median(np.abs(np.diff(time[:row]))))
-        ends = np.flatnonzero(~((np.diff(time[row:]) > 0.0) & (time[row + 1 :] <= time[row - 1])))
-        again = time[row : row + 1 + (ends[0] if ends.size else time.size)]
-        there = (time[:row] >= again[0]) & (time[:row] <= again[-1])
-        if min(there.sum(), again.size) < max(LONG, 0.5 * max(there.sum(), again.size)):
-            continue
+    with np.errstate(invalid="ignore", over="ignore"):  # false cells are infinite or missing
         step = np.linalg.norm(np.diff(run.pose[:, :2], axis=0), axis=1)
-        if step[row - 1] <= LONG * np.nanmedian(step[row - 1 - again.size : row + again.size]):
-            notes.append(f"the clock was set back by {back + period:.4g} s at {time[row - 1]:.4g} s")
-            time[row:] += back + period
+        later = np.flatnonzero(np.diff(time) < 0.0) + 1
+        for row in later:
+            ends = np.flatnonzero(~((np.diff(time[row:]) > 0.0) & (time[row + 1 :] <= time[row - 1])))
+            again = time[row : row + 1 + (ends[0] if ends.size else time.size)]
+            there = (time[:row] >= again[0]) & (time[:row] <= again[-1])
+            rows = sorted((int(there.sum()), again.size))
+            if rows[0] < max(LONG, 0.5 * rows[1]):
+                continue
+            usual = step[max(row - 1 - rows[0], 0) : row + rows[0]]
+            usual = usual[np.isfinite(usual)]
+            if usual.size and step[row - 1] <= LONG * np.median(usual):
+                back = time[row - 1] - time[row] + float(np.median(np.diff(again)))
+                notes.append(f"the clock was set back by {back:.4g} s at {time[row - 1]:.4g} s")
+                time[row:] += back
     return replace(run, time=time, notes=(*run.notes, *notes)) if notes else run
 
 
