@@ -13,6 +13,7 @@ from support.cse1 import ASIDE, FIVE, THRUSTERS
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, clean, read, smooth
+from diagnosis.predictors import DescribedShip
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.predictors.weak_form import HORIZON
 
@@ -127,6 +128,18 @@ def test_runs_with_models_of_their_own_are_predicted_as_alone():
     expected = [w.residuals(m) for w, m in zip(alone, models, strict=True)]
     np.testing.assert_allclose(found, np.concatenate(expected), atol=1e-12)
     assert not np.allclose(found, Windows.joined(alone).residuals_by_run(models[:1] * 3), atol=1e-4)
+
+
+def test_values_of_one_run_hold_in_it_alone():
+    made = [replace(sail(40.0, h=0.05, seed=k)[0], name=name) for k, name in enumerate("abc")]
+    runs, model = [smoothed(run) for run in made], Model(runs={"b": {"plant_F_vsp": 0.5}})
+    nominal, learned = DescribedShip(Model()).residuals(Windows(runs), [model])
+    expected = [
+        Windows([run]).residuals(model.during(name)) for run, name in zip(runs, "abc", strict=True)
+    ]
+    np.testing.assert_allclose(learned, np.concatenate(expected), atol=1e-12)
+    differs = ~np.isclose(nominal, learned, atol=1e-9).all(axis=1)
+    assert {*Windows(runs).run[Windows(runs).sample_window[differs]]} == {1}
 
 
 def test_no_sample_is_further_than_a_window_from_its_start():

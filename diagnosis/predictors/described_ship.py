@@ -65,7 +65,9 @@ class DescribedShip:
     def residuals(self, windows: Windows, learned: Sequence[Model] = ()) -> list[np.ndarray]:
         first, *others = dict.fromkeys(smoothed.track.run.name for smoothed in windows.runs)
         models = (self.model, *learned)
-        return windows.residuals_of_each(models if others else [m.during(first) for m in models])
+        if others and any(m.runs for m in models):
+            return [windows.residuals_by_run([m] * len(windows.runs)) for m in models]
+        return windows.residuals_of_each([m.during(first) for m in models])
 
     def free_runs(
         self, smoothed: Smoothed, learned: Model | None = None, begin: float = -np.inf
