@@ -20,6 +20,7 @@ from cybership.message_text import first_fault
 from .commands.command_line import Done, out_options, run
 from .execution.progress import Advance
 from .execution.result_folder import together
+from .execution.user_files import json_content
 
 if TYPE_CHECKING:
     from .design import Question
@@ -52,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def design(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.diagnosis
-    content = _json(folder / DIAGNOSIS)
+    content = _diagnosis(folder / DIAGNOSIS)
     task = _task(folder / POSTERIOR)
     if task is None:
         return _advised(options, content, folder)
@@ -105,16 +106,8 @@ def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path)
     return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
 
 
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"no diagnosis: '{path}' cannot be read: {error.strerror}; give the result folder of "
-            "cybership learn"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"'{path}' is not JSON: {error}") from None
+def _diagnosis(path: Path) -> dict[str, Any]:
+    content = json_content(path, "a diagnosis (give the result folder of cybership learn)")
     if not isinstance(content, dict) or not {"effects", "possibilities", "verdict"} <= content.keys():
         raise InputError(f"'{path}' is not the result of cybership learn")
     return content
@@ -126,15 +119,13 @@ def _task(path: Path) -> Task | None:
     Raises:
         InputError: it is damaged.
     """
+    content = json_content(path, "a posterior") if path.exists() else {}
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
         return Task.model_validate(content["task"]) if "task" in content else None
-    except OSError:
-        return None
     except ValidationError as error:
         raise InputError(f"'{path}', task: {first_fault(error)}") from None
-    except (ValueError, TypeError) as error:
-        raise InputError(f"'{path}' is not JSON: {error}") from None
+    except TypeError:
+        raise InputError(f"'{path}' is not a posterior of cybership learn") from None
 
 
 def _count(text: str) -> int:

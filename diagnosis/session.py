@@ -15,7 +15,7 @@ from cosim import InputError
 from .assessment.gathering import told_apart
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
-from .execution.parallel import for_each
+from .execution.parallel import in_halves
 from .execution.progress import Advance, silent
 from .predictors import (
     DescribedShip,
@@ -197,10 +197,8 @@ def _compared(
         return evaluate_runs([every[k] for k in which], predictor, after, held)
 
     known = [predictor, model, after, *every, *(w.smoothed for w in every)]
-    halves = [range(first, len(every), 2) for first in range(min(2, len(every)))]
     # What is not of this project may not outlive a fork.
-    found = for_each(of_some, halves, known) if predictor.parametric else [*map(of_some, halves)]
-    evaluations = [found[k % 2][k // 2] for k in range(len(every))]
+    evaluations = in_halves(of_some, range(len(every)), known, share=predictor.parametric)
     return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 

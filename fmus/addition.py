@@ -11,6 +11,7 @@ itself, over its last step. An acceleration input gets M^-1 of that.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from .declare import Component, Fields, Variable, bundle, flatten, group_of, packer, variables, width
@@ -51,6 +52,9 @@ class Last(NamedTuple):
 
 class Params(NamedTuple):
     """All is fixed."""
+
+
+FOUND = partial(Component, "found", "Findings added to an FMU", Params, hold_nonfinite=False)
 
 
 def addition(
@@ -135,17 +139,7 @@ def addition(
         kept = [where(h > LEAST, a, b) for a, b in zip(new, s, strict=False)]
         return state(*kept, *pasts), outputs(*values)
 
-    return Component(
-        name="found",
-        description="Findings added to an FMU",
-        params=Params,
-        state=state,
-        inputs=inputs,
-        outputs=outputs,
-        init=init,
-        step=step,
-        hold_nonfinite=False,
-    )
+    return FOUND(state, inputs, outputs, init, step)
 
 
 class AddedTerm(NamedTuple):
@@ -202,17 +196,7 @@ def added_terms(starts: Sequence[float], outputs: int, terms: Sequence[AddedTerm
         new = [where(h > LEAST, a, b) for a, b in zip([*seen, 1.0], before, strict=True)]
         return packer(state)(new), packer(given)(sums)
 
-    return Component(
-        name="found",
-        description="Findings added to an FMU",
-        params=Params,
-        state=state,
-        inputs=inputs,
-        outputs=given,
-        init=init,
-        step=step,
-        hold_nonfinite=False,
-    )
+    return FOUND(state, inputs, given, init, step)
 
 
 def _polar(signals: Mapping[str, Number], given: Mapping[str, Line]) -> dict[str, Number]:

@@ -12,6 +12,7 @@ from cosim.scenario import find_scenario
 
 from ..execution.result_folder import together
 from ..report.formatting import as_json, finite
+from ..runs.cleaning import Z95
 from .designing import Designer, ScoredPlan
 from .hypotheses import Space
 from .information import CRITERIA, SURE, Knowledge, expected, pairs, projected
@@ -24,7 +25,6 @@ MOST_RUNS = 9  # of a plan; chosen
 STEP = 0.02  # s, times the time scale: base step of the scenarios
 TARGET = [f"{axis}_t{order}" for order in ("", "_dot", "_ddot") for axis in ("x", "y", "psi")]
 POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
-Z95 = 1.96
 
 
 def files(count: int) -> list[str]:

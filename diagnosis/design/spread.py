@@ -13,7 +13,7 @@ from fmus.signals import Estimate, Target
 from ..assessment.closed_loop import LoopPart
 from ..execution.progress import Advance, silent
 from ..predictors import Model
-from ..predictors.prediction import stacked
+from ..predictors.prediction import merged
 from .hypotheses import Space
 from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
@@ -60,15 +60,11 @@ def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
         models: of one ship.
         motion: the target, at equal steps.
     """
-    of, h = stacked(models), float(motion.time[1] - motion.time[0])
-    columns: dict[str, dict[str, Any]] = {
-        part: {n: x[:, 0] if isinstance(x, np.ndarray) else x for n, x in getattr(of, part).items()}
-        for part in ("vessel", "thrusters")
-    }
+    of, h = merged(models, lambda values: values), float(motion.time[1] - motion.time[0])
     start = dict(zip(("x_0", "y_0", "psi_0"), map(float, motion.eta[0]), strict=True))
     craft = of.ship
-    ship = LoopPart(craft.vessel, {**columns["vessel"], **start})
-    drive = LoopPart(craft.thrusters, columns["thrusters"])
+    ship = LoopPart(craft.vessel, {**of.vessel, **start})
+    drive = LoopPart(craft.thrusters, of.thrusters)
     controller = LoopPart(craft.serving(adaptive.COMPONENT), {})
     targets = np.column_stack([motion.eta, motion.eta_dot, motion.eta_ddot])
     found = np.empty((len(models), len(targets), 3))

@@ -103,6 +103,25 @@ def for_each(
     return [found[k] if k in found else function(item) for k, item in enumerate(items)]
 
 
+def in_halves(
+    function: Callable[[Sequence[Item]], Sequence[Found]],
+    items: Sequence[Item],
+    common: Sequence[object] = (),
+    share: bool = True,
+) -> list[Found]:
+    """What a function gives for each item, where it takes many at once as fast as one.
+
+    Args:
+        function: gives a result for each of the items that it is called with.
+        items: every second one goes to the other process, if there are two.
+        common: see :func:`for_each`.
+        share: whether a second process may take any.
+    """
+    halves = [items[::2], items[1::2]][: len(items)]
+    parts = for_each(function, halves, common) if share else [*map(function, halves)]
+    return [parts[k % 2][k // 2] for k in range(len(items))]
+
+
 def _packed(content: Any, known: dict[int, Any]) -> bytes:
     class Packer(Pickler):
         def persistent_id(self, obj: Any) -> int | None:

@@ -14,7 +14,7 @@ import numpy as np
 from cosim import InputError
 
 from ..assessment.remainder import any_significant
-from ..execution.parallel import for_each
+from ..execution.parallel import in_halves
 from ..predictors import Model, WeakWindows, Windows, omega
 from ..search.findings import Findings
 from ..search.gram import run_folds
@@ -133,18 +133,14 @@ class ValidationData:
         if any(id(f) in due for f in found):
             variants = [self._models(f) for f in due.values()]
 
-            def of_some(which: Sequence[int]) -> list[list[Losses]]:
+            def of_some(which: Sequence[int]) -> list[tuple[Losses, ...]]:
                 folds = [self._folds[k] for k in which]
-                return [
-                    fold_losses(folds, [models[k] for k in which], self.sigma) for models in variants
-                ]
+                each = (fold_losses(folds, [m[k] for k in which], self.sigma) for m in variants)
+                return [*zip(*each, strict=True)]
 
-            count = len(self._folds)
-            halves = [range(first, count, 2) for first in range(min(2, count))]
-            parts = for_each(of_some, halves)
-            for n, f in enumerate(due.values()):
-                by_fold = [parts[k % 2][n][k // 2] for k in range(count)]
-                self._known[id(f)] = f, Losses(*map(np.concatenate, zip(*by_fold, strict=True)))
+            by_fold = in_halves(of_some, range(len(self._folds)))
+            for f, parts in zip(due.values(), zip(*by_fold, strict=True), strict=True):
+                self._known[id(f)] = f, Losses(*map(np.concatenate, zip(*parts, strict=True)))
         return [self._known[id(f)][1] for f in found]
 
     def _models(self, found: Findings | Model) -> Sequence[Model]:

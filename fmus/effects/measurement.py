@@ -95,56 +95,64 @@ CLOCK_OFFSET = Effect(
 )
 
 
-def low_pass(channel: str, symbol: str, coordinates: str) -> Effect:
-    """The effect that a channel is measured behind a low-pass filter of first order."""
-    name = f"{channel}_lag"
+def measured_behind(
+    name: str,
+    channel: str,
+    kind: str,
+    search: Search,
+    *,
+    description: str,
+    formula: str,
+    symbol: str,
+    source: str,
+) -> Effect:
+    """The effect that a channel of the pose is measured behind a filter with one time constant."""
+    said = f"The {channel} is measured through a {kind} with a time constant of"
     return Effect(
         id=name,
         kind="measurement",
         axis="XYN",
+        description=description,
+        formula=formula,
+        symbol=symbol,
+        sign="0: none",
+        source=source,
+        linear=False,
+        parameters=(
+            Variable(name, "s", f"time constant of the {kind} of the {channel}", 0.0, LAGS, False),
+        ),
+        function=None,
+        search=search,
+        wording=Wording(lambda f: f"{said} {number(f[name])} s.", FILTER),
+    )
+
+
+def low_pass(channel: str, symbol: str, coordinates: str) -> Effect:
+    """The effect that a channel is measured behind a low-pass filter of first order."""
+    return measured_behind(
+        f"{channel}_lag",
+        channel,
+        "low-pass filter",
+        Search(differentiable=True),
         description=f"the measured {channel} is low-pass filtered (first order)",
         formula=f"T d({coordinates})_m/dt = ({coordinates}) - ({coordinates})_m",
         symbol=symbol,
-        sign="0: none",
         source="first-order lag of an instrument",
-        linear=False,
-        parameters=(
-            Variable(name, "s", f"time constant of the filter of the {channel}", 0.0, LAGS, False),
-        ),
-        function=None,
-        search=Search(differentiable=True),
-        wording=Wording(
-            lambda f: (
-                f"The {channel} is measured through a low-pass filter with a time constant of "
-                f"{number(f[name])} s."
-            ),
-            FILTER,
-        ),
     )
 
 
 def tracker(channel: str, symbol: str, coordinates: str) -> Effect:
     """The effect that a channel is the estimate of a steady Kalman filter of constant velocity."""
     name = f"{channel}_tracker"
-    return Effect(
-        id=name,
-        kind="measurement",
-        axis="XYN",
+    return measured_behind(
+        name,
+        channel,
+        "tracking filter",
+        Search(tries=[{name: T} for T in TRACKERS]),
         description=f"the measured {channel} is the estimate of a Kalman filter of constant velocity",
         formula=f"T^2 d2y/dt2 + sqrt(2) T d(y - p)/dt + y - p = 0, p = ({coordinates})",
         symbol=symbol,
-        sign="0: none",
         source="Kalata 1984, alpha-beta filter at small gains",
-        linear=False,
-        parameters=(
-            Variable(name, "s", f"time constant of the tracker of the {channel}", 0.0, LAGS, False),
-        ),
-        function=None,
-        search=Search(tries=[{name: T} for T in TRACKERS]),
-        wording=Wording(
-            lambda f: f"The {channel} is measured behind a tracking filter of {number(f[name])} s.",
-            FILTER,
-        ),
     )
 
 
