@@ -156,13 +156,13 @@ def _parser() -> argparse.ArgumentParser:
         "diagnosis", type=Path, metavar="DIAGNOSIS", help="result folder of cybership learn"
     )
     made.add_argument(
-        "--minutes", type=positive, default=4.0, metavar="M", help="length of a run [min] (4)"
+        "--minutes", type=positive, default=4.0, metavar="M", help="length of a run [min] (default: 4)"
     )
     made.add_argument(
         "--basin",
         metavar="WxH|FILE",
         help="length to the north and to the east [m] about the middle of the measured tracks, or a "
-        "JSON file with the walls (what the runs have used, and a ship's length more)",
+        "JSON file with the walls (default: what the runs have used, and a ship's length more)",
     )
     made.add_argument(
         "--runs",
@@ -170,15 +170,17 @@ def _parser() -> argparse.ArgumentParser:
         default=1,
         dest="count",
         metavar="N",
-        help="runs to design, or rounds to simulate (1)",
+        help="runs to design, or rounds to simulate (default: 1)",
     )
     made.add_argument(
         "--criterion",
         default="certainty",
         metavar="NAME",
-        help="certainty, box-hill, buzzi-ferraris, d-optimal or a-optimal (certainty)",
+        help="certainty, box-hill, buzzi-ferraris, d-optimal or a-optimal (default: certainty)",
     )
-    made.add_argument("--seed", type=_seed, default=0, metavar="N", help="of everything random (0)")
+    made.add_argument(
+        "--seed", type=_seed, default=0, metavar="N", help="seed of everything random (default: 0)"
+    )
     made.add_argument(
         "--simulate",
         type=Path,
