@@ -15,7 +15,7 @@ from cosim import InputError
 from .assessment.gathering import told_apart
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
-from .execution.parallel import in_halves
+from .execution.parallel import in_halves, one_thread
 from .execution.progress import Advance, silent
 from .predictors import (
     DescribedShip,
@@ -136,13 +136,14 @@ class Diagnosis(DecidedFindings):
 
 @contextmanager
 def well_posed() -> Iterator[None]:
-    """Tell an ill-posed problem as one of the data, in place of an error of linear algebra.
+    """Compute by one thread, and report an ill-posed problem as one of the data.
 
     Raises:
         InputError: a system of equations inside is singular or not finite.
     """
     try:
-        yield
+        with one_thread():
+            yield
     except LinAlgError as error:
         raise InputError(f"these runs do not determine the requested values: {error}") from None
 

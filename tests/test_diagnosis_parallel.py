@@ -7,8 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import get_context
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
-from diagnosis.execution.parallel import for_each, forks
+from diagnosis.execution.parallel import for_each, forks, one_thread
 
 forked = pytest.mark.skipif(not forks(), reason="needs fork and two cores")
 
@@ -88,3 +89,13 @@ def interrupted(k):
     if os.getpid() == HERE:
         raise KeyboardInterrupt
     time.sleep(60.0)
+
+
+def test_linear_algebra_has_one_thread_while_it_lasts_and_as_many_as_before_after_it():
+    def threads():
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(limits=2, user_api="blas"):
+        with one_thread():
+            assert threads() == {1}
+        assert threads() == {2}

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim import InputError
 
-from ..execution.parallel import for_each
+from ..execution.parallel import for_each, one_thread
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.weak_form import WIDTH
@@ -21,6 +21,7 @@ from .plausibility import refuse_implausible
 from .trial_errors import measured_passage
 
 
+@one_thread()
 def gather(
     paths: Sequence[str | Path | Run],
     advance: Advance = silent,

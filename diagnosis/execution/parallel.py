@@ -8,8 +8,8 @@ import os
 import sys
 import threading
 from array import array
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from io import BytesIO
 from multiprocessing import current_process, get_context
@@ -36,6 +36,13 @@ def forks() -> bool:
 def _libraries() -> ThreadpoolController:
     """The loaded libraries with threads of their own, which take milliseconds to find."""
     return ThreadpoolController()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let linear algebra use one thread: matrices here are small, and waiting threads take the cores."""
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield
 
 
 def for_each(
@@ -83,9 +90,7 @@ def for_each(
             sender.send_bytes(_packed(work(), known))
 
     second = context.Process(target=beside, daemon=True)
-    with _libraries().limit(
-        limits=1, user_api="blas"
-    ):  # or each process would have a thread for each core
+    with one_thread():  # or each process would have a thread for each core
         with UninterruptedProcesses():
             second.start()
         sender.close()
