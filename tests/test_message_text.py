@@ -7,6 +7,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import cosim
+import diagnosis
 from cybership.message_text import (
     LONGEST_FAULT,
     LONGEST_VALUE,
@@ -100,3 +101,12 @@ def test_messages_of_errors_repeat_no_value_whole(error):
     assert says.endswith(text[text.index("of the ship's") :])
     assert len(says) == len(text) - 4000 - len("\x1b[2J\n") + LONGEST_VALUE - 1
     assert str(error(says)) == says
+
+
+def test_a_missing_measurement_is_compared_with_measurements_only(tmp_path):
+    (tmp_path / "here").mkdir()  # such as the folder that the command has just made
+    with pytest.raises(cosim.InputError, match=r"run1\.csv'$"):
+        diagnosis.read(tmp_path / "run1.csv")
+    (tmp_path / "run2.csv").touch()
+    with pytest.raises(cosim.InputError, match=r"did you mean 'run2\.csv'\?$"):
+        diagnosis.read(tmp_path / "run1.csv")

@@ -41,6 +41,7 @@ from .resolution import resolution
 from .tables import column_names, date_stamps, numbers, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
+TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
 
@@ -116,6 +117,11 @@ class Run:
         return replace(self, **kept, measured={s: c[keep] for s, c in self.measured.items()})
 
 
+def _is_run(path: Path) -> bool:
+    """Whether a path looks like a measured run: a table, or the folder of a log."""
+    return path.suffix in TABLES or any((path / name).is_file() for name in LOGS)
+
+
 def read(
     path: str | Path, layout: Layout | None = None, of: Ship | None = None, also: Iterable[str] = ()
 ) -> Run:
@@ -137,7 +143,7 @@ def read(
             raise InputError(f"no log in '{path}': log.csv is missing")
         path = found[0]
     elif not path.is_file():
-        near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = [p.name for p in path.parent.iterdir() if _is_run(p)] if path.parent.is_dir() else []
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
     is_log = path.name in LOGS
     name = path.absolute().parent.name if is_log else path.stem
