@@ -2,6 +2,7 @@
 
 import importlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from benchmarks import ship_effects
 from benchmarks.ship_effects import Cause, causes, sail
 from cosim import InputError
 from diagnosis import propose_columns
-from diagnosis.predictors import Model, ship_with
+from diagnosis.predictors import Model, Windows, ship_with
+from diagnosis.predictors.thrust import Response
 from diagnosis.runs import read, read_frame
 from thesis import analysis
 
@@ -58,6 +60,32 @@ def test_force_of_the_commands_is_that_of_the_two_propellers(ship, run):
     np.testing.assert_allclose(found.tau_cmd[:, 0], port + starboard, atol=1e-9)
     np.testing.assert_allclose(found.tau_cmd[:, 1], 0.0, atol=1e-12)
     np.testing.assert_allclose(found.tau_cmd[:, 2], 0.395 * (port - starboard), atol=1e-9)
+
+
+def test_no_window_begins_while_actuators_may_follow_commands_from_before_the_run(ship, run):
+    """The Otter's propellers lag by 1 s. What they were commanded before the log is not known."""
+    model, (w,) = (
+        Model(ship=ship),
+        diagnosis.gather([read_frame(run, "run", ship)], model=Model(ship=ship)),
+    )
+    after = w.run.time[0] + 3.0 * 1.0
+    assert (w.middle - 0.5 * w.width).min() >= after - 1e-9
+    assert Windows([w.smoothed], w.horizon).start.min() >= after
+    began, lasts = w.middle - 0.5 * w.width, w.middle + 0.5 * w.width
+    held, rest = (
+        Response(w.run, model, moving).means(np.stack([began, lasts]))[1] for moving in (True, False)
+    )
+    unknown = np.abs(w.run.commands[0])
+    assert (unknown > 1.0).all(), "the first command is not zero, or this test shows nothing"
+    assert (np.abs(held - rest).max(axis=(0, 1)) <= 0.05 * unknown).all()
+    assert (np.abs(held - rest).max(axis=(0, 1)) > 0.0).all()
+
+
+def test_the_described_lag_is_not_reported_as_a_delay(ship, run):
+    (w,) = diagnosis.gather([read_frame(run, "run", ship)], model=Model(ship=ship))
+    for delay, reported in ((0.4, False), (1.5, True)):
+        notes = replace(w.smoothed, delay=delay, late=True).notes
+        assert any("after they are given" in note for note in notes) == reported
 
 
 @pytest.mark.parametrize(

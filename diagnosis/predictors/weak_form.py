@@ -138,6 +138,8 @@ def places(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
 def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindows:
     """The windows of a run with half of the samples or more, all commands, and thrusters at work.
 
+    They begin where actuators that lag hardly follow commands from before the run any more.
+
     Args:
         smoothed: the run.
         horizon: length of the windows in which models predict it [s]; by default that of its ship.
@@ -159,6 +161,7 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole
+        & (middles - half >= smoothed.track.responded - 1e-9)
         & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
         & (number(~np.all(np.isfinite(smoothed.nu), axis=1, keepdims=False)) == 0)

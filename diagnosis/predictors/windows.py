@@ -272,10 +272,12 @@ def step_of(smoothed: Smoothed) -> float:
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     """The windows of a length [s] of a run that have their first sample and at least half of all.
 
-    They follow each other from the first sample that is used.
+    They follow each other from the first sample that is used, and at which actuators that lag hardly
+    follow commands from before the run any more.
     """
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
-    since = smoothed.time - first_time(smoothed) + 0.25 * period
+    begin = max(first_time(smoothed), track.responded)
+    since = smoothed.time - begin + 0.25 * period
     number = np.floor(since / length).astype(int)
     complete = int((since[-1] + period) // length)
     measured = np.flatnonzero(~track.between & (number >= 0) & (number < complete))

@@ -23,6 +23,7 @@ HORIZON = 8.0
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
 EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
 CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
+RESPONSE = 3.0  # time constants, after which 5 % of an unknown earlier command are left
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 # Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
 # which nothing can be differentiated.
@@ -83,6 +84,17 @@ class Track:
             name: getattr(self, name)[keep] for name in ("pose", "fresh", "frozen", "dropped", "between")
         }
         return replace(self, run=self.run.rows(keep), **judged)
+
+    @property
+    def lag(self) -> float:
+        """The longest lag [s] of the ship's actuators, as its file describes them."""
+        described = self.run.ship
+        return max((part.number("lag") for part in described.actuators), default=0.0) if described else 0.0
+
+    @property
+    def responded(self) -> float:
+        """Time [s] from which commands before the run, which are not known, hardly act any more."""
+        return float(self.run.time[0]) + RESPONSE * self.lag
 
     @cached_property
     def valid(self) -> np.ndarray:

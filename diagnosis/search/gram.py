@@ -19,7 +19,7 @@ from .most_likely import ridge
 
 FOLDS = 8  # of cross-validation over blocks
 WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
-# Least number of parts that are left out in turn: stretches of fewer runs, or runs of a calibration.
+# Least number of parts that are left out in turn: stretches of fewer runs.
 # Each stretch of a single run is as long as the shortest that can be learned from; chosen.
 PARTS = 4
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..predictors import Model
 from ..search.findings import Finding, Findings
-from ..search.gram import PARTS
+from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
@@ -75,7 +75,7 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         prior: of the nominal coefficients.
     """
     train, start = data.train, data.start
-    if len(train) < PARTS or not any(prior.std.values()):
+    if len(train) < WHOLE_RUNS or not any(prior.std.values()):
         return None
     runs = ValidationData(train, [], start, found.sigma)
     calibrator = Calibrator(found, train, start, prior)

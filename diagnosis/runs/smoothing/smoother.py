@@ -140,7 +140,8 @@ class Smoothed:
     def notes(self) -> tuple[str, ...]:
         """Notes on the data, a line each."""
         notes = (*self.track.notes, *self.doubted)
-        if not (self.late and self.delay >= BRIEF * self.scale.time):
+        # The pose alone does not tell a delay from the lag that the ship's file describes.
+        if not (self.late and self.delay >= max(BRIEF * self.scale.time, self.track.lag)):
             return notes
         delay = (
             f"commands act {self.delay:.2f} s after they are given, as the pose shows without a model"
