@@ -88,8 +88,8 @@ class Track:
     @property
     def lag(self) -> float:
         """The longest lag [s] of the ship's actuators, as its file describes them."""
-        described = self.run.ship
-        return max((part.number("lag") for part in described.actuators), default=0.0) if described else 0.0
+        parts = self.run.ship.actuators if self.run.ship else ()
+        return max([part.number("lag") for part in parts], default=0.0)
 
     @property
     def responded(self) -> float:
