@@ -16,6 +16,7 @@ from diagnosis import InputError, Model, Windows, clean, read, smooth
 from diagnosis.predictors import DescribedShip
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.predictors.weak_form import HORIZON
+from diagnosis.predictors.windows import free_runs
 
 # The first window starts where the smoother sees one side only: a velocity error of a millimetre a second.
 POSITION, HEADING, USUAL = 6e-3, 4e-3, 1.5e-3
@@ -124,10 +125,11 @@ def test_runs_with_models_of_their_own_are_predicted_as_alone():
         Model(),
     ]
     alone = [Windows([run]) for run in runs]
-    found = Windows.joined(alone).residuals_by_run(models)
+    together = Windows(runs)
+    found = together.residuals_by_run(models)
     expected = [w.residuals(m) for w, m in zip(alone, models, strict=True)]
     np.testing.assert_allclose(found, np.concatenate(expected), atol=1e-12)
-    assert not np.allclose(found, Windows.joined(alone).residuals_by_run(models[:1] * 3), atol=1e-4)
+    assert not np.allclose(found, together.residuals_by_run(models[:1] * 3), atol=1e-4)
 
 
 def test_values_of_one_run_hold_in_it_alone():
@@ -247,6 +249,9 @@ def test_half_the_power_is_half_the_force():
     weaker = replace(full, power=np.tile([0.5, 0.25], (base().time.size, 1)))
     thrusters = {"plant_F_vsp": 0.5 * 1.165, "plant_F_bow": 0.25 * 2.629}
     assert rms(windows_of(weaker)) == pytest.approx(rms(windows_of(full), thrusters=thrusters), rel=1e-9)
+    _, (whole,) = free_runs(smoothed(weaker), [Model()])  # in plain numbers
+    _, (other,) = free_runs(smoothed(full), [Model(thrusters=thrusters)])
+    np.testing.assert_allclose(whole, other, atol=1e-9)
 
 
 def test_unknown_parameter_names_the_nearest():

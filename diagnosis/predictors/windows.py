@@ -25,6 +25,7 @@ from .weak_form import BLOCK, BLOCKS, HORIZON
 # Of a run that is predicted as a whole, times the scale of the ship.
 FREE_STEP = BRIEF  # the mean of the commands acts in it
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
+ANY_TIME = (-np.inf, np.inf)  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ class Windows:
     Args:
         runs: smoothed runs of one ship.
         length: of the windows [s]; by default that of the ship.
+        spans: for each run first and last time [s] at which a window may begin; by default any.
 
     Attributes:
         runs: the runs.
@@ -78,10 +80,16 @@ class Windows:
         InputError: no run has a window with enough samples.
     """
 
-    def __init__(self, runs: Sequence[Smoothed], length: float | None = None) -> None:
+    def __init__(
+        self,
+        runs: Sequence[Smoothed],
+        length: float | None = None,
+        spans: Sequence[tuple[float, float]] | None = None,
+    ) -> None:
         self.runs = tuple(runs)
         self.length = length or HORIZON * runs[0].scale.time
-        parts = [usable_windows(smoothed, self.length) for smoothed in runs]
+        spans = spans or [ANY_TIME] * len(runs)
+        parts = [usable_windows(s, self.length, span) for s, span in zip(runs, spans, strict=True)]
         counts = [p.first_rows.size for p in parts]
         if not sum(counts):
             raise InputError(f"no window of {self.length:.3g} s has enough samples")
@@ -94,7 +102,7 @@ class Windows:
         self._groups: list[tuple[WindowStarts, np.ndarray]] = []
         kinds = [(step_of(s), s.track.run.signals) for s in runs]
         for kind in sorted({kinds[k] for k in np.unique(self.run)}):
-            members = [k for k, each in enumerate(kinds) if each == kind]
+            members = [k for k in np.unique(self.run).tolist() if kinds[k] == kind]
             starts = tuple((runs[k], parts[k].first_rows) for k in members)
             group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
@@ -105,38 +113,11 @@ class Windows:
         Raises:
             InputError: nothing is left of one.
         """
-        kept = self._with(self.since >= seconds)
-        if np.unique(kept.sample_window).size < self.run.size:
-            raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
-        return kept
-
-    def within(self, first: float, last: float) -> "Windows":
-        """The windows that start from one time to another [s].
-
-        Raises:
-            InputError: there is none.
-        """
-        chosen = (self.start >= first) & (self.start <= last)
-        if not chosen.any():
-            raise InputError(f"no window starts from {first:.3g} to {last:.3g} s")
-        kept = self._with(chosen[self.sample_window])
-        kept.run, kept.start = self.run[chosen], self.start[chosen]
-        kept.sample_window = (np.cumsum(chosen) - 1)[kept.sample_window]
-        kept._groups = []
-        for starts, windows in self._groups:
-            edges = np.cumsum([rows.size for _, rows in starts.runs])[:-1]
-            parts = zip(starts.runs, np.split(chosen[windows], edges), strict=True)
-            runs = tuple((smoothed, rows[part]) for (smoothed, rows), part in parts if part.any())
-            if runs:
-                place = (np.cumsum(chosen) - 1)[windows[chosen[windows]]]
-                kept._groups.append((replace(starts, runs=runs), place))
-        return kept
-
-    def _with(self, samples: np.ndarray) -> "Windows":
-        """The same with some of the samples (samples,)."""
-        kept = copy(self)
+        kept, samples = copy(self), self.since >= seconds
         kept.sample_window, kept.since = self.sample_window[samples], self.since[samples]
         kept.measured = self.measured[samples]
+        if np.unique(kept.sample_window).size < self.run.size:
+            raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
         return kept
 
     def finer(self, parts: int) -> "Windows":
@@ -184,38 +165,10 @@ class Windows:
         found[..., 2] = wrap(found[..., 2])
         return found
 
-    @classmethod
-    def joined(cls, parts: Sequence["Windows"]) -> "Windows":
-        """The windows of several that have one run each, in which each counts as a run of its own."""
-        kept = copy(parts[0])
-        kept.runs = tuple(smoothed for part in parts for smoothed in part.runs)
-        sizes = [part.run.size for part in parts]
-        before = np.cumsum([0, *sizes[:-1]])
-        kept.run = np.repeat(np.arange(len(parts)), sizes)
-        kept.start = np.concatenate([part.start for part in parts])
-        kept.sample_window = np.concatenate(
-            [p.sample_window + n for p, n in zip(parts, before, strict=True)]
-        )
-        kept.measured = np.concatenate([part.measured for part in parts])
-        kept.since = np.concatenate([part.since for part in parts])
-        kinds: dict[object, list[tuple[WindowStarts, np.ndarray]]] = {}
-        for part, n in zip(parts, before, strict=True):
-            ((starts, windows),) = part._groups
-            kind = starts.h, starts.steps, starts.runs[0][0].track.run.signals
-            kinds.setdefault(kind, []).append((starts, windows + n))
-        kept._groups = [
-            (
-                replace(each[0][0], runs=tuple(run for starts, _ in each for run in starts.runs)),
-                np.concatenate([windows for _, windows in each]),
-            )
-            for each in kinds.values()
-        ]
-        return kept
-
     def residuals_by_run(self, models: Sequence[Model]) -> np.ndarray:
         """Residuals (samples, 3), predicted by a model for each run; these have the same measurement."""
         of = {
-            id(starts): [models[k] for k in dict.fromkeys(self.run[windows].tolist())]
+            id(starts): [models[k] for k in np.unique(self.run[windows])]
             for starts, windows in self._groups
         }
         return self.residuals_by(lambda starts: predict_each(starts, of[id(starts)]))[0]
@@ -269,11 +222,13 @@ def step_of(smoothed: Smoothed) -> float:
     return row / parts
 
 
-def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
+def usable_windows(
+    smoothed: Smoothed, length: float, span: tuple[float, float] = ANY_TIME
+) -> RunWindows:
     """The windows of a length [s] of a run that have their first sample and at least half of all.
 
     They follow each other from the first sample that is used, and at which actuators that lag hardly
-    follow commands from before the run any more.
+    follow commands from before the run any more. Those count that begin in a span [s].
     """
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
     begin = max(first_time(smoothed), track.responded)
@@ -284,6 +239,8 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     _, at = np.unique(number[measured], return_index=True)
     first = measured[at]  # the first sample of each window that has any
     prompt = since[first] - length * number[first] < period
+    started = smoothed.time[first]
+    prompt &= (started >= span[0]) & (started <= span[1])
     chosen, samples = np.unique(number[used], return_counts=True)
     full = chosen[2 * samples >= round(length / period)]
     first = first[prompt & used[first] & np.isin(number[first], full)]

@@ -5,9 +5,8 @@ the model error, by blocks, and the error of the window predictions, by windows.
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from cosim import InputError
 from ..assessment.remainder import any_significant
 from ..execution.parallel import in_halves
 from ..predictors import Model, WeakWindows, Windows, omega
+from ..predictors.windows import ANY_TIME
 from ..search.findings import Findings
 from ..search.gram import run_folds
 
@@ -49,14 +49,7 @@ class Fold:
         self._rows = np.isin(number, blocks)
         self._block = number[self._rows]
         first, last = w.middle[self._rows][[0, -1]]
-        self._span = (-np.inf, np.inf) if whole else (first, last)
-
-    @cached_property
-    def windows(self) -> Windows | None:
-        """The windows that begin here; None: none has enough samples."""
-        with suppress(InputError):
-            return Windows([self.data.smoothed], self.data.horizon).within(*self._span)
-        return None
+        self.span = ANY_TIME if whole else (float(first), float(last))  # s, where windows begin
 
     def omega_loss(self, model: Model, sigma: np.ndarray) -> np.ndarray:
         """(blocks,), see :class:`Losses`; sigma (3,) is what a model error is divided by."""
@@ -68,15 +61,17 @@ class Fold:
 def fold_losses(folds: Sequence[Fold], models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
     """Losses of folds, each of a model of its own; models that are measured alike predict at once."""
     squares = [(np.zeros(0), np.zeros(0))] * len(folds)
-    together: dict[object, list[tuple[int, Windows, Model]]] = {}
+    together: dict[tuple[Any, ...], list[int]] = {}
     for k, (fold, model) in enumerate(zip(folds, models, strict=True)):
-        if fold.windows is not None:
-            alike = model.clock, model.filters, id(model.given), fold.data.horizon
-            together.setdefault(alike, []).append((k, fold.windows, model))
-    for each in together.values():
-        places, parts, of = zip(*each, strict=True)
-        windows = Windows.joined(parts)
-        errors = windows.summary(windows.residuals_by_run(of))
+        alike = model.clock, model.filters, id(model.given), fold.data.horizon
+        together.setdefault(alike, []).append(k)
+    for (*_, horizon), places in together.items():
+        runs, spans = [folds[k].data.smoothed for k in places], [folds[k].span for k in places]
+        try:
+            windows = Windows(runs, horizon, spans)
+        except InputError:  # none has a window with enough samples
+            continue
+        errors = windows.summary(windows.residuals_by_run([models[k] for k in places]))
         for n, k in enumerate(places):
             own = windows.run == n
             squares[k] = errors.position[own] ** 2, errors.heading[own] ** 2
