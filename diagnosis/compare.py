@@ -24,6 +24,7 @@ from .commands.command_line import (
     inputs_of,
     out_options,
     parser,
+    proposing,
     run,
 )
 from .execution.progress import Advance
@@ -42,8 +43,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     from .acceptance import FILES as RECORD
     from .acceptance import lines, read_criteria, validate
     from .assessment.gathering import gather  # only now: it takes a while to import
-    from .commands.initial_model import initial_model, proposing
-    from .predictors import MAP, ship_of_model, ship_with
+    from .predictors import MAP, open_model, ship_of_model, ship_with
     from .report import ReportData, file_content, show_comparison, write_report
     from .report.document import write_json
 
@@ -52,7 +52,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     criteria = None if options.criteria is None else read_criteria(options.criteria)
     with together(options.out, (*FILES, MAP, *RECORD)) as new:
         craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
-        model = initial_model(options.model, options.map, craft, execution_of(options))
+        model = open_model(options.model, options.map, craft, execution_of(options))
         paths, start = options.runs, model.start
         runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session

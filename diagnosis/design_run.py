@@ -58,14 +58,13 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     if task is None:
         return _advised(options, content, folder)
     from .assessment.gathering import gather  # only now: it takes a while to import
-    from .commands.initial_model import initial_model
     from .design import Question, plan_next
     from .design.limits import limits_of
-    from .predictors import DEFAULT_EXECUTION, ship_of_model, ship_with
+    from .predictors import open_model, ship_of_model, ship_with
 
     limits = limits_of(options.minutes, options.basin)
     craft = ship_with([Path(e) for e in task.effects], task.ship or ship_of_model(task.model))
-    start = initial_model(task.model, None, craft, DEFAULT_EXECUTION).start
+    start = open_model(task.model, ship=craft).start
     if start is None:
         return _advised(options, content, folder)
     runs = gather(task.runs, advance, task.anyway, start, task.horizon)

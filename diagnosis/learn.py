@@ -27,6 +27,7 @@ from .commands.command_line import (
     out_options,
     parser,
     prior,
+    proposing,
     run,
 )
 from .execution.progress import Advance
@@ -99,14 +100,13 @@ def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
 def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
     """The runs and the model, read and checked."""
     from .assessment.gathering import gather  # only now: it takes a while to import
-    from .commands.initial_model import initial_model, proposing
-    from .predictors import DescribedShip, ship_of_model, ship_with
+    from .predictors import DescribedShip, open_model, ship_of_model, ship_with
     from .search import shares
 
     by = method(options.method)  # before any work: an unknown name, or a library that is missing
     criterion(options.pruning)
     craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
-    model = initial_model(options.model, options.map, craft, execution_of(options))
+    model = open_model(options.model, options.map, craft, execution_of(options))
     start = model.start
     if options.fit and not model.parametric:
         raise InputError(f"--fit needs a model with parameters; {model.name} has none")

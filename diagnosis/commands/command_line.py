@@ -5,6 +5,7 @@ import io
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -144,6 +145,31 @@ def execution_of(options: argparse.Namespace) -> "Execution":
     from ..predictors import Execution  # only now: it takes a while to import
 
     return Execution(options.timeout, getattr(options, "step", None), not options.unconfined)
+
+
+@contextmanager
+def proposing() -> Iterator[None]:
+    """Where the variables of an FMU are not known inside, propose a map in the working directory.
+
+    Raises:
+        InputError: they are not.
+    """
+    from ..predictors import MAP, UnmatchedError  # only now: it takes a while to import
+
+    try:
+        yield
+    except UnmatchedError as error:
+        hint = f"'{MAP}' has the known entries: complete it, and give it by --map {MAP}"
+        if Path(MAP).exists():
+            hint = f"complete '{MAP}' for --map, or remove it to get a new proposal"
+        else:
+            from ..predictors import write_map  # only FMUs have maps
+
+            try:
+                write_map(Path(MAP), error.proposal)
+            except OSError:
+                hint = "--map FILE states them"
+        raise InputError(f"{error}; {hint}") from None
 
 
 def ship_option(made: argparse.ArgumentParser) -> None:

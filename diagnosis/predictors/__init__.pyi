@@ -2,7 +2,6 @@ from .black_box import BlackBox as BlackBox
 from .black_box import at_samples as at_samples
 from .described_ship import DescribedShip as DescribedShip
 from .described_ship import nominal as nominal
-from .described_ship import ship_name as ship_name
 from .evaluation import LEVELS as LEVELS
 from .evaluation import Bands as Bands
 from .evaluation import Evaluation as Evaluation
@@ -24,8 +23,6 @@ from .predictor import Predictor as Predictor
 from .predictor import PredictorDescription as PredictorDescription
 from .predictor import UnmatchedError as UnmatchedError
 from .predictor import open_model as open_model
-from .predictor import refuse_execution as refuse_execution
-from .predictor import refuse_map as refuse_map
 from .python_function import PythonFunction as PythonFunction
 from .ship_model import Model as Model
 from .ship_model import SampledForce as SampledForce

@@ -14,7 +14,7 @@ from ..execution.progress import Advance, silent
 from ..execution.result_folder import sha256
 from ..runs import Fingerprint, Smoothed
 from .parameter_set import read_model, write_model
-from .predictor import MODEL, Predictor, PredictorDescription, refuse_map
+from .predictor import MODEL, Predictor, PredictorDescription
 from .ship_model import Model
 from .weak_form import WeakWindows
 from .windows import Windows, free_runs
@@ -47,7 +47,7 @@ class DescribedShip:
 
     @property
     def name(self) -> str:
-        return f"the model of {ship_name(self.model.ship)}"
+        return f"the model of {self.model.ship.name}"
 
     @property
     def start(self) -> Model:
@@ -96,11 +96,6 @@ def windows_of(runs: Sequence[Smoothed], length: float) -> Windows | None:
         return None
 
 
-def ship_name(of: Ship) -> str:
-    """The name of a ship."""
-    return of.name
-
-
 def nominal(runs: Sequence[WeakWindows]) -> Model:
     """The nominal model of the ship that runs are of.
 
@@ -114,11 +109,6 @@ def nominal(runs: Sequence[WeakWindows]) -> Model:
     return Model(ship=ship(description=next(iter(ships), None)))
 
 
-def open_parameters(
-    path: Path,
-    map: Path | None,  # noqa: A002 - as the option of the commands
-    of: Ship | None,
-) -> DescribedShip:
-    """The model in a parameter set, see :func:`.predictor.open_model`."""
-    refuse_map(map)
-    return DescribedShip(read_model(path, of), path)
+def open_parameters(path: Path | None, of: Ship | None) -> DescribedShip:
+    """The model in a parameter set, or the nominal one, see :func:`.predictor.open_model`."""
+    return DescribedShip(Model(ship=of or ship()) if path is None else read_model(path, of), path)

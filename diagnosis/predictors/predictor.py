@@ -220,7 +220,7 @@ class ModelSource(Protocol):
 
 
 # Ending -> module and function of what opens such a file; imported when it is needed. The function gets
-# the path, the map of --map or None, and the ship.
+# the path and the ship, that of an FMU also the map of --map and how it is run.
 SOURCES = {
     ".fmu": ("fmu.foreign_fmu", "Fmu"),
     ".ssp": ("fmu.foreign_fmu", "Fmu"),
@@ -233,7 +233,7 @@ WRITTEN = MODEL, FOUND, MAP = "model.ssv", "found.fmu", "map.json"
 
 
 def open_model(
-    path: str | Path,
+    path: str | Path | None,
     map: str | Path | None = None,  # noqa: A002 - as the option of the commands
     ship: Ship | None = None,
     execution: Execution = DEFAULT_EXECUTION,
@@ -241,39 +241,22 @@ def open_model(
     """The model in a file, by its ending; any other ending is that of a parameter set.
 
     Args:
-        path: of the file.
+        path: of the file; None: the nominal model.
         map: file that tells which of its variables are which signals.
         ship: that it is a model of; None: that of the runs.
         execution: how an FMU is run.
 
     Raises:
-        InputError: no such file, or not what its name says; an execution for what is not an FMU.
+        InputError: no such file, or not what its name says; a map or execution for what is no FMU.
     """
-    module, opens = SOURCES.get(Path(path).suffix, SOURCES[".ssv"])
-    runs = [execution] if opens == "Fmu" else []
-    if not runs:
-        refuse_execution(execution)
-    found = import_module(f".{module}", __package__)
-    return getattr(found, opens)(Path(path), None if map is None else Path(map), ship, *runs)
-
-
-def refuse_map(map: Path | None) -> None:  # noqa: A002
-    """Refuse a map for what has none.
-
-    Raises:
-        InputError: there is one.
-    """
+    module, opens = SOURCES.get("" if path is None else Path(path).suffix, SOURCES[".ssv"])
+    opened = getattr(import_module(f".{module}", __package__), opens)
+    if opens == "Fmu":
+        return opened(path, map, ship, execution)
     if map is not None:
         raise InputError("--map belongs to an FMU: --model NAME.fmu is missing")
-
-
-def refuse_execution(execution: Execution) -> None:
-    """Refuse what says how an FMU is run for what is none.
-
-    Raises:
-        InputError: something is said.
-    """
     if execution != DEFAULT_EXECUTION:
         raise InputError(
             "--timeout, --step and --unconfined belong to an FMU: --model NAME.fmu is missing"
         )
+    return opened(None if path is None else Path(path), ship)

@@ -29,7 +29,6 @@ from ..execution.user_files import from_file
 from ..runs import Smoothed
 from .black_box import MOTION, TAU, BlackBox, Signals, commands_at
 from .described_ship import nominal
-from .predictor import refuse_map
 from .ship_model import Model
 from .weak_form import WeakWindows
 
@@ -112,17 +111,12 @@ def _law(state: vessel.State, commands: Signals, by: FunctionPredictor) -> list[
     return by.answer(state, commands)
 
 
-def open_function(
-    path: Path,
-    map: Path | None,  # noqa: A002 - as the option of the commands
-    ship: Ship | None,
-) -> PythonFunction:
+def open_function(path: Path, ship: Ship | None) -> PythonFunction:
     """The function ``acceleration`` of a file, see :func:`.predictor.open_model`.
 
     Raises:
         InputError: no such file or function, or the file fails.
     """
-    refuse_map(map)
     function = from_file(path, NAME, "a model")
     if not callable(function):
         raise InputError(f"'{path}' has no function {NAME}(state, commands)")

@@ -20,7 +20,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from cosim import InputError
 
 from ...execution.result_folder import together
-from ...predictors import ship_name
 from ...predictors.evaluation import Evaluation
 from ...report.content import Content, fmu_result, part, sensor_results, versions
 from ...runs import Fingerprint
@@ -153,7 +152,7 @@ def validate(
         "particulars": read.content.particulars.lines,
         "confinement": _confinement(comparison),
         "model": _model_name(comparison),
-        "ship": ship_name(comparison.evaluations[0].model.ship),
+        "ship": comparison.evaluations[0].model.ship.name,
         "fmu": fmu,
         "files": hashed,
         "samples": samples(comparison.evaluations),

@@ -5,7 +5,7 @@ from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -16,7 +16,8 @@ from cosim.fmu import FmuModel as FmuModel
 from fmus.frames import rotate_to_body
 from fmus.ship import ship
 
-from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
+from ...execution.result_folder import sha256
+from ...runs import OF_UNIT, QUANTITY, Run, Smoothed
 from ..black_box import (
     MOTION,
     POSE,
@@ -29,6 +30,7 @@ from ..black_box import (
     commands_at,
     planes,
 )
+from ..described_ship import nominal
 from ..predictor import (
     FOUND,
     MAP,
@@ -44,30 +46,8 @@ from .short_steps import ShortSteps
 from .variable_map import VariableMap, signal_lines, write_map
 from .wrapper import Wrapped, write_wrapper
 
-
-class FmuUse(NamedTuple):
-    """An FMU as it predicts some runs.
-
-    Attributes:
-        name, sha256: of its file.
-        confined: makes its processes.
-        step: the step that is asked for or that it suggests [s]; None: neither.
-        fixed_step: the only step that it takes, or that is asked for [s]; None: it takes any.
-        given: which of its variables is which signal, as a file or its names tell.
-        map: the same with the units that it declares.
-        learned_from: runs of which it was learned, as far as it tells.
-        files: what decides its predictions: what each file is for, its path, its SHA-256.
-    """
-
-    name: str
-    sha256: str
-    confined: ConfinedFmu
-    step: float | None
-    fixed_step: float | None
-    given: VariableMap
-    map: VariableMap
-    learned_from: tuple[Fingerprint, ...]
-    files: Sequence[tuple[str, Path, str]]
+if TYPE_CHECKING:
+    from .foreign_fmu import Fmu
 
 
 class FmuPredictor(BlackBox):
@@ -82,11 +62,18 @@ class FmuPredictor(BlackBox):
 
     kind = "FMU"
 
-    def __init__(self, fmu: FmuUse, runs: Sequence[WeakWindows], ship: Model) -> None:
-        super().__init__(fmu.name, runs, ship)
-        self.learned_from, self.files = fmu.learned_from, fmu.files
-        self.fmu, self.given, self.map = fmu, fmu.given, fmu.map
-        self.confined, self.confinement = fmu.confined, fmu.confined.confinement
+    def __init__(
+        self,
+        fmu: "Fmu",
+        process: ConfinedFmu,
+        maps: tuple[VariableMap, VariableMap],
+        runs: Sequence[WeakWindows],
+    ) -> None:
+        super().__init__(fmu.name, runs, fmu.start or nominal(runs))
+        self.fmu, self.confined, self.confinement = fmu, process, process.confinement
+        self.given, self.map = maps
+        self.learned_from = fmu.learned_from
+        self.files = [(role, path, sha256(path)) for role, path in fmu.files]
         self.lines = signal_lines(self.map, commands_of([w.run for w in runs]))
         self.starts = frozenset(self.map.told("start")) & set(MOTION)
         self.inputs = frozenset(self.map.told("inputs"))

@@ -17,9 +17,7 @@ from cybership.scratch_folder import Scratch
 from fmus.ship import Ship
 
 from ...execution.progress import Advance, silent
-from ...execution.result_folder import sha256
 from ...runs import Fingerprint, Run
-from ..described_ship import nominal
 from ..predictor import (
     DEFAULT_EXECUTION,
     Execution,
@@ -27,7 +25,7 @@ from ..predictor import (
 )
 from ..ship_model import Model
 from ..weak_form import WeakWindows
-from .fmu_predictor import FmuPredictor, FmuUse, commands_of
+from .fmu_predictor import FmuPredictor, commands_of
 from .instances import confined
 from .lineage import learned_from, parts_of
 from .ship_of_fmu import SYSTEMS
@@ -159,10 +157,8 @@ class Fmu:
         """
         measured = [w.run for w in runs]
         maps = self.given(measured), self.variables(measured)  # before a process is started
-        process, steps = confined(self.model, self.execution), (self.step, self.fixed_step)
-        files = [(role, path, sha256(path)) for role, path in self.files]
-        use = FmuUse(self.name, self.sha256, process, *steps, *maps, self.learned_from, files)
-        predictor = FmuPredictor(use, runs, self.start or nominal(runs))
+        process = confined(self.model, self.execution)
+        predictor = FmuPredictor(self, process, maps, runs)
         finalize(predictor, process.close)
         return predictor
 
