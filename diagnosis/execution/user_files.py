@@ -2,10 +2,29 @@
 
 import json
 import runpy
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from cosim import InputError
+from cosim.errors import nearest
+
+
+def chosen(
+    name: str, known: Mapping[str, tuple[str, str]], package: str | None, what: str, own: str
+) -> Any:
+    """What a name stands for: an object of a module of ``known``, or ``own`` in a user's Python file.
+
+    Raises:
+        InputError: there is no such ``what`` (for messages), or the file fails.
+    """
+    if name.endswith(".py"):
+        return from_file(Path(name), own, f"a {what}")
+    if name not in known:
+        raise InputError(f"no {what} '{name}'{nearest(name, known)}; there are {', '.join(known)}")
+    module, found = known[name]
+    return getattr(import_module(f".{module}", package), found)
 
 
 def from_file(path: Path, name: str, what: str) -> object:

@@ -19,6 +19,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
+from ..runs.cleaning import DIGITS
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
 
@@ -323,6 +324,6 @@ def true_pose(measured: Any, b: vessel.PreparedVessel) -> list[Any]:
         x, y, psi = vessel.measured(vessel.State(*pose), b)
         off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
         pose = [a + b for a, b in zip(pose, off, strict=True)]
-        if not any((np.abs(o) > np.sqrt(np.finfo(float).eps)).any() for o in off):
+        if not any((np.abs(o) > DIGITS).any() for o in off):
             break
     return pose

@@ -15,6 +15,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
+from ..runs.cleaning import DIGITS
 from .prediction import WindowStarts, arriving, filtered, propagate
 from .ship_model import Model
 from .thrust import Response
@@ -211,7 +212,7 @@ def _slope(s: vessel.State, model: Model) -> np.ndarray:
     found[:, 2, 5] = 1.0
     base = acceleration(at)
     for k, (name, speed) in enumerate(zip(("u", "v", "r"), model.ship.scale.speeds, strict=True)):
-        step = np.sqrt(np.finfo(float).eps) * speed
+        step = DIGITS * speed
         ahead = at._replace(**{name: getattr(at, name) + step})
         found[:, 3:, 3 + k] = (acceleration(ahead) - base) / step
     return found

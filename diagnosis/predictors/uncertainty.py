@@ -24,6 +24,7 @@ from functools import cache
 import numpy as np
 from scipy.special import hyp0f1
 
+from ..runs.cleaning import DIGITS
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
@@ -104,7 +105,7 @@ def _gain(corner: np.ndarray, order: int) -> np.ndarray:
 def _slope(w: WeakWindows, model: Model) -> np.ndarray:
     """Force and moment (K, 3, 3) by u, v, r over steps as large as its error."""
     error = np.median(w.smoothed.nu_std[w.known], axis=0)
-    steps = np.maximum(error, np.sqrt(np.finfo(float).eps) * np.array(w.scale.speeds))
+    steps = np.maximum(error, DIGITS * np.array(w.scale.speeds))
     _, nu = w.motion
     first = modelled_force(w, model, nu)
     changes = [modelled_force(w, model, nu + step) - first for step in np.diag(steps)]

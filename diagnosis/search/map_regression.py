@@ -18,9 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
+from ..runs.cleaning import DIGITS
 from .candidates import SLIGHT
 from .gram import Folds, GramTable
-from .most_likely import ROUNDING, ridge
+from .most_likely import ridge
 
 REPLICATES = 200  # of the block bootstrap: the standard error of a share is 3.5 % at the most
 
@@ -74,7 +75,7 @@ class CandidateRegression(NamedTuple):
         """The maximum a posteriori fits to data with Gram matrices (..., p, p)."""
         H = gram[..., self.use[:, None], self.use] + self.precision
         diagonal = np.einsum("...ii->...i", H)
-        diagonal += ROUNDING * (diagonal + self.unit**-2.0)
+        diagonal += DIGITS * (diagonal + self.unit**-2.0)
         given = np.flatnonzero(self.target)
         right = gram[..., self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
         beta = np.linalg.solve(H, right[..., None])[..., 0]

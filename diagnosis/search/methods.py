@@ -1,15 +1,12 @@
 """Methods of identification behind one interface, and the table of those that there are."""
 
 from collections.abc import Sequence
-from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from cosim import InputError
-from cosim.errors import nearest
 
 from ..execution.progress import Advance
-from ..execution.user_files import from_file
+from ..execution.user_files import chosen
 
 if TYPE_CHECKING:
     from ..predictors import Model, WeakWindows
@@ -75,21 +72,12 @@ def method(name: str = DEFAULT) -> Method:
     Raises:
         InputError: there is none of this name, it needs what is not installed, or the file fails.
     """
-    if name.endswith(".py"):
-        return _from_file(Path(name))
-    if name not in METHODS:
-        raise InputError(f"no method '{name}'{nearest(name, METHODS)}; there are {', '.join(METHODS)}")
-    module, made = METHODS[name]
     try:
-        return getattr(import_module(f".{module}", __package__), made)()
+        found = chosen(name, METHODS, __package__, "method", "METHOD")
+        found = found() if name in METHODS else found
     except ModuleNotFoundError as error:
         library = (error.name or "a library").partition(".")[0]
         raise InputError(f"method '{name}' needs {library}: pip install 'cybership[analysis]'") from None
-
-
-def _from_file(path: Path) -> Method:
-    """The method that a user's file declares."""
-    found = from_file(path, "METHOD", "a method")
     if not isinstance(found, Method) or isinstance(found, type):
-        raise InputError(f"'{path}' has no METHOD = ..., an object with a name and a function fit")
+        raise InputError(f"'{name}' has no METHOD = ..., an object with a name and a function fit")
     return found

@@ -14,12 +14,11 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ..predictors.evaluation import quantile
-from ..runs.cleaning import CHANCE
+from ..runs.cleaning import CHANCE, DIGITS
 
 STEPS = 6  # of whatever is iterated, and halvings of a step, at the most; two or three are usual
 ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
 LEVEL = 0.95  # probability of the intervals of values, and of the sets of ids; contract
-ROUNDING = np.sqrt(np.finfo(float).eps)  # relative, far above that of a sum: collinear parameters share
 
 At = TypeVar("At")
 
@@ -53,8 +52,11 @@ def beyond(places: int) -> float:
 
 
 def ridge(H: np.ndarray, unit: np.ndarray | float = 1.0) -> np.ndarray:
-    """(p, p), what makes an information matrix regular, for parameters with units (p,)."""
-    return ROUNDING * np.diag(np.diag(H) + np.power(unit, -2.0))
+    """(p, p), what makes an information matrix regular, for parameters with units (p,).
+
+    It is far above the rounding of a sum, so that collinear parameters share.
+    """
+    return DIGITS * np.diag(np.diag(H) + np.power(unit, -2.0))
 
 
 def most_likely(

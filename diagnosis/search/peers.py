@@ -20,10 +20,10 @@ from cosim import InputError
 
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
+from ..runs.cleaning import DIGITS
 from .candidates import Candidate, CandidateShape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import FOLDS, block_numbers
-from .most_likely import ROUNDING
 from .prior import Prior
 
 THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
@@ -77,7 +77,7 @@ def features(data: Sequence[WeakWindows], model: Model) -> Features:
     owner = np.repeat(np.arange(len(columns)), [x.shape[1] for x in columns])
     A = np.concatenate(columns, axis=1)
     scale, size = A.std(axis=0), float(target.std())
-    live = scale * np.concatenate(units) > ROUNDING * size
+    live = scale * np.concatenate(units) > DIGITS * size
     blocks = np.repeat(np.unique(block_numbers(data), axis=0, return_inverse=True)[1].ravel(), 3)
     used = [n for n, keep in zip(names, live, strict=True) if keep]
     standard = A[:, live] / scale[live]

@@ -1,13 +1,10 @@
 """Criteria of pruning behind one interface, and the table of those that there are."""
 
-from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 from cosim import InputError
-from cosim.errors import nearest
 
-from ..execution.user_files import from_file
+from ..execution.user_files import chosen
 
 if TYPE_CHECKING:
     from .validation_data import Losses
@@ -33,8 +30,8 @@ class Harm(Protocol):
         ...
 
 
-# Name -> module of this room with a function ``harm``.
-CRITERIA = {"paired": "paired_errors", "bic": "information_criterion"}
+# Name -> module of this room and its function.
+CRITERIA = {"paired": ("paired_errors", "harm"), "bic": ("information_criterion", "harm")}
 USUAL = "paired"
 
 
@@ -48,12 +45,7 @@ def criterion(name: str = USUAL) -> Harm:
     Raises:
         InputError: there is none of this name, or the file fails.
     """
-    if name.endswith(".py"):
-        found: Any = from_file(Path(name), "harm", "a criterion of pruning")
-        if not callable(found):
-            raise InputError(f"'{name}' has no function harm(its, others, more)")
-        return cast(Harm, found)
-    if name not in CRITERIA:
-        known = ", ".join(CRITERIA)
-        raise InputError(f"no criterion of pruning '{name}'{nearest(name, CRITERIA)}; there are {known}")
-    return import_module(f".{CRITERIA[name]}", __package__).harm
+    found = chosen(name, CRITERIA, __package__, "criterion of pruning", "harm")
+    if not callable(found):
+        raise InputError(f"'{name}' has no function harm(its, others, more)")
+    return cast(Harm, found)

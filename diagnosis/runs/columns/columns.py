@@ -19,7 +19,6 @@ docs/measurements.md.
 """
 
 import codecs
-import json
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -45,6 +44,7 @@ from cosim.trials import KINDS
 from cybership.message_text import Location, first_fault, name_of, quoted
 from fmus.ship import Ship
 
+from ...execution.user_files import json_content
 from .unit_check import UNITS
 
 FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
@@ -278,13 +278,9 @@ def stated_layout(path: Path) -> Layout | None:
 
 def _layout_in(beside: Path) -> Layout:
     try:
-        return Layout.model_validate(json.loads(beside.read_text(encoding="utf-8")))
+        return Layout.model_validate(json_content(beside, "a side-car"))
     except ValidationError as error:
         raise InputError(f"'{beside}': {first_fault(error, _nearest_key)}") from None
-    except RecursionError:
-        raise InputError(f"'{beside}' cannot be read: it is nested too deeply") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{beside}' cannot be read: {error}") from None
 
 
 def _nearest_key(location: Location) -> str:

@@ -30,8 +30,9 @@ from ...execution.parallel import for_each
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
+from ...runs.cleaning import DIGITS
 from ..candidates import SMALL, model_error
-from ..most_likely import ROUNDING, STEPS, Quadratic, most_likely, ridge
+from ..most_likely import STEPS, Quadratic, most_likely, ridge
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
@@ -171,7 +172,7 @@ class PredictionFit:
         whole = _square(V, s.noise[fine] + missed[fine, None])
         # Of a ship that turns far within a window rounding alone would make it indefinite.
         diagonal = np.einsum("wii->wi", whole)
-        diagonal += ROUNDING * diagonal.max(axis=1, keepdims=True)
+        diagonal += DIGITS * diagonal.max(axis=1, keepdims=True)
         found[fine] = np.linalg.inv(np.linalg.cholesky(whole))
         return found
 
