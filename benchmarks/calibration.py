@@ -25,7 +25,7 @@ import numpy as np
 from diagnosis import Model, clean, diagnose, evaluate, load, smooth, weak_windows
 from diagnosis.predictors import LEVELS
 from diagnosis.search.candidates import model_error
-from diagnosis.search.prediction_fit.fit import Fitted, fit_predictions, shootings
+from diagnosis.search.prediction_fit.fit import Fitted, PredictionFit, fit_to, shootings
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
 from diagnosis.search.prediction_fit.refit import fit_model_error
@@ -94,7 +94,7 @@ def fitted(problem: Problem) -> tuple[Fitted, NominalPrior, list]:
     for _ in range(2):  # the second time with what the first leaves as noise
         sigma = np.sqrt(np.mean(model_error(train, at.model(prior)) ** 2, axis=0))
         at, _ = fit_model_error(at, sigma, train, prior)
-    return fit_predictions(train, shootings(train), at, prior), prior, runs
+    return fit_to(PredictionFit(train, shootings(train), at, prior), at), prior, runs
 
 
 def simulated(seeds: Sequence[int], noise: str, folder: Path) -> Found:

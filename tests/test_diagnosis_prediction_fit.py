@@ -19,7 +19,7 @@ from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.prediction_fit import disturbance as pushes
 from diagnosis.search.prediction_fit.disturbance import ForceDisturbance, covariance, estimate
 from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
-from diagnosis.search.prediction_fit.fit import fit_predictions, shootings
+from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, shootings
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
 from diagnosis.search.prediction_fit.refit import fit_model_error, to_predictions
@@ -85,7 +85,7 @@ def as_modelled():
 def fitted():
     prior = NominalPrior.of(Model(), {"damping": 0.1})
     at = RefinedModel(Model(), np.zeros(prior.size), {"delta_X_u": -0.5}, np.zeros((1, 1)))
-    return fit_predictions([hidden()], shootings([hidden()]), at, prior), prior
+    return fit_to(PredictionFit([hidden()], shootings([hidden()]), at, prior), at), prior
 
 
 def test_slopes_are_those_of_one_model_after_the_other():
@@ -264,7 +264,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
     for _ in range(2):  # the second time with what the first leaves as noise
         sigma = np.sqrt(np.mean(model_error(data, at.model(prior)) ** 2, axis=0))
         at, std = fit_model_error(at, sigma, data, prior)
-    fit = fit_predictions(data, shootings(data), at, prior)
+    fit = fit_to(PredictionFit(data, shootings(data), at, prior), at)
     true = LIGHTLY_DAMPED - Model().value("N_r")
     assert at.values["delta_N_r"] - true > 3.0 * std["delta_N_r"]
     found, error = fit.estimate.values["delta_N_r"], np.sqrt(fit.covariance[0, 0])

@@ -17,7 +17,6 @@ from diagnosis.acceptance import FILES, json_schema, read_criteria, template
 from diagnosis.acceptance.budget import (
     Budget,
     Learned,
-    Sources,
     budget,
     combined,
     read_learned,
@@ -178,7 +177,7 @@ def test_uncertainties_combine_by_their_squares():
 
 def test_a_budget_is_over_the_windows_that_count():
     one = {"u": np.array([1.0, 9.0, 100.0])}
-    s = Sources(one, one, None, None, None, None, one, {})
+    s = dict.fromkeys(Budget._fields, "not given") | {"measurement": one}
     found = budget("u", [s], [np.array([True, True, False])])
     assert found.measurement == pytest.approx(np.sqrt(5.0))
     assert found.parameters is None
@@ -199,10 +198,10 @@ def with_std(predictions, **std):
 def test_the_initial_state_in_closed_form(comparison):
     """A shift moves the end by as much; of a velocity, for a short while, what it covers in that time."""
     p = Predictions(comparison.evaluations[0], 1.0)
-    shifted = sources_of(with_std(p, eta_std=[3e-3, 4e-3, 0.0]), None).initial_state
+    shifted = sources_of(with_std(p, eta_std=[3e-3, 4e-3, 0.0]), None)["initial_state"]
     assert shifted["position"] == pytest.approx(np.full(p.rows.size, 25e-6), rel=1e-6)
     assert shifted["heading"] == pytest.approx(0.0)
-    faster = sources_of(with_std(p, eta_dot_std=[3e-3, 4e-3, 2e-3]), None).initial_state
+    faster = sources_of(with_std(p, eta_dot_std=[3e-3, 4e-3, 2e-3]), None)["initial_state"]
     seconds = p.smoothed.time[p.rows] - p.start
     assert np.sqrt(faster["position"]) == pytest.approx(5e-3 * seconds, rel=0.2)
     assert np.sqrt(faster["heading"]) == pytest.approx(2e-3 * seconds, rel=0.35)  # yaw is damped
@@ -210,8 +209,8 @@ def test_the_initial_state_in_closed_form(comparison):
 
 def test_parameters_and_process_noise(predictions):
     """By one parameter as its change does; both quadratic in their size, and unknown without a posterior."""
-    assert sources_of(predictions, None).parameters is None
-    assert sources_of(predictions, None).process_noise is None
+    assert isinstance(sources_of(predictions, None)["parameters"], str)
+    assert isinstance(sources_of(predictions, None)["process_noise"], str)
     size = np.array([0.02, 0.01, 0.005])
     found = []
     for factor in (1.0, 2.0):
@@ -223,12 +222,14 @@ def test_parameters_and_process_noise(predictions):
         )
     (changed,) = predictions.motions([predictions.model.plus({"X_u": 0.01})])
     expected = judged("position", difference(changed, predictions.motion))
-    assert np.sqrt(found[0].parameters["position"]) == pytest.approx(expected, rel=1e-3)
-    assert found[1].parameters["position"] == pytest.approx(
-        4.0 * found[0].parameters["position"], rel=1e-2
+    assert np.sqrt(found[0]["parameters"]["position"]) == pytest.approx(expected, rel=1e-3)
+    assert found[1]["parameters"]["position"] == pytest.approx(
+        4.0 * found[0]["parameters"]["position"], rel=1e-2
     )
-    assert found[1].process_noise["heading"] == pytest.approx(4.0 * found[0].process_noise["heading"])
-    assert "u" not in found[0].process_noise
+    assert found[1]["process_noise"]["heading"] == pytest.approx(
+        4.0 * found[0]["process_noise"]["heading"]
+    )
+    assert "u" not in found[0]["process_noise"]
 
 
 def test_predicted_velocities_are_those_of_the_ship(predictions):

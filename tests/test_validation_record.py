@@ -276,14 +276,14 @@ def test_u_num_is_not_known_where_steps_do_not_act(comparison):
 
 def test_current_and_wind_are_inputs_where_they_are_known(comparison):
     p = Predictions(comparison.evaluations[0], 4.0)
-    assert sources_of(p, None).current is None
+    assert isinstance(sources_of(p, None)["current"], str)
     one, two = (sources_of(p, None, InputStd(current=k * 0.01, wind=0.0)) for k in (1.0, 2.0))
-    assert np.sqrt(two.current["position"]) == pytest.approx(
-        2.0 * np.sqrt(one.current["position"]), rel=0.1
+    assert np.sqrt(two["current"]["position"]) == pytest.approx(
+        2.0 * np.sqrt(one["current"]["position"]), rel=0.1
     )
     # Still water carries a ship that follows it by less than the current goes.
-    assert 0.0 < np.sqrt(one.current["position"]).mean() < np.sqrt(2.0) * 0.01 * 4.0
-    assert one.wind["position"] == pytest.approx(0.0)
+    assert 0.0 < np.sqrt(one["current"]["position"]).mean() < np.sqrt(2.0) * 0.01 * 4.0
+    assert one["wind"]["position"] == pytest.approx(0.0)
 
 
 def test_met_says_what_is_not_known(comparison, tmp_path):

@@ -11,7 +11,7 @@ the order of convergence that these show (ASME V&V 20, section 2); where they sh
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot, isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -36,8 +36,9 @@ SAME = 1e-6  # of a value or its standard deviation: rounding in files; chosen
 ROUNDING = 1e-9  # of the motion: a change that is none, but of the last digits of a log; chosen
 SLOWEST = 0.5  # order of convergence below which there is none; chosen, an explicit Euler method has 1
 HIGHEST = 5.0  # and above which halving did not act on each step; chosen, that of Runge and Kutta has 4
-# Quantity -> variance in each window (w,); None: not known.
-Variances = Mapping[str, np.ndarray] | None
+Variances = Mapping[str, np.ndarray]  # quantity -> variance in each window (w,)
+# Source, as a field of Budget -> variances of the predictions, or why they are not known.
+Sources = Mapping[str, Variances | str]
 
 
 class Learned(NamedTuple):
@@ -91,29 +92,14 @@ def read_learned(folder: str | Path) -> Learned:
     return Learned(posterior, ForceDisturbance(size, time), files, learned_from)
 
 
-@dataclass(frozen=True, eq=False)
-class Sources:
-    """Variances of the windows' predictions, by source; None in place of one that is not known.
+class Budget(NamedTuple):
+    """Standard uncertainties of one quantity, SI; None: not known. Combined ones hold what is known.
 
     Attributes:
-        measurement: of what a prediction is held against (u_D).
+        measurement: of what a prediction is compared with (u_D).
         initial_state, parameters, process_noise, current, wind: of what goes into it (u_input).
         numerical: of the steps (u_num).
-        notes: source -> why it is not known, or what it leaves out.
     """
-
-    measurement: Variances
-    initial_state: Variances
-    parameters: Variances
-    process_noise: Variances
-    current: Variances
-    wind: Variances
-    numerical: Variances
-    notes: Mapping[str, str]
-
-
-class Budget(NamedTuple):
-    """Standard uncertainties of one quantity, SI; None: not known. Combined ones hold what is known."""
 
     measurement: float | None
     initial_state: float | None
@@ -150,14 +136,14 @@ def combined(*parts: float | None) -> float:
     return hypot(*(u for u in parts if u is not None))
 
 
-def budget(quantity: str, sources: list[Sources], counted: list[np.ndarray]) -> Budget:
+def budget(quantity: str, sources: Sequence[Sources], counted: list[np.ndarray]) -> Budget:
     """The budget of a quantity over the windows of some runs that count, of each a mask (w,)."""
 
     def over_runs(name: str) -> float | None:
         found = []
         for s, rows in zip(sources, counted, strict=True):
-            variances: Variances = getattr(s, name)
-            if variances is None or quantity not in variances:
+            variances = s[name]
+            if isinstance(variances, str) or quantity not in variances:
                 return None
             found.append(variances[quantity][rows])
         u = float(np.sqrt(np.mean(np.concatenate(found)))) if found else np.nan
@@ -168,26 +154,23 @@ def budget(quantity: str, sources: list[Sources], counted: list[np.ndarray]) -> 
 
 def sources_of(p: Predictions, learned: Learned | None, acting: InputStd | None = None) -> Sources:
     """The uncertainty of a run's predictions, by source; ``acting``: that of current and wind."""
-    notes: dict[str, str] = {}
-
-    def known(name: str, found: Callable[[], Variances]) -> Variances:
-        try:
-            return found()
-        except InputError as error:
-            notes[name] = str(error)
-            return None
-
     base = p.motion
-    return Sources(
-        _measurement(p),
-        known("initial_state", lambda: _initial(p, base)),
-        known("parameters", lambda: _parameters(p, base, learned)),
-        known("process_noise", lambda: _process_noise(p, learned)),
-        known("current", lambda: _acting(p, base, CURRENT, acting and acting.current)),
-        known("wind", lambda: _acting(p, base, WIND, acting and acting.wind)),
-        known("numerical", lambda: _numerical(p, base)),
-        notes,
-    )
+    parts: dict[str, Callable[[], Variances]] = {
+        "measurement": lambda: _measurement(p),
+        "initial_state": lambda: _initial(p, base),
+        "parameters": lambda: _parameters(p, base, learned),
+        "process_noise": lambda: _process_noise(p, learned),
+        "current": lambda: _acting(p, base, CURRENT, acting and acting.current),
+        "wind": lambda: _acting(p, base, WIND, acting and acting.wind),
+        "numerical": lambda: _numerical(p, base),
+    }
+    found: dict[str, Variances | str] = {}
+    for name, of in parts.items():
+        try:
+            found[name] = of()
+        except InputError as error:
+            found[name] = str(error)
+    return found
 
 
 def _squares(*changes: np.ndarray) -> dict[str, np.ndarray]:

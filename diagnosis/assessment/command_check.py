@@ -6,12 +6,12 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.thrust import full_thrust
-from ..predictors.weak_form import BLOCK
+from ..predictors.weak_form import BLOCK, needed_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU
 from ..runs.columns.side_car import ColumnChange
 from ..runs.files.resolution import FUZZ
-from .readings import inertial, needed
+from .readings import inertial
 from .settings import SETTINGS
 
 
@@ -86,7 +86,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
         return (
             "all its commands are constant, so the response of the ship to commands cannot be estimated"
         )
-    z = needed(w, model)
+    z = needed_force(w, model)
     size = np.sqrt((z**2).mean(axis=0))
     for k in np.flatnonzero(~varies):
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
@@ -120,7 +120,7 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     idle = (every.held @ given).max(axis=1) == 0.0
     if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
-    still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))
+    still = np.sqrt((needed_force(every, model)[idle] ** 2).mean(axis=0))
     if (still < SETTINGS.explained * size).any():
         return None
     return (

@@ -24,8 +24,8 @@ from scipy.optimize import lsq_linear
 
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
-from ..predictors.weak_form import OVERLAP
-from .readings import Reading, inertial, needed, reread
+from ..predictors.weak_form import OVERLAP, needed_force
+from .readings import Reading, inertial, reread
 from .settings import SETTINGS
 
 ROUNDS = 5  # of noise and explanation in turn; the density is then within 0.1 of its limit
@@ -88,7 +88,7 @@ class ReadingOdds:
         """Logarithm of the density of the run's motion by a reading."""
         with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
             w = reread(self.w, reading, self.model)
-            e, z, a = omega(w, self.model), needed(w, self.model), inertial(w, self.model)
+            e, z, a = omega(w, self.model), needed_force(w, self.model), inertial(w, self.model)
             each = [omega(w, self.model.plus({n: 1.0})) - e for n in self._thrusters]
             streams = [omega(w, self.model.plus({n: self._stream})) - e for n in ("V_n", "V_e")]
             found = np.concatenate([e, z, a, *each, *streams])

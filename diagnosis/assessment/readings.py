@@ -170,13 +170,7 @@ def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
     return replace(w, smoothed=meant, slope=w.slope / reading.pace, memory=memory)
 
 
-def needed(w: WeakWindows, model: Model) -> np.ndarray:
-    """Force (K, 3) that the motion of a run needs by a model's inertia and hull [N, N, N m]."""
-    with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
-        return np.nan_to_num(needed_force(w, model), posinf=0.0, neginf=0.0)
-
-
 def inertial(w: WeakWindows, model: Model) -> np.ndarray:
-    """The part (K, 3) of it that is not damping: M nu_dot + C nu [N, N, N m]."""
+    """The part (K, 3) of the needed force that is not damping: M nu_dot + C nu [N, N, N m]."""
     none = {v.name: 0.0 for v in variables(type(model.hull.params.damping))}
-    return needed(w, replace(model, vessel=dict(model.vessel) | none))
+    return needed_force(w, replace(model, vessel=dict(model.vessel) | none))

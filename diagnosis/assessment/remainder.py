@@ -105,11 +105,6 @@ def noise_of(runs: Sequence[WeakWindows], start: Model, model: Model) -> list[np
     return [omega_std(w, replace(start, measurement=model.measurement)) for w in runs]
 
 
-def any_significant(runs: Sequence[WeakWindows], start: Model, model: Model) -> bool:
-    """Whether a model leaves a significant residual on some axis."""
-    return any(axis.significant for axis in remaining(runs, start, model).values())
-
-
 def axis_remainders(
     data: Sequence[WeakWindows],
     before: Sequence[np.ndarray],

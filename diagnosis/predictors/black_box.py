@@ -32,6 +32,7 @@ from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.ops import wrap
 
 from ..runs import Fingerprint, Run, Smoothed
+from ..runs.cleaning import between
 from .described_ship import DescribedShip, windows_of
 from .prediction import WindowStarts, at_rest
 from .predictor import Predictor, PredictorDescription
@@ -281,11 +282,6 @@ class BlackBox(ABC):
         rigid = np.array([[i.m, 0.0, 0.0], [0.0, i.m, i.m * i.x_g], [0.0, i.m * i.x_g, i.I_z]])
         (X, *_), (_, Y, Y_r), (_, N_v, N) = (rigid - M).tolist()
         return {"X_udot": X, "Y_vdot": Y, "Y_rdot": Y_r, "N_vdot": N_v, "N_rdot": N}
-
-
-def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (n, m) at some times (n,) by linear interpolation of those (k, m) at known ones (k,)."""
-    return np.column_stack([np.interp(time, known, x) for x in values.T])
 
 
 def commanded(run: Run) -> dict[str, np.ndarray]:

@@ -16,7 +16,7 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed
 from ..runs.cleaning import DIGITS
-from .prediction import WindowStarts, arriving, filtered, propagate
+from .prediction import WindowStarts, arriving, filtered, propagate, stacked
 from .ship_model import Model
 from .thrust import Response
 from .windows import usable_windows
@@ -124,15 +124,15 @@ class Shooting:
         """
         key = Response.key(model), model.filters
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
-        same = {n: steps[n] for n, m in changed.items() if (Response.key(m), m.filters) == key}
-        together = _together(model, same)
+        same = {n: m for n, m in changed.items() if (Response.key(m), m.filters) == key}
+        together = stacked([model, *same.values()])
         states = self._states(together, model)
         base, *others = self._poses(states, together)
         found = dict(zip(same, others, strict=True))
         found |= {n: self._poses(self._states(m), m)[0] for n, m in changed.items() if n not in found}
         slopes = [_off(found[n], base) / h for n, h in steps.items()]
-        stacked = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
-        return Around(_off(self.measured, base), stacked, self._linear(states, model))
+        by_parameter = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
+        return Around(_off(self.measured, base), by_parameter, self._linear(states, model))
 
     def _poses(self, states: Sequence[vessel.State], model: Model) -> np.ndarray:
         """(p, w, T, 3): measured pose at the instants; parameters of the model may be arrays (p, 1)."""
@@ -184,16 +184,6 @@ def _off(pose: np.ndarray, other: np.ndarray) -> np.ndarray:
         off = pose - other
         off[..., 2] = wrap(off[..., 2])
     return off
-
-
-def _together(model: Model, steps: Mapping[str, float]) -> Model:
-    """A model, and models that differ from it in one parameter each, as one with arrays (p, 1)."""
-    parts = {part: dict(getattr(model, part)) for part in model.ship.parameters}
-    for k, (name, step) in enumerate(steps.items()):
-        values = np.full((len(steps) + 1, 1), model.value(name))
-        values[k + 1] += step
-        parts[model.owner(name)][name] = values
-    return replace(model, **parts)
 
 
 def _slope(s: vessel.State, model: Model) -> np.ndarray:

@@ -208,8 +208,9 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
-    """Force (K, 3) [N, N, N m] that a motion needs by a model's inertia and hull."""
-    return _balance(w, model, thrust=False)
+    """Force (K, 3) [N, N, N m] that a motion needs by a model's inertia and hull; 0 where not finite."""
+    with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
+        return np.nan_to_num(_balance(w, model, thrust=False), posinf=0.0, neginf=0.0)
 
 
 def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:

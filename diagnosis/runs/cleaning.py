@@ -35,6 +35,7 @@ HELD, LONG = 0.5, 5.0
 PLACE, HEADING = slice(0, 2), slice(2, 3)  # channels of the pose, each of one receiver
 FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 FEWEST = 4  # samples, without which there is no third difference
+SHOWN = 3  # items of a list that a message states one by one; chosen
 DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
 # Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
@@ -288,6 +289,11 @@ def in_order(time: np.ndarray) -> np.ndarray:
 def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Integral (n, k) over times (n,) [s], from the first one, of values (n, k) that are held."""
     return np.vstack([0.0 * values[:1], np.cumsum(values[:-1] * np.diff(time)[:, None], axis=0)])
+
+
+def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n, m) at some times (n,) by linear interpolation of those (k, m) at known ones (k,)."""
+    return np.column_stack([np.interp(time, known, x) for x in values.T])
 
 
 def lost(pose: np.ndarray) -> np.ndarray:

@@ -9,13 +9,12 @@ import numpy as np
 
 from fmus.ops import wrap
 
-from .cleaning import noise, repeated
+from .cleaning import FEWEST, SHOWN, noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import UNITS
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
-FIRST = 3  # outliers whose times are stated
 # Relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
 # begins below half of it.
 HARDLY_KNOWN = 0.3
@@ -106,7 +105,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
             GIVEN if name in given else ESTIMATED,
             _correlation(s.time[right], off[right, k]),
             outliers=wrong.size,
-            outlier_times=tuple(s.time[wrong[:FIRST]].tolist()),
+            outlier_times=tuple(s.time[wrong[:SHOWN]].tolist()),
         )
     if s.sensors is None:
         return
@@ -116,7 +115,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
     for name, values in {**s.sensors.run.measured, **s.sensors.aside}.items():
         there = np.isfinite(values) & np.isfinite(time)
         new = there & ~repeated(values[:, None], there)
-        if new.sum() > FIRST:
+        if new.sum() >= FEWEST:
             yield MeasuredChannel(
                 name,
                 _rate(time[new]),
@@ -152,7 +151,7 @@ def _rate(time: np.ndarray) -> float:
 def _correlation(time: np.ndarray, off: np.ndarray) -> float:
     """Time constant [s] of residuals (n,) at times (n,) [s], if their correlation is significant."""
     step = np.diff(time)
-    if step.size < FIRST:
+    if time.size < FEWEST:
         return 0.0
     period = float(np.median(step))
     near = step < 1.5 * period

@@ -4,6 +4,7 @@ import numpy as np
 
 from fmus.frames import air_velocity, rotate_to_earth
 
+from .cleaning import between
 from .files.reading import Run
 
 TRUE = ("wind_speed", "wind_direction")
@@ -32,4 +33,4 @@ def air_along(run: Run, psi: np.ndarray, nu: np.ndarray) -> np.ndarray | None:
     known = np.isfinite(air).all(axis=1) & np.isfinite(run.time)
     if not known.any():
         return None
-    return np.column_stack([np.interp(run.time, run.time[known], x[known]) for x in air.T])
+    return between(run.time, run.time[known], air[known])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .cleaning import BRIEF, DIGITS, EVERY, Track, impulse, long_gap
+from .cleaning import BRIEF, DIGITS, EVERY, Track, between, impulse, long_gap
 
 # Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
@@ -113,5 +113,5 @@ def _by(part: np.ndarray, values: np.ndarray) -> Any:
 
 def _mean(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Means from each edge (m,) to the next of values (n, k) that are held; the last as it is."""
-    at = np.column_stack([np.interp(edges, time, column) for column in impulse(time, values).T])
+    at = between(edges, time, impulse(time, values))
     return np.vstack([np.diff(at, axis=0) / np.diff(edges)[:, None], values[-1:]])

@@ -11,7 +11,7 @@ from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from .confidence import confidence_of
-from .paired_errors import gain, harm, harms
+from .paired_errors import gain, harm
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -91,5 +91,5 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         now = still
     if harm(now, first) or gain(other, now) <= 0.0:
         return None
-    rejected = data.validate and harms(data, best.findings.model, start)
+    rejected = data.validate and harm(*data.losses(best.findings.model, start))
     return None if rejected else best

@@ -23,7 +23,7 @@ from ..search.prediction_fit.refit import to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
 from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
-from .paired_errors import harms
+from .paired_errors import harm
 from .pruning import NOTHING, Withdrawn, prune
 from .pruning_criteria import Harm
 from .shares import shares, unique_shares
@@ -125,7 +125,7 @@ def judge(
     advance("fit to predictions")
     changed = bool(learned.effects) or refitted
     fit = to_predictions(learned, train, prior, changed)
-    if data.validate and harms(data, fit.findings.model, start):
+    if data.validate and harm(*data.losses(fit.findings.model, start)):
         # The fit by the model error was compared with these runs already.
         fit = fit.about(learned)
     left = {f.id for f in fit.findings.effects}

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from ..predictors import Model
-from ..search.findings import Findings
 from ..search.significance import worse
-from .validation_data import Losses, ValidationData
+from .validation_data import Losses
 
 FITS = "the model fits {where} worse"
 PREDICTS = "predictions of {where} are worse"
@@ -34,12 +32,6 @@ def predicts_worse(its: Losses, others: Losses) -> bool:
     if any(worse(b, a) for a, b in pairs):
         return bool(sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs) > 0.0)
     return True
-
-
-def harms(data: ValidationData, found: Findings | Model, other: Findings | Model) -> str:
-    """The same of findings or a model compared with another, on the data that decide."""
-    its, others = data.losses(found, other)
-    return harm(its, others)
 
 
 def gain(its: Losses, others: Losses) -> float:

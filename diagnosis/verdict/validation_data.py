@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim import InputError
 
-from ..assessment.remainder import any_significant
+from ..assessment.remainder import remaining
 from ..execution.parallel import in_halves
 from ..predictors import Model, WeakWindows, Windows, omega
 from ..predictors.windows import ANY_TIME
@@ -119,7 +119,7 @@ class ValidationData:
 
     def remains(self, model: Model) -> bool:
         """Whether a model leaves a significant residual."""
-        return any_significant(self.runs, self.start, model)
+        return any(a.significant for a in remaining(self.runs, self.start, model).values())
 
     def losses(self, *found: Findings | Model) -> list[Losses]:
         """Losses of models, each fitted without the fold that it is judged on."""

@@ -218,7 +218,8 @@ class _JudgedRuns:
                 self._notes.append(str(error))
                 continue
             found = sources_of(p, self._learned, self._acting)
-            self._notes += [f"{name.replace('_', ' ')}: {why}" for name, why in found.notes.items()]
+            unknown = ((name, why) for name, why in found.items() if isinstance(why, str))
+            self._notes += [f"{name.replace('_', ' ')}: {why}" for name, why in unknown]
             same = frozenset(name for pair in self.same if e.name in pair for name in pair)
             yield Predicted(e.name, p, found, window_means(p), same, e.name in self._seen)
 

@@ -5,11 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..cleaning import Z95
+from ..cleaning import SHOWN, Z95
 from ..files.reading import Run
 from .constants import Kind
-
-MOST_STRETCHES = 3  # of a clock, each with its line; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +103,7 @@ def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
     """A line for each fault; many stretches of a clock share one."""
     found = list(found)
     rates = [f for f in found if f.kind == "clock_rate"]
-    if len(rates) > MOST_STRETCHES:
+    if len(rates) > SHOWN:
         values = [f.value for f in rates]
         span = f"{min(values):.3g} to {max(values):.3g} s pass in one second of it"
         yield f"the clock of the log runs unevenly: {span}, in {len(rates)} stretches"

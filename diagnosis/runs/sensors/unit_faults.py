@@ -8,6 +8,7 @@ import numpy as np
 from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.scale import Scale
 
+from ..cleaning import between
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
@@ -96,7 +97,7 @@ def sway(run: Run, scale: Scale) -> Examined:
 def _position(e: Evidence) -> np.ndarray:
     """(n, 2), position in all rows [m]."""
     at, time = e.rows, e.time
-    return np.column_stack([np.interp(time, time[at], e.run.pose[at, k]) for k in (0, 1)])
+    return between(time, time[at], e.run.pose[at, :2])
 
 
 def _windows(e: Evidence, *paths: np.ndarray) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fmus.scale import Scale
 
-from ..cleaning import Track, impulse
+from ..cleaning import Track, between, impulse
 from ..linear_filter import filtered
 from .spline import Knots
 
@@ -111,10 +111,6 @@ class Commands:
         row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
         return self._impulses[row] + run.tau_cmd[row] * (time - run.time[row])[:, None]
 
-    def sampled(self, x: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Signals (m, k) at times [s]."""
-        return np.column_stack([np.interp(time, self.even, column) for column in x.T])
-
     def motion(self, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity (m, k) by accelerations (m, k), each held for a step.
 
@@ -138,6 +134,6 @@ class Commands:
         a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
-        sampled = (self.sampled(each, self.track.run.time).T for each in (x, x_dot, x_ddot))
+        sampled = (between(self.track.run.time, self.even, each).T for each in (x, x_dot, x_ddot))
         eta = [np.column_stack([plane.real, plane.imag, yaw.real]) for plane, yaw in sampled]
         return CommandResponse(eta[0], eta[1], eta[2], delay)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
-from ..cleaning import BRIEF, CHANCE, DIGITS, WIDTH
+from ..cleaning import BRIEF, CHANCE, DIGITS, WIDTH, between
 from .command_motion import FORGETTING, Commands
 from .penalised import Fit, Problem
 from .spline import middles
@@ -51,8 +51,8 @@ class Regression:
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
         commands, time = self.commands, self.time + self.commands.track.run.time[0]
-        ahead = commands.sampled(commands.motion(commands.rotation[:, None] * tau)[0], time)
-        yaw = commands.sampled(commands.motion(tau)[0], time)
+        ahead = between(time, commands.even, commands.motion(commands.rotation[:, None] * tau)[0])
+        yaw = between(time, commands.even, commands.motion(tau)[0])
         # A force to starboard moves the ship as one ahead does, a right angle further.
         north, east = np.real(ahead), np.imag(ahead)
         plane = {0: np.hstack([north, -east]), 1: np.hstack([east, north])}

@@ -19,7 +19,8 @@ from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
 from ...runs import Run, Smoothed, SmoothMotion, without_commands
-from ...runs.cleaning import BRIEF
+from ...runs.cleaning import BRIEF, between
+from ...runs.files.telegrams import groups_of
 from ..map_regression import REPLICATES
 
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
@@ -204,14 +205,13 @@ def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.nd
 def stretches(error: np.ndarray, time: np.ndarray, step: float) -> list[np.ndarray]:
     """Parts (m, 3) without a gap and long enough for a spectrum, a row each ``step`` [s]."""
     known = np.isfinite(error).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
     found = []
-    for first, end in edges.reshape(-1, 2):
+    for first, end in groups_of(known):
         even = np.arange(float(time[first]), float(time[end - 1]), step)
         if even.size <= SEGMENT / BRIEF:  # one is lost by the difference
             continue
         # Means over each interval: what is quicker must not pass for something slow.
         sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
-        at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
+        at = between(even, time[first:end], sums)
         found.append(np.diff(at, axis=0) / step)
     return found

@@ -242,19 +242,6 @@ def whitened(W: np.ndarray, x: np.ndarray) -> np.ndarray:
     return found
 
 
-def fit_predictions(
-    runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: RefinedModel, prior: NominalPrior
-) -> Fitted:
-    """The most likely model by its predictions, and how sure it is.
-
-    Args:
-        runs, windows: to learn from, and their windows, see :func:`shootings`; at least one.
-        at: where to begin: a model with all effects that were accepted.
-        prior: of the nominal coefficients.
-    """
-    return fit_to(PredictionFit(runs, windows, at, prior), at)
-
-
 @dataclass(frozen=True, eq=False)
 class _Weighed(Quadratic[RefinedModel]):
     """The cost with what the windows say, at the power of their likelihood."""

@@ -17,7 +17,7 @@ from ..prior import NominalPrior
 from ..refinement import RefinedModel, TrainingSet, nuisance_of, refit
 from .disturbance import estimate
 from .disturbance_summary import Unrecorded, unrecorded
-from .fit import fit_predictions, shootings
+from .fit import PredictionFit, fit_to, shootings
 from .joint_posterior import JointPosterior
 from .predicted_bands import prediction_bands
 
@@ -65,7 +65,7 @@ def to_predictions(
         return RefitOutcome(found, JointPosterior.nothing(), unrecorded(runs, found.model, push, {}))
     begin = replace(begin, offset=prior.rescaled(begin.offset, searched))
     weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
-    fitted = fit_predictions(runs, windows, weak, prior)
+    fitted = fit_to(PredictionFit(runs, windows, weak, prior), weak)
     posterior, at = JointPosterior.of(fitted, prior), fitted.estimate
     model, std = at.model(prior), posterior.std
     effects = []
