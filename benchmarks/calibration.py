@@ -27,8 +27,7 @@ from diagnosis.predictors import LEVELS
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prediction_fit.fit import Fitted, PredictionFit, fit_to, shootings
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
-from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
-from diagnosis.search.prediction_fit.refit import fit_model_error
+from diagnosis.search.prediction_fit.refit import fit_model_error, prediction_bands
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
 from fmus.ship import ship

@@ -21,8 +21,7 @@ from diagnosis.search.prediction_fit.disturbance import ForceDisturbance, covari
 from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
 from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, shootings
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
-from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
-from diagnosis.search.prediction_fit.refit import fit_model_error, to_predictions
+from diagnosis.search.prediction_fit.refit import fit_model_error, prediction_bands, to_predictions
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
 from fmus.vessel import vessel

@@ -27,8 +27,7 @@ from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
-from .likelihood import adapt, criteria, likeliest, with_noise
-from .noise_uncertainty import noise_rel_std
+from .likelihood import adapt, criteria, likeliest, noise_rel_std, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots

@@ -5,21 +5,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...predictors import WeakWindows
+from ...predictors import Model, WeakWindows
 from ...predictors.evaluation import Bands
+from ...predictors.shooting import Shooting
 from ...predictors.uncertainty import omega_std
 from ...predictors.windows import Windows
 from ...runs import Smoothed
-from ..candidates import model_error
+from ..candidates import SMALL, model_error
 from ..conclusion import interval, laplace_std, suspected
 from ..findings import Findings
 from ..prior import NominalPrior
 from ..refinement import RefinedModel, TrainingSet, nuisance_of, refit
-from .disturbance import estimate
+from .disturbance import ForceDisturbance, covariance, estimate
 from .disturbance_summary import Unrecorded, unrecorded
 from .fit import PredictionFit, fit_to, shootings
 from .joint_posterior import JointPosterior
-from .predicted_bands import prediction_bands
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class RefitOutcome:
     unrecorded: Unrecorded
 
     def bands(self, smoothed: Smoothed, windows: Windows | None) -> Bands | None:
-        """The bands about the predictions of a run, see :func:`.predicted_bands.prediction_bands`."""
+        """The bands about the predictions of a run, see :func:`prediction_bands`."""
         push = self.unrecorded.push
         return prediction_bands(smoothed, windows, self.findings.model, self.posterior, push)
 
@@ -104,3 +104,36 @@ def fit_model_error(
     unit = np.array([*[1.0] * len(at.fitted), *prior.std.values()])
     std = laplace_std(t, nuisance) * unit
     return last, dict(zip([*at.fitted, *prior.std], std.tolist(), strict=True))
+
+
+def prediction_bands(
+    smoothed: Smoothed,
+    windows: Windows | None,
+    model: Model,
+    posterior: JointPosterior,
+    push: ForceDisturbance,
+) -> Bands | None:
+    """The bands about a model's predictions in the windows of a run; None: it has none.
+
+    Args:
+        smoothed, windows: the run.
+        model, posterior: that predicts, and of its fitted values.
+        push: the unrecorded force.
+    """
+    if windows is None:
+        return None
+    shots = Shooting([smoothed], windows.length)
+    std = posterior.std
+    around = shots.around(model, {n: SMALL * s for n, s in std.items() if s > 0.0})
+    kept = [k for k, s in enumerate(std.values()) if s > 0.0]
+    C = posterior.covariance[np.ix_(kept, kept)]
+    later = covariance(around.motion, shots.at_start, push)
+    first = smoothed.eta[shots.starts.runs[0][1]]
+    predicted = np.concatenate([first[:, None], shots.measured - around.residuals], axis=1)
+    instants = np.arange(shots.since.size)
+    found = np.zeros((len(later), shots.since.size + 1, 3, 3))
+    found[:, 1:] = later[:, instants, :, instants].swapaxes(0, 1)
+    found[:, 1:] += around.slopes @ C @ np.swapaxes(around.slopes, -1, -2)
+    found[:, 0, range(3), range(3)] = shots.at_start[:, :3]
+    found[..., range(3), range(3)] += smoothed.noise**2
+    return Bands(windows, np.concatenate([[0.0], shots.since]), predicted, found)
