@@ -13,19 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim import InputError
-from cosim.command import command_parser, renamed_option, run_command
+from cosim.command import renamed_option, run_command
 from cosim.errors import nearest
 from cybership.message_text import quoted
 
-from .commands.command_line import (
-    Done,
-    anyway_option,
-    confinement_options,
-    execution_of,
-    out_options,
-    run,
-    ship_option,
-)
+from .commands.command_line import Done, execution_of, fmu_parser, out_options, run
 from .execution.progress import Advance
 from .execution.result_folder import together
 from .execution.user_files import json_content
@@ -132,14 +124,13 @@ def _of_ship(options: argparse.Namespace, advance: Advance) -> Mapping[str, floa
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = command_parser(
-        "diagnosis.linearise",
+    made = fmu_parser(
+        "linearise",
         "Compute A, B, C, D of an FMU in a state, with names and units, as JSON and MAT.",
         "examples:  %(prog)s vendor.fmu --operating-point state.json\n"
         "           %(prog)s vendor.fmu --run trial.csv --time 60\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
     )
-    made.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMI 2.0 FMU for co-simulation")
     where = made.add_mutually_exclusive_group()
     renamed_option(
         where,
@@ -150,18 +141,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     where.add_argument("--run", type=Path, metavar="RUN", help="measured run that contains the state")
     made.add_argument("--time", type=float, metavar="SECONDS", help="time in that run [s]")
-    made.add_argument(
-        "--map",
-        type=Path,
-        metavar="FILE.json",
-        help="map of the FMU's variables to the columns, and its start values (default: guessed from "
-        "names)",
-    )
-    ship_option(made)
-    confinement_options(made)
-    anyway_option(made)
     out_options(made, Path("results", "linear"))
-    made.set_defaults(effects=[], horizon=None)
     return made
 
 

@@ -15,16 +15,9 @@ from rich.table import Table
 from rich.text import Text
 
 from cosim import InputError
-from cosim.command import command_parser, printable, run_command
+from cosim.command import printable, run_command
 
-from .commands.command_line import (
-    Done,
-    anyway_option,
-    confinement_options,
-    execution_of,
-    run,
-    ship_option,
-)
+from .commands.command_line import Done, execution_of, fmu_parser, run
 from .execution.progress import Advance
 
 if TYPE_CHECKING:
@@ -117,19 +110,12 @@ def _prior(p: "CalibratedParameter") -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = command_parser(
-        "diagnosis.parameters",
+    made = fmu_parser(
+        "parameters",
         "List the parameters of an FMU that can be calibrated, and write them to a file.",
         "examples:  %(prog)s vendor.fmu\n"
         "           %(prog)s vendor.fmu --map map.json --runs run1.csv run2.csv\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
-    )
-    made.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMI 2.0 FMU for co-simulation")
-    made.add_argument(
-        "--map",
-        type=Path,
-        metavar="FILE.json",
-        help="map of the FMU's variables to the columns (default: guessed from names)",
     )
     made.add_argument(
         "--runs",
@@ -147,10 +133,6 @@ def _parser() -> argparse.ArgumentParser:
         help="file that is written (default: parameters.json)",
     )
     made.add_argument("--overwrite", action="store_true", help="replace an existing file")
-    ship_option(made)
-    confinement_options(made)
-    anyway_option(made)
-    made.set_defaults(effects=[], horizon=None)
     return made
 
 

@@ -106,6 +106,24 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     return made
 
 
+def fmu_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser of a command about an FMU, and about measured runs of what it is a model of."""
+    made = command_parser(f"diagnosis.{name}", description, epilog)
+    made.add_argument("fmu", type=Path, metavar="FILE.fmu", help="an FMI 2.0 FMU for co-simulation")
+    made.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE.json",
+        help="map of the FMU's variables to the columns, and its start values (default: guessed from "
+        "names)",
+    )
+    ship_option(made)
+    confinement_options(made)
+    anyway_option(made)
+    made.set_defaults(effects=[], horizon=None)
+    return made
+
+
 def fmu_options(made: argparse.ArgumentParser) -> None:
     """Add ``--map`` and how an FMU given by ``--model`` is run."""
     made.add_argument(
