@@ -24,7 +24,7 @@ from .sensors.sensor_finding import Examined
 from .sensors.unit_faults import sway, units
 from .sensors.wraps import wraps
 from .smoothing.smoother import Smoothed, smooth
-from .thinning import spaced
+from .thinning import filled_up, thinned
 
 # A part of a log contains less information on its clock than the whole.
 WHOLE_FIRST = (
@@ -109,7 +109,7 @@ def prepare(
         )
     sensors = sensors.without({name for finding in unrepaired for name in finding.aside})
     repaired = replace(sensors.run, notes=(*sensors.run.notes, *sensors.notes))
-    return PreparedRun(raw, sensors, spaced(clean(repaired, anyway, of.scale)), anyway)
+    return PreparedRun(raw, sensors, filled_up(thinned(clean(repaired, anyway, of.scale))), anyway)
 
 
 def examine(run: Run, scale: Scale) -> Examined:

@@ -12,11 +12,6 @@ from .cleaning import BRIEF, DIGITS, EVERY, Track, between, impulse, long_gap
 MOST_ROWS = 100_000
 
 
-def spaced(track: Track) -> Track:
-    """A run with rows neither more frequent nor rarer than its analysis can bear."""
-    return filled_up(thinned(track))
-
-
 def filled_up(track: Track) -> Track:
     """A run with more rows, without measurements, where its rows are rarer than windows of forces.
 

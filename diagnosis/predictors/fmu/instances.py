@@ -40,25 +40,28 @@ class FmuRun:
         inputs: names of inputs.
         outputs: names of outputs.
         h: length of a step [s].
+
+    Attributes:
+        instance: of the FMU.
     """
 
     def __init__(
         self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], h: float
     ) -> None:
-        self._variables, self._instance, self._h = fmu.model.variables, fmu.instance(), h
+        self._variables, self.instance, self._h = fmu.model.variables, fmu.instance(), h
         names, count = [*inputs, *outputs], len(inputs)
         self._memory, self._count, self.outputs = DoubleMemory(len(names)), count, tuple(outputs)
         ports = [Port(self._variables[name], k) for k, name in enumerate(names)]
-        self._access = self._instance.bind(ports[:count], ports[count:], self._memory, h)
+        self._access = self.instance.bind(ports[:count], ports[count:], self._memory, h)
 
     def initialise(self, start: Mapping[str, float], inputs: Sequence[float], stop: float) -> np.ndarray:
         """Begin with some values, up to a time [s]; returns the outputs."""
-        self._instance.set_up(stop)
+        self.instance.set_up(stop)
         for name, value in start.items():
-            self._instance.set_value(self._variables[name], value)
-        self._instance.enter_initialization()
+            self.instance.set_value(self._variables[name], value)
+        self.instance.enter_initialization()
         self.put(inputs)
-        self._instance.exit_initialization()
+        self.instance.exit_initialization()
         self._access.get()
         return self._told(0)
 
@@ -85,7 +88,7 @@ class FmuRun:
     def whole_run(self, start: Mapping[str, float], inputs: Sequence[float], steps: int) -> np.ndarray:
         """Outputs (steps + 1, m) of a whole run with inputs that stay the same."""
         held = np.tile(np.array(inputs, float), steps).tobytes()
-        told = self._instance.whole_run(start, held, steps, self._h)
+        told = self.instance.whole_run(start, held, steps, self._h)
         rows = np.frombuffer(told).reshape(-1, len(self.outputs))
         return np.array([self._finite(row, k) for k, row in enumerate(rows)])
 
@@ -98,18 +101,6 @@ class FmuRun:
             name = self.outputs[int(np.flatnonzero(~np.isfinite(told))[0])]
             raise SimulationError(f"{name} is not finite at t = {k * self._h:.6g} s after its start")
         return told
-
-    def restart(self) -> None:
-        """Return to the state after instantiation."""
-        self._instance.reset()
-
-    def terminate(self) -> None:
-        """End the simulation."""
-        self._instance.terminate()
-
-    def free(self) -> None:
-        """End its process."""
-        self._instance.free()
 
 
 def simulate(
@@ -153,8 +144,8 @@ def _together(
             for w, one in enumerate(running):
                 told[k + 1, w] = one.end(k)
         for one in running:
-            one.terminate()
+            one.instance.terminate()
     finally:
         for one in running:
-            one.free()
+            one.instance.free()
     return told

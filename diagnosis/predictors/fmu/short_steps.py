@@ -54,7 +54,7 @@ class ShortSteps:
         self._fmu, self.h, self._late = fmu, h, late
         self._inputs, self._outputs = tuple(inputs), tuple(dict.fromkeys(outputs))
         self._resets: bool | None = None
-        self._instance: FmuRun | None = None
+        self._begun: FmuRun | None = None
 
     def run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
         """Each output (STEPS + 1,) from a start on; from the first step on where outputs are late.
@@ -79,9 +79,9 @@ class ShortSteps:
 
     def close(self) -> None:
         """Free the FMU."""
-        instance, self._instance = self._instance, None
-        if instance is not None:
-            instance.free()
+        begun, self._begun = self._begun, None
+        if begun is not None:
+            begun.instance.free()
 
     def _tried(self, start: Values, inputs: Values) -> bool:
         """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
@@ -92,11 +92,11 @@ class ShortSteps:
         )
 
     def _run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
-        if self._instance is not None and self._resets is not False:
-            self._instance.restart()
+        if self._begun is not None and self._resets is not False:
+            self._begun.instance.reset()
         else:
             self.close()
-            self._instance = FmuRun(self._fmu, self._inputs, self._outputs, self.h)
+            self._begun = FmuRun(self._fmu, self._inputs, self._outputs, self.h)
         given, steps = [inputs[name] for name in self._inputs], STEPS + self._late
-        told = self._instance.whole_run(start, given, steps)
+        told = self._begun.whole_run(start, given, steps)
         return dict(zip(self._outputs, told[int(self._late) :].T, strict=True))
