@@ -15,7 +15,7 @@ from cosim.fmu import ConfinedFmu
 from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
-from ..predictors.fmu.fmu_predictor import FmuPredictor
+from ..predictors.fmu.foreign_fmu import FmuPredictor
 from ..predictors.fmu.variable_map import DISTURBANCES
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed

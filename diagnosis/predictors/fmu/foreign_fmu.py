@@ -1,35 +1,60 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from weakref import finalize
 
+import numpy as np
+from scipy.interpolate import CubicSpline
 from typing_extensions import deprecated
 
 import cosim
 from cosim.export import export_fmu
+from cosim.fmu import ConfinedFmu
 from cosim.fmu import FmuModel as FmuModel
 from cosim.system import prepare
 from cybership.scratch_folder import Scratch
-from fmus.ship import Ship
+from fmus.frames import rotate_to_body
+from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
-from ...runs import Fingerprint, Run
+from ...execution.result_folder import sha256
+from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
+from ..black_box import (
+    MOTION,
+    POSE,
+    SMALL,
+    TAU,
+    VELOCITY,
+    BlackBox,
+    Signals,
+    at_samples,
+    commands_at,
+    planes,
+)
+from ..described_ship import nominal
 from ..predictor import (
     DEFAULT_EXECUTION,
+    FOUND,
+    MAP,
     Execution,
+    PredictorDescription,
     UnmatchedError,
 )
 from ..ship_model import Model
+from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
-from .fmu_predictor import FmuPredictor, commands_of
-from .instances import confined
-from .lineage import learned_from, parts_of
+from ..windows import FREE_STEP, Windows, step_of
+from .instances import Begun, confined, simulate
+from .lineage import learned_from, parts_of, remember
 from .ship_of_fmu import SYSTEMS
-from .variable_map import VariableMap, completed, propose, read_map, unmatched
+from .short_steps import ShortSteps
+from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
+from .wrapper import Wrapped, write_wrapper
 
 
 class Fmu:
@@ -138,7 +163,7 @@ class Fmu:
             raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
         return found
 
-    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> FmuPredictor:
+    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> "FmuPredictor":
         """The predictor of some runs, see :meth:`..predictor.ModelSource.on`.
 
         Raises:
@@ -149,7 +174,7 @@ class Fmu:
         assert predictor.model  # which takes a while
         return predictor
 
-    def begun_on(self, runs: Sequence[WeakWindows]) -> FmuPredictor:
+    def begun_on(self, runs: Sequence[WeakWindows]) -> "FmuPredictor":
         """The predictor of some runs, of which nothing is computed yet.
 
         Raises:
@@ -161,6 +186,189 @@ class Fmu:
         predictor = FmuPredictor(self, process, maps, runs)
         finalize(predictor, process.close)
         return predictor
+
+
+class FmuPredictor(BlackBox):
+    """How an FMU predicts some runs.
+
+    Attributes:
+        given: which of its variables is which signal, as it was told or proposed.
+        map: the same with the units that the FMU declares.
+        lines: see :func:`.variable_map.signal_lines`.
+        confinement: what confines its processes, in words; "unconfined" where nothing does.
+    """
+
+    kind = "FMU"
+
+    def __init__(
+        self,
+        fmu: Fmu,
+        process: ConfinedFmu,
+        maps: tuple[VariableMap, VariableMap],
+        runs: Sequence[WeakWindows],
+    ) -> None:
+        super().__init__(fmu.name, runs, fmu.start or nominal(runs))
+        self.fmu, self.confined, self.confinement = fmu, process, process.confinement
+        self.given, self.map = maps
+        self.learned_from = fmu.learned_from
+        self.files = [(role, path, sha256(path)) for role, path in fmu.files]
+        self.lines = signal_lines(self.map, commands_of([w.run for w in runs]))
+        self.starts = frozenset(self.map.told("start")) & set(MOTION)
+        self.inputs = frozenset(self.map.told("inputs"))
+        self.sha256, self.given_map, self.own_run_in = fmu.sha256, self.given.content(), self.map.run_in
+
+    @property
+    def whole(self) -> bool:
+        return not set(VELOCITY) <= {*self.starts, *self.map.fixed}
+
+    @property
+    def placed(self) -> bool:
+        return not set(POSE) <= self.map.told("outputs").keys() & self.starts
+
+    @cached_property
+    def late(self) -> list[str]:
+        """The outputs that are zero until the first step, against their start values."""
+        w = self.runs[0]
+        sizes = dict(zip(MOTION, (w.scale.length, w.scale.length, 1.0, *w.scale.speeds), strict=True))
+        started = [s for s in MOTION if s in self.starts & self.map.told("outputs").keys()]
+        if not started:
+            return []
+        state = np.where(w.known[:, None], np.hstack([w.smoothed.eta, w.smoothed.nu]), 0.0)
+        size = np.array([sizes[s] for s in MOTION])
+        row = int(np.abs(state / size)[:, [MOTION.index(s) for s in started]].min(axis=1).argmax())
+        h = self.fmu.fixed_step or step_of(w.smoothed)
+        first = {s: x[0, 0] for s, x in self._told(w.smoothed, np.array([row]), h, 1).items()}
+        values = dict(zip(MOTION, state[row], strict=True))
+        return [s for s in started if first[s] == 0.0 and abs(values[s]) > SMALL * sizes[s]]
+
+    @cached_property
+    def model(self) -> Model:
+        inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
+        time = self.runs[0].scale.time
+        h = self.fmu.fixed_step or min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
+        late = bool(self.late)
+        with closing(ShortSteps(self.confined, inputs, outputs, h, late)) as self._steps:
+            return super().model
+
+    def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
+        found = super().windows(runs, length)
+        if found is None or not self.late:
+            return found
+        return found.after(self.fmu.fixed_step or 0.5 * step_of(runs[0]))
+
+    def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
+        own = self.fmu.fixed_step or h
+        count = steps if own == h else int(np.ceil(steps * h / own - 1e-9))
+        motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
+        for signal, told in self._told(smoothed, rows, own, max(count, 3 if self.late else 1)).items():
+            x = np.unwrap(told, axis=0) if signal == "psi" else told
+            if self.late:
+                x[0] = 3.0 * (x[1] - x[2]) + x[3]
+            if own != h:
+                x = CubicSpline(own * np.arange(len(x)), x)(h * np.arange(steps + 1))
+            motion[:, MOTION.index(signal)] = x[: steps + 1]
+        return motion
+
+    def _told(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> dict[str, np.ndarray]:
+        """Signal -> its values (steps + 1, w) [SI], in steps of h [s] from some rows on."""
+        run, columns = smoothed.track.run, self.map.told("outputs")
+        at, middle = self._variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
+        given = [commands_at(run, time + middle) for time in smoothed.time[rows]]
+        begun = [
+            Begun(_row(at, row), self._variables("inputs", commands))
+            for row, commands in zip(rows, given, strict=True)
+        ]
+        try:
+            told = simulate(self.confined, begun, [c.name for c in columns.values()], h, steps)
+        except cosim.InputError as error:
+            raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {error}") from None
+        return self._outputs(told)
+
+    def accelerations(self, signals: Signals) -> np.ndarray:
+        start, inputs = (self._variables(group, signals) for group in ("start", "inputs"))
+        size = next(iter(signals.values())).size
+        return np.array([self._accelerated(_row(start, k), _row(inputs, k)) for k in range(size)])
+
+    def _accelerated(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> np.ndarray:
+        """nu_dot (3,) from a start on, by differences of a few short steps."""
+        motion = self._outputs(self._steps.run(start, inputs))
+        slopes = self._steps.derivatives
+        if set(VELOCITY) <= motion.keys():
+            return np.array([slopes(motion[s])[0] for s in VELOCITY])
+        x, y, psi = (motion[s] for s in POSE)
+        rate, change = np.transpose([slopes(p) for p in (x, y, np.unwrap(psi))])
+        u, v = rotate_to_body(psi[0], rate[0], rate[1])
+        u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
+        return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])
+
+    @property
+    def _started_by(self) -> str:
+        return f", by {', '.join(c.name for c in self.map.told('start').values())}"
+
+    def description(self) -> PredictorDescription:
+        outside = tuple(self.confined.outside)
+        return replace(super().description(), confinement=self.confinement, outside=outside)
+
+    def _sentences(self, wait: float) -> Iterator[str]:
+        yield from super()._sentences(wait)
+        description = self.ship.ship.description
+        yield (
+            f"Windows, filters and effects are those of a ship of {description.length:.4g} m "
+            f"({description.title}); --ship NAME|FILE.toml selects another."
+        )
+        if (step := self.fmu.fixed_step) is not None:
+            yield f"It is stepped every {step:.6g} s, with a cubic spline through its outputs."
+        if self.late:
+            yield (
+                f"Its outputs {', '.join(self.late)} are zero until the first step, contrary to "
+                "their start values: samples of the first step of each window are left out."
+            )
+        yield from self.confined.sentences()
+
+    def write(
+        self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
+    ) -> list[str]:
+        """Its map; with additions, one FMU of both, and the map of that."""
+        if learned is None:
+            write_map(folder / MAP, self.given.content())
+            return []
+        wrapped = Wrapped(self.name, self.confined.model, self.map, self.lines)
+        told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
+        if of_both is not None:
+            remember(folder / FOUND, self.learned_from, runs)
+        write_map(folder / MAP, (of_both or self.given).content())
+        return [told]
+
+    def _variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
+        """Variable -> its values, for those of some signals [SI] that a group of the map has."""
+        lines, told = self.lines[group], self.map.told(group)
+        known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
+        return {name: (x - line.offset) / line.gain for x, line, name in known}
+
+    def _outputs(self, values: Signals) -> dict[str, np.ndarray]:
+        """Signal -> its values [SI], by variables' values; also of those that stay the same."""
+        lines, columns = self.lines["outputs"], self.map.told("outputs")
+        found = {s: lines[s].gain * values[c.name] + lines[s].offset for s, c in columns.items()}
+        like = next(iter(values.values()))
+        return found | {s: np.full(like.shape, x) for s, x in self.map.fixed.items()}
+
+
+def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
+    return {name: float(x[k]) for name, x in values.items()}
+
+
+def commands_of(runs: Sequence[Run]) -> dict[str, str]:
+    """Signal -> quantity of the forces and commands that all of some runs of a ship have.
+
+    A force in the plane is there by its components, and as ``NAME.force`` and ``NAME.angle``, the angle
+    from ahead to starboard.
+    """
+    units = ship(description=runs[0].ship).commands
+    every = [{*TAU, *run.commanded} for run in runs]
+    common = [s for s in dict.fromkeys([*TAU, *runs[0].commanded]) if all(s in e for e in every)]
+    found = {s: QUANTITY[s] if s in QUANTITY else OF_UNIT[units[s]] for s in common}
+    polar = {f"{name}.{of}": of for name in planes(found) for of in ("force", "angle")}
+    return found | polar
 
 
 def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
