@@ -3,12 +3,13 @@
 import json
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
 from cosim import InputError
 from cosim.command import printable
+from cosim.errors import unique_keys
 from cybership.message_text import first_fault
 
 from ...execution.result_folder import sha256
@@ -109,7 +110,7 @@ def verify_record(
 def _read(path: Path) -> tuple[bytes, Record]:
     try:
         raw = path.read_bytes()
-        json.loads(raw, object_pairs_hook=_once)
+        json.loads(raw, object_pairs_hook=unique_keys)
         content = Record.model_validate_json(raw, strict=True)
     except OSError as error:
         raise InputError(
@@ -117,18 +118,11 @@ def _read(path: Path) -> tuple[bytes, Record]:
         ) from None
     except ValidationError as error:
         raise InputError(f"'{path}' is not a validation record: {first_fault(error)}") from None
-    except (ValueError, RecursionError) as error:
+    except (ValueError, RecursionError, InputError) as error:
         raise InputError(f"'{path}' is not a validation record: {error}") from None
     if content.form != FORM:
         raise InputError(f"'{path}' has the form '{content.form[:40]}'; '{FORM}' is needed")
     return raw, content
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object without a key twice, of which readers would take one or the other."""
-    if len(dict(pairs)) < len(pairs):
-        raise ValueError("a key occurs twice in one object")
-    return dict(pairs)
 
 
 def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) -> Check:
