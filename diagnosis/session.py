@@ -28,6 +28,7 @@ from .predictors import (
     nominal,
     open_model,
 )
+from .predictors.evaluation import DataUse
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Findings, Method, Prior, method
@@ -281,7 +282,7 @@ class Session:
         calibrates = self.predictor.parametric
         verdict = judge(found, data, self.known, self.harms, region, calibrates, self.advance)
         gain = self._gained(verdict, data) if self.predictor.parametric else None
-        return self._concluded(verdict, data, region, gain)
+        return self._concluded(verdict, region, gain)
 
     def _gained(self, verdict: DecidedFindings, data: ValidationData) -> PredictionGain | None:
         """What the search for effects gained over calibration alone."""
@@ -295,27 +296,32 @@ class Session:
         nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
         return OperatingRegion.of(nu, self.start.ship.scale)
 
-    def _compared(self, after: Model | None) -> Comparison:
-        decide = len(self.train) + len(self.validate)
-        runs = self.runs
-        return _compared(self.predictor, runs[:decide], after, runs[decide:], self.advance)
+    def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:
+        decide, runs = len(self.train) + len(self.validate), self.runs
+        return _compared(predictor or self.predictor, runs[:decide], after, runs[decide:], self.advance)
 
     def _concluded(
-        self,
-        verdict: DecidedFindings,
-        data: ValidationData,
-        region: OperatingRegion,
-        gain: PredictionGain | None,
+        self, verdict: DecidedFindings, region: OperatingRegion, gain: PredictionGain | None
     ) -> Diagnosis:
-        """The diagnosis by a verdict: errors of predictions, and whether the learned model is stable."""
-        comparison = _predicted(verdict, self.predictor, self.runs, data, self.advance)
+        """The diagnosis by a verdict: errors and bands of predictions, and whether it is stable."""
+        learned = verdict.learned.model
+        found = self._compared(learned if verdict.changed else None, self.predictor.in_windows())
+        parts: list[tuple[DataUse, Sequence[WeakWindows]]] = [
+            ("train", self.train),
+            ("validate", self.validate),
+            ("test", self.test),
+        ]
+        uses = [use for use, runs in parts for _ in runs]
+        evaluations = [
+            replace(e, bands=verdict.bands(e.smoothed, e.windows), use=use)
+            for e, use in zip(found.evaluations, uses, strict=True)
+        ]
         self.advance("stability")
-        stability = check_stability(verdict.learned.model, self.start, self.advance, region)
         return Diagnosis(
             **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
-            comparison=comparison,
+            comparison=replace(found, evaluations=evaluations, predictor=self.predictor),
             start=self.start,
-            stability=stability,
+            stability=check_stability(learned, self.start, self.advance, region),
             speeds=region,
             prior=self.prior,
             seed=self.seed,
@@ -356,22 +362,3 @@ def begin(
     if isinstance(predictor, DescribedShip):
         predictor = predictor.learning_from(runs[:last])
     return Session(*parts, predictor, prior, chosen, harms, advance, seed)
-
-
-def _predicted(
-    verdict: DecidedFindings,
-    predictor: Predictor,
-    runs: Sequence[WeakWindows],
-    data: ValidationData,
-    advance: Advance,
-) -> Comparison:
-    """Errors of the initial and of the learned model, with bands about the predictions of the latter."""
-    learned, decide = verdict.learned.model, len(data.runs)
-    final = learned if verdict.changed else None
-    found = _compared(predictor.in_windows(), runs[:decide], final, runs[decide:], advance)
-    uses = ["train"] * len(data.train) + ["validate"] * len(data.validate) + ["test"] * len(runs)
-    evaluations = [
-        replace(e, bands=verdict.bands(e.smoothed, e.windows), use=use)
-        for e, use in zip(found.evaluations, uses, strict=False)
-    ]
-    return replace(found, evaluations=evaluations, predictor=predictor)
