@@ -32,8 +32,22 @@ from ..validity import covered, window_means
 from .provenance import Files, code, files_of, foreign, parameters_of, parameters_sha256, samples
 from .record_figures import figures
 from .record_files import FILES, write_record
-from .record_keys import FORM, REFERENCES, STANDING
+from .verification import FORM
 
+STANDING = (
+    "This record uses terms of ASME V&V 20, ITTC 7.5-02-06-03 and DNV-RP-0513. It does not claim "
+    "conformity with them."
+)
+REFERENCES = (
+    "ASME V&V 20-2009: Standard for Verification and Validation in Computational Fluid Dynamics "
+    "and Heat Transfer (comparison error E, u_num, u_input, u_D, u_val).",
+    "ITTC Recommended Procedures 7.5-02-06-03: Validation of Manoeuvring Simulation Models "
+    "(documentation of a model and of its validation data).",
+    "DNV-RP-0513: Assurance of simulation models (criteria before the comparison, intended use, "
+    "traceable records).",
+    "JCGM 100:2008 (GUM): Guide to the expression of uncertainty in measurement (standard and expanded "
+    "uncertainty).",
+)
 # Attributes that the record holds; KEY=ATTRIBUTE where a key has another name.
 JUDGEMENT = (
     "criterion=criterion.title requirement=criterion.text restrictions=criterion.restrictions outcome "

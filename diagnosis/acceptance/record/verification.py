@@ -14,9 +14,9 @@ from cybership.message_text import first_fault
 
 from ...execution.result_folder import sha256
 from .provenance import code
-from .record_keys import FORM
 from .signature import is_signed
 
+FORM = "cybership validation record 2"  # of the records of this version
 # What compare writes next to a record, so that a file of that name is no copy of one that it read.
 OUTPUTS = ("comparison.json", "report.html", "map.json")
 SIGNATURE, KEY, CODE = "signature", "key", "code"  # names that --allow-missing takes besides files
