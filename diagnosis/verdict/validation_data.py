@@ -129,9 +129,11 @@ class ValidationData:
             variants = [self._models(f) for f in due.values()]
 
             def of_some(which: Sequence[int]) -> list[tuple[Losses, ...]]:
-                folds = [self._folds[k] for k in which]
-                each = (fold_losses(folds, [m[k] for k in which], self.sigma) for m in variants)
-                return [*zip(*each, strict=True)]
+                """Of each fold the losses of all variants, which are predicted at once."""
+                folds = [self._folds[k] for k in which] * len(variants)
+                models = [m[k] for m in variants for k in which]
+                each = fold_losses(folds, models, self.sigma)
+                return [tuple(each[k :: len(which)]) for k in range(len(which))]
 
             by_fold = in_halves(of_some, range(len(self._folds)))
             for f, parts in zip(due.values(), zip(*by_fold, strict=True), strict=True):
