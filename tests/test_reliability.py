@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command import command as in_this_process
+from support.command import main_of
 from support.plain import GAIN
 from support.project import ROOT
 from test_run import in_a_process as command
@@ -352,27 +354,28 @@ def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_p
     assert {*tmp_path.glob(".*")} == {young, alive}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["cosim.run", "scenarios/setpoint.json", "--stop", "0.1", "--no-plots"], ["cosim.scenario"],
-        ["fmus.build", "--list"], ["fmus.build", "vessel"], ["fmus.check", "--list"], ["fmus.effects"],
-        ["cosim.interface", "scenarios/ellipse.json"], ["diagnosis.learn", "--help"],
-    ],
-    ids=" ".join,
+CALLS = (
+    ["cosim.run", "scenarios/setpoint.json", "--stop", "0.1", "--no-plots", "--out"], ["cosim.scenario"],
+    ["fmus.build", "--list"], ["fmus.build", "vessel"], ["fmus.check", "--list"], ["fmus.effects"],
+    ["cosim.interface", "scenarios/ellipse.json"], ["diagnosis.learn", "--help"],
 )  # fmt: skip
-def test_commands_without_docstrings_print_the_same(arguments, tmp_path):
-    out = ["--out", str(tmp_path)] if "cosim.run" in arguments else []
-    plain, bare = (
-        subprocess.run(
-            [sys.executable, *optimised, "-m", *arguments, *out], capture_output=True, text=True, cwd=ROOT, check=False
-        )
-        for optimised in ([], ["-OO"])
+PRINTED = """
+import json, sys
+from support.command import command, main_of
+print(json.dumps([command(main_of(name), *arguments) for name, *arguments in json.loads(sys.argv[1])]))
+"""
+
+
+def test_commands_without_docstrings_print_the_same(tmp_path):
+    calls = [[*call, tmp_path] if call[-1] == "--out" else call for call in CALLS]
+    bare = subprocess.run(
+        [sys.executable, "-OO", "-c", PRINTED, json.dumps(calls, default=str)],
+        capture_output=True, text=True, cwd=ROOT, check=True, env={**os.environ, "PYTHONPATH": "tests"},
     )  # fmt: skip
-    assert bare.returncode == plain.returncode == 0
-    if "cosim.scenario" not in arguments:  # the schema's descriptions are docstrings
-        assert bare.stdout == plain.stdout
+    for (name, *arguments), (code, printed, _) in zip(calls, json.loads(bare.stdout), strict=True):
+        here = in_this_process(main_of(name), *arguments, cwd=ROOT)
+        assert (code, here.returncode) == (0, 0)
+        assert printed == here.stdout or name == "cosim.scenario", "whose descriptions are docstrings"
 
 
 GROWTH = """
