@@ -218,13 +218,15 @@ def serial(monkeypatch):
     monkeypatch.setattr("thesis.monte_carlo.analyse_runs", here)
 
 
-@pytest.fixture
-def short_loops(monkeypatch):
-    """The closed loops of the check of a learned model last 30 s, for tests that are about something else."""
+@pytest.fixture(autouse=True, scope="session")
+def _short_loops():
+    """The closed loops of the check of a learned model last 30 s; test_diagnosis_stability.py has whole ones."""
     from diagnosis.assessment import stability
 
     short = tuple(r._replace(seconds=30.0) for r in stability.REFERENCES)
-    monkeypatch.setattr(stability, "REFERENCES", short)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stability, "REFERENCES", short)
+        yield
 
 
 @pytest.fixture

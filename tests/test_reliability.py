@@ -417,13 +417,13 @@ def test_campaign_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
     assert mutations.broken_scenarios(60, 2, tmp_path, nothing) == []
     assert mutations.broken_files(30, 2, tmp_path, nothing) == []
-    assert endings.kills(4, 2, tmp_path, nothing) == []
-    assert endings.signals(4, 2, tmp_path, nothing) == []
-    assert endings.short_of_disk(2, 2, tmp_path, nothing) == []
-    assert endings.deaths(10, 2, tmp_path, nothing) == []
-    assert campaigns.interrupted_campaigns(2, 2, tmp_path, nothing) == []
-    assert campaigns.deaths_elsewhere(4, 2, tmp_path, nothing) == []
-    assert campaigns.spoilt_cache(2, 2, tmp_path, nothing) == []
+    assert endings.kills(2, 2, tmp_path, nothing) == []
+    assert endings.signals(2, 2, tmp_path, nothing) == []
+    assert endings.short_of_disk(1, 2, tmp_path, nothing) == []
+    assert endings.deaths(5, 2, tmp_path, nothing) == []
+    assert campaigns.interrupted_campaigns(1, 2, tmp_path, nothing) == []
+    assert campaigns.deaths_elsewhere(2, 2, tmp_path, nothing) == []
+    assert campaigns.spoilt_cache(1, 2, tmp_path, nothing) == []
 
 
 @linux_only
@@ -436,10 +436,10 @@ def test_broken_ships_in_small(tmp_path, monkeypatch):
 @linux_only
 def test_killed_commands_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
-    assert killed_commands.interrupted_compares(3, 2, tmp_path, nothing) == []
-    assert killed_commands.killed_diagnoses(4, 2, tmp_path, nothing) == []
-    assert killed_commands.ended_builds(4, 2, tmp_path, nothing) == []
-    assert killed_commands.killed_campaigns(2, 2, tmp_path, nothing) == []
+    assert killed_commands.interrupted_compares(1, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_diagnoses(2, 2, tmp_path, nothing) == []
+    assert killed_commands.ended_builds(2, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_campaigns(1, 2, tmp_path, nothing) == []
 
 
 @pytest.mark.slow
