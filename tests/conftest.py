@@ -56,13 +56,18 @@ def pytest_configure(config):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
-    """Tests that took long are marked slow; slow ones go first, so that none is left alone at the end."""
+    """Tests that took long are marked slow, and their files go first: none is left alone at the end.
+
+    The tests of a file stay together, so that mostly one worker makes what they share.
+    """
     listed = slow_tests()
     for item in items:
         if item.nodeid in listed and not item.get_closest_marker("numerical"):
             item.add_marker("slow")
     yield
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    slow = [item.get_closest_marker("slow") is not None for item in items]
+    first = {item.path for item, is_slow in zip(items, slow, strict=True) if is_slow}
+    items.sort(key=lambda item: item.path not in first)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -366,6 +366,7 @@ print(json.dumps([command(main_of(name), *arguments) for name, *arguments in jso
 """
 
 
+@pytest.mark.slow
 def test_commands_without_docstrings_print_the_same(tmp_path):
     calls = [[*call, tmp_path] if call[-1] == "--out" else call for call in CALLS]
     bare = subprocess.run(
