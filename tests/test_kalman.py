@@ -5,6 +5,7 @@ import random
 
 import numpy as np
 import pytest
+from support.ccode import stepped
 from support.project import COMPONENTS
 
 import cosim
@@ -54,12 +55,9 @@ def beats_all_others(log, most=1.0, most_dot=0.8):
 
 def run(rows, p=None, h=0.01):
     """Estimates for rows of x_m, y_m, psi_m, tau_X, tau_Y, tau_N."""
-    p, pack = p or params(), packer(KALMAN.inputs)
-    state, found = KALMAN.init(pack(rows[0]), p), []
-    for row in rows[1:]:
-        state, estimate = KALMAN.step(state, pack(row), p, h)
-        found.append(estimate)
-    return found
+    law = stepped(KALMAN, p or params(), packer(KALMAN.inputs)(rows[0]))
+    pack = packer(KALMAN.outputs)
+    return [pack(law.advance(row, h)) for row in rows[1:]]
 
 
 def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
@@ -69,12 +67,11 @@ def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
     """
     rng = random.Random(seed)
     vessel = COMPONENTS["vessel"]
-    p = vessel.params()
-    state, ready = vessel.init(Force(), p), vessel.prepared(p)
+    body, pack = stepped(vessel, vessel.params(), Force()), packer(vessel.outputs)
     rows, nu, nu_dot = [], [], []
     for k in range(round(seconds / h)):
         known = tau(k * h)
-        state, out = vessel.advance(state, Force(*map(sum, zip(known, extra, strict=True))), ready, h)
+        out = pack(body.advance([*map(sum, zip(known, extra, strict=True))], h))
         x, y, psi = out.pose
         psi = math.remainder(psi + rng.gauss(0, 1.5 * noise), math.tau)
         rows.append([x + rng.gauss(0, noise), y + rng.gauss(0, noise), psi, *known])
