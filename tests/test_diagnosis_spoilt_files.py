@@ -150,8 +150,6 @@ SHIPS = [
     ({}, {"bow_failure_time": 5.0}),
     ({}, {"bow_outage_start_1": 10.0, "bow_outage_end_1": 40.0}),
     ({}, {"vsp_outage_start_1": 10.0, "vsp_outage_end_1": 40.0}),
-    ({}, {"delay": 1.0}),
-    ({}, {"lag": 2.0}),
     ({}, {"deadband": 0.1}),
     ({}, {"saturation_vsp": 0.3}),
     ({}, {"attack_point_dx": 0.2, "attack_point_dy": 0.1}),
@@ -167,8 +165,13 @@ SHIPS = [
 ]
 
 
-@pytest.mark.parametrize("given", [pytest.param(commands, id="smooth"), pytest.param(jumps, id="jumps")])
-@pytest.mark.parametrize(("ship", "thrusters"), in_part(SHIPS, keep=[SHIPS[k] for k in (4, 9)]))
+# Late forces are seen in jumps of the commands; the others have smooth ones and jumps in turn.
+LATE = [({}, {"delay": 1.0}), ({}, {"lag": 2.0})]
+CASES = [(*each, (commands, jumps)[k % 2]) for k, each in enumerate(SHIPS)]
+CASES += [(*each, given) for each in LATE for given in (commands, jumps)]
+
+
+@pytest.mark.parametrize(("ship", "thrusters", "given"), in_part(CASES, keep=[CASES[4], CASES[-1]]))
 def test_no_hidden_effect_is_refused(ship, thrusters, given):
     run = sail(60.0, 1.0 / RATE, ship=ship, thrusters=thrusters, given=given)[0]
     refuse_implausible([weak_windows(smoothed(run))], Model())
