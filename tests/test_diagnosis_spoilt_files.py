@@ -142,8 +142,10 @@ def test_file_that_can_be_used_is_not_refused(way, tmp_path):
 # What a ship may well have: single effects of realistic and of unusual size.
 SHIPS = [
     ({}, {}),
+    ({"heading_offset": 0.3}, {}),
     ({"heading_offset": 1.2}, {}),
     ({}, {"loss_surge": 1.0}),
+    ({}, {"loss_sway": 1.0}),
     ({}, {"loss_yaw": 1.0}),
     ({}, {"loss_vsp": 0.9}),
     ({}, {"loss_surge": 0.5, "loss_sway": 0.5, "loss_yaw": 0.5}),
@@ -153,7 +155,9 @@ SHIPS = [
     ({}, {"deadband": 0.1}),
     ({}, {"saturation_vsp": 0.3}),
     ({}, {"attack_point_dx": 0.2, "attack_point_dy": 0.1}),
+    ({"V_n": 0.1, "V_e": -0.08}, {}),
     ({"V_n": 0.3, "V_e": 0.2}, {}),
+    ({"F_n": 0.3, "F_e": -0.2}, {}),
     ({"F_n": 1.0, "F_e": 0.5}, {}),
     ({"mass": 4.5}, {}),
     ({"mass": 8.0}, {}),
