@@ -175,7 +175,7 @@ def test_interrupt_while_it_imports_is_one_line(tmp_path, arguments, number):
     while process.poll() is None and not endings.catches(process.pid):
         time.sleep(0.0005)
     process.send_signal(number)
-    _, stderr = process.communicate(timeout=60)
+    _, stderr = process.communicate()
     assert (process.returncode, stderr) == (130, "interrupted\n")
 
 
@@ -199,7 +199,7 @@ def interrupt_twice(tmp_path):
     for _ in range(2):
         process.send_signal(signal.SIGINT)
         time.sleep(0.3)
-    _, stderr = process.communicate(timeout=30)
+    _, stderr = process.communicate()
     assert faults(process.returncode, stderr, tmp_path / "out", {130}) == []
 
 
@@ -247,7 +247,7 @@ def test_interrupt_during_instantiation_is_no_bad_input(plain_fmu, tmp_path):
     )  # fmt: skip
     assert process.stdout.readline() == "here\n"
     process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=30)
+    _, stderr = process.communicate()
     assert process.returncode == 130
     assert stderr.splitlines()[1:] == ["interrupted"]  # after a warning of its free input
     assert not (tmp_path / "out").exists()
