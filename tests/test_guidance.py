@@ -5,7 +5,7 @@ import random
 
 import numpy as np
 import pytest
-from support.project import COMPONENTS
+from support.project import COMPONENTS, with_values
 
 from fmus.declare import flatten, packer, variables
 from fmus.signals import Target
@@ -17,11 +17,7 @@ GUIDANCE = [n for n, c in COMPONENTS.items() if c.outputs is Target and not vari
 def follow(name, seconds, h=0.01, **parameters):
     """Rows of the target along a path, at steps of h [s], or of several in turn."""
     c = COMPONENTS[name]
-    names = [v.name for v in variables(c.params)]
-    p = packer(c.params)(
-        [parameters.pop(n, start) for n, start in zip(names, flatten(c.params()), strict=True)]
-    )
-    assert not parameters
+    p = with_values(c, **parameters)
     s = c.init(c.inputs(), p)
     rows = [c.step(s, c.inputs(), p, 0.0)[1]]
     steps = np.atleast_1d(h).tolist()

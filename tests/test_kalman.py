@@ -6,10 +6,10 @@ import random
 import numpy as np
 import pytest
 from support.ccode import stepped
-from support.project import COMPONENTS
+from support.project import COMPONENTS, with_values
 
 import cosim
-from fmus.declare import flatten, packer, variables
+from fmus.declare import flatten, packer
 from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
 from fmus.observer.axis import MOST_DISTURBANCE, DisturbedAxis, NoiseLearning, later, rates, taken
 from fmus.signals import Force
@@ -29,9 +29,7 @@ HIDDEN = {
 
 
 def params(**changes):
-    named = variables(KALMAN.params)
-    assert set(changes) <= {v.name for v in named}
-    return packer(KALMAN.params)([changes.get(v.name, v.start) for v in named])
+    return with_values(KALMAN, **changes)
 
 
 def log_of(scenario, folder, stop, frozen=True, **parameters):
