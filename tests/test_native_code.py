@@ -173,6 +173,21 @@ def test_truth_values_may_be_prepared():
     assert len(run.step(params, [0.1, 0.0, 0.0], [0.0] * 7, 0.01)) == 7 + len(variables(vessel.outputs))
 
 
+@compiled
+@pytest.mark.parametrize("h", [0.01, 0.05])
+def test_a_component_moves_on_in_c_as_in_python(h):
+    """Also where a step is taken in parts, and the state between."""
+    vessel = COMPONENTS["vessel"]
+    assert 0.01 < vessel.max_step < 0.05
+    one, other = (
+        make(vessel, vessel.params(), Force(0.1)) for make in (ccode.Stepped, ccode.SteppedInC)
+    )
+    for k in range(20):
+        force = [0.5, 0.1 * k, -0.05]
+        assert same_bits(one.advance(force, h), other.advance(force, h))
+        assert same_bits(flatten(one.state), flatten(other.state))
+
+
 def test_branch_and_kernel_are_recorded_as_such():
     @kernel
     def heavy(x, y):
