@@ -28,7 +28,7 @@ def measured(ship, seed, vessel=None, thrusters=None, off=0.0):
         run, _ = sail(SECONDS, 0.1, vessel, thrusters, seed=seed, given=partial(later, seed))
         return replace(run, name=f"run {seed}", pose=run.pose + np.array([0.0, 0.0, off]))
     cause = ship_effects.Cause("", vessel or {}, thrusters or {})
-    table = ship_effects.sail(ship, cause, np.random.default_rng(seed), None)
+    table = ship_effects.sail(ship, cause, np.random.default_rng(seed), None, seconds=SECONDS)
     return replace(read_frame(table, of=ship), name=f"run {seed}")
 
 
@@ -43,8 +43,7 @@ def later(seed, t):
     ("name", "hidden"),
     [("cse1", (DRAG, {}, 0.0)), ("otter", ({}, {"lag": 0.8}, 0.0)), ("cse1", ({}, {}, OFF))],
 )
-def test_another_test_run_changes_nothing_that_is_learned(tmp_path, monkeypatch, name, hidden):
-    monkeypatch.setattr(ship_effects, "SECONDS", SECONDS)
+def test_another_test_run_changes_nothing_that_is_learned(tmp_path, name, hidden):
     ship = ship_with((), name)
     start = Model(ship=ship)
     train = measured(ship, 1, *hidden)
