@@ -56,13 +56,18 @@ def pytest_configure(config):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
-    """Tests that took long are marked slow; slow ones go first, so that none is left alone at the end."""
+    """Tests that took long are marked slow, and their files go first: none is left alone at the end.
+
+    The tests of a file stay together, so that mostly one worker makes what they share.
+    """
     listed = slow_tests()
     for item in items:
         if item.nodeid in listed and not item.get_closest_marker("numerical"):
             item.add_marker("slow")
     yield
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    slow = [item.get_closest_marker("slow") is not None for item in items]
+    first = {item.path for item, is_slow in zip(items, slow, strict=True) if is_slow}
+    items.sort(key=lambda item: item.path not in first)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -218,13 +223,15 @@ def serial(monkeypatch):
     monkeypatch.setattr("thesis.monte_carlo.analyse_runs", here)
 
 
-@pytest.fixture
-def short_loops(monkeypatch):
-    """The closed loops of the check of a learned model last 30 s, for tests that are about something else."""
+@pytest.fixture(autouse=True, scope="session")
+def _short_loops():
+    """The closed loops of the check of a learned model last 30 s; test_diagnosis_stability.py has whole ones."""
     from diagnosis.assessment import stability
 
     short = tuple(r._replace(seconds=30.0) for r in stability.REFERENCES)
-    monkeypatch.setattr(stability, "REFERENCES", short)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stability, "REFERENCES", short)
+        yield
 
 
 @pytest.fixture

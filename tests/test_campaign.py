@@ -6,12 +6,12 @@ import re
 import signal
 import subprocess
 import sys
-import time
 
 import pandas
 import pytest
 from rich.console import Console
 from support.command import command
+from support.events import once_there
 from support.project import ROOT
 
 import cosim
@@ -365,10 +365,7 @@ def scheduler(tmp_path):
     try:
         for _ in range(2):
             started.append(dask(tmp_path, "worker", "--nthreads", 1, "--no-nanny", *common))
-        until = time.monotonic() + 60.0
-        while not file.exists():
-            assert time.monotonic() < until
-            time.sleep(0.1)
+        once_there(file.exists)
         yield json.loads(file.read_text())["address"], started[1:]
     finally:
         for process in started:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from support import ccode, lag
+from support.events import once_there
 from support.project import ROOT
 
 from fmucheck.examine import examine
@@ -54,11 +55,7 @@ def test_nothing_that_an_fmu_leaves_or_does_at_the_end_stays(tmp_path, monkeypat
 
 def wait_for(path):
     """The number that another process writes to a file."""
-    deadline = time.monotonic() + 20.0
-    while not (text := path.read_text() if path.exists() else ""):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    return int(text)
+    return int(once_there(lambda: path.exists() and path.read_text()))
 
 
 def is_alive(pid):
@@ -88,7 +85,7 @@ def test_nothing_outlives_a_trial(number, tmp_path):
     for _ in range(3 if number else 0):  # an impatient user
         process.send_signal(number)
         time.sleep(0.01)
-    _, said = process.communicate(timeout=20.0)
+    _, said = process.communicate()
     assert (process.returncode, said.strip()) == ((130, "interrupted") if number else (0, ""))
     assert not is_alive(child)
     assert list(place.iterdir()) == []

@@ -5,10 +5,10 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from support.events import once_there
 from support.foreign import build_lag, needs_compiler
 from support.spy import build_spy, found
 
@@ -137,12 +137,8 @@ def test_what_it_has_started_ends_with_it(tmp_path, means, more):
     try:
         if confined.confinement.startswith("unconfined") and means:
             pytest.skip(confined.confinement)
-        started, until = Path(f"/proc/{int(stepped(confined)[0])}/stat"), time.monotonic() + 10.0
-        while (
-            runs := started.exists() and ") Z" not in started.read_text()
-        ) and time.monotonic() < until:
-            time.sleep(0.05)
-        assert not runs
+        started = Path(f"/proc/{int(stepped(confined)[0])}/stat")
+        once_there(lambda: not started.exists() or ") Z" in started.read_text())
     finally:
         confined.close()
 
@@ -249,7 +245,4 @@ def test_processes_end_with_a_master_that_is_killed(tmp_path):
     master.send_signal(signal.SIGKILL)
     master.wait()
     master.stdout.close()
-    until = time.monotonic() + 20.0
-    while time.monotonic() < until and any(Path(f"/proc/{pid}").exists() for pid in pids):
-        time.sleep(0.05)
-    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
+    once_there(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from support import loops
+from support.ccode import stepped
 from support.cse1 import VESSEL
 from support.project import COMPONENTS
 
@@ -12,6 +14,7 @@ from fmus.controller import bs, pid
 from fmus.controller.adaptive import Disturbance
 from fmus.controller.backstepping import FeedbackGains, Inputs, control_errors
 from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
+from fmus.declare import flatten, packer
 from fmus.frames import rotate_to_body
 from fmus.hull import Damping, Inertia, RotationalDamping, Terms, mass_matrix
 from fmus.signals import Estimate, Force, Target
@@ -44,24 +47,24 @@ def rich_target(t):
     terms = [  # axis, amplitude, frequency
         (0, 0.5, 0.11), (0, 0.2, 0.31), (1, 0.5, 0.13), (1, 0.2, 0.37), (2, 1.0, 0.17), (2, 0.5, 0.43),
     ]  # fmt: skip
-    value, rate, acceleration = np.zeros(3), np.zeros(3), np.zeros(3)
+    value, rate, acceleration = [0.0] * 3, [0.0] * 3, [0.0] * 3
     for axis, a, w in terms:
         value[axis] += a * math.sin(w * t)
         rate[axis] += a * w * math.cos(w * t)
         acceleration[axis] -= a * w * w * math.sin(w * t)
-    return Target(*map(float, (*value, *rate, *acceleration)))
+    return Target(*value, *rate, *acceleration)
 
 
 def closed_loop(component, params, seconds, h=H, start=None, plant=None):
-    """Yield (time, vessel state, controller state, inputs, outputs), with true states fed back."""
+    """Yield (time, vessel state, controller with its state, inputs, outputs), with true states fed back."""
     plant = plant or VESSEL.params()
-    s = start or vessel.State()
-    cs = component.init(Inputs(true_estimate(s), rich_target(0.0)), params)
+    s, pack = start or vessel.State(), packer(component.outputs)
+    law = stepped(component, params, Inputs(true_estimate(s), rich_target(0.0)))
     b = VESSEL.prepare(plant).hull
     for k in range(round(seconds / h)):
         i = Inputs(true_estimate(s), rich_target(k * h))
-        cs, out = component.step(cs, i, params, h)
-        yield k * h, s, cs, i, out
+        out = pack(law.advance(flatten(i), h))
+        yield k * h, s, law, i, out
         s = vessel.integrate(s, Force(*out.tau), b, h)
 
 
@@ -106,8 +109,8 @@ def test_adaptation_recovers_known_parameters_under_rich_motion():
     phi = ROTATIONAL.start(*TRUE_PHI)._replace(phi_0_2=0.0, phi_0_6=0.0)
     gamma = ROTATIONAL.gamma(0.0, 400.0, 0.0, 0.0, 0.0, 100.0, 0.0, 0.0)
     params = Params(phi=phi, gamma=gamma)
-    *_, (_, _, state, _, _) = closed_loop(ABS, params, 200.0, 0.01)
-    assert list(state.phi_hat) == pytest.approx(list(TRUE_PHI), rel=0.02)
+    *_, (_, _, law, _, _) = closed_loop(ABS, params, 200.0, 0.01)
+    assert list(law.state.phi_hat) == pytest.approx(list(TRUE_PHI), rel=0.02)
 
 
 @pytest.mark.slow
@@ -117,8 +120,8 @@ def test_adaptation_approaches_four_unknown_parameters():
     plant = VESSEL.params(damping=Damping(Terms()._replace(**only._asdict())))
     gamma = ROTATIONAL.gamma(0.0, 1000.0, 0.0, 8000.0, 0.0, 250.0, 0.0, 4000.0)
     params = Params(gamma=gamma)
-    *_, (_, _, state, _, _) = closed_loop(ABS, params, 600.0, 0.01, plant=plant)
-    error = np.linalg.norm(np.subtract(state.phi_hat, only))
+    *_, (_, _, law, _, _) = closed_loop(ABS, params, 600.0, 0.01, plant=plant)
+    error = np.linalg.norm(np.subtract(law.state.phi_hat, only))
     assert error < np.linalg.norm(only) / 7.0
 
 
@@ -126,8 +129,8 @@ def test_lyapunov_function_with_adaptation_does_not_grow():
     gamma = np.array(ROTATIONAL_GAINS)
     params = Params()
     values = []
-    for _, _, cs, i, _ in closed_loop(ABS, params, 20.0, start=vessel.State(x=0.3, r=0.2)):
-        error = np.array(TRUE_PHI) - np.array(cs.phi_hat)
+    for _, _, law, i, _ in closed_loop(ABS, params, 20.0, start=vessel.State(x=0.3, r=0.2)):
+        error = np.array(TRUE_PHI) - np.array(law.state.phi_hat)
         values.append(lyapunov(i, params.gains) + 0.5 * error @ (error / gamma))
     growth = np.diff(values)
     assert growth.max() <= 1e-5
@@ -139,14 +142,11 @@ def test_earth_fixed_force_is_found():
     params = Params(
         phi=ROTATIONAL.start(*TRUE_PHI), gamma=ROTATIONAL.gamma(*[0.0] * 8), disturbance=disturbance
     )
-    north, east, h = 0.2, -0.1, 0.01
-    s, b = vessel.State(), VESSEL.prepare(VESSEL.params()).hull
-    cs = ABS.init(None, params)
-    for k in range(20000):
-        cs, out = ABS.step(cs, Inputs(true_estimate(s), rich_target(k * h)), params, h)
-        X, Y = rotate_to_body(s.psi, north, east)
-        s = vessel.integrate(s, Force(out.tau[0] + X, out.tau[1] + Y, out.tau[2]), b, h)
-    assert cs.omega[:2] == pytest.approx((north, east), abs=0.02)
+    force = (0.2, -0.1, 0.0)
+    *_, (_, _, law, _) = loops.closed_loop(
+        ABS, params, 200.0, 0.01, lambda k, h: rich_target(k * h), vessel.State(), earth=force
+    )
+    assert law.state.omega[:2] == pytest.approx(force[:2], abs=0.02)
 
 
 def test_force_is_the_sum_of_its_parts_and_omega_hat_is_the_models():

@@ -84,11 +84,9 @@ def measured(kind, change=None):
 def errors(run, kind):
     """Window errors of position [m] and heading [rad], of the true model and of others."""
     truth = {"delay": KINDS[kind][1]}
-    windows, found = Windows([run]), []
-    for other in ({}, *HIDDEN):
-        thrusters = truth | other.get("thrusters", {})
-        found.append(windows.errors(Model(other.get("vessel", {}), thrusters)).over_all())
-    return np.array(found, float)
+    models = [Model(x.get("vessel", {}), truth | x.get("thrusters", {})) for x in ({}, *HIDDEN)]
+    windows = Windows([run])
+    return np.array([windows.summary(r).over_all() for r in windows.residuals_of_each(models)], float)
 
 
 def errors_of_whole(kind):

@@ -14,7 +14,7 @@ from support.measured import DATA, needs_data, sail, smoothed
 import diagnosis
 from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
-from diagnosis import InputError, Model, Run, compare, read, weak_windows
+from diagnosis import InputError, Model, Run, compare, weak_windows
 from diagnosis.assessment.command_check import without_force
 from diagnosis.assessment.gains import ThrustGains, _own, gains
 from diagnosis.assessment.plausibility import (
@@ -55,16 +55,6 @@ MISTAKES = [
     ("y points west", {"y": {"name": "y", "flip": True}}, {"pose": flipped(1, -1, 1)}),
     ("x points south", {"x": {"name": "x", "flip": True}}, {"pose": flipped(-1, 1, 1)}),
     (
-        "x and y are swapped",
-        {"x": {"name": "y"}, "y": {"name": "x"}},
-        {"pose": lambda p: p[:, [1, 0, 2]]},
-    ),
-    (
-        "position is in cm",
-        {"x": {"name": "x", "unit": "cm"}, "y": {"name": "y", "unit": "cm"}},
-        {"pose": flipped(100, 100, 1)},
-    ),
-    (
         "commands have the wrong sign",
         {name: {"name": name, "flip": True} for name in COLUMNS[4:]},
         {"commands": flipped(-1, -1, -1)},
@@ -78,7 +68,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(
-    ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[0], MISTAKES[4]])
+    ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[0], MISTAKES[3]])
 )
 def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_path):
     w = weak_windows(smoothed(replace(edited(**edits), file=tmp_path / "a.csv")))
@@ -208,29 +198,6 @@ def test_commands_that_follow_those_of_another_axis_tell_no_gain_of_their_own():
     assert gains(weak_windows(smoothed(base())), Model()).told.all()
 
 
-HARMLESS = [
-    ({}, {}),
-    ({"heading_offset": 0.3}, {}),
-    ({"heading_offset": 1.2}, {}),
-    ({}, {"loss_surge": 1.0}),
-    ({}, {"loss_sway": 1.0}),
-    ({}, {"loss_yaw": 1.0}),
-    ({}, {"loss_vsp": 0.9}),
-    ({}, {"bow_failure_time": 5.0}),
-    ({}, {"delay": 1.0}),
-    ({"V_n": 0.1, "V_e": -0.08}, {}),
-    ({"F_n": 0.3, "F_e": -0.2}, {}),
-    ({"mass": 8.0}, {}),
-]
-
-
-@pytest.mark.parametrize(("ship", "thrusters"), in_part(HARMLESS, keep=[HARMLESS[k] for k in (1, 3)]))
-def test_no_effect_is_a_mistake(ship, thrusters):
-    run = sail(60.0, 0.05, ship=ship, thrusters=thrusters)[0]
-    assert same_columns(run) is None
-    assert likeliest_mistake(weak_windows(smoothed(run)), Model()) is None
-
-
 def test_late_clock_is_no_mistake():
     late = replace(base(), pose=np.vstack([np.repeat(base().pose[:1], 10, axis=0), base().pose[:-10]]))
     noise = 1e-4 * np.random.default_rng(0).standard_normal(late.pose.shape)
@@ -285,15 +252,6 @@ def test_command_refuses_goes_on_anyway_and_takes_the_line(tmp_path):
     assert command(compare.main, tmp_path / "a.csv", "--anyway", "--out", out).returncode == 0
     (tmp_path / "a.csv.json").write_text('{"columns": {"psi": {"name": "psi", "flip": true}}}')
     assert command(compare.main, tmp_path / "a.csv", "--out", out).returncode == 0
-
-
-@pytest.mark.slow
-@needs_data
-@pytest.mark.parametrize("name", ["dptest1", "random_run1"])
-def test_real_run_is_no_mistake(name):
-    run = read(DATA / "cse1" / f"{name}.mat")
-    assert same_columns(run) is None
-    assert likeliest_mistake(weak_windows(smoothed(run)), Model()) is None
 
 
 @pytest.mark.slow

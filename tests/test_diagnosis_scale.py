@@ -76,7 +76,6 @@ def loaded(scale, seconds=64.0):
     return gather([at_size(run, scale) for run in runs], model=of_size(scale))
 
 
-@cache
 def learned(scale):
     train, test = loaded(scale)
     return diagnosis.diagnose([train], [test], model=of_size(scale))
@@ -103,8 +102,8 @@ def test_motion_model_error_and_predictions_are_the_same_in_own_units(scale):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", SIZES, ids=["7 m", "320 m"])
-def test_the_same_is_found_in_own_units(scale):
+def test_the_same_is_found_in_own_units_and_texts_say_the_seconds_of_the_ship(tmp_path):
+    scale = SIZES[-1]
     same, other = learned(REFERENCE), learned(scale)
     assert other.verdict == same.verdict == "found"
     assert [f.id for f in other.learned.effects] == [f.id for f in same.learned.effects]
@@ -126,16 +125,10 @@ def test_the_same_is_found_in_own_units(scale):
     assert other.stability.learned_min_dissipation / rate == pytest.approx(
         same.stability.learned_min_dissipation, rel=1e-3
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scale", SIZES, ids=["7 m", "320 m"])
-def test_texts_say_the_seconds_of_the_ship(scale, tmp_path):
-    found = learned(scale)
     seconds = f"{8.0 * scale.time:.3g} s"
-    assert f"prediction error over {seconds}" in repr(found)
-    assert f"over {seconds} [mm]" in found._repr_html_()
-    page = found.write_report(tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f"prediction error over {seconds}" in repr(other)
+    assert f"over {seconds} [mm]" in other._repr_html_()
+    page = other.write_report(tmp_path / "report.html").read_text(encoding="utf-8")
     for text in (
         f"in windows of {seconds}",
         f"error of {seconds} predictions",

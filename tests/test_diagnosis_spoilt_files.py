@@ -142,20 +142,22 @@ def test_file_that_can_be_used_is_not_refused(way, tmp_path):
 # What a ship may well have: single effects of realistic and of unusual size.
 SHIPS = [
     ({}, {}),
+    ({"heading_offset": 0.3}, {}),
     ({"heading_offset": 1.2}, {}),
     ({}, {"loss_surge": 1.0}),
+    ({}, {"loss_sway": 1.0}),
     ({}, {"loss_yaw": 1.0}),
     ({}, {"loss_vsp": 0.9}),
     ({}, {"loss_surge": 0.5, "loss_sway": 0.5, "loss_yaw": 0.5}),
     ({}, {"bow_failure_time": 5.0}),
     ({}, {"bow_outage_start_1": 10.0, "bow_outage_end_1": 40.0}),
     ({}, {"vsp_outage_start_1": 10.0, "vsp_outage_end_1": 40.0}),
-    ({}, {"delay": 1.0}),
-    ({}, {"lag": 2.0}),
     ({}, {"deadband": 0.1}),
     ({}, {"saturation_vsp": 0.3}),
     ({}, {"attack_point_dx": 0.2, "attack_point_dy": 0.1}),
+    ({"V_n": 0.1, "V_e": -0.08}, {}),
     ({"V_n": 0.3, "V_e": 0.2}, {}),
+    ({"F_n": 0.3, "F_e": -0.2}, {}),
     ({"F_n": 1.0, "F_e": 0.5}, {}),
     ({"mass": 4.5}, {}),
     ({"mass": 8.0}, {}),
@@ -167,8 +169,13 @@ SHIPS = [
 ]
 
 
-@pytest.mark.parametrize("given", [pytest.param(commands, id="smooth"), pytest.param(jumps, id="jumps")])
-@pytest.mark.parametrize(("ship", "thrusters"), in_part(SHIPS, keep=[SHIPS[k] for k in (4, 9)]))
+# Late forces are seen in jumps of the commands; the others have smooth ones and jumps in turn.
+LATE = [({}, {"delay": 1.0}), ({}, {"lag": 2.0})]
+CASES = [(*each, (commands, jumps)[k % 2]) for k, each in enumerate(SHIPS)]
+CASES += [(*each, given) for each in LATE for given in (commands, jumps)]
+
+
+@pytest.mark.parametrize(("ship", "thrusters", "given"), in_part(CASES, keep=[CASES[4], CASES[-1]]))
 def test_no_hidden_effect_is_refused(ship, thrusters, given):
     run = sail(60.0, 1.0 / RATE, ship=ship, thrusters=thrusters, given=given)[0]
     refuse_implausible([weak_windows(smoothed(run))], Model())

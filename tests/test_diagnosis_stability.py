@@ -106,9 +106,9 @@ def test_the_damping_of_a_described_ship_and_its_changes_count():
 
 
 @pytest.mark.parametrize("whole", [False, slow(True)])
-def test_the_nominal_model_is_as_good_as_itself(whole, request):
-    if not whole:
-        request.getfixturevalue("short_loops")
+def test_the_nominal_model_is_as_good_as_itself(whole, monkeypatch):
+    if whole:
+        monkeypatch.setattr(stability, "REFERENCES", REFERENCES)
     found = check_stability(NOMINAL, NOMINAL)
     assert found.nominal_min_dissipation == found.learned_min_dissipation < 0.0
     assert (found.mass_definite, found.bounded, found.safe, found.region) == (True, True, True, None)
@@ -130,7 +130,6 @@ def test_the_nominal_model_is_as_good_as_itself(whole, request):
         ),
     ],
 )
-@pytest.mark.usefixtures("short_loops")
 def test_less_dissipation_names_the_region(changes, words):
     found = check_stability(Model(changes), NOMINAL)
     assert found.region is not None
@@ -146,7 +145,6 @@ def test_less_dissipation_names_the_region(changes, words):
         Model({}, {"bow_speed_loss": 3.0, "loss_vsp": 0.2}, {"clock_offset": 0.2}),
     ],
 )
-@pytest.mark.usefixtures("short_loops")
 def test_more_damping_or_none_of_its_kind_warns_of_nothing(model):
     found = check_stability(model, NOMINAL)
     assert found.region is None
@@ -173,7 +171,6 @@ def test_what_cannot_be_checked_is_one_message():
         check_stability(NOMINAL, NOMINAL, region=OperatingRegion(0.0))
 
 
-@pytest.mark.usefixtures("short_loops")
 def test_a_force_too_strong_for_the_thrusters_is_told_apart():
     found = check_stability(Model({"F_n": 30.0}), NOMINAL)
     assert not found.bounded
@@ -185,7 +182,6 @@ def test_a_force_too_strong_for_the_thrusters_is_told_apart():
     assert not found.safe
 
 
-@pytest.mark.usefixtures("short_loops")
 def test_a_model_that_was_unsound_before_it_learned_is_no_reason_to_withhold_it():
     found = check_stability(Model({"X_u": 40.0}), Model({"X_u": 40.0}))
     assert not found.bounded

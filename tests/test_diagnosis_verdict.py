@@ -163,18 +163,6 @@ def test_wrong_coefficients_alone_are_written():
 
 @pytest.mark.slow
 @pytest.mark.numerical
-def test_coefficient_far_outside_of_the_prior_is_an_effect():
-    found = learned(voyages(ship={"X_u": 2.0 * Model().value("X_u")}), 0.1)
-    assert found.verdict == "found"
-    (effect,) = found.learned.effects
-    assert effect.id == "X_u"
-    assert effect.confidence > 0.95
-    assert effect.share > 0.9, "the share is that of the fall against the model before"
-    assert not found.remainder.significant
-
-
-@pytest.mark.slow
-@pytest.mark.numerical
 def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     found = learned(voyages(**DEAD), 0.1)
     assert found.verdict == "found"

@@ -1,17 +1,15 @@
 """The pages of docs: what they name exists, and their links lead somewhere."""
 
 import ast
-import importlib
 import json
 import re
 import shlex
-import subprocess
-import sys
 from functools import cache
+from inspect import signature
 from pathlib import Path
 
 import pytest
-from support.command import command
+from support.command import command, main_of
 
 import cosim
 import diagnosis.predictors
@@ -156,12 +154,14 @@ def test_python_of_the_pages_runs(page, reason, text, tmp_path, monkeypatch):
 @cache
 def help_of(module):
     """What a command of ours says of its options."""
-    return subprocess.run(
-        [sys.executable, "-m", module, "--help"], capture_output=True, text=True, cwd=ROOT, check=True
-    ).stdout
+    main = main_of(module)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", [module, "--help"])
+        done = command(main if signature(main).parameters else lambda _: main(), "--help")
+    assert done.returncode == 0
+    return done.stdout
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_commands_of_the_pages_have_the_options_that_are_shown(page):
     for kind in ("sh", "bash"):
@@ -221,10 +221,7 @@ def test_shell_of_the_pages_is_run_or_says_why_not(page, reason, text):
 @pytest.mark.parametrize(("page", "reason", "text"), [b for b in blocks("sh") if not b.values[1]])
 def test_shell_of_the_pages_runs(page, reason, text, place):
     for name, arguments in commands(text):
-        module = importlib.import_module(name)
-        if not hasattr(module, "main"):
-            module = importlib.import_module(f"{name}.__main__")
-        done = command(module.main, *arguments, cwd=place)
+        done = command(main_of(name), *arguments, cwd=place)
         assert done.returncode == 0, done.stderr
 
 

@@ -440,8 +440,8 @@ def test_table_interpolates_over_command_and_inflow():
 
 @pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
 @pytest.mark.parametrize("component", [COMPONENT, THRUSTERS], ids=lambda c: c.name)
-def test_same_source_in_c_with_every_effect_on(component, tmp_path):
-    run = ccode.Compiled(component, tmp_path)
+def test_same_source_in_c_with_every_effect_on(component):
+    run = ccode.Compiled(component)
     rng = random.Random(4)
     names = {p.name for e in EFFECTS.values() for p in e.parameters}
     for _ in range(20):

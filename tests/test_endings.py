@@ -45,9 +45,9 @@ def started(*arguments, **environment):
     )  # fmt: skip
 
 
-def ended(process, within=60.0):
-    """Exit code and lines on standard error of a process that ends within some time [s]."""
-    _, stderr = process.communicate(timeout=within)
+def ended(process):
+    """Exit code and lines on standard error of a process that ends."""
+    _, stderr = process.communicate()
     return process.returncode, without_progress(stderr).splitlines()
 
 

@@ -108,8 +108,8 @@ def test_controllers_store_smoothed_samples_of_the_past(name):
     component = COMPONENTS[name]
     p = component.params()
     p = p._replace(samples=p.samples._replace(fixed_point=SPAN))
-    *_, (_, _, cs, out) = closed_loop(component, p, 12.0, H, multisine_target(2.0))
-    times = [row.time for row in cs.store.rows if row.filled]
+    *_, (_, _, law, out) = closed_loop(component, p, 12.0, H, multisine_target(2.0))
+    times = [row.time for row in law.state.store.rows if row.filled]
     assert len(times) >= 5
     assert out.learning.stored_at == max(times)
     assert max(times) <= 12.0 - SPAN + 2 * H

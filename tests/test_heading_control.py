@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.project import COMPONENTS, ROOT
+from support.project import COMPONENTS, ROOT, with_values
 from support.ships import SHIPS, scaled
 
 import cosim
 from fmus.controller.backstepping import Applied, Inputs
-from fmus.declare import flatten, packer, variables
+from fmus.declare import flatten
 from fmus.hull import damping_force, mass_matrix
 from fmus.ship import ship
 from fmus.signals import Estimate, Force, Target, VelocityInCurrent
@@ -23,14 +23,6 @@ from fmus.vessel.vessel import water_velocity
 HEADING, LOS = COMPONENTS["controller_heading"], COMPONENTS["guidance_los"]
 OTTER = SHIPS["otter"]
 H = 0.02
-
-
-def with_values(component, **values):
-    """Parameters of a component, some of them with other values."""
-    names = [v.name for v in variables(component.params)]
-    start = dict(zip(names, flatten(component.params()), strict=True))
-    assert values.keys() <= start.keys()
-    return packer(component.params)(list((start | values).values()))
 
 
 # The autopilot, on the hull of Nomoto: m r_dot + d r = N

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.events import once_there
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 from support.plain import GAIN
 from support.project import ROOT
@@ -43,16 +44,8 @@ def alive(pid):
         return False
 
 
-def soon(happens):
-    """Whether something happens within 20 s."""
-    deadline = time.monotonic() + 20.0
-    while time.monotonic() < deadline and not happens():
-        time.sleep(0.05)
-    return happens()
-
-
 def gone(workers):
-    return soon(lambda: not any(map(alive, workers)))
+    return once_there(lambda: not any(map(alive, workers)))
 
 
 @pytest.fixture(autouse=True)
@@ -255,7 +248,7 @@ def running(ellipse, plain_fmu, tmp_path):
         path = tmp_path / "scenario.json"
         path.write_text(json.dumps(ellipse | {"stop": 10000.0}))
         process = start(path, tmp_path / "out")
-        assert soon(lambda: mark.exists() or not hang)
+        assert once_there(lambda: mark.exists() or not hang)
         (simulating,) = children(process.pid)
         workers = children(simulating)
         assert len(workers) == 2
@@ -271,7 +264,7 @@ def running(ellipse, plain_fmu, tmp_path):
 def test_interrupted_run_keeps_its_log_and_leaves_no_process(running, tmp_path):
     process, workers = running(hang=False)
     process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=20)
+    _, stderr = process.communicate()
     assert process.returncode == 130
     assert "interrupted: " in stderr
     assert "Traceback" not in stderr
@@ -285,7 +278,7 @@ def test_second_interrupt_does_not_wait_for_an_fmu_that_hangs(running, tmp_path,
     for number in (first, signal.SIGINT):
         process.send_signal(number)
         time.sleep(0.3)
-    _, stderr = process.communicate(timeout=20)
+    _, stderr = process.communicate()
     assert process.returncode == 130
     assert "Traceback" not in stderr
     assert len(cosim.read_log(tmp_path / "out")["time"]) >= 1000

@@ -5,10 +5,11 @@ import random
 
 import numpy as np
 import pytest
-from support.project import COMPONENTS
+from support.ccode import stepped
+from support.project import COMPONENTS, with_values
 
 import cosim
-from fmus.declare import flatten, packer, variables
+from fmus.declare import flatten, packer
 from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
 from fmus.observer.axis import MOST_DISTURBANCE, DisturbedAxis, NoiseLearning, later, rates, taken
 from fmus.signals import Force
@@ -28,9 +29,7 @@ HIDDEN = {
 
 
 def params(**changes):
-    named = variables(KALMAN.params)
-    assert set(changes) <= {v.name for v in named}
-    return packer(KALMAN.params)([changes.get(v.name, v.start) for v in named])
+    return with_values(KALMAN, **changes)
 
 
 def log_of(scenario, folder, stop, frozen=True, **parameters):
@@ -54,12 +53,9 @@ def beats_all_others(log, most=1.0, most_dot=0.8):
 
 def run(rows, p=None, h=0.01):
     """Estimates for rows of x_m, y_m, psi_m, tau_X, tau_Y, tau_N."""
-    p, pack = p or params(), packer(KALMAN.inputs)
-    state, found = KALMAN.init(pack(rows[0]), p), []
-    for row in rows[1:]:
-        state, estimate = KALMAN.step(state, pack(row), p, h)
-        found.append(estimate)
-    return found
+    law = stepped(KALMAN, p or params(), packer(KALMAN.inputs)(rows[0]))
+    pack = packer(KALMAN.outputs)
+    return [pack(law.advance(row, h)) for row in rows[1:]]
 
 
 def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
@@ -69,12 +65,11 @@ def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
     """
     rng = random.Random(seed)
     vessel = COMPONENTS["vessel"]
-    p = vessel.params()
-    state, ready = vessel.init(Force(), p), vessel.prepared(p)
+    body, pack = stepped(vessel, vessel.params(), Force()), packer(vessel.outputs)
     rows, nu, nu_dot = [], [], []
     for k in range(round(seconds / h)):
         known = tau(k * h)
-        state, out = vessel.advance(state, Force(*map(sum, zip(known, extra, strict=True))), ready, h)
+        out = pack(body.advance([*map(sum, zip(known, extra, strict=True))], h))
         x, y, psi = out.pose
         psi = math.remainder(psi + rng.gauss(0, 1.5 * noise), math.tau)
         rows.append([x + rng.gauss(0, noise), y + rng.gauss(0, noise), psi, *known])

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 from support.command import command
-from support.project import COMPONENTS, ROOT
+from support.project import COMPONENTS, ROOT, with_values
 from support.ships import PROPELLER, SHIPS, described, part, scaled
 
 import cosim
@@ -19,7 +19,7 @@ from cosim.trials import MEASURES, executes, measure, outcome, passage, sheet
 from cosim.trials.measures import limits
 from cosim.trials.trial_outcome import TrialOutcome
 from cosim.trials.trial_picture import draw_trial
-from fmus.declare import flatten, packer, variables
+from fmus.declare import packer, variables
 from fmus.ship import ship
 from fmus.signals import Force, VelocityInCurrent
 from fmus.sizing import sized
@@ -27,14 +27,6 @@ from fmus.sizing import sized
 OTTER = SHIPS["otter"]
 DEG = math.radians(1.0)
 KINDS = ("circle", "spiral", "stop", "zigzag")
-
-
-def with_values(component, **values):
-    """Parameters of a component, some of them with other values."""
-    names = [v.name for v in variables(component.params)]
-    start = dict(zip(names, flatten(component.params()), strict=True))
-    assert values.keys() <= start.keys()
-    return packer(component.params)(list((start | values).values()))
 
 
 # Ships whose answer is known: the guidance moves them, the measures are held against closed forms

@@ -64,10 +64,10 @@ def agree(expected, got):
 
 @compiled
 @pytest.mark.parametrize("name", [*[slow(n) if n in LARGE else n for n in COMPONENTS], *PARTS])
-def test_c_gives_the_same_bits(name, tmp_path):
+def test_c_gives_the_same_bits(name):
     """Over runs of 15 steps from random parameters: extreme ones, and inputs that are NaN or infinite."""
     component = COMPONENTS[name] if name in COMPONENTS else part_of_ship(name)
-    run = ccode.Compiled(component, tmp_path)
+    run = ccode.Compiled(component)
     rng = random.Random(name)
     pack = packer(component.inputs)
     count = len(variables(component.inputs))
@@ -111,12 +111,12 @@ def of_inputs(function):
 
 
 @compiled
-def test_traps_of_arithmetic(tmp_path):
+def test_traps_of_arithmetic():
     """Zeros keep their signs, infinities have no whole part, NaN is not folded away."""
     component = of_inputs(
         lambda a, b, c: (a + 0.0 - b * 0.0, floor(a), where(a - a == 0.0, -a, c / 3.0))
     )
-    run = ccode.Compiled(component, tmp_path, "-O2")
+    run = ccode.Compiled(component, "-O2")
     values = [0.0, -0.0, 0.5, -0.5, 1e300, -1e-320, math.inf, -math.inf, math.nan]
     for a in values:
         for b in values:
@@ -125,7 +125,7 @@ def test_traps_of_arithmetic(tmp_path):
 
 
 @compiled
-def test_division_by_zero_fails_where_python_fails(tmp_path):
+def test_division_by_zero_fails_where_python_fails():
     """Also where nothing uses the quotient; not in a branch that is not taken."""
 
     def function(a, b, c):
@@ -133,7 +133,7 @@ def test_division_by_zero_fails_where_python_fails(tmp_path):
         return when(a > 0.0, lambda: 1.0 / c, lambda: c), a, b
 
     component = of_inputs(function)
-    run = ccode.Compiled(component, tmp_path)
+    run = ccode.Compiled(component)
     for given in ([1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 1.0, 2.0]):
         expected = by_python(lambda given=given: [*component.step((0.0,), Given(*given), None, 0.0)])
         assert agree(expected, run.step([], given, [0.0], 0.0))
@@ -153,9 +153,9 @@ def mixed(a, b):
 
 
 @compiled
-def test_a_kernel_and_a_branch_in_c_give_the_same_bits(tmp_path):
+def test_a_kernel_and_a_branch_in_c_give_the_same_bits():
     component = of_inputs(lambda a, b, c: mixed(a, b)[:3])
-    run = ccode.Compiled(component, tmp_path)
+    run = ccode.Compiled(component)
     for a in (-2.5, -0.0, 0.5, 3.0, 3.5):
         for b in (0.5, -3.0, 3.25, 0.0):
             expected = by_python(lambda a=a, b=b: [*component.step((0.0,), Given(a, b, 0.0), None, 0.0)])
@@ -163,14 +163,29 @@ def test_a_kernel_and_a_branch_in_c_give_the_same_bits(tmp_path):
 
 
 @compiled
-def test_truth_values_may_be_prepared(tmp_path):
+def test_truth_values_may_be_prepared():
     """They pass through an array of doubles, beside what is no number at all."""
     vessel = COMPONENTS["vessel"]
     recorded = program(vessel)
     assert any(x.condition for x in recorded.prepare.results)
-    run = ccode.Compiled(vessel, tmp_path)
+    run = ccode.Compiled(vessel)
     params = [v.start for v in variables(vessel.params)]
     assert len(run.step(params, [0.1, 0.0, 0.0], [0.0] * 7, 0.01)) == 7 + len(variables(vessel.outputs))
+
+
+@compiled
+@pytest.mark.parametrize("h", [0.01, 0.05])
+def test_a_component_moves_on_in_c_as_in_python(h):
+    """Also where a step is taken in parts, and the state between."""
+    vessel = COMPONENTS["vessel"]
+    assert 0.01 < vessel.max_step < 0.05
+    one, other = (
+        make(vessel, vessel.params(), Force(0.1)) for make in (ccode.Stepped, ccode.SteppedInC)
+    )
+    for k in range(20):
+        force = [0.5, 0.1 * k, -0.05]
+        assert same_bits(one.advance(force, h), other.advance(force, h))
+        assert same_bits(flatten(one.state), flatten(other.state))
 
 
 def test_branch_and_kernel_are_recorded_as_such():

@@ -106,27 +106,6 @@ def test_same_log_from_native_and_from_python_fmus(stop, native, tmp_path):
     assert logs[0].count(b"\n") == round(stop * 100) + 2
 
 
-def test_reset_and_states_repeat_bit_for_bit(native, opened_here):
-    one, other = (
-        opened_here(native["vessel"], "one").initialise(),
-        opened_here(native["vessel"], "other").initialise(),
-    )
-    first = one.play(0)
-    state = one.fmu.getFMUstate()
-    rows = one.play(1)
-    saved = one.fmu.serializeFMUstate(state)
-    one.fmu.setFMUstate(state)
-    assert one.play(1) == rows
-    restored = other.fmu.deSerializeFMUstate(saved)
-    other.fmu.setFMUstate(restored)
-    assert other.play(1) == rows
-    for fmu, given in ((one, state), (other, restored)):
-        fmu.fmu.freeFMUstate(given)
-    one.fmu.reset()
-    one.initialise()
-    assert one.play(0) == first
-
-
 def test_state_of_another_fmu_is_refused(native, opened_here):
     vessel, observer = (
         opened_here(native["vessel"]).initialise(),

@@ -5,8 +5,9 @@ import random
 from itertools import pairwise
 
 import pytest
+from support.project import with_values
 
-from fmus.declare import flatten, packer, variables
+from fmus.declare import variables
 from fmus.observer.mdf import COMPONENT, State
 from fmus.observer.screen import Inputs
 from fmus.signals import Force, Measurement
@@ -16,9 +17,7 @@ H = 0.01
 
 def params(component=COMPONENT, **changes):
     """Parameters of an observer, some changed by name."""
-    names = [v.name for v in variables(component.params)]
-    start = zip(names, flatten(component.params()), strict=True)
-    return packer(component.params)([changes.pop(name, value) for name, value in start])
+    return with_values(component, **changes)
 
 
 NAN = math.nan

@@ -234,7 +234,6 @@ def test_ships_with_and_without_a_users_effects_live_in_one_process(craft):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("short_loops")
 def test_a_method_of_a_user_is_a_file_or_an_object(tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(LEAST_SQUARES)

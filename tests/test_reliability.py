@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command import command as in_this_process
+from support.command import main_of
 from support.plain import GAIN
 from support.project import ROOT
 from test_run import in_a_process as command
@@ -173,7 +175,7 @@ def test_interrupt_while_it_imports_is_one_line(tmp_path, arguments, number):
     while process.poll() is None and not endings.catches(process.pid):
         time.sleep(0.0005)
     process.send_signal(number)
-    _, stderr = process.communicate(timeout=60)
+    _, stderr = process.communicate()
     assert (process.returncode, stderr) == (130, "interrupted\n")
 
 
@@ -197,7 +199,7 @@ def interrupt_twice(tmp_path):
     for _ in range(2):
         process.send_signal(signal.SIGINT)
         time.sleep(0.3)
-    _, stderr = process.communicate(timeout=30)
+    _, stderr = process.communicate()
     assert faults(process.returncode, stderr, tmp_path / "out", {130}) == []
 
 
@@ -245,7 +247,7 @@ def test_interrupt_during_instantiation_is_no_bad_input(plain_fmu, tmp_path):
     )  # fmt: skip
     assert process.stdout.readline() == "here\n"
     process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=30)
+    _, stderr = process.communicate()
     assert process.returncode == 130
     assert stderr.splitlines()[1:] == ["interrupted"]  # after a warning of its free input
     assert not (tmp_path / "out").exists()
@@ -352,27 +354,29 @@ def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_p
     assert {*tmp_path.glob(".*")} == {young, alive}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["cosim.run", "scenarios/setpoint.json", "--stop", "0.1", "--no-plots"], ["cosim.scenario"],
-        ["fmus.build", "--list"], ["fmus.build", "vessel"], ["fmus.check", "--list"], ["fmus.effects"],
-        ["cosim.interface", "scenarios/ellipse.json"], ["diagnosis.learn", "--help"],
-    ],
-    ids=" ".join,
+CALLS = (
+    ["cosim.run", "scenarios/setpoint.json", "--stop", "0.1", "--no-plots", "--out"], ["cosim.scenario"],
+    ["fmus.build", "--list"], ["fmus.build", "vessel"], ["fmus.check", "--list"], ["fmus.effects"],
+    ["cosim.interface", "scenarios/ellipse.json"], ["diagnosis.learn", "--help"],
 )  # fmt: skip
-def test_commands_without_docstrings_print_the_same(arguments, tmp_path):
-    out = ["--out", str(tmp_path)] if "cosim.run" in arguments else []
-    plain, bare = (
-        subprocess.run(
-            [sys.executable, *optimised, "-m", *arguments, *out], capture_output=True, text=True, cwd=ROOT, check=False
-        )
-        for optimised in ([], ["-OO"])
+PRINTED = """
+import json, sys
+from support.command import command, main_of
+print(json.dumps([command(main_of(name), *arguments) for name, *arguments in json.loads(sys.argv[1])]))
+"""
+
+
+@pytest.mark.slow
+def test_commands_without_docstrings_print_the_same(tmp_path):
+    calls = [[*call, tmp_path] if call[-1] == "--out" else call for call in CALLS]
+    bare = subprocess.run(
+        [sys.executable, "-OO", "-c", PRINTED, json.dumps(calls, default=str)],
+        capture_output=True, text=True, cwd=ROOT, check=True, env={**os.environ, "PYTHONPATH": "tests"},
     )  # fmt: skip
-    assert bare.returncode == plain.returncode == 0
-    if "cosim.scenario" not in arguments:  # the schema's descriptions are docstrings
-        assert bare.stdout == plain.stdout
+    for (name, *arguments), (code, printed, _) in zip(calls, json.loads(bare.stdout), strict=True):
+        here = in_this_process(main_of(name), *arguments, cwd=ROOT)
+        assert (code, here.returncode) == (0, 0)
+        assert printed == here.stdout or name == "cosim.scenario", "whose descriptions are docstrings"
 
 
 GROWTH = """
@@ -414,13 +418,13 @@ def test_campaign_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
     assert mutations.broken_scenarios(60, 2, tmp_path, nothing) == []
     assert mutations.broken_files(30, 2, tmp_path, nothing) == []
-    assert endings.kills(4, 2, tmp_path, nothing) == []
-    assert endings.signals(4, 2, tmp_path, nothing) == []
-    assert endings.short_of_disk(2, 2, tmp_path, nothing) == []
-    assert endings.deaths(10, 2, tmp_path, nothing) == []
-    assert campaigns.interrupted_campaigns(2, 2, tmp_path, nothing) == []
-    assert campaigns.deaths_elsewhere(4, 2, tmp_path, nothing) == []
-    assert campaigns.spoilt_cache(2, 2, tmp_path, nothing) == []
+    assert endings.kills(2, 2, tmp_path, nothing) == []
+    assert endings.signals(2, 2, tmp_path, nothing) == []
+    assert endings.short_of_disk(1, 2, tmp_path, nothing) == []
+    assert endings.deaths(5, 2, tmp_path, nothing) == []
+    assert campaigns.interrupted_campaigns(1, 2, tmp_path, nothing) == []
+    assert campaigns.deaths_elsewhere(2, 2, tmp_path, nothing) == []
+    assert campaigns.spoilt_cache(1, 2, tmp_path, nothing) == []
 
 
 @linux_only
@@ -433,10 +437,10 @@ def test_broken_ships_in_small(tmp_path, monkeypatch):
 @linux_only
 def test_killed_commands_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
-    assert killed_commands.interrupted_compares(3, 2, tmp_path, nothing) == []
-    assert killed_commands.killed_diagnoses(4, 2, tmp_path, nothing) == []
-    assert killed_commands.ended_builds(4, 2, tmp_path, nothing) == []
-    assert killed_commands.killed_campaigns(2, 2, tmp_path, nothing) == []
+    assert killed_commands.interrupted_compares(1, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_diagnoses(2, 2, tmp_path, nothing) == []
+    assert killed_commands.ended_builds(2, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_campaigns(1, 2, tmp_path, nothing) == []
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ def ship():
 
 @pytest.fixture(scope="module")
 def run(ship):
-    return sail(ship, Cause("", {}, {}), np.random.default_rng(5), None)
+    return sail(ship, Cause("", {}, {}), np.random.default_rng(5), None, seconds=120.0)
 
 
 def test_commands_are_read_by_actuator_and_unit(ship, run, tmp_path):
@@ -154,7 +154,7 @@ def test_force_columns_are_commands_too(ship, run):
 def test_the_exact_model_predicts_what_was_simulated(ship, monkeypatch):
     """Simulation step by step and prediction of windows are two ways to the same motion."""
     monkeypatch.setattr(ship_effects, "NOISE", (2e-4, 2e-4, 2e-4))
-    run = sail(ship, Cause("", {}, {}), np.random.default_rng(6), None)
+    run = sail(ship, Cause("", {}, {}), np.random.default_rng(6), None, seconds=120.0)
     (w,) = diagnosis.load(run, ship="otter")
     (e,) = diagnosis.evaluate([w], Model(ship=ship)).evaluations
     assert e.before.position < 5e-3  # of some 5 m
@@ -163,7 +163,7 @@ def test_the_exact_model_predicts_what_was_simulated(ship, monkeypatch):
 @pytest.mark.slow
 def test_a_weak_port_propeller_is_named(ship):
     rng = np.random.default_rng(3)
-    runs = [sail(ship, causes(ship)["loss"], rng, None) for _ in range(2)]
+    runs = [sail(ship, causes(ship)["loss"], rng, None, seconds=120.0) for _ in range(2)]
     found = diagnosis.diagnose(runs[:1], runs[1:], prior=0.0, ship="otter").content
     assert found.verdict == "found"
     (effect,) = found.effects

@@ -1,5 +1,6 @@
 """A command of the project, run in this process, and what it says."""
 
+import importlib
 import io
 import os
 import re
@@ -25,6 +26,12 @@ class Done(NamedTuple):
     returncode: int
     stdout: str
     stderr: str
+
+
+def main_of(name: str) -> Callable[..., int | None]:
+    """The function ``main`` of a module that ``python -m`` runs."""
+    module = importlib.import_module(name)
+    return (module if hasattr(module, "main") else importlib.import_module(f"{name}.__main__")).main
 
 
 def command(

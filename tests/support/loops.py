@@ -3,11 +3,13 @@
 import math
 
 from fmus.controller.backstepping import Inputs
+from fmus.declare import flatten, packer
 from fmus.frames import rotate_to_body
 from fmus.guidance import ellipse, multisine
 from fmus.hull import motion
 from fmus.signals import Estimate, Force, Nothing
 from fmus.vessel import vessel
+from support.ccode import stepped
 from support.cse1 import VESSEL
 
 NO_LOSS = (0.0, 0.0, 0.0)
@@ -62,8 +64,8 @@ def closed_loop(
     loss=NO_LOSS,
     earth=NO_FORCE,
 ):
-    """Yield (t, vessel state, controller state, outputs) of each step; every request acts in full."""
-    params = unlimited(params)
+    """Yield (t, vessel state, controller with its state, outputs) of each step; every request acts in full."""
+    params, pack = unlimited(params), packer(component.outputs)
     b = VESSEL.prepare(plant or VESSEL.params()).hull
     s = start or vessel.State(5.0, 2.0)
     goal = target(0, h)
@@ -72,12 +74,11 @@ def closed_loop(
         return Estimate(*s[:6], *motion(s.u, s.v, s.r, acting(s, tau, loss, earth), b), 0.0)
 
     # The acceleration before the first step is none of the controller's force; init takes its own.
-    cs = component.init(Inputs(estimate(s, NO_FORCE), goal), params)
-    tau = getattr(cs, "tau", NO_FORCE)
+    law = stepped(component, params, Inputs(estimate(s, NO_FORCE), goal))
+    tau = getattr(law.state, "tau", NO_FORCE)
     for k in range(math.ceil(seconds / h)):
-        i = Inputs(estimate(s, tau), goal)
-        cs, out = component.step(cs, i, params, h)
-        yield k * h, s, cs, out
+        out = pack(law.advance(flatten(Inputs(estimate(s, tau), goal)), h))
+        yield k * h, s, law, out
         tau = out.tau
         s = vessel.integrate(s, acting(s, tau, loss, earth), b, h)
         goal = target(k + 1, h)

@@ -10,7 +10,9 @@ import pytest
 
 from diagnosis import Run, clean, smooth
 from diagnosis.predictors.ship_model import parameters
-from fmus.signals import Force, VelocityInCurrent
+from fmus.declare import variables
+from fmus.signals import Force
+from support.ccode import stepped
 from support.cse1 import THRUSTERS, VESSEL, Inputs
 from support.shared import kept
 
@@ -19,6 +21,12 @@ needs_data = pytest.mark.skipif(
     not DATA.is_dir(), reason="no measured runs: CYBERSHIP_DATA names no folder that exists"
 )
 START = {"psi_0": 3.1}  # soon wraps
+# Places in the outputs of the vessel, and in those of the thrusters.
+MEASURED, VELOCITY = (
+    [[v.name for v in variables(VESSEL.outputs)].index(name) for name in names]
+    for names in (("x_m", "y_m", "psi_m"), "uvr")
+)
+ACTING = slice(6, 9)
 NOISE = np.array([5e-4, 5e-4, 9e-4])
 
 
@@ -91,19 +99,14 @@ def voyage(seconds, h, ship, thrusters, quick, craft=None, given=commands):
     t = np.arange(round(seconds / h)) * h
     tau_cmd = commands(t, quick) if given is commands else given(t)
     hull, drive = (craft.vessel, craft.thrusters) if craft else (VESSEL, THRUSTERS)
-    p = parameters(hull, START | ship)
-    plan = parameters(drive, thrusters)
-    body, machine = hull.prepared(p), drive.prepared(plan)
-    s, past = hull.init(Force(), p), drive.init(Inputs(), plan)
-    _, seen = hull.advance(s, Force(), body, 0.0)
-    poses, nu, before = [], [], 0.0
+    body = stepped(hull, parameters(hull, START | ship), Force())
+    machine = stepped(drive, parameters(drive, thrusters), Inputs())
+    poses, nu, before, seen = [], [], 0.0, body.advance([0.0, 0.0, 0.0], 0.0)
     for tau in tau_cmd.tolist():
-        poses.append(tuple(seen.measured))
-        nu.append((s.u, s.v, s.r))
-        inputs = Inputs(Force(*tau), VelocityInCurrent(s.u, s.v, s.r))
-        past, out = drive.advance(past, inputs, machine, before)
-        s, seen = hull.advance(s, Force(*out[3 + 3 :]), body, h)
-        before = h
+        poses.append([seen[k] for k in MEASURED])
+        nu.append([seen[k] for k in VELOCITY])
+        acting = machine.advance([*tau, *nu[-1]], before)[ACTING]
+        seen, before = body.advance(acting, h), h
     return t, np.array(poses), np.array(nu), tau_cmd
 
 

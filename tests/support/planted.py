@@ -7,10 +7,11 @@ import numpy as np
 from diagnosis import Run, WeakWindows, clean, smooth, weak_windows
 from diagnosis.predictors.ship_model import parameters
 from fmus.hull import Triple
-from fmus.signals import Force, VelocityInCurrent
+from fmus.signals import Force
 from fmus.vessel import vessel
+from support.ccode import stepped
 from support.cse1 import THRUSTERS, VESSEL, Inputs
-from support.measured import NOISE, START, commands
+from support.measured import ACTING, MEASURED, NOISE, START, VELOCITY, commands
 from support.shared import kept
 
 STEP = 0.05  # s
@@ -61,24 +62,20 @@ def voyages(
 def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> WeakWindows:
     t = np.arange(round(seconds / STEP)) * STEP
     tau_cmd = commands(t + APART * k)
-    hull = VESSEL
-    p = parameters(hull, START | ship)
-    body = hull.prepared(p)
-    plan = parameters(THRUSTERS, thrusters)
+    body = stepped(VESSEL, parameters(VESSEL, START | ship), Force())
     machines = [
-        THRUSTERS.prepared(parameters(THRUSTERS, thrusters | x)) for x in ({}, {"loss_bow": 1.0})
+        stepped(THRUSTERS, parameters(THRUSTERS, thrusters | x), Inputs())
+        for x in ({}, {"loss_bow": 1.0})
     ]
-    s, past = hull.init(Force(), p), THRUSTERS.init(Inputs(), plan)
-    _, seen = hull.advance(s, Force(), body, 0.0)
-    poses, before = [], 0.0
+    poses, before, seen = [], 0.0, body.advance([0.0, 0.0, 0.0], 0.0)
     for now, tau in zip(t.tolist(), tau_cmd.tolist(), strict=True):
-        poses.append(tuple(seen.measured))
-        machine = machines[dead is not None and dead(now)]
-        inputs = Inputs(Force(*tau), VelocityInCurrent(s.u, s.v, s.r))
-        past, out = THRUSTERS.advance(past, inputs, machine, before)
-        force = np.array(out[6:]) + (push(now, s) if push else 0.0)
-        s, seen = hull.advance(s, Force(*force.tolist()), body, STEP)
-        before = STEP
+        poses.append([seen[k] for k in MEASURED])
+        given = [*tau, *(seen[k] for k in VELOCITY)]
+        acting = [machine.advance(given, before)[ACTING] for machine in machines]
+        force = acting[dead is not None and dead(now)]
+        if push:
+            force = np.add(force, push(now, body.state)).tolist()
+        seen, before = body.advance(force, STEP), STEP
     rng = np.random.default_rng(k + 1)
     pose = np.array(poses) + noise * NOISE * rng.standard_normal((t.size, 3))
     pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))

@@ -59,4 +59,9 @@ def kept(make: Callable[..., T], *arguments: object) -> T:
     def write(folder: Path) -> None:
         (folder / "result").write_bytes(pickle.dumps(make(*arguments)))
 
-    return pickle.loads((once(_session[0] / name, write) / "result").read_bytes())
+    return pickle.loads((made_once(name, write) / "result").read_bytes())
+
+
+def made_once(name: str, make: Callable[[Path], object]) -> Path:
+    """A folder of the session with this name, that the first process to ask for it fills."""
+    return once(_session[0] / name, make)
