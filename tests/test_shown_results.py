@@ -17,7 +17,7 @@ LONGEST = 2000  # letters of any result in a terminal: what a screen holds
 
 @pytest.fixture(scope="module")
 def runs():
-    return [weak_windows(smoothed(replace(sail(40.0, ship=HIDDEN)[0], name="a")))]
+    return [weak_windows(smoothed(replace(sail(90.0, ship=HIDDEN)[0], name="a")))]
 
 
 @pytest.fixture(scope="module")

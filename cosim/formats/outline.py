@@ -46,6 +46,13 @@ def read_outline(annotations: Element | None) -> AnnotatedOutline | None:
     return AnnotatedOutline.read({**ship.attrib, "corners": corners})
 
 
+class CommandLimit(NamedTuple):
+    """The largest value of a command of an actuator to either side, and its unit."""
+
+    limit: float
+    unit: str
+
+
 class AnnotatedTrial(NamedTuple):
     """A manoeuvring trial.
 

@@ -7,7 +7,7 @@ from pathlib import PurePath
 from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import FmuModel, FmuVariable, Value
-from ..formats.outline import AnnotatedOutline, AnnotatedTrial, read_outline, read_trial
+from ..formats.outline import AnnotatedOutline, AnnotatedTrial, CommandLimit, read_outline, read_trial
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -96,6 +96,20 @@ class System:
         """The manoeuvring trial that the first FMU which says so conducts."""
         trials = (read_trial(m.annotations, n) for n, m in self.models.items() if "order" in m.variables)
         return next((trial for trial in trials if trial is not None), None)
+
+    @property
+    def commands(self) -> dict[str, CommandLimit]:
+        """Logged commands of actuators, with their limits: ``X_max`` is that of ``X``."""
+        found = {}
+        for part, model in self.models.items():
+            given = {v.name: value for v, value in self.parameters.get(part, ())}
+            for name in model.variables:
+                limit = model.variables.get(f"{name}_max")
+                value = None if limit is None else given.get(limit.name, limit.start)
+                if isinstance(value, float) and f"{part}.{name}" in self.logged:
+                    unit = "" if limit is None or limit.unit is None else limit.unit.name
+                    found[f"{part}.{name}"] = CommandLimit(value, unit)
+        return found
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""
