@@ -228,7 +228,7 @@ class ShownDiagnosis(session.Diagnosis):
 
     @property
     def plot(self) -> Plots:
-        """Pictures: ``plot.where()``, ``plot.omega()``, ``plot.track()``, ``plot.ranking()``."""
+        """Pictures: ``plot.where()``, ``omega()``, ``track()``, ``free()``, ``ranking()``."""
         return Plots(self._report)
 
     def to_ssv(self, path: str | Path = "model.ssv", anyway: bool = False) -> Path:

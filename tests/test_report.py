@@ -372,19 +372,23 @@ def test_a_title_has_ship_runs_date_and_verdict(evaluations, data, tmp_path):
 def test_a_rise_within_the_noise_is_grey(evaluations):
     """A force below its uncertainty, a prediction within its paired standard errors; else it is orange."""
     r = found(evaluations)
-    position, _, *forces = error_changes(r, 0)
+    position = error_changes(r, 0)[0]
     assert position.kind == "fall"
     e = evaluations[0]
     for size, kind in ((0.012, "noise"), (0.1, "rise")):
         omega = np.full_like(e.before.omega, size)
-        worse = replace(e, after=replace(e.after, omega=omega), before=replace(e.before, omega=0.5 * omega))
+        worse = replace(
+            e, after=replace(e.after, omega=omega), before=replace(e.before, omega=0.5 * omega)
+        )
         changed = error_changes(found([worse]), 0)[2:]
         assert {c.kind for c in changed} == {kind}, "the standard deviation is 0.01"
         assert {c.ratio for c in changed} == {"0.5×"}
     errors = e.before.errors
     rng = np.random.default_rng(1)
     for shift, kind in ((0.0, "noise"), (0.5, "rise")):
-        factor = np.exp(shift + 0.01 + 0.3 * rng.permutation(np.linspace(-1.0, 1.0, errors.position.size)))
+        factor = np.exp(
+            shift + 0.01 + 0.3 * rng.permutation(np.linspace(-1.0, 1.0, errors.position.size))
+        )
         after = replace(e.before, errors=replace(errors, position=factor * errors.position))
         if after.position > e.before.position:
             assert error_changes(found([replace(e, after=after)]), 0)[0].kind == kind

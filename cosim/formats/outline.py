@@ -47,9 +47,10 @@ def read_outline(annotations: Element | None) -> AnnotatedOutline | None:
 
 
 class CommandLimit(NamedTuple):
-    """The largest value of a command of an actuator to either side, and its unit."""
+    """The lowest and the highest value of a command of an actuator, and its unit."""
 
-    limit: float
+    low: float
+    high: float
     unit: str
 
 

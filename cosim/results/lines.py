@@ -19,7 +19,7 @@ def _norm(log: Log, names: Sequence[str]) -> np.ndarray:
 
 def errors(runs: Runs) -> "Figure":
     """Heading error, cross-track error and distance to the target over time."""
-    figure, panels = stacked(3, 1, 6.5)
+    figure, panels = stacked(3, 1, 7.0)
     for run in runs:
         x, y, psi = (run.log[name] for name in run.roles.pose)
         target = [run.log[name] for name in run.roles.target]
@@ -53,18 +53,18 @@ def commands(runs: Runs) -> "Figure":
     for run in runs:
         for panel, name in zip(each, limits, strict=True):
             if name in run.commands:
-                limit, unit = run.commands[name]
+                low, high, unit = run.commands[name]
                 factor = np.degrees(1.0) if unit == "rad" else 1.0
                 plot(panel, run, factor * run.log[name])
-                for end in (-factor * limit, factor * limit):
-                    panel.axhline(end, color="0.4", linewidth=0.8, dashes=(5, 4), zorder=1)
+                for end in (low, high):
+                    panel.axhline(factor * end, color="0.4", linewidth=0.8, dashes=(5, 4), zorder=1)
         plot(speed, run, np.hypot(*(run.log[name] for name in run.roles.velocity[:2])))
         psi, wanted = np.unwrap(run.log[run.roles.pose[2]]), run.log.get(run.roles.target[2])
         plot(heading, run, np.degrees(psi))
         if wanted is not None:
             target = np.degrees(psi + wrap(wanted - psi))
             plot(heading, run, target, color="black", linestyle=":", label=f"{run.label}: wanted")
-    for panel, (name, (_, unit)) in zip(each, limits.items(), strict=True):
+    for panel, (name, (*_, unit)) in zip(each, limits.items(), strict=True):
         panel.set_ylabel(f"{name.rpartition('.')[2]} [{'deg' if unit == 'rad' else unit}]")
     speed.set_ylabel("speed [m/s]")
     heading.set_ylabel("heading [deg]")

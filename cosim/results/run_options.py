@@ -45,7 +45,7 @@ def read_options(folder: Path) -> RunOptions:
             str(told["trial"]["kind"]), str(told["trial"]["order"])
         )
         commands = {
-            str(name): CommandLimit(float(each["limit"]), str(each["unit"]))
+            str(name): CommandLimit(float(each["low"]), float(each["high"]), str(each["unit"]))
             for name, each in told.get("commands", {}).items()
         }
         ship = scenario.get("ship")

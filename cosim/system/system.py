@@ -99,16 +99,17 @@ class System:
 
     @property
     def commands(self) -> dict[str, CommandLimit]:
-        """Logged commands of actuators, with their limits: ``X_max`` is that of ``X``."""
+        """Logged commands of actuators, with their limits: of ``X`` these are ``X_max``, ``X_min``."""
         found = {}
         for part, model in self.models.items():
-            given = {v.name: value for v, value in self.parameters.get(part, ())}
-            for name in model.variables:
-                limit = model.variables.get(f"{name}_max")
-                value = None if limit is None else given.get(limit.name, limit.start)
-                if isinstance(value, float) and f"{part}.{name}" in self.logged:
-                    unit = "" if limit is None or limit.unit is None else limit.unit.name
-                    found[f"{part}.{name}"] = CommandLimit(value, unit)
+            values = {name: v.start for name, v in model.variables.items()}
+            values |= {v.name: value for v, value in self.parameters.get(part, ())}
+            for name in values:
+                high = values.get(f"{name}_max")
+                if high is not None and f"{part}.{name}" in self.logged:
+                    low, unit = values.get(f"{name}_min"), model.variables[name].unit
+                    ends = -float(high) if low is None else float(low), float(high)
+                    found[f"{part}.{name}"] = CommandLimit(*ends, unit.name if unit else "")
         return found
 
     def close(self) -> None:

@@ -60,7 +60,7 @@ class TrialOutcome(NamedTuple):
         if check is None or not self.length or any(name.startswith("overshoot") for name in self.limits):
             return []
         angle = f"{math.degrees(check):.3g}°"
-        return [f"no IMO limit for a check angle of {angle}: MSC.137(76) has limits for 10° and 20°"]
+        return [f"no IMO limit at a check angle of {angle}, but at 10° and 20°"]
 
     def write(self, folder: Path) -> None:
         """Write ``trial.json``."""

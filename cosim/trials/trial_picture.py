@@ -82,17 +82,12 @@ def _heading(panel: Axes, found: TrialOutcome) -> None:
         if (angle := found.measures.get(f"overshoot_{k}")) is not None:
             at = begin + found.measures[f"overshoot_time_{k}"]
             off = np.degrees(p.at(at)[2] - p.at(times[0])[2])
-            limit = found.limits.get(f"overshoot_{k}")
-            allowed = "" if limit is None else f" (IMO ≤ {np.degrees(limit):.3g}°)"
             panel.plot(at - times[0], off, "o", color="red", markersize=4.0)
-            text = f"{np.degrees(angle):.3g}°{allowed}"
-            panel.annotate(
-                text,
-                (at - times[0], off),
-                (0, 5 * np.sign(off)),
-                **BY_POINTS,
-                va="bottom" if off > 0.0 else "top",
-            )
+            beside = {"xytext": (0, 5 * np.sign(off)), "va": "bottom" if off > 0.0 else "top"}
+            panel.annotate(f"{np.degrees(angle):.3g}°", (at - times[0], off), **beside, **BY_POINTS)
+    allowed = [f"{np.degrees(x):.3g}°" for n, x in found.limits.items() if n.startswith("overshoot")]
+    named = [f"IMO limit of overshoots: {', '.join(allowed)}"] if allowed else found.without_limit
+    panel.set_title("".join(named), loc="right", fontsize=8, color=MARK)
     panel.margins(y=0.15)
     panel.set_ylabel("heading [°]")
 
@@ -102,7 +97,7 @@ def _order(panel: Axes, found: TrialOutcome) -> None:
     p = found.passage
     time = p.time - executes(p)[0]
     panel.plot(*thin(time, p.order / np.abs(p.order).max()), color="red", linewidth=0.9)
-    panel.set(ylim=(-1.2, 1.2), yticks=[-1.0, 0.0, 1.0], xlabel="time [s]", ylabel="order [of largest]")
+    panel.set(ylim=(-1.2, 1.2), yticks=[-1.0, 0.0, 1.0], xlabel="time [s]", ylabel="order [1]")
 
 
 def _speed(panel: Axes, found: TrialOutcome) -> None:

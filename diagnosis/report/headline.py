@@ -61,6 +61,16 @@ def finding_sentence(e: ReportedEffect) -> str:
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
 
 
+def cause(r: ReportData) -> str:
+    """The effects that were found, by name and description, for a line of a picture; empty if none."""
+    if r.diagnosis is None:
+        return ""
+    known = r.diagnosis.start.ship.effects
+    what = {e.id: known[e.id].description.removeprefix(f"addition to {e.id}: ") for e in r.effects}
+    sure = [f"{e.id}, {what[e.id].rstrip('.')}" for e in r.effects if is_sure(e)]
+    return f"cause found: {'; '.join(sure)}" if sure else ""
+
+
 def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over: float) -> list[str]:
     """What a model gains in windows of so many seconds, in words and numbers; empty: not known."""
     if gain is None:

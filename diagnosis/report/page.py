@@ -18,7 +18,7 @@ from .chart import data_uri, themed
 from .content import coefficients, versions
 from .error_change import error_changes
 from .glossary import linked
-from .headline import boundedness, finding_sentence, first_sentences, gain_of_search, page_title
+from .headline import boundedness, cause, finding_sentence, first_sentences, gain_of_search, page_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
 
@@ -178,8 +178,8 @@ def _by_use(r: ReportData) -> Iterator[tuple[str, list[Evaluation]]]:
 
 def _free(r: ReportData) -> Iterator[Drawing]:
     """The first run of which least was used."""
-    e = max(r.evaluations, key=lambda e: [*USES].index(e.use))
-    yield drawing(tracks.free(e), "free", f"{r.called(e)}: predicted as a whole.")
+    e = r.least_used
+    yield drawing(tracks.free(e, cause(r)), "free", f"{r.called(e)}: predicted as a whole.")
 
 
 def _places(r: ReportData, k: int, e: Evaluation) -> Iterator[Drawing]:

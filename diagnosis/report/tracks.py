@@ -35,14 +35,21 @@ def track(e: Evaluation, learned: bool) -> Chart:
     return _chart(panel)
 
 
-def free(e: Evaluation) -> Chart:
-    """A whole run, predicted by the models from its first state."""
+def free(e: Evaluation, found: str = "") -> Chart:
+    """A whole run, predicted by the models from its first state.
+
+    Args:
+        e: the run.
+        found: the cause that was found, for a line below.
+    """
     measured = e.smoothed.eta[:, :2]
     paths = [p[:, :2] for p in e.free_runs()[1]][: 2 if e.learned else 1]
     panel = _map(_around(measured, paths))
+    panel.x.label += f"\n{found}" if found else ""
     _broad(panel, *_east_north(measured))
     for path, (_, colour, label) in zip(paths, _models(e, bool(e.learned)), strict=True):
-        panel.draw(*_east_north(_finite(path)), colour, label)
+        predicted = label if label == "predicted" else f"predicted {label}"
+        panel.draw(*_east_north(_finite(path)), colour, predicted)
     panel.draw(*_east_north(measured[:1]), INK, dots=True)
     return _chart(panel)
 
