@@ -36,6 +36,7 @@ from diagnosis.report import (
     write_coefficients,
     write_report,
 )
+from diagnosis.report.chart import Text
 from diagnosis.report.content import coefficients
 from diagnosis.report.error_change import error_changes
 from diagnosis.report.reported_effect import ReportedCoefficient
@@ -466,6 +467,57 @@ def test_lines_point_where_the_missing_force_does(data):
     ends, tips = (np.column_stack([v[k::3] for v in arrows[:2]]) for k in (0, 1))
     assert np.allclose((tips - ends)[:, 0] / (tips - ends)[:, 1], east / north)
     assert (tips > ends)[:, 1].all()
+
+
+def test_a_picture_has_at_most_eight_ellipses_and_eight_ships(data):
+    e = evaluate_run(data[1], Model(), Model().plus(HIDDEN))
+    assert e.windows is not None
+    since = np.linspace(0.0, e.windows.length, 17)
+    starts = tracks.worst_of(e)
+    many = SimpleNamespace(ellipses=lambda window, level: np.tile(level + 0.1 * since, (2, 30, 1)).T)
+    chart = tracks.worst_window(replace(e, bands=many), True)
+    areas = [m for m in chart.panels[0].marks if m.area]
+    count = sum(np.count_nonzero(np.isnan(m.x)) for m in areas)
+    assert starts is not None
+    assert count == 8
+    last = max(np.nanmax(m.x) for m in areas)
+    assert last == pytest.approx(0.9 + 0.1 * since[-1]), "that of the end among them"
+    poses = np.tile([0.0, 0.0, 0.0], (30, 1))
+    panel = tracks._map(np.array([[-9.0, -9.0], [9.0, 9.0]]))
+    tracks._ships(panel, poses, ship())
+    assert len(panel.marks) == 8
+
+
+def test_nothing_of_a_map_of_forces_lies_on_its_key(data):
+    """Lines are seen within the panel only, in each format; the key is above it."""
+    e = evaluate_run(data[1], Model(), Model().plus(HIDDEN))
+    for chart in (tracks.place(e, True), tracks.place(e, True, [(5.0, 10.0)])):
+        (box,) = chart.boxes()
+        free = [(item, inside) for item, inside in chart.drawn() if inside is None]
+        key = [i for i, _ in free if not isinstance(i, Text) and np.max(i.y) < box.top]
+        words = [i for i, _ in free if isinstance(i, Text) and i.y < box.top]
+        assert len(key) == len(words) == len(chart.legend)
+        for line, word, following in zip(key, words, [*key[1:], None], strict=True):
+            assert np.max(line.x) < word.x
+            assert following is None or word.x + 5.2 * len(word.text) < np.min(following.x)
+        (axes,) = chart.figure().axes
+        edges = [
+            a.get_clip_box().transformed(axes.transData.inverted())
+            for a in axes.lines[-1 - len(key) : -len(key)]
+        ]
+        assert all(min(b.y0, b.y1) >= box.top - 1e-6 for b in edges)
+
+
+def test_the_picture_of_a_whole_run_names_the_cause(evaluations):
+    r = found(evaluations)
+    assert headline.cause(r) == "cause found: thrust_curve, " + EFFECTS[
+        "thrust_curve"
+    ].description.rstrip(".")
+    made = tracks.free(r.least_used, headline.cause(r))
+    assert r.least_used.use == "test"
+    assert [*made.legend] == ["measured", "predicted before", "predicted after"]
+    assert made.panels[0].x.label.endswith(headline.cause(r))
+    assert headline.cause(ReportData(r.comparison)) == ""
 
 
 def test_a_whole_run_is_predicted_from_its_first_state(data):
