@@ -102,14 +102,14 @@ class System:
         """Logged commands of actuators, with their limits: of ``X`` these are ``X_max``, ``X_min``."""
         found = {}
         for part, model in self.models.items():
-            values = {name: v.start for name, v in model.variables.items()}
-            values |= {v.name: value for v, value in self.parameters.get(part, ())}
-            for name in values:
+            numbers = {n: v.start for n, v in model.variables.items() if v.type == "Real" and v.start}
+            numbers |= {v.name: value for v, value in self.parameters.get(part, ()) if v.type == "Real"}
+            values = {n: float(x) for n, x in numbers.items() if n.endswith(("_max", "_min"))}
+            for name, variable in model.variables.items():
                 high = values.get(f"{name}_max")
                 if high is not None and f"{part}.{name}" in self.logged:
-                    low, unit = values.get(f"{name}_min"), model.variables[name].unit
-                    ends = -float(high) if low is None else float(low), float(high)
-                    found[f"{part}.{name}"] = CommandLimit(*ends, unit.name if unit else "")
+                    low, unit = values.get(f"{name}_min", -high), variable.unit
+                    found[f"{part}.{name}"] = CommandLimit(low, high, unit.name if unit else "")
         return found
 
     def close(self) -> None:
