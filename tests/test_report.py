@@ -327,6 +327,8 @@ window.onload = () => {{
   const closed = [...page.querySelectorAll(".table")].filter(t => t.checkVisibility());
   document.body.dataset.unsaid = closed.filter(t => said(t) != (t.scrollWidth > t.clientWidth)).length;
   page.querySelectorAll("details").forEach(d => d.open = true);
+  const heads = [...page.querySelectorAll("thead th")].map(h => getComputedStyle(h).whiteSpace);
+  document.body.dataset.unwrapped = heads.filter(w => w == "nowrap").length;
   const figures = [...page.querySelectorAll("svg")].map(f => f.getBoundingClientRect());
   document.body.dataset.width = page.scrollWidth;
   document.body.dataset.height = page.scrollHeight;
@@ -348,6 +350,7 @@ def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_p
     assert seen["thin"] == seen["wide"] == "0"
     assert width < 1000 or seen["cut"] == "0"  # on a phone tables may be scrolled
     assert seen["unsaid"] == "0", "and say so"
+    assert seen["unwrapped"] == "0", "headings"
 
 
 def test_a_report_of_nine_runs_is_six_screens(evaluations, browser, tmp_path):
