@@ -353,6 +353,7 @@ def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_p
     assert seen["unwrapped"] == "0", "headings"
 
 
+@pytest.mark.slow
 def test_a_report_of_nine_runs_is_six_screens(evaluations, browser, tmp_path):
     """Of 1280 x 900; the pictures of each run are folded, and can be opened."""
     nine = [replace(e, use=use) for e in evaluations[:1] for use in ("train",) * 6 + ("test",) * 3]

@@ -44,6 +44,7 @@ def test_a_notebook_shows_a_comparison_with_pictures(compared):
     assert "<svg" in compared.plot.track()._repr_svg_()
 
 
+@pytest.mark.slow
 def test_a_calibrated_model_prints_what_the_command_shows(runs):
     quick = diagnosis.calibrate(runs)
     text = str(quick)
@@ -64,6 +65,7 @@ def parts(value, seen=()):
                     yield from parts(each, (*seen, value))
 
 
+@pytest.mark.slow
 def test_no_result_prints_an_array(compared, runs, tmp_path):
     found = [*parts(compared), *parts(runs[0]), compared.before, runs[0].run, runs[0].smoothed]
     assert len({type(each) for each in found}) > 8
