@@ -7,9 +7,12 @@ from .acceptance import verify_record as verify_record
 from .assessment.gathering import gather as gather
 from .assessment.stability import Stability as Stability
 from .assessment.stability import check_stability as check_stability
+from .interactive import ShownCalibration as ShownCalibration
+from .interactive import ShownComparison as ShownComparison
 from .interactive import ShownDiagnosis as ShownDiagnosis
 from .interactive import calibrate as calibrate
 from .interactive import diagnose as diagnose
+from .interactive import evaluate as evaluate
 from .interactive import load as load
 from .predictors import Fmu as Fmu
 from .predictors import Model as Model
@@ -48,4 +51,3 @@ from .session import Comparison as Comparison
 from .session import Diagnosis as Diagnosis
 from .session import Session as Session
 from .session import begin as begin
-from .session import evaluate as evaluate

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cosim import InputError
 from fmus.ships.naming import DEFAULT as DEFAULT_SHIP
@@ -30,7 +30,7 @@ from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
 from .report.report_data import ReportData
-from .report.terminal import summary
+from .report.terminal import as_text, show_calibration, show_comparison, summary
 from .runs import Run, read_frame, ship_of_logs
 from .search import DEFAULT, Method, Prior, shares
 from .verdict.pruning_criteria import USUAL as PAIRED
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     Source: TypeAlias = str | Path | Result | pandas.DataFrame
 
 AXES = ("X", "Y", "N")
+T = TypeVar("T")
 
 
 def load(
@@ -149,6 +150,45 @@ def _listed(runs: Any) -> Sequence[Any]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class ShownComparison(session.Comparison):
+    """A comparison; shows itself in a terminal as the command does, and in a notebook with pictures."""
+
+    @cached_property
+    def _report(self) -> ReportData:
+        return ReportData.of(self)
+
+    @property
+    def plot(self) -> Plots:
+        """Pictures: ``plot.where()``, ``plot.omega()``, ``plot.track()``."""
+        return Plots(self._report)
+
+    def write_report(self, path: str | Path = "report.html") -> Path:
+        """Write the report of ``python -m diagnosis.compare``: one HTML file that needs no other."""
+        return write_report(path, self._report)
+
+    def __repr__(self) -> str:
+        return as_text(show_comparison(self._report))
+
+    def _repr_html_(self) -> str:
+        return as_html(self._report)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShownCalibration(session.CalibratedModel):
+    """A calibrated model; shows itself in a terminal as ``learn --quick`` does, and in a notebook."""
+
+    @cached_property
+    def _report(self) -> ReportData:
+        return ReportData.of(self.comparison)
+
+    def __repr__(self) -> str:
+        return as_text(show_calibration(self, self._report))
+
+    def _repr_html_(self) -> str:
+        return as_html(self._report)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ShownDiagnosis(session.Diagnosis):
     """A diagnosis; shows itself in a terminal in ten lines, and in a notebook with pictures."""
 
@@ -188,7 +228,7 @@ class ShownDiagnosis(session.Diagnosis):
 
     @property
     def plot(self) -> Plots:
-        """Pictures: ``plot.where()``, ``plot.omega()``, ``plot.track()``, ``plot.ranking()``."""
+        """Pictures: ``plot.where()``, ``omega()``, ``track()``, ``free()``, ``ranking()``."""
         return Plots(self._report)
 
     def to_ssv(self, path: str | Path = "model.ssv", anyway: bool = False) -> Path:
@@ -256,8 +296,8 @@ def compare(
     map: str | Path | None = None,  # noqa: A002 - as the option of the command
     advance: Advance = silent,
     ship: str | Path | None = None,
-) -> session.Comparison:
-    """Hold a model against measured runs; ``diagnosis.compare(...)`` calls this.
+) -> ShownComparison:
+    """Compare a model with measured runs; ``diagnosis.compare(...)`` calls this.
 
     Args:
         runs: from :func:`load`, or what that takes.
@@ -273,7 +313,23 @@ def compare(
     given = _listed(runs)
     model, of = _opened(model, map, ship, given)
     loaded = given if _are_loaded(given) else load(given, model=of)
-    return session.evaluate(loaded, model, advance=advance)
+    return _shown(ShownComparison, session.evaluate(loaded, model, advance=advance))
+
+
+def evaluate(
+    runs: Sequence[WeakWindows],
+    model: Model | ModelSource | str | Path | None = None,
+    after: Model | None = None,
+    held_out: Sequence[WeakWindows] = (),
+    advance: Advance = silent,
+) -> ShownComparison:
+    """Compare a model, or two, with measured runs; see :func:`.session.evaluate`."""
+    return _shown(ShownComparison, session.evaluate(runs, model, after, held_out, advance))
+
+
+def _shown(kind: type[T], found: Any, **changes: Any) -> T:
+    """A result of the session as one that shows itself."""
+    return kind(**{f.name: getattr(found, f.name) for f in fields(found)} | changes)
 
 
 def diagnose(
@@ -311,7 +367,7 @@ def diagnose(
     choices = {"seed": seed, "by": by, "pruning": pruning}
     task = _begun(runs, validate, held_out, prior, model, ship, advance, **choices)
     found = task.diagnose()
-    return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
+    return _shown(ShownDiagnosis, found, comparison=_shown(ShownComparison, found.comparison))
 
 
 def _begun(
@@ -342,7 +398,7 @@ def calibrate(
     advance: Advance = silent,
     ship: str | Path | None = None,
     validate: Sequence[WeakWindows] | Source | Sequence[Source] = (),
-) -> session.CalibratedModel:
+) -> ShownCalibration:
     """Fit the coefficients of a model to runs, without an effect: what ``learn --quick`` does.
 
     Args:
@@ -357,4 +413,4 @@ def calibrate(
     found = _begun(runs, validate, held_out, prior, model, ship, advance).calibrate()
     if found is None:
         raise InputError("there is no coefficient to calibrate, or the runs do not identify them")
-    return found
+    return _shown(ShownCalibration, found, comparison=_shown(ShownComparison, found.comparison))

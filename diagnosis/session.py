@@ -17,6 +17,7 @@ from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import in_halves, one_thread
 from .execution.progress import Advance, silent
+from .execution.short_text import ShortRepr
 from .predictors import (
     DescribedShip,
     Evaluation,
@@ -44,8 +45,8 @@ from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(ShortRepr):
     """The error of a model, or of the initial and the learned one, on measured runs.
 
     Attributes:
@@ -77,8 +78,8 @@ class Comparison:
         return find_regions([e.weak_windows for e in self.evaluations], errors, self.omega_std)
 
 
-@dataclass(frozen=True, eq=False)
-class CalibratedModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibratedModel(ShortRepr):
     """The initial model with other values of its coefficients, and without an effect.
 
     Attributes:
@@ -103,7 +104,7 @@ class CalibratedModel:
         return self.learned.model
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(DecidedFindings):
     """A verdict, and what it rests on.
 
@@ -204,8 +205,8 @@ def _compared(
     return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 
-@dataclass(frozen=True, eq=False)
-class Session:
+@dataclass(frozen=True, eq=False, repr=False)
+class Session(ShortRepr):
     """The five steps of ``learn``, in growing order of time: each is a method, and needs those before.
 
     Attributes:

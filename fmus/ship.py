@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ship:
     """A ship's components. Two ships, or one with and without a user's effects, may live side by side.
 
@@ -41,6 +41,9 @@ class Ship:
     vessel: Component
     thrusters: Component
     description: Description
+
+    def __repr__(self) -> str:
+        return f"<ship {self.name}>"
 
     @property
     def name(self) -> str:

@@ -163,11 +163,7 @@ def kept(monkeypatch):
     from cosim.campaign import charts
 
     found = {}
-    monkeypatch.setattr(
-        charts.Figure,
-        "savefig",
-        lambda figure, path, **_: (found.update({len(found): figure}), path.touch()),
-    )
+    monkeypatch.setattr(charts, "save", lambda figure, path: found.update({len(found): figure}))
     return found
 
 
@@ -175,6 +171,7 @@ def test_categories_have_boxes_and_numbers_a_median_where_several_runs_share_a_v
     import pandas as pd
 
     from cosim.campaign.charts import draw_campaign
+    from cosim.results import drawing
 
     made = pd.DataFrame(
         [
@@ -189,6 +186,10 @@ def test_categories_have_boxes_and_numbers_a_median_where_several_runs_share_a_v
     )
     over_k, over_c = kept[0].axes
     points, median = over_k.get_lines()
+    assert points.get_color() == median.get_color() == drawing.LINES[0][0], "as the pictures of runs"
+    for each in (over_k, over_c, *kept[1].axes):
+        assert not each.spines["top"].get_visible()
+        assert each.get_axisbelow()
     assert points.get_xdata().size == 12, "runs that are done"
     assert median.get_xdata().tolist() == [1.0, 2.0]
     assert median.get_ydata().tolist() == [12.0, 21.5]

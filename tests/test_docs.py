@@ -233,6 +233,41 @@ def test_the_site_begins_with_picture_line_and_how_to_contribute():
     assert "../CONTRIBUTING.md" in (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
 
 
+FRONTS = [ROOT / "README.md", ROOT / "docs" / "index.md"]
+
+
+@pytest.mark.parametrize("page", FRONTS, ids=lambda p: p.name)
+def test_a_front_page_says_what_for_in_ten_seconds(page):
+    """One line, the eight before and after with a caption, three cards, two lines to start, few links."""
+    text = page.read_text("utf-8").partition("```{toctree}")[0]
+    title, line, picture, caption, *_ = text.split("\n\n")
+    assert title.startswith("# ")
+    assert line.startswith("**")
+    assert "images/eight.png)" in picture
+    assert (ROOT / "docs" / "images" / "eight.png").stat().st_size < 200_000
+    assert caption.startswith("*")
+    assert "`X_u`" in caption, "the cause by name"
+    assert all(name in text for name in ("Simulate", "Diagnose", "Export"))
+    assert len(re.findall(r"(?<!!)\[[^\]]+\]\([^)]+\)", text)) <= 12
+    prose = re.sub(r"```.*?```|<!--.*?-->|^\|.*$|^[%:].*$", "\n\n", text, flags=re.DOTALL | re.MULTILINE)
+    for sentence in re.split(r"(?<=[.:!?])[*)]*\s+|\n\n|\n- ", re.sub(r"`[^`]*`", "x", prose)):
+        assert len(sentence.split()) <= 25, sentence
+
+
+def test_the_picture_of_the_front_pages_is_that_of_the_demo():
+    from cybership import demo
+
+    assert "eight.png" in Path(demo.__file__).read_text("utf-8")
+
+
+def test_the_readme_has_the_two_lines_of_the_gate():
+    lines = [x for x in FRONTS[0].read_text("utf-8").splitlines() if x.startswith("python -m pip")]
+    assert lines == [
+        "python -m pip install . && python -m cosim.run scenarios/ellipse.json",
+        'python -m pip install -e ".[dev]" && python -m pytest -n auto',
+    ]
+
+
 def test_no_two_pages_of_the_site_have_the_same_title():
     pages = [p for p in (ROOT / "docs").rglob("*.md") if p.name != "contributing.md"]
     titles = [re.search(r"^# (.+)$", p.read_text(encoding="utf-8"), re.MULTILINE)[1] for p in pages]

@@ -1,5 +1,6 @@
 """Manoeuvring trials: their guidance, and their measures against closed forms."""
 
+import io
 import json
 import math
 import re
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.console import Console
 from scipy.optimize import brentq
 from support.command import command
 from support.project import COMPONENTS, ROOT, with_values
@@ -145,6 +147,32 @@ def test_a_picture_of_a_turn_is_seen_along_the_first_heading(length, side):
     )
     (plain, _), *_ = [draw_trial(found._replace(measures={})).figure.axes[0].get_lines()]
     assert plain.get_ydata() == pytest.approx(ahead)
+
+
+@pytest.mark.parametrize(("check", "limits"), [(0.17, ["10°", "25°"]), (0.26, [])])
+def test_a_zigzag_has_an_axis_of_its_order_and_marks_at_its_overshoots(check, limits):
+    """And the limits of IMO with their unit, or a sentence that there are none at this check angle."""
+    found = outcome("zigzag", nomoto("zigzag", 200.0, 5.0, psi_check=check), 1.0)
+    _, heading, order = draw_trial(found).figure.axes
+    assert list(order.get_yticks()) == [-1.0, 0.0, 1.0]
+    assert order.get_ylabel() == "order [1]"
+    dots = [line for line in heading.get_lines() if line.get_marker() == "o"]
+    angles = [x for n, x in found.measures.items() if re.fullmatch(r"overshoot_\d", n)]
+    assert [t.get_text() for t in heading.texts] == [f"{math.degrees(x):.3g}°" for x in angles]
+    tops = [check + x for x in angles]
+    assert [abs(dot.get_ydata()[0]) for dot in dots] == pytest.approx(np.degrees(tops), rel=0.05)
+    sentence = heading.get_title(loc="right")
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(sheet(found))
+    shown = console.export_text()
+    assert "IMO limit" in shown
+    if limits:
+        assert sentence == "IMO limit of overshoots: " + ", ".join(limits)
+        assert "10 °" in shown
+        assert "MSC.137(76)" in shown
+    else:
+        assert sentence == "no IMO limit at a check angle of 14.9°, but at 10° and 20°"
+        assert sentence in shown
 
 
 def test_a_picture_of_a_stop_has_the_speed_and_of_a_spiral_the_rates():
@@ -383,6 +411,8 @@ def test_a_run_is_measured_where_its_guidance_is_a_trial(name, names, tmp_path):
     assert sheet_["measures"] == told
     assert sheet_["executes"][0] == pytest.approx(20.0)
     assert (tmp_path / "trial.png").exists()
+    limited = json.loads((tmp_path / "log.json").read_text())["commands"]
+    assert (tmp_path / "commands.png").exists() == bool(limited) == (name == "otter_zigzag")
     assert result.trial is not None
     assert result.trial.limits.keys() & names
     assert [c.header for c in sheet(result.trial).columns][:3] == ["measure", "value", "unit"]

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cosim.formats.outline import AnnotatedOutline
+from cosim.formats.outline import AnnotatedOutline, CommandLimit
 from cosim.metrics import main
 from cosim.plots import main as plots_main
 from cosim.results import (
@@ -374,6 +374,27 @@ class TestPlots:
         assert drawing.draw({"a": {"time": log["time"]}}, tmp_path) == []
         assert drawing.draw({}, tmp_path) == []
 
+    def test_commands_have_their_limits_and_the_heading_that_is_wanted(self):
+        log = wild() | {"thrusters.rudder_delta": np.radians(wild(2)["vessel.u"])}
+        log["guidance.psi_t"] = log["vessel.psi"] + 2.0 * np.pi + 0.1
+        limits = {"thrusters.rudder_delta": CommandLimit(-0.6, 0.5, "rad")}
+        told = {"a": RunOptions(commands=limits)}
+        assert "commands" not in dict(drawing.figures({"a": log}))
+        rudder, speed, heading = dict(drawing.figures({"a": log}, told))["commands"].axes
+        assert rudder.get_ylabel() == "rudder_delta [deg]"
+        line, low, high, *_ = rudder.get_lines()
+        assert line.get_ydata() == pytest.approx(wild(2)["vessel.u"])
+        ends = [each.get_ydata()[0] for each in (low, high)]
+        assert ends == pytest.approx(np.degrees([-0.6, 0.5]))
+        assert speed.get_lines()[0].get_ydata() == pytest.approx(
+            np.hypot(log["vessel.u"], log["vessel.v"])
+        )
+        reached, wanted = heading.get_lines()
+        assert wanted.get_ydata() - reached.get_ydata() == pytest.approx(np.degrees(0.1))
+        without = {name: values for name, values in log.items() if not name.startswith("guidance.")}
+        *_, heading = dict(drawing.figures({"a": without}, told))["commands"].axes
+        assert len(heading.get_lines()) == 1
+
     def test_lost_thrust_is_part_of_the_model_error(self):
         """(7.7): what was commanded and did not act is missing too; without its columns the hull's stays."""
         log = wild()
@@ -390,7 +411,13 @@ class TestPlots:
         a, b = wild(1), wild(2)
         a["vessel.psi"] = a["guidance.psi_t"] + 2.0 * np.pi + 0.1
         drawn = dict(drawing.figures({"a": a, "b": b}))
-        heading, aside = drawn["errors"].axes
+        heading, aside, away = drawn["errors"].axes
+        far = np.hypot(*(a[p] - a[t] for p, t in zip(ROLES.pose[:2], ROLES.target[:2], strict=True)))
+        assert away.get_lines()[0].get_ydata() == pytest.approx(far)
+        below = drawn["trajectory"].axes[1]
+        assert below.get_ylabel() == "distance to target [m]", "tracks that coincide are one line"
+        assert below.get_lines()[0].get_ydata() == pytest.approx(far)
+        assert len(dict(drawing.figures({"a": a}))["trajectory"].axes) == 1
         line, other, zero = heading.get_lines()
         assert line.get_ydata() == pytest.approx(np.degrees(0.1))
         assert other.get_ydata() == pytest.approx(

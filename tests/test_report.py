@@ -30,12 +30,15 @@ from diagnosis.report import (
     ReportData,
     curves,
     glossary,
+    headline,
     page,
     tracks,
     write_coefficients,
     write_report,
 )
+from diagnosis.report.chart import Text
 from diagnosis.report.content import coefficients
+from diagnosis.report.error_change import error_changes
 from diagnosis.report.reported_effect import ReportedCoefficient
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from fmus.ship import ship
@@ -56,6 +59,13 @@ def data():
 def evaluations(data):
     after = Model().plus(HIDDEN)
     return [evaluate_run(w, Model(), after, held_out=k == 1) for k, w in enumerate(data)]
+
+
+def seen_in(browser, report, wrapped, width):
+    """Numbers of a page in a frame of some width [px], see MEASURE."""
+    content = html.escape(report.read_text(encoding="utf-8"))
+    wrapped.write_text(MEASURE.format(width=width, page=content), encoding="utf-8")
+    return dict(re.findall(r'data-(\w+)="(\d+)"', browser(wrapped, "--dump-dom")))
 
 
 def compared(evaluations, **before):
@@ -205,7 +215,7 @@ def test_same_input_gives_the_same_bytes(report, evaluations, tmp_path):
 def test_comparison_has_no_after(data, tmp_path):
     c = compared([evaluate_run(w, Model()) for w in data[1:]], sentences=["Surge is worst <astern>."])
     text = Page(write_report(tmp_path / "report.html", ReportData(c))).text
-    assert "Surge is worst <astern>." in text
+    assert "Surge is worst <astern>." in "".join(text)
     assert "model error" in text  # in a legend
     assert "after" not in text
 
@@ -312,6 +322,13 @@ srcdoc="{page}"></iframe><script>
 const frame = document.querySelector("iframe");
 window.onload = () => {{
   const page = frame.contentDocument.documentElement;
+  document.body.dataset.folded = page.scrollHeight;
+  const said = t => getComputedStyle(t, "::before").height.replace("auto", "0px") != "0px";
+  const closed = [...page.querySelectorAll(".table")].filter(t => t.checkVisibility());
+  document.body.dataset.unsaid = closed.filter(t => said(t) != (t.scrollWidth > t.clientWidth)).length;
+  page.querySelectorAll("details").forEach(d => d.open = true);
+  const heads = [...page.querySelectorAll("thead th")].map(h => getComputedStyle(h).whiteSpace);
+  document.body.dataset.unwrapped = heads.filter(w => w == "nowrap").length;
   const figures = [...page.querySelectorAll("svg")].map(f => f.getBoundingClientRect());
   document.body.dataset.width = page.scrollWidth;
   document.body.dataset.height = page.scrollHeight;
@@ -326,15 +343,60 @@ window.onload = () => {{
 
 @pytest.mark.parametrize("width", [390, 1200, 1300])
 def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_path, width):
-    wrapped = tmp_path / "wrapped.html"
-    content = html.escape(report.read_text(encoding="utf-8"))
-    wrapped.write_text(MEASURE.format(width=width, page=content), encoding="utf-8")
-    seen = dict(re.findall(r'data-(\w+)="(\d+)"', browser(wrapped, "--dump-dom")))
+    seen = seen_in(browser, report, tmp_path / "wrapped.html", width)
     assert int(seen["width"]) == width
     assert int(seen["height"]) > 2000
     assert int(seen["figures"]) == Page(report).tags["svg"]
     assert seen["thin"] == seen["wide"] == "0"
     assert width < 1000 or seen["cut"] == "0"  # on a phone tables may be scrolled
+    assert seen["unsaid"] == "0", "and say so"
+    assert seen["unwrapped"] == "0", "headings"
+
+
+@pytest.mark.slow
+def test_a_report_of_nine_runs_is_six_screens(evaluations, browser, tmp_path):
+    """Of 1280 x 900; the pictures of each run are folded, and can be opened."""
+    nine = [replace(e, use=use) for e in evaluations[:1] for use in ("train",) * 6 + ("test",) * 3]
+    page = write_report(tmp_path / "report.html", found(nine))
+    seen = seen_in(browser, page, tmp_path / "wrapped.html", 1280)
+    assert int(seen["folded"]) <= 6 * 900
+    summaries = re.findall(r"<summary>([^<]*): (\d) pictures</summary>", page.read_text("utf-8"))
+    assert len(summaries) == 9
+    assert all(int(count) >= 4 for _, count in summaries)
+
+
+def test_a_title_has_ship_runs_date_and_verdict(evaluations, data, tmp_path):
+    title = headline.page_title(found(evaluations), "2026-11-25")
+    assert title == f"CyberShip Enterprise 1, {EVIL} and b, 2026-11-25: {headline.VERDICTS['ambiguous']}"
+    many = headline.page_title(found([evaluations[1]] * 9), "2026-11-25")
+    assert many.startswith("CyberShip Enterprise 1, 9 runs, 2026-11-25: ")
+    alone = headline.page_title(ReportData(compared(evaluations)), "2026-11-25")
+    assert alone.endswith(": comparison of model and measurements")
+
+
+def test_a_rise_within_the_noise_is_grey(evaluations):
+    """A force below its uncertainty, a prediction within its paired standard errors; else it is orange."""
+    r = found(evaluations)
+    position = error_changes(r, 0)[0]
+    assert position.kind == "fall"
+    e = evaluations[0]
+    for size, kind in ((0.012, "noise"), (0.1, "rise")):
+        omega = np.full_like(e.before.omega, size)
+        worse = replace(
+            e, after=replace(e.after, omega=omega), before=replace(e.before, omega=0.5 * omega)
+        )
+        changed = error_changes(found([worse]), 0)[2:]
+        assert {c.kind for c in changed} == {kind}, "the standard deviation is 0.01"
+        assert {c.ratio for c in changed} == {"0.5×"}
+    errors = e.before.errors
+    rng = np.random.default_rng(1)
+    for shift, kind in ((0.0, "noise"), (0.5, "rise")):
+        factor = np.exp(
+            shift + 0.01 + 0.3 * rng.permutation(np.linspace(-1.0, 1.0, errors.position.size))
+        )
+        after = replace(e.before, errors=replace(errors, position=factor * errors.position))
+        if after.position > e.before.position:
+            assert error_changes(found([replace(e, after=after)]), 0)[0].kind == kind
 
 
 def test_browser_has_nothing_to_complain_of_and_prints(report, browser, tmp_path):
@@ -409,6 +471,56 @@ def test_lines_point_where_the_missing_force_does(data):
     ends, tips = (np.column_stack([v[k::3] for v in arrows[:2]]) for k in (0, 1))
     assert np.allclose((tips - ends)[:, 0] / (tips - ends)[:, 1], east / north)
     assert (tips > ends)[:, 1].all()
+
+
+def test_a_picture_has_at_most_eight_ellipses_and_eight_ships(data):
+    e = evaluate_run(data[1], Model(), Model().plus(HIDDEN))
+    assert e.windows is not None
+    since = np.linspace(0.0, e.windows.length, 17)
+    starts = tracks.worst_of(e)
+    many = SimpleNamespace(ellipses=lambda window, level: np.tile(level + 0.1 * since, (2, 30, 1)).T)
+    chart = tracks.worst_window(replace(e, bands=many), True)
+    areas = [m for m in chart.panels[0].marks if m.area]
+    count = sum(np.count_nonzero(np.isnan(m.x)) for m in areas)
+    assert starts is not None
+    assert count == 8
+    last = max(np.nanmax(m.x) for m in areas)
+    assert last == pytest.approx(0.9 + 0.1 * since[-1]), "that of the end among them"
+    poses = np.tile([0.0, 0.0, 0.0], (30, 1))
+    panel = tracks._map(np.array([[-9.0, -9.0], [9.0, 9.0]]))
+    tracks._ships(panel, poses, ship())
+    assert len(panel.marks) == 8
+
+
+def test_nothing_of_a_map_of_forces_lies_on_its_key(data):
+    """Lines are seen within the panel only, in each format; the key is above it."""
+    e = evaluate_run(data[1], Model(), Model().plus(HIDDEN))
+    for chart in (tracks.place(e, True), tracks.place(e, True, [(5.0, 10.0)])):
+        (box,) = chart.boxes()
+        free = [(item, inside) for item, inside in chart.drawn() if inside is None]
+        key = [i for i, _ in free if not isinstance(i, Text) and np.max(i.y) < box.top]
+        words = [i for i, _ in free if isinstance(i, Text) and i.y < box.top]
+        assert len(key) == len(words) == len(chart.legend)
+        for line, word, following in zip(key, words, [*key[1:], None], strict=True):
+            assert np.max(line.x) < word.x
+            assert following is None or word.x + 5.2 * len(word.text) < np.min(following.x)
+        (axes,) = chart.figure().axes
+        boxes = [line.get_clip_box().transformed(axes.transData.inverted()) for line in axes.lines]
+        tops = [min(b.y0, b.y1) for b in boxes]
+        within = [item for item, inside in chart.drawn() if inside is not None]
+        assert sum(top == pytest.approx(box.top) for top in tops) == len(within)
+
+
+def test_the_picture_of_a_whole_run_names_the_cause(evaluations):
+    r = found(evaluations)
+    assert headline.cause(r) == "cause found: thrust_curve, " + EFFECTS[
+        "thrust_curve"
+    ].description.rstrip(".")
+    made = tracks.free(r.least_used, headline.cause(r))
+    assert r.least_used.use == "test"
+    assert [*made.legend] == ["measured", "predicted before", "predicted after"]
+    assert made.panels[0].x.label.endswith(headline.cause(r))
+    assert headline.cause(ReportData(r.comparison)) == ""
 
 
 def test_a_whole_run_is_predicted_from_its_first_state(data):

@@ -226,7 +226,11 @@ def test_ranking_is_from_the_best_down_with_what_ties_hollow():
     (panel,) = figures.ranking(made).panels
     assert panel.y.names == ["a", "b", "c", "d"]
     assert panel.ends()[1] == (4.0, -1.0), "the best is above"
-    assert [*panel.notes.values()] == ["90 %", "< 0 %", "50 %", ""]
+    assert [*panel.notes.values()] == ["90 %", "0 %", "50 %", ""]
+    labels = ["best", "not clearly worse", "clearly worse"]
+    assert [*figures.ranking(made).legend] == labels, "the picture explains hollow and grey dots"
+    tiny = [ranked("a", 0.0, 0.0, beyond=8.9e-38)]
+    assert [*figures.ranking(tiny).panels[0].notes.values()] == ["< 1 %"]
     dots = [m for m in panel.marks if m.dots]
     assert [m.x[0] for m in dots] == [0.0, 1.0, 5.0, 6.0]
     assert [m.colour for m in dots] == [figures.AFTER] * 2 + [figures.BAND] * 2

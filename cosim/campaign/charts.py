@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cybership.scratch_folder import atomic_write
-
 from ..errors import InputError
+from ..results.canvas import blank, save
+from ..results.canvas import grid as pale_grid
+from ..results.drawing import LINES
 from ..trials.measures import EVERY
 from .comparison import differences
 
@@ -27,8 +28,8 @@ TIMES = ("step", "stop")  # of a scenario [s]
 UNITS = {metric.name: metric.unit for metric in EVERY}
 # Pairs of axes of which heat maps are drawn; chosen: three axes give three.
 MOST_MAPS = 3
-# Resolution [dots per inch] and size of one panel [inch]; taste.
-DPI, PANEL = 110, (4.2, 3.2)
+PANEL = (4.2, 3.2)  # size of one panel [inch]; taste
+RUN = LINES[0][0]  # colour, as of a run
 BANDS_SIZE = (10.0, 5.0)  # of the picture of an ensemble
 CHANNELS = {"x": "north [m]", "y": "east [m]", "psi": "heading [°]"}  # of a member less the mean
 
@@ -78,8 +79,7 @@ def draw_campaign(
     for name, figure in figures.items():
         stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
         path = folder / f"{stem}.png"
-        with atomic_write(path) as scratch:
-            figure.savefig(scratch, dpi=DPI, format="png")
+        save(figure, path)
         paths.append(path)
     return paths
 
@@ -89,7 +89,8 @@ def _is_number(made: pandas.DataFrame, name: str) -> bool:
 
 
 def _panels(rows: int, columns: int) -> tuple[Figure, np.ndarray]:
-    figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * rows), layout="constrained")
+    figure = blank(PANEL[0] * columns, PANEL[1] * rows)
+    figure.set_layout_engine("constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
@@ -118,7 +119,6 @@ def _labelled(name: str, unit: str | None) -> str:
 
 def _named(axes: Axes, x: str, metric: str) -> None:
     axes.set(xlabel=x, ylabel=_labelled(metric, UNITS.get(metric)))
-    axes.grid(alpha=0.3)
 
 
 def _against_axes(
@@ -129,11 +129,12 @@ def _against_axes(
     for k, metric in enumerate(metrics):
         for j, name in enumerate(choices):
             panel: Axes = panels[k, j]
+            pale_grid(panel)
             if _is_number(done, name):
-                panel.plot(done[name], done[metric], ".", alpha=0.5)
+                panel.plot(done[name], done[metric], ".", color=RUN, alpha=0.5)
                 if done[name].nunique() <= len(done) // 2:  # several runs at each value
                     median = done.groupby(name)[metric].median()
-                    panel.plot(median.index, median, "-", label="median")
+                    panel.plot(median.index, median, "-", color=RUN, label="median")
                     panel.legend(fontsize=7)
             else:
                 groups = {
@@ -173,14 +174,14 @@ def _differences(found: pandas.DataFrame, axis: str, metrics: Sequence[str]) -> 
     """Mean paired differences with their intervals, a panel for each metric."""
     figure, panels = _panels(1, len(metrics))
     for panel, metric in zip(panels[0], metrics, strict=True):
+        pale_grid(panel)
         part = found.query("metric == @metric")
         places = np.arange(len(part))
-        panel.errorbar(part["difference"], places, xerr=part["half"], fmt="o", capsize=3)
+        panel.errorbar(part["difference"], places, xerr=part["half"], fmt="o", color=RUN, capsize=3)
         panel.axvline(0.0, color="k", lw=0.8)
         panel.set_yticks(places, list(part["value"]), fontsize=7)
         panel.set(title=f"{axis}: less {part['against'].iloc[0]}", ylim=(-0.5, len(part) - 0.5))
         panel.set_xlabel(_labelled(f"mean difference of {metric}", UNITS.get(metric)))
-        panel.grid(alpha=0.3)
     return figure
 
 
@@ -191,11 +192,14 @@ def draw_bands(found: pandas.DataFrame, poses: np.ndarray) -> Figure:
         found: the bands, from :func:`.ensemble.bands`.
         poses: (members, 3, n), north, east [m] and heading [rad].
     """
-    figure = Figure(figsize=BANDS_SIZE, dpi=DPI, layout="constrained")
+    figure = blank(*BANDS_SIZE)
+    figure.set_layout_engine("constrained")
     panels = figure.subplot_mosaic([["track", name] for name in CHANNELS])
+    for panel in panels.values():
+        pale_grid(panel)
     track = panels["track"]
     for member in poses:
-        track.plot(member[1], member[0], color="tab:blue", lw=0.5, alpha=0.3)
+        track.plot(member[1], member[0], color=RUN, lw=0.5, alpha=0.3)
     track.plot(found["y_mean"], found["x_mean"], color="k", lw=1.0, label="mean")
     track.set(xlabel="east [m]", ylabel="north [m]", title=f"{len(poses)} members")
     track.set_aspect("equal", "datalim")
@@ -205,13 +209,11 @@ def draw_bands(found: pandas.DataFrame, poses: np.ndarray) -> Figure:
         for low, high, shade in ((5, 95, 0.25), (25, 75, 0.45)):
             ends = (scale * (found[f"{name}_{q}"] - found[f"{name}_mean"]) for q in (low, high))
             panel.fill_between(
-                found["time"], *ends, color="tab:blue", alpha=shade, lw=0.0, label=f"{high - low} %"
+                found["time"], *ends, color=RUN, alpha=shade, lw=0.0, label=f"{high - low} %"
             )
         panel.axhline(0.0, color="k", lw=1.0, label="mean")
         panel.set_ylabel(label)
     panels["x"].set_title("from the mean")
     panels["x"].legend(fontsize=7)
     panels["psi"].set_xlabel("time [s]")
-    for panel in panels.values():
-        panel.grid(alpha=0.3)
     return figure

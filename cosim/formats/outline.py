@@ -46,6 +46,14 @@ def read_outline(annotations: Element | None) -> AnnotatedOutline | None:
     return AnnotatedOutline.read({**ship.attrib, "corners": corners})
 
 
+class CommandLimit(NamedTuple):
+    """The lowest and the highest value of a command of an actuator, and its unit."""
+
+    low: float
+    high: float
+    unit: str
+
+
 class AnnotatedTrial(NamedTuple):
     """A manoeuvring trial.
 

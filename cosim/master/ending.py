@@ -72,8 +72,8 @@ class Result:
         """Draw one of the pictures of a run.
 
         Args:
-            name: ``trajectory``, ``errors``, ``metrics``, ``forces`` or ``model_error``; ``trial`` of a
-                manoeuvring trial.
+            name: ``trajectory``, ``errors``, ``metrics``, ``forces``, ``model_error`` or
+                ``commands``; ``trial`` of a manoeuvring trial.
 
         Returns:
             The picture, which shows itself in a notebook.
@@ -172,9 +172,9 @@ def finish(
 
         with paused_collector(), writing(result):  # figures are many small objects, and short-lived
             runs = {system.scenario.name: columns}
-            told = RunOptions(window.start, window.stop, roles, system.outline)
+            told = RunOptions(window.start, window.stop, roles, system.outline, commands=system.commands)
             drawn = drawing.draw(runs, result.folder, {system.scenario.name: told})
-            missing = drawing.PICTURES.keys() - {path.stem for path in drawn}
+            missing = drawing.PICTURES.keys() - {path.stem for path in drawn} - {drawing.COMMANDS}
             if result.trial is not None:
                 from ..trials.trial_picture import write_picture
 

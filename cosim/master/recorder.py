@@ -35,6 +35,7 @@ def _kept_names(system: System, names: Sequence[str], pictures: bool) -> list[st
     """Those of some columns that are kept until the end."""
     known = {*(needed if pictures else read)(names, system.scenario.roles)}
     known |= set() if system.trial is None else {system.trial.order}
+    known |= {*system.commands} if pictures else set()
     return [name for name in names if name in known]
 
 

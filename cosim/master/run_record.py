@@ -37,6 +37,7 @@ def describe(system: System) -> dict[str, Any]:
         },
         "ship": None if system.outline is None else system.outline._asdict(),
         "trial": None if system.trial is None else system.trial._asdict(),
+        "commands": {name: each._asdict() for name, each in system.commands.items()},
         "order": system.order,
         "scenario": resolved,
         "seed": system.scenario.seed,

@@ -6,7 +6,7 @@ no global state.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -15,12 +15,13 @@ import numpy as np
 from cybership.scratch_folder import atomic_write
 
 from .log import Log
+from .run_options import NO_COMMANDS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..formats.outline import AnnotatedOutline
+    from ..formats.outline import AnnotatedOutline, CommandLimit
     from ..scenario.roles import Roles
 
 DPI = 120  # chosen
@@ -45,6 +46,7 @@ class DrawnRun(NamedTuple):
         roles: names of the columns.
         start, stop: the part of the run that metrics cover [s]; None is unbounded.
         outline: of the ship; None draws none.
+        commands: column of each command of an actuator, and its limit.
     """
 
     label: str
@@ -54,6 +56,7 @@ class DrawnRun(NamedTuple):
     start: float | None = None
     stop: float | None = None
     outline: AnnotatedOutline | None = None
+    commands: Mapping[str, CommandLimit] = NO_COMMANDS
 
 
 Runs = Sequence[DrawnRun]
@@ -99,6 +102,7 @@ def arrange(figure: Figure) -> Figure:
     top = TOP + sum(s.get_window_extent().height / figure.dpi / letter for s in figure.legends)
     grid = figure.axes[0].get_gridspec()
     assert grid is not None
+    below = BOTTOM if figure.axes[0].get_xlabel() else BETWEEN  # a panel with an axis of its own
     apart = LEFT if any(panel.get_ylabel() for panel in figure.axes[1 : grid.ncols]) else RIGHT
     figure.subplots_adjust(
         left=LEFT / wide,
@@ -106,7 +110,7 @@ def arrange(figure: Figure) -> Figure:
         bottom=BOTTOM / high,
         top=1.0 - top / high,
         wspace=apart * grid.ncols / (wide - LEFT - RIGHT - (grid.ncols - 1) * apart),
-        hspace=BETWEEN * grid.nrows / (high - BOTTOM - top - (grid.nrows - 1) * BETWEEN),
+        hspace=below * grid.nrows / (high - BOTTOM - top - (grid.nrows - 1) * below),
     )
     aside = ScaledTranslation(-LABEL * letter, 0.0, figure.dpi_scale_trans)
     for panel in figure.axes:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..scenario.roles import Roles
 from .canvas import DrawnRun, Runs, save
-from .lines import errors, forces, metrics, model_error
+from .lines import commands, errors, forces, metrics, model_error
 from .log import Log
 from .performance import MetricsError
 from .picture_files import PictureOptions
@@ -27,6 +26,7 @@ LINES = (("blue", "-"), ("green", "--"), ("red", "--"), ("magenta", "-."))
 MORE_COLORS = ("tab:orange", "tab:brown", "tab:cyan", "tab:olive", "tab:purple", "tab:gray")
 
 
+COMMANDS = "commands"  # a picture, and the role of its columns
 USUAL = PictureOptions()
 NOTHING: Mapping[str, RunOptions] = MappingProxyType({})
 
@@ -35,7 +35,8 @@ class RunPicture(NamedTuple):
     """A picture.
 
     Attributes:
-        choices: roles of the columns that it needs; the first whose columns are all there counts.
+        choices: roles of the columns that it needs; the first whose columns are all there counts. The
+            role ``commands`` is that of the actuators, which has as many columns as the run says.
         figure: draws the runs.
     """
 
@@ -55,6 +56,9 @@ PICTURES = {
         metrics,
     ),
     "forces": RunPicture((("linear_force", "nonlinear_force", "requested_force"),), forces),
+    COMMANDS: RunPicture(
+        (("commands", "pose", "velocity", "target"), ("commands", "pose", "velocity")), commands
+    ),
     "model_error": RunPicture(
         (("model_error", "estimate", "force", "acting_force"), ("model_error", "estimate")), model_error
     ),
@@ -77,7 +81,7 @@ def draw(
         options: format, size and style.
 
     Returns:
-        The files written, among trajectory.png, errors.png, metrics.png, forces.png and
+        The files written, among trajectory.png, errors.png, metrics.png, forces.png, commands.png and
         model_error.png.
 
     Raises:
@@ -105,10 +109,11 @@ def figures(
         able: list[DrawnRun] = []
         for k, (label, log) in enumerate(runs.items()):
             own = told.get(label, RunOptions())
-            part = _usable(log, picture.choices, own.roles)
+            part = _usable(log, picture.choices, own)
             if part is not None:
                 named = label.replace("$", r"\$")
-                able.append(DrawnRun(named, part, _line(k), own.roles, own.start, own.stop, own.outline))
+                shown = (own.start, own.stop, own.outline, own.commands)
+                able.append(DrawnRun(named, part, _line(k), own.roles, *shown))
         if not able:
             continue
         try:
@@ -130,10 +135,12 @@ def _line(k: int) -> dict[str, Any]:
     }
 
 
-def _usable(log: Log, choices: Sequence[Sequence[str]], roles: Roles) -> Log | None:
+def _usable(log: Log, choices: Sequence[Sequence[str]], own: RunOptions) -> Log | None:
     """The columns of the first choice that the log has, without rows that cannot be drawn."""
     for choice in choices:
-        columns = roles.of(*choice)
+        columns = own.roles.of(*(role for role in choice if role != COMMANDS))
+        if COMMANDS in choice:
+            columns = (*columns, *own.commands) if own.commands else (COMMANDS,)
         if all(name in log for name in columns):
             part = {name: np.asarray(log[name], float) for name in ("time", *columns)}
             good = np.all([np.abs(values) < LARGEST for values in part.values()], axis=0)

@@ -18,15 +18,17 @@ def _norm(log: Log, names: Sequence[str]) -> np.ndarray:
 
 
 def errors(runs: Runs) -> "Figure":
-    """Heading error and cross-track error over time."""
-    figure, panels = stacked(2, 1, 5.0)
+    """Heading error, cross-track error and distance to the target over time."""
+    figure, panels = stacked(3, 1, 7.0)
     for run in runs:
         x, y, psi = (run.log[name] for name in run.roles.pose)
         target = [run.log[name] for name in run.roles.target]
         plot(panels[0, 0], run, np.degrees(wrap(psi - target[2])))
         plot(panels[1, 0], run, cross_track(x, y, target))
+        plot(panels[2, 0], run, distance(run))
     panels[0, 0].set_ylabel("heading error [deg]")
     panels[1, 0].set_ylabel("cross-track error e [m]")
+    panels[2, 0].set_ylabel("distance to target [m]")
     for panel in panels.flat:
         panel.axhline(0.0, color="0.4", linewidth=0.6, zorder=1)
     return finish(figure, panels, runs, least=1e-4)
@@ -35,6 +37,43 @@ def errors(runs: Runs) -> "Figure":
 def _is_anything(runs: Runs, role: str) -> bool:
     """Whether a column of a role is not zero throughout in some run."""
     return any(np.any(run.log[name] != 0.0) for run in runs for name in run.roles.of(role))
+
+
+def distance(run: DrawnRun) -> np.ndarray:
+    """Distance of the ship to its target [m]."""
+    (x, y, _), (x_t, y_t, _) = run.roles.pose, run.roles.target
+    return np.hypot(run.log[x] - run.log[x_t], run.log[y] - run.log[y_t])
+
+
+def commands(runs: Runs) -> "Figure":
+    """Commands of the actuators with their limits, speed, and heading wanted and reached."""
+    limits = {name: each for run in runs for name, each in run.commands.items()}
+    figure, panels = stacked(len(limits) + 2, 1, 1.0 + 1.6 * (len(limits) + 2))
+    *each, speed, heading = panels.flat
+    for run in runs:
+        for panel, name in zip(each, limits, strict=True):
+            if name in run.commands:
+                low, high, unit = run.commands[name]
+                factor = np.degrees(1.0) if unit == "rad" else 1.0
+                plot(panel, run, factor * run.log[name])
+                for end in (low, high):
+                    panel.axhline(factor * end, color="0.4", linewidth=0.8, dashes=(5, 4), zorder=1)
+        plot(speed, run, np.hypot(*(run.log[name] for name in run.roles.velocity[:2])))
+        psi, wanted = np.unwrap(run.log[run.roles.pose[2]]), run.log.get(run.roles.target[2])
+        plot(heading, run, np.degrees(psi))
+        if wanted is not None:
+            target = np.degrees(psi + wrap(wanted - psi))
+            plot(heading, run, target, color="black", linestyle=":", label=f"{run.label}: wanted")
+    for panel, (name, (*_, unit)) in zip(each, limits.items(), strict=True):
+        panel.set_ylabel(f"{name.rpartition('.')[2]} [{'deg' if unit == 'rad' else unit}]")
+    speed.set_ylabel("speed [m/s]")
+    heading.set_ylabel("heading [deg]")
+    each[0].plot([], [], color="0.4", linewidth=0.8, dashes=(5, 4), label="limit")
+    wanted = [line for line in heading.get_lines() if str(line.get_label()).endswith(": wanted")]
+    if wanted:
+        each[0].plot([], [], color="black", linestyle=":", label="heading wanted")
+    legend(figure, each[0], len(runs) + 2)
+    return finish(figure, panels, (), least=1e-4)
 
 
 GROWING = (

@@ -24,9 +24,18 @@ METRICS = "metrics.json"
 TRIAL = "trial.json"
 TRIAL_PICTURE = "trial.png"
 CHUNK = 2**20  # bytes read at once; chosen
+SHOWN = 6  # names of columns that a terminal shows; chosen: a line has about so many
 
 # Column name, as in the header of ``log.csv``, -> values, shape (rows,).
 Log = Mapping[str, np.ndarray]
+
+
+class LogColumns(dict[str, np.ndarray]):
+    """Columns of a log by name; a terminal shows their number, not their values."""
+
+    def __repr__(self) -> str:
+        rows = len(next(iter(self.values()), ()))
+        return f"<log of {rows} rows: {', '.join([*self][:SHOWN])}{', ...' * (len(self) > SHOWN)}>"
 
 
 class LogWriter:
@@ -245,7 +254,7 @@ def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[s
     except (OSError, ValueError, UnicodeDecodeError, StopIteration) as error:
         raise InputError(f"'{path}' cannot be read as a log: {error}") from error
     table = table.reshape(-1, len(wanted))
-    return {name: table[:, k] for k, name in enumerate(wanted)}
+    return LogColumns({name: table[:, k] for k, name in enumerate(wanted)})
 
 
 def _read_parquet(path: Path, columns: Sequence[str] | None) -> dict[str, np.ndarray]:
@@ -259,7 +268,7 @@ def _read_parquet(path: Path, columns: Sequence[str] | None) -> dict[str, np.nda
             table = file.read(columns=wanted)
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a log: {error}") from error
-    return {name: table[name].to_numpy() for name in wanted}
+    return LogColumns({name: table[name].to_numpy() for name in wanted})
 
 
 def _wanted(names: Sequence[str], columns: Sequence[str] | None, path: Path) -> list[str]:

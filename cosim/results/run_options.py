@@ -1,12 +1,16 @@
 """Options of a finished run for metrics and pictures, from the scenario in its ``log.json``."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
-from ..formats.outline import AnnotatedOutline, AnnotatedTrial
+from ..formats.outline import AnnotatedOutline, AnnotatedTrial, CommandLimit
 from ..scenario.roles import DEFAULT_ROLES, Roles
 from .log import SIDECAR
+
+NO_COMMANDS: Mapping[str, CommandLimit] = MappingProxyType({})
 
 
 class RunOptions(NamedTuple):
@@ -18,6 +22,7 @@ class RunOptions(NamedTuple):
         outline: of the ship; None where its FMUs do not say.
         ship: whose FMUs the project's were: a name, or the path of a description; None: the usual ship.
         trial: the manoeuvring trial that it is; None: it is none.
+        commands: column of each command of an actuator, and its limit.
     """
 
     start: float | None = None
@@ -26,6 +31,7 @@ class RunOptions(NamedTuple):
     outline: AnnotatedOutline | None = None
     ship: str | None = None
     trial: AnnotatedTrial | None = None
+    commands: Mapping[str, CommandLimit] = NO_COMMANDS
 
 
 def read_options(folder: Path) -> RunOptions:
@@ -38,8 +44,11 @@ def read_options(folder: Path) -> RunOptions:
         trial = told.get("trial") and AnnotatedTrial(
             str(told["trial"]["kind"]), str(told["trial"]["order"])
         )
-        return RunOptions(
-            window["from"], window["to"], roles, outline, scenario.get("ship"), trial or None
-        )
+        commands = {
+            str(name): CommandLimit(float(each["low"]), float(each["high"]), str(each["unit"]))
+            for name, each in told.get("commands", {}).items()
+        }
+        ship = scenario.get("ship")
+        return RunOptions(window["from"], window["to"], roles, outline, ship, trial or None, commands)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return RunOptions()

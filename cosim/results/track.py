@@ -7,7 +7,8 @@ import numpy as np
 
 from ..formats.outline import AnnotatedOutline
 from ..scenario.roles import Columns
-from .canvas import WIDTH, DrawnRun, Runs, arrange, blank, grid, legend
+from .canvas import WIDTH, DrawnRun, Runs, arrange, blank, grid, legend, plot
+from .lines import distance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +20,7 @@ OUTLINES = 12  # ships drawn along a path, chosen
 SCALES = (1.0, 0.5, 0.25, 0.125, 0.05, 0.02, 0.01)  # of those ships
 # Longest ship, as a share of the picture: in its own length unless the track is hardly longer; chosen
 OUTLINE_SHARE = 0.5
+DISTANCE = 2.2  # in; height of the distance to the target below the tracks of several runs; chosen
 STILL = 0.01  # m; a target that moves less is a point, chosen: below a line's width in most pictures
 
 
@@ -106,7 +108,10 @@ def _limits(values: Sequence[np.ndarray]) -> tuple[float, float]:
 
 
 def trajectory(runs: Runs) -> "Figure":
-    """Path of ship and target, north over east."""
+    """Path of ship and target, north over east; of several runs also the distance to the target.
+
+    Two tracks that differ by millimetres are one line on a map.
+    """
     from matplotlib.collections import PolyCollection
 
     paths = [_path(run, run.roles.pose) for run in runs]
@@ -116,9 +121,17 @@ def trajectory(runs: Runs) -> "Figure":
     size = max(tall, wide, STILL)
     # Neither side so short that the picture becomes a strip, and room for the ships.
     tall, wide = (max(span, 0.4 * size) + 0.16 * size for span in (tall, wide))
-    figure = blank(WIDTH, min(max(6.5 * tall / wide, 3.0), 9.0) + 1.0)
-    panel = figure.subplots()
-    grid(panel)
+    high, below = min(max(6.5 * tall / wide, 3.0), 9.0) + 1.0, DISTANCE * (1 < len(runs) == len(targets))
+    figure = blank(WIDTH, high + below)
+    panel, *others = figure.subplots(
+        2 if below else 1, height_ratios=[high, below][: 2 if below else 1], squeeze=False
+    ).flat
+    for each in (panel, *others):
+        grid(each)
+    for each in others:
+        for run in runs:
+            plot(each, run, distance(run))
+        each.set(xlabel="time [s]", ylabel="distance to target [m]", ylim=(0.0, None))
     panel.set(
         xlabel="east y [m]",
         ylabel="north x [m]",

@@ -7,7 +7,7 @@ from pathlib import PurePath
 from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import FmuModel, FmuVariable, Value
-from ..formats.outline import AnnotatedOutline, AnnotatedTrial, read_outline, read_trial
+from ..formats.outline import AnnotatedOutline, AnnotatedTrial, CommandLimit, read_outline, read_trial
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -96,6 +96,21 @@ class System:
         """The manoeuvring trial that the first FMU which says so conducts."""
         trials = (read_trial(m.annotations, n) for n, m in self.models.items() if "order" in m.variables)
         return next((trial for trial in trials if trial is not None), None)
+
+    @property
+    def commands(self) -> dict[str, CommandLimit]:
+        """Logged commands of actuators, with their limits: of ``X`` these are ``X_max``, ``X_min``."""
+        found = {}
+        for part, model in self.models.items():
+            numbers = {n: v.start for n, v in model.variables.items() if v.type == "Real" and v.start}
+            numbers |= {v.name: value for v, value in self.parameters.get(part, ()) if v.type == "Real"}
+            values = {n: float(x) for n, x in numbers.items() if n.endswith(("_max", "_min"))}
+            for name, variable in model.variables.items():
+                high = values.get(f"{name}_max")
+                if high is not None and f"{part}.{name}" in self.logged:
+                    low, unit = values.get(f"{name}_min", -high), variable.unit
+                    found[f"{part}.{name}"] = CommandLimit(low, high, unit.name if unit else "")
+        return found
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""

@@ -27,6 +27,9 @@ class Passage(NamedTuple):
     psi: np.ndarray
     order: np.ndarray
 
+    def __repr__(self) -> str:
+        return f"<passage of {self.time.size} samples in {np.ptp(self.time):.4g} s>"
+
     @property
     def way(self) -> np.ndarray:
         """(n,), distance along the track from its first row [m]."""

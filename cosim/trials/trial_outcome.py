@@ -21,6 +21,7 @@ APPROACH = {"approach_speed"}  # what is measured before the order does anything
 NOTHING = (
     "no further measures: the run is too short, or the order does not make the manoeuvre of this trial"
 )
+LIMITS = "IMO limit: resolution MSC.137(76), for ships of 100 m or more"
 DEGREES = {"rad": "°", "rad/s": "°/s"}  # how angles are shown
 
 
@@ -51,6 +52,15 @@ class TrialOutcome(NamedTuple):
             "limits": dict(self.limits),
             "units": {m.name: m.unit for m in MEASURES if m.name in self.measures},
         }
+
+    @property
+    def without_limit(self) -> list[str]:
+        """A sentence on a check angle for which the resolution has no limits; else none."""
+        check = self.measures.get("check_angle")
+        if check is None or not self.length or any(name.startswith("overshoot") for name in self.limits):
+            return []
+        angle = f"{math.degrees(check):.3g}°"
+        return [f"no IMO limit at a check angle of {angle}, but at 10° and 20°"]
 
     def write(self, folder: Path) -> None:
         """Write ``trial.json``."""
@@ -124,10 +134,10 @@ def simulated_trial(folder: Path, start: float | None = None, stop: float | None
 def sheet(found: TrialOutcome, title: str = "") -> Table:
     """A trial for the terminal, as in a trial report: angles in degrees, distances also in lengths."""
     shown = Table(title=title or f"Trial: {found.kind}", title_justify="left", box=None, pad_edge=False)
-    if found.measures.keys() <= APPROACH:
-        shown.caption, shown.caption_justify = NOTHING, "left"
+    notes = [NOTHING] if found.measures.keys() <= APPROACH else [LIMITS] if found.limits else []
+    shown.caption, shown.caption_justify = "\n".join([*notes, *found.without_limit]) or None, "left"
     shown.add_column("measure", style="bold", no_wrap=True)
-    for name in ("value", "unit", "in L", "limit"):
+    for name in ("value", "unit", "in L", "IMO limit"):
         shown.add_column(name, justify="left" if name == "unit" else "right", no_wrap=True)
     shown.add_column("meaning")
     for name, unit, meaning in MEASURES:
@@ -141,7 +151,7 @@ def sheet(found: TrialOutcome, title: str = "") -> Table:
             f"{factor * value:.4g}",
             DEGREES.get(unit, unit),
             in_lengths,
-            "" if limit is None else f"{factor * limit:.4g}",
+            "" if limit is None else f"{factor * limit:.4g} {DEGREES.get(unit, unit)}",
             meaning,
         )
     return shown

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEIGHT = 4.2  # in
+BY_POINTS = {"textcoords": "offset points", "fontsize": 8, "ha": "center"}  # of a text next to a dot
 SHIP, MARK = "blue", "0.4"  # colours of the ship's line, and of what is measured
 
 
@@ -34,12 +35,18 @@ def write_picture(found: TrialOutcome, folder: Path) -> None:
 
 
 def _figure(found: TrialOutcome) -> Figure:
-    figure = blank(WIDTH, HEIGHT)
-    left, right = figure.subplots(1, 2)
-    for panel in (left, right):
+    figure, draws = blank(WIDTH, HEIGHT), PANELS[found.kind]
+    cells = figure.add_gridspec(len(draws), 2, height_ratios=[2] * (len(draws) > 1) + [1])
+    left = figure.add_subplot(cells[:, 0])
+    panels = [figure.add_subplot(cells[k, 1]) for k in range(len(draws))]
+    for panel in (left, *panels):
         grid(panel)
     _track(left, found)
-    PANELS[found.kind](right, found)
+    for panel, draw in zip(panels, draws, strict=True):
+        draw(panel, found)
+    for panel in panels[:-1]:
+        panel.sharex(panels[-1])
+        panel.tick_params(labelbottom=False)
     return arrange(figure)
 
 
@@ -64,18 +71,33 @@ def _track(panel: Axes, found: TrialOutcome) -> None:
 
 
 def _heading(panel: Axes, found: TrialOutcome) -> None:
-    """Heading off the first one, and the order as a share of its largest, over time."""
+    """Heading off the first one over time, with the overshoots of a zig-zag."""
     p = found.passage
     times = executes(p)
     time = p.time - times[0]
     panel.plot(*thin(time, np.degrees(p.psi - p.at(times[0])[2])), color=SHIP, linewidth=1.4)
     for instant in times:
         panel.axvline(instant - times[0], color=MARK, linewidth=0.6)
-    share = panel.twinx()
-    share.plot(*thin(time, p.order / np.abs(p.order).max()), color="red", linewidth=0.9)
-    share.set(ylim=(-3.0, 3.0), yticks=[])
-    share.spines[:].set_visible(False)
-    panel.set(xlabel="time [s]", ylabel="heading [°]; order (red)")
+    for k, begin in enumerate(times[1:], 1):
+        if (angle := found.measures.get(f"overshoot_{k}")) is not None:
+            at = begin + found.measures[f"overshoot_time_{k}"]
+            off = np.degrees(p.at(at)[2] - p.at(times[0])[2])
+            panel.plot(at - times[0], off, "o", color="red", markersize=4.0)
+            beside = {"xytext": (0, 5 * np.sign(off)), "va": "bottom" if off > 0.0 else "top"}
+            panel.annotate(f"{np.degrees(angle):.3g}°", (at - times[0], off), **beside, **BY_POINTS)
+    allowed = [f"{np.degrees(x):.3g}°" for n, x in found.limits.items() if n.startswith("overshoot")]
+    named = [f"IMO limit of overshoots: {', '.join(allowed)}"] if allowed else found.without_limit
+    panel.set_title("".join(named), loc="right", fontsize=8, color=MARK)
+    panel.margins(y=0.15)
+    panel.set_ylabel("heading [°]")
+
+
+def _order(panel: Axes, found: TrialOutcome) -> None:
+    """The order as a share of its largest over time."""
+    p = found.passage
+    time = p.time - executes(p)[0]
+    panel.plot(*thin(time, p.order / np.abs(p.order).max()), color="red", linewidth=0.9)
+    panel.set(ylim=(-1.2, 1.2), yticks=[-1.0, 0.0, 1.0], xlabel="time [s]", ylabel="order [1]")
 
 
 def _speed(panel: Axes, found: TrialOutcome) -> None:
@@ -93,9 +115,9 @@ def _rates(panel: Axes, found: TrialOutcome) -> None:
     panel.set(xlabel="order", ylabel="rate of turn [°/s]")
 
 
-PANELS: Mapping[str, Callable[[Axes, TrialOutcome], None]] = {
-    "circle": _heading,
-    "zigzag": _heading,
-    "stop": _speed,
-    "spiral": _rates,
+PANELS: Mapping[str, Sequence[Callable[[Axes, TrialOutcome], None]]] = {
+    "circle": (_heading, _order),
+    "zigzag": (_heading, _order),
+    "stop": (_speed,),
+    "spiral": (_rates,),
 }

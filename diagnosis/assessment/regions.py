@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from ..execution.short_text import ShortRepr
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import NOISE_TOLERANCE
 from ..runs.cleaning import Z95
@@ -23,8 +24,8 @@ NAMES = {"X": "Surge", "Y": "Sway", "N": "Yaw"}
 UNITS = {"X": "N", "Y": "N", "N": "N m"}
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile(ShortRepr):
     """RMS of the model error of an axis over a covariate.
 
     Attributes:
@@ -92,8 +93,8 @@ class Region:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorRegions:
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorRegions(ShortRepr):
     """Where a model fails.
 
     Attributes:

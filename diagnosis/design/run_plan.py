@@ -11,6 +11,7 @@ import numpy as np
 from cosim.scenario import find_scenario
 
 from ..execution.result_folder import together
+from ..execution.short_text import ShortRepr
 from ..report.formatting import as_json, finite
 from ..runs.cleaning import Z95
 from .designing import Designer, ScoredPlan
@@ -49,8 +50,8 @@ def picture_file(n: int) -> str:
     return f"track_{n}.png"
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedRun:
+@dataclass(frozen=True, eq=False, repr=False)
+class PlannedRun(ShortRepr):
     """One run of a plan.
 
     Attributes:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammaincinv
 
+from ..execution.short_text import ShortRepr
 from ..runs import Smoothed
 from .described_ship import DescribedShip
 from .predictor import Predictor
@@ -22,8 +23,8 @@ def quantile(level: float, dof: int) -> float:
     return 2.0 * float(gammaincinv(0.5 * dof, level))
 
 
-@dataclass(frozen=True, eq=False)
-class Bands:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bands(ShortRepr):
     """The covariance of predictions in the windows of a run.
 
     Attributes:
@@ -81,8 +82,8 @@ class Bands:
 DataUse = Literal["train", "validate", "test"]
 
 
-@dataclass(frozen=True, eq=False)
-class PredictionError:
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictionError(ShortRepr):
     """Errors of one model on one run.
 
     Attributes:
@@ -112,8 +113,8 @@ class PredictionError:
         return np.sqrt(np.mean(self.omega**2, axis=0))
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(ShortRepr):
     """One run with the errors of the initial and of the learned model on it.
 
     Attributes:

@@ -15,6 +15,7 @@ import numpy as np
 from cosim import InputError
 from fmus.ops import wrap
 
+from ..execution.short_text import ShortRepr
 from ..runs import Smoothed
 from ..runs.cleaning import BRIEF
 from .prediction import WindowStarts, by_measurement, predict, predict_each
@@ -28,8 +29,8 @@ LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow;
 ANY_TIME = (-np.inf, np.inf)  # s
 
 
-@dataclass(frozen=True, eq=False)
-class WindowErrors:
+@dataclass(frozen=True, eq=False, repr=False)
+class WindowErrors(ShortRepr):
     """Root mean square errors of prediction in each window; inf where the model diverges.
 
     Attributes:

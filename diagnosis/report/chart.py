@@ -261,6 +261,7 @@ class Chart:
     def figure(self) -> "Figure":
         """The same picture by matplotlib, for PNG and PDF."""
         from matplotlib.figure import Figure
+        from matplotlib.patches import Rectangle
 
         size = np.array([WIDTH, self.height])
         made = Figure(figsize=tuple(size * point / inch), facecolor="none")
@@ -276,15 +277,19 @@ class Chart:
                 continue
             b = boxes[-1 if inside is None else inside]
             look = {"color": m.colour, "alpha": FAINT if m.faint else None, "zorder": order}
-            x, y = m.x.clip(b.left, b.left + b.width), m.y.clip(b.top, b.top + b.height)
+            x, y = (each.clip(-WIDTH, 2 * WIDTH) for each in (m.x, m.y))  # as in an SVG
             if m.dots:
-                axes.plot(x, y, ".", mfc="none" if m.hollow else m.colour, **look)
+                drawn = axes.plot(x, y, ".", mfc="none" if m.hollow else m.colour, **look)
             elif m.area:
                 parts = np.split(np.column_stack([x, y]), np.flatnonzero(np.isnan(x)))
-                for part in (p[np.isfinite(p).all(axis=1)] for p in parts):
-                    axes.fill(*part.T, linewidth=0.0, **look)
+                whole = (p[np.isfinite(p).all(axis=1)] for p in parts)
+                drawn = [each for p in whole for each in axes.fill(*p.T, linewidth=0.0, **look)]
             else:
-                axes.plot(x, y, "--" if m.dashed else "-", lw=m.width, **look)
+                drawn = axes.plot(x, y, "--" if m.dashed else "-", lw=m.width, **look)
+            for each in drawn:  # axes would replace a clip that is given earlier
+                each.set_clip_path(
+                    Rectangle((b.left, b.top), b.width, b.height, transform=axes.transData)
+                )
         return made
 
 

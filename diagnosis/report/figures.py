@@ -19,6 +19,7 @@ from .formatting import percent
 from .shape import Curve
 
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
+MOST_RANKED = 2 * LENGTH  # candidates of a picture: the shortlist, and as many again
 RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {
@@ -111,9 +112,9 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     """Candidates by how much worse than the first they are, with the standard error of that difference.
 
     The percentage is the share of the model error that each explains beyond other values of the nominal
-    coefficients, where a method tells that. Hollow: so near that only chance decides.
+    coefficients, where a method tells that. Hollow: so near that only chance decides. Grey: further.
     """
-    shown = ranked[: 2 * LENGTH]  # the shortlist, and as many again
+    shown = ranked[:MOST_RANKED]
     behind = np.array([_behind(r, shown[0]) for r in shown])
     linear = TIE * float(np.median(behind[:, 1]))
     # Linear below what may be a tie, logarithmic far above.
@@ -124,8 +125,9 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     panel = Panel(ChartAxis(label, scale=scale), names)
     for k, (r, (x, std)) in enumerate(zip(shown, behind, strict=True)):
         colour = AFTER if (tied := x <= TIE * std) else BAND
+        label = "best" if k == 0 else "not clearly worse" if tied else "clearly worse"
         panel.draw([x - std, x + std], [k, k], colour)
-        panel.draw(x, k, colour, dots=True, hollow=tied and k > 0)
+        panel.draw(x, k, colour, label, dots=True, hollow=tied and k > 0)
         panel.notes[k] = _explained(r.beyond if np.isfinite(r.beyond) else r.q2)
     return Chart(WIDTH / 2 + ROW * len(shown), [panel])
 
@@ -138,8 +140,8 @@ def _behind(r: Ranked, first: Ranked) -> tuple[float, float]:
 
 
 def _explained(share: float) -> str:
-    """The share beside a candidate; a negative one without its size, which means nothing."""
-    return "" if not np.isfinite(share) else percent(share) if share >= 0.0 else "< 0 %"
+    """The share next to a candidate; a negative one explains nothing."""
+    return percent(max(share, 0.0)) if np.isfinite(share) else ""
 
 
 def curve(c: Curve) -> Chart:

@@ -28,8 +28,10 @@ def unit(text: str) -> str:
 
 
 def percent(value: float | None) -> str:
-    """A share in per cent; a dash where it is None."""
-    return NO_VALUE if value is None or not np.isfinite(value) else f"{100.0 * value:.0f} %"
+    """A share in per cent; a dash where it is None. One that is not zero is not written as zero."""
+    if value is None or not np.isfinite(value):
+        return NO_VALUE
+    return "< 1 %" if 0.0 < 100.0 * value < 0.5 else f"{100.0 * value:.0f} %"
 
 
 def times(before: float | None, after: float | None) -> str:

@@ -9,8 +9,8 @@ from ..assessment.stability import Stability
 from ..session import CalibratedModel
 from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
-from .finding_text import listed
-from .formatting import number
+from .finding_text import SHOWN, listed
+from .formatting import number, percent
 from .report_data import ReportData
 from .reported_effect import ReportedEffect
 
@@ -55,10 +55,20 @@ def finding_sentence(e: ReportedEffect) -> str:
     if is_sure(e):
         return e.sentence
     others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
-    sure = f" ({100.0 * e.confidence:.2g} % for {e.id})" if np.isfinite(e.confidence) else ""
+    sure = f" ({percent(e.confidence)} for {e.id})" if np.isfinite(e.confidence) else ""
     doubt = f" However, {e.doubt}." if e.doubt else ""
     model = "" if e.in_model else " It is not in the learned model."
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
+
+
+def cause(r: ReportData) -> str:
+    """The effects that were found, by name and description, for a line of a picture; empty if none."""
+    if r.diagnosis is None:
+        return ""
+    known = r.diagnosis.start.ship.effects
+    what = {e.id: known[e.id].description.removeprefix(f"addition to {e.id}: ") for e in r.effects}
+    sure = [f"{e.id}, {what[e.id].rstrip('.')}" for e in r.effects if is_sure(e)]
+    return f"cause found: {'; '.join(sure)}" if sure else ""
 
 
 def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over: float) -> list[str]:
@@ -103,6 +113,20 @@ def verdict_title(r: ReportData) -> str:
     one_cause = verdict == "ambiguous" and not r.effects[0].indistinguishable
     possible = verdict == "unexplained" and r.possibilities
     return UNSURE if one_cause or possible else VERDICTS[verdict]
+
+
+def page_title(r: ReportData, day: str) -> str:
+    """Ship or model, runs, date and verdict, as the title of a page.
+
+    Args:
+        r: the result.
+        day: on which the page is written.
+    """
+    predictor = r.comparison.predictor
+    of = predictor.model.ship.description.title if predictor.parametric else predictor.name
+    names = [e.name for e in r.evaluations]
+    runs = f"{len(names)} runs" if len(names) > SHOWN else listed(names, "and")
+    return f"{of}, {runs}, {day}: {verdict_title(r) or 'comparison of model and measurements'}"
 
 
 def headline(r: ReportData) -> str:

@@ -5,7 +5,7 @@ from cosim.results import Drawn
 
 from . import figures, tracks
 from .chart import Chart
-from .headline import headline, verdict_title
+from .headline import cause, headline, verdict_title
 from .page import rendered
 from .report_data import ReportData
 
@@ -54,6 +54,10 @@ class Plots:
     def track(self, run: int = 0) -> NotebookChart:
         """Measured and predicted track of the run with this number."""
         return NotebookChart(tracks.track(self._comparison.evaluations[run], self._data.learned))
+
+    def free(self) -> NotebookChart:
+        """The run of which least was used, predicted as a whole, with the cause that was found."""
+        return NotebookChart(tracks.free(self._data.least_used, cause(self._data)))
 
     def ranking(self) -> NotebookChart:
         """The candidates by their loss.

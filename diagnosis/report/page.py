@@ -1,6 +1,7 @@
 """The report: a result as text and tables, with charts of the runs, in one HTML page."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import date
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -15,8 +16,9 @@ from ..predictors.evaluation import Evaluation
 from . import figures, formatting, tracks
 from .chart import data_uri, themed
 from .content import coefficients, versions
+from .error_change import error_changes
 from .glossary import linked
-from .headline import boundedness, finding_sentence, gain_of_search, headline, verdict_title
+from .headline import boundedness, cause, finding_sentence, first_sentences, gain_of_search, page_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
 
@@ -76,8 +78,9 @@ def write_report(
     """
     path = Path(path)
     advance("report: figures")
-    sections = (_tracks, _growth, _free, _omega, _places, _profiles, _shapes, _ranking, _residuals)
+    sections = (_growth, _free, _profiles, _shapes, _ranking)
     drawn = {section.__name__.strip("_"): [*section(data)] for section in sections}
+    of_runs = [[*_of_run(data, k, e)] for k, e in enumerate(data.evaluations)]
     advance("report: page")
     made_with = [*_provenance(data), *origin.items()]
     write_page(
@@ -85,11 +88,12 @@ def write_report(
         "page.html",
         r=data,
         diagnosis=data.diagnosis,
-        title="Comparison of model and measurements" if data.diagnosis is None else "Diagnosis",
-        verdict=verdict_title(data),
-        sentence=headline(data),
+        title=page_title(data, date.today().isoformat()),
+        sentence=first_sentences(data),
         gain=gain_of_search(data),
         pictures=drawn,
+        of_runs=of_runs,
+        changes=[error_changes(data, k) for k in range(len(data.evaluations))],
         tiles=[*_tiles(data)],
         trials=[*trial_rows(data)],
         coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
@@ -125,7 +129,7 @@ def rendered(template: str, **values: object) -> str:
     made.filters |= {
         x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, finding_sentence, boundedness)
     }
-    made.globals |= {"times": f.times, "degrees": degrees(1.0)}
+    made.globals |= {"degrees": degrees(1.0)}
     return made.get_template(template).render(values)
 
 
@@ -141,22 +145,20 @@ def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:
     yield "versions", versions()
 
 
-def _tracks(r: ReportData) -> Iterator[Drawing]:
-    for k, e in enumerate(r.evaluations):
-        name = r.called(e)
-        yield drawing(tracks.track(e, r.learned), f"track-{k}", f"{name}.", f"Track of {e.name}")
-        if worst := tracks.worst_window(e, r.learned):
-            yield drawing(worst, f"worst-{k}", f"{name}: the worst window.")
-        if heading := tracks.heading_bands(e):
-            caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
-            yield drawing(heading, f"heading-{k}", caption)
-
-
-def _residuals(r: ReportData) -> Iterator[Drawing]:
-    for k, e in enumerate(r.evaluations):
-        yield drawing(
-            figures.residuals(e.smoothed), f"residuals-{k}", f"{e.name}: residuals of the pose."
-        )
+def _of_run(r: ReportData, k: int, e: Evaluation) -> Iterator[Drawing]:
+    """All pictures of one run."""
+    name = r.called(e)
+    yield drawing(tracks.track(e, r.learned), f"track-{k}", f"{name}.", f"Track of {e.name}")
+    if worst := tracks.worst_window(e, r.learned):
+        yield drawing(worst, f"worst-{k}", f"{name}: the worst window.")
+    if heading := tracks.heading_bands(e):
+        caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
+        yield drawing(heading, f"heading-{k}", caption)
+    if e.weak_windows.middle.size:
+        figure = figures.model_error(e, r.comparison.omega_std[k], r.learned)
+        yield drawing(figure, f"omega-{k}", f"{name}: the model error over time.")
+        yield from _places(r, k, e)
+    yield drawing(figures.residuals(e.smoothed), f"residuals-{k}", f"{name}: residuals of the pose.")
 
 
 def _growth(r: ReportData) -> Iterator[Drawing]:
@@ -176,37 +178,26 @@ def _by_use(r: ReportData) -> Iterator[tuple[str, list[Evaluation]]]:
 
 def _free(r: ReportData) -> Iterator[Drawing]:
     """The first run of which least was used."""
-    e = max(r.evaluations, key=lambda e: [*USES].index(e.use))
-    yield drawing(tracks.free(e), "free", f"{r.called(e)}: predicted as a whole.")
+    e = r.least_used
+    yield drawing(tracks.free(e, cause(r)), "free", f"{r.called(e)}: predicted as a whole.")
 
 
-def _places(r: ReportData) -> Iterator[Drawing]:
-    """The runs in which something is found at a place or at a time, or that acts from outside."""
+def _places(r: ReportData, k: int, e: Evaluation) -> Iterator[Drawing]:
+    """A run in which something is found at a place or at a time, or that acts from outside."""
+    name = r.called(e)
     placed = any(region.covariate.id in PLACE for region in r.comparison.before.regions)
-    pushes: dict[str, list[tuple[float, float]]] = {}
-    if r.diagnosis is not None:
-        effects = r.diagnosis.start.ship.effects
-        placed = placed or any(effects[e.id].kind == "environment" for e in r.accepted)
-        for s in r.diagnosis.unrecorded.stretches:
-            if s.axis != "N":
-                pushes.setdefault(s.run, []).append((s.start, s.end))
-    for k, e in enumerate(r.evaluations):
-        name = r.called(e)
-        if not e.weak_windows.middle.size:
-            continue
-        if placed:
-            caption = f"{name}: the model error along the track."
-            yield drawing(tracks.place(e, r.learned), f"place-{k}", caption)
-        if e.name in pushes:
-            caption = f"{name}: times of disturbances, and the residual force."
-            yield drawing(tracks.place(e, r.learned, pushes[e.name]), f"push-{k}", caption)
-
-
-def _omega(r: ReportData) -> Iterator[Drawing]:
-    for k, e in enumerate(r.evaluations):
-        if e.weak_windows.middle.size:
-            figure = figures.model_error(e, r.comparison.omega_std[k], r.learned)
-            yield drawing(figure, f"omega-{k}", f"{r.called(e)}.", f"Model error over time, {e.name}")
+    pushes: list[tuple[float, float]] = []
+    if (d := r.diagnosis) is not None:
+        effects = d.start.ship.effects
+        placed = placed or any(effects[f.id].kind == "environment" for f in r.accepted)
+        stretches = d.unrecorded.stretches
+        pushes = [(s.start, s.end) for s in stretches if s.run == e.name and s.axis != "N"]
+    if placed:
+        caption = f"{name}: the model error along the track."
+        yield drawing(tracks.place(e, r.learned), f"place-{k}", caption)
+    if pushes:
+        caption = f"{name}: times of disturbances, and the residual force."
+        yield drawing(tracks.place(e, r.learned, pushes), f"push-{k}", caption)
 
 
 def _profiles(r: ReportData) -> Iterator[Drawing]:
@@ -219,7 +210,8 @@ def _profiles(r: ReportData) -> Iterator[Drawing]:
 
 def _ranking(r: ReportData) -> Iterator[Drawing]:
     if r.ranking:
-        caption = f"The best of {len(r.ranking)} candidates."
+        shown = min(len(r.ranking), figures.MOST_RANKED)
+        caption = f"The best {shown} of {len(r.ranking)} candidates."
         label = "Candidates in the order of their score"
         yield drawing(figures.ranking(r.ranking), "ranking", caption, label)
 

@@ -53,6 +53,11 @@ class ReportData:
         return self.comparison.evaluations
 
     @property
+    def least_used(self) -> Evaluation:
+        """The first run of which least was used."""
+        return max(self.evaluations, key=lambda e: [*USES].index(e.use))
+
+    @property
     def learned(self) -> bool:
         """Whether the learned model is another than the initial one."""
         return any(e.after is not e.before for e in self.evaluations)

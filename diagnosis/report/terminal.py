@@ -1,9 +1,10 @@
 """Output of the commands on a terminal of 80 columns, or in a pipe."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from io import StringIO
 from math import degrees
 
-from rich.console import RenderableType
+from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -25,18 +26,30 @@ from .headline import (
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
 
+WIDTH = 80  # columns of a text; as of a terminal
 WEIGH = ", in kg: weigh the ship"  # behind a mass beyond its prior
 ASCII = str.maketrans("−–", "--")  # for any terminal
 
 
-def show_comparison(r: ReportData, out: str) -> Iterator[RenderableType]:
+def as_text(shown: Iterable[RenderableType]) -> str:
+    """Output as a text of 80 columns, without colours."""
+    console = Console(file=StringIO(), width=WIDTH, highlight=False, markup=False, color_system=None)
+    for part in shown:
+        console.print(part)
+    assert isinstance(console.file, StringIO)
+    return "\n".join(map(str.rstrip, console.file.getvalue().splitlines())).rstrip()
+
+
+def show_comparison(r: ReportData, out: str = "") -> Iterator[RenderableType]:
     """Output of ``diagnosis.compare``."""
     yield from _runs(r)
     yield from _errors(r)
     yield from _files(r, out)
 
 
-def show_calibration(calibrated: CalibratedModel, r: ReportData, out: str) -> Iterator[RenderableType]:
+def show_calibration(
+    calibrated: CalibratedModel, r: ReportData, out: str = ""
+) -> Iterator[RenderableType]:
     """Output of the second answer of ``diagnosis.learn``."""
     gain = gain_of_calibration(calibrated, r)
     if gain:
@@ -117,7 +130,8 @@ def _lines(title: str, lines: Iterable[str]) -> Iterator[RenderableType]:
 
 
 def _files(r: ReportData, out: str) -> Iterator[RenderableType]:
-    yield Text(f"{', '.join(r.files)} in {out}", no_wrap=True, overflow="ignore")
+    if r.files:
+        yield Text(f"{', '.join(r.files)} in {out}", no_wrap=True, overflow="ignore")
 
 
 def _table(*columns: str) -> Table:

@@ -15,6 +15,8 @@ from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, C
 from .figures import interrupted
 
 QUARTILES = (0.25, 0.5, 0.75)  # 1
+MOST_ELLIPSES = 8  # of a picture, of all levels together; chosen: more hide the tracks
+MOST_SHIPS = 8  # outlines along a track; chosen: more hide it
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
@@ -33,14 +35,21 @@ def track(e: Evaluation, learned: bool) -> Chart:
     return _chart(panel)
 
 
-def free(e: Evaluation) -> Chart:
-    """A whole run, predicted by the models from its first state."""
+def free(e: Evaluation, found: str = "") -> Chart:
+    """A whole run, predicted by the models from its first state.
+
+    Args:
+        e: the run.
+        found: the cause that was found, for a line below.
+    """
     measured = e.smoothed.eta[:, :2]
     paths = [p[:, :2] for p in e.free_runs()[1]][: 2 if e.learned else 1]
     panel = _map(_around(measured, paths))
+    panel.x.label += f"\n{found}" if found else ""
     _broad(panel, *_east_north(measured))
     for path, (_, colour, label) in zip(paths, _models(e, bool(e.learned)), strict=True):
-        panel.draw(*_east_north(_finite(path)), colour, label)
+        predicted = label if label == "predicted" else f"predicted {label}"
+        panel.draw(*_east_north(_finite(path)), colour, predicted)
     panel.draw(*_east_north(measured[:1]), INK, dots=True)
     return _chart(panel)
 
@@ -109,6 +118,7 @@ def worst_window(e: Evaluation, learned: bool) -> Chart | None:
     panel = _map(_around(measured[:, :2], [p[:, :2] for p, _, _ in paths]))
     _broad(panel, *_east_north(measured))
     for around in [] if e.bands is None else [e.bands.ellipses(worst, level) for level in LEVELS]:
+        around = _some(around, MOST_ELLIPSES // len(LEVELS))
         closed = np.insert(around, around.shape[1], np.nan, axis=1).reshape(-1, 2)
         panel.draw(*_east_north(closed), AFTER, area=True, faint=True)
     for predicted, colour, label in paths:
@@ -157,10 +167,15 @@ def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(high - low for low, high in panel.ends())
     outline = of.vessel.outline
-    for corners in [] if outline is None else hulls(poses, outline.corners):
+    for corners in [] if outline is None else hulls(_some(poses, MOST_SHIPS), outline.corners):
         if 2 * np.ptp(corners, axis=0).max() < room:
             east, north = np.vstack([corners, corners[:1]]).T
             panel.draw(east, north, INK, width=LINE / 2)
+
+
+def _some(items: np.ndarray, most: int) -> np.ndarray:
+    """At most so many of all (n, ...), at equal distances, the last one among them."""
+    return items[np.linspace(items.shape[0] - 1, 0, min(most, items.shape[0])).astype(int)]
 
 
 def _broad(panel: Panel, x: np.ndarray, y: np.ndarray, label: str = "measured") -> None:

@@ -12,6 +12,7 @@ from cosim import InputError
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
+from ..execution.short_text import ShortRepr
 from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
@@ -51,8 +52,8 @@ class Counts(NamedTuple):
     used: int
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
+@dataclass(frozen=True, eq=False, repr=False)
+class Track(ShortRepr):
     """A run with its samples judged.
 
     Attributes:

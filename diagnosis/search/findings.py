@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..execution.short_text import ShortRepr
 from ..predictors import Model
 from ..predictors.prediction import FAR_OFF
 from ..predictors.ship_model import parameter_and_run
@@ -55,8 +56,8 @@ class Suspect:
     value: float
 
 
-@dataclass(frozen=True, eq=False)
-class Finding:
+@dataclass(frozen=True, eq=False, repr=False)
+class Finding(ShortRepr):
     """One effect that was found.
 
     Attributes:
@@ -96,8 +97,8 @@ class Finding:
         return [*dict.fromkeys(run for run in runs if run)]
 
 
-@dataclass(frozen=True, eq=False)
-class Findings:
+@dataclass(frozen=True, eq=False, repr=False)
+class Findings(ShortRepr):
     """The result of a method.
 
     Attributes:

@@ -12,6 +12,7 @@ from ..assessment.regions import find_regions
 from ..assessment.remainder import Remainder, noise_of, remainder_sentence, remaining
 from ..assessment.stability import OperatingRegion, drives_on
 from ..execution.progress import Advance
+from ..execution.short_text import ShortRepr
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.evaluation import Bands
 from ..predictors.windows import Windows
@@ -31,8 +32,8 @@ from .validation_data import ValidationData
 VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
 
 
-@dataclass(frozen=True, eq=False)
-class DecidedFindings:
+@dataclass(frozen=True, eq=False, repr=False)
+class DecidedFindings(ShortRepr):
     """What a model lacks, as the runs that decide have it.
 
     Attributes:

@@ -20,6 +20,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from cosim import InputError
 
 from ...execution.result_folder import together
+from ...execution.short_text import ShortRepr
 from ...predictors.evaluation import Evaluation
 from ...report.content import Content, fmu_result, part, sensor_results, versions
 from ...runs import Fingerprint
@@ -61,8 +62,8 @@ BUDGET = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Validation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(ShortRepr):
     """Judgements of a model by criteria, see :func:`validate`.
 
     Attributes:

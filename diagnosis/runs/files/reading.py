@@ -21,6 +21,7 @@ from fmus.ship_description import Description
 from fmus.ships.naming import DEFAULT
 
 from ...execution.result_folder import sha256
+from ...execution.short_text import ShortRepr
 from ..columns.columns import (
     BESIDE,
     POSE,
@@ -46,8 +47,8 @@ TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
 MOST_COMMAND = 1.05  # of the full command
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(ShortRepr):
     """One measured run, as it was found. A command acts from its time to the next.
 
     Attributes:

@@ -19,6 +19,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
+from ...execution.short_text import ShortRepr
 from ..cleaning import BRIEF, CHANCE, HORIZON, LONG, WIDTH, Counts, Track, noise
 from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
@@ -73,8 +74,8 @@ class SmoothMotion(NamedTuple):
     nu: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class Smoothed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Smoothed(ShortRepr):
     """A smoothed run. All arrays (n, 3) are NaN where too much is missing.
 
     Attributes:

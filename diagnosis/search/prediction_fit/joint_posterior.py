@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from ...execution.short_text import ShortRepr
 from ...runs import Fingerprint
 from ..prior import NominalPrior
 from .fit import Fitted
@@ -15,8 +16,8 @@ from .fit import Fitted
 TOGETHER = 0.97  # of a correlation, from which on two values are known only together; chosen
 
 
-@dataclass(frozen=True, eq=False)
-class JointPosterior:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointPosterior(ShortRepr):
     """A normal distribution of parameters of a model.
 
     Attributes:
