@@ -12,14 +12,17 @@ Source: WebAssembly Core Specification 1.0, chapter 5 (binary format).
 
 from __future__ import annotations
 
+import json
 import struct
+from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from ..declare import Component
 from ..fmi.trace import Operand
 from .c_text import Body, may_fail
 from .model_source import sizes
-from .program import Program
+from .program import Program, program
 from .tape import Branch, Call, RecordedFunction, RecordedValue
 
 MAGIC = b"\0asm\1\0\0\0"
@@ -54,7 +57,8 @@ Written = tuple[RecordedFunction, Sequence[tuple[str, Sequence[Operand]]]]
 def component_module(recorded: Program) -> bytes:
     """The functions ``prepare``, ``init`` and ``step`` of a component, as in its C.
 
-    The arrays are ``params``, ``inputs``, ``prepared``, ``state``, ``h`` [s], ``after`` and ``outputs``.
+    The arrays are ``params``, ``inputs``, ``outputs``, ``prepared``, ``state``, ``after`` and ``h`` [s].
+    The first three follow each other from the beginning of the memory on, as value references count.
     """
     counts = sizes(recorded)
     states = counts.pop("states")
@@ -65,6 +69,27 @@ def component_module(recorded: Program) -> bytes:
         "step": (recorded.step, [("after", after), ("outputs", outputs)]),
     }
     return module(functions, {**counts, "state": states, "after": states, "h": 1})
+
+
+def exported_webassembly(components: Iterable[Component]) -> dict[str, str]:
+    """Components for a page: text by name of the file.
+
+    Each file is JSON: the module (``code``, in base64) and the properties that a master must respect:
+    ``max_step`` [s], 0 where there is none, and ``hold_nonfinite``.
+
+    Raises:
+        TraceError: a component does with a value what can be done with a number only.
+    """
+    return {
+        f"{c.name}.json": json.dumps(
+            {
+                "code": b64encode(component_module(program(c))).decode(),
+                "max_step": c.max_step or 0.0,
+                "hold_nonfinite": c.hold_nonfinite,
+            }
+        )
+        for c in components
+    }
 
 
 def module(functions: Mapping[str, Written], arrays: Mapping[str, int]) -> bytes:
