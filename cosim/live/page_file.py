@@ -68,8 +68,8 @@ def check_own(system: System) -> None:
     for name in system.models:
         if name not in system.own:
             raise InputError(
-                f"fmus.{name}: '{system.scenario.fmus[name].path}' is not an FMU of the project. A browser "
-                "runs WebAssembly only, which those with a bare name have: choose one of these"
+                f"fmus.{name}: '{system.scenario.fmus[name].path}' is not an FMU of the project; "
+                "a browser runs only these, which have a name without a folder"
             )
 
 

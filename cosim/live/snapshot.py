@@ -166,7 +166,5 @@ def _measured(system: System) -> list[str]:
 def _actuators(master: Master, force: Sequence[str]) -> list[Signal]:
     """Outputs of the FMU that allocates the force, without forces; commands in most cases."""
     owner = force[0].partition(".")[0]
-    return [
-        s for s in master.table.signals
-        if s.instance == owner and s.variable.causality == "output" and not s.variable.name.startswith("tau_")
-    ]  # fmt: skip
+    outputs = [s for s in master.table.signals if s.variable.causality == "output"]
+    return [s for s in outputs if s.instance == owner and not s.variable.name.startswith("tau_")]
