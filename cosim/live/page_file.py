@@ -38,7 +38,7 @@ def write_live_page(system: System, path: Path, overrides: Overrides = ()) -> Pa
     Raises:
         InputError: the page would be too large, or cannot run the scenario.
     """
-    check_own(system)
+    check_runnable(system)
     master = Master(system, lambda _: None)
     try:
         data = snapshot(master)
@@ -59,12 +59,14 @@ def write_live_page(system: System, path: Path, overrides: Overrides = ()) -> Pa
     return path
 
 
-def check_own(system: System) -> None:
-    """Refuse FMUs of others, whose programs a browser cannot run.
+def check_runnable(system: System) -> None:
+    """Refuse what a browser cannot run: FMUs of others, and inputs from files.
 
     Raises:
         InputError: names the first.
     """
+    if system.recordings:
+        raise InputError("recordings: a page cannot read inputs from files; leave them out")
     for name in system.models:
         if name not in system.own:
             raise InputError(

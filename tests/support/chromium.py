@@ -145,7 +145,11 @@ class Tab:
                 text=key if kind == "keyDown" else "",
             )
 
-    def screenshot(self, file, width, height):
+    def size(self, width, height):
+        """Give the page a size [pixels]; below 600 it is that of a phone."""
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
         self.send("Emulation.setDeviceMetricsOverride", session=True, **size)
+
+    def screenshot(self, file, width, height):
+        self.size(width, height)
         file.write_bytes(base64.b64decode(self.send("Page.captureScreenshot", session=True)["data"]))
