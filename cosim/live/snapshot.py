@@ -164,7 +164,10 @@ def _measured(system: System) -> list[str]:
 
 
 def _actuators(master: Master, force: Sequence[str]) -> list[Signal]:
-    """Outputs of the FMU that allocates the force, without forces; commands in most cases."""
-    owner = force[0].partition(".")[0]
-    outputs = [s for s in master.table.signals if s.variable.causality == "output"]
-    return [s for s in outputs if s.instance == owner and not s.variable.name.startswith("tau_")]
+    """Commands of the actuators, and what they report: all but forces of the FMU that has the force."""
+    system, owner = master.system, force[0].partition(".")[0]
+    plant = system.scenario.roles.pose[0].partition(".")[0]
+    commands = {c.target.name for c in system.connections if c.source.instance != plant}
+    own = [s for s in master.table.signals if s.instance == owner]
+    shown = [s for s in own if s.variable.causality == "output" or s.name in commands]
+    return [s for s in shown if not s.variable.name.startswith("tau_")]

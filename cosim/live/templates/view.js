@@ -205,6 +205,7 @@ class Page {
     $("metrics").replaceChildren(...(found ? this.data.metrics.filter((m) => m.name in found) : [])
       .map((m) => row(m.name, found[m.name], m.unit, null, m.meaning)));
     $("nometrics").hidden = found !== null;
+    if (this.data.roles.target.includes(-1)) $("nometrics").textContent = "Metrics need a target, which this scenario lacks.";
     this.largest ??= this.data.actuators.map((a) => Math.max(Math.abs(a.min ?? 0), Math.abs(a.max ?? 0)));
     $("actuators").replaceChildren(...this.data.actuators.map((a, k) => {
       const value = run.table[a.slot];
