@@ -195,7 +195,8 @@ class Simulation {
   replace(index, option) {
     const part = this.parts[index];
     for (const [, slot] of part.got) this.table[slot] = NaN;
-    Object.assign(part, option, { fmu: new Fmu(this.data.modules[option.module], doubles(option.values)) });
+    const { copies, put, got, module, values } = option;
+    Object.assign(part, { copies, put, got, fmu: new Fmu(this.data.modules[module], doubles(values)) });
     for (const [target, source] of part.copies) this.table[target] = this.table[source];
     for (const [reference, slot] of part.put) part.fmu.put(reference, this.table[slot]);
     part.fmu.initialise();
