@@ -31,6 +31,7 @@ SUBCOMMANDS = {
         "cybership.demo", "run a ship with hidden drag, diagnose it, run it with the learned model"
     ),
     "run": Subcommand("cosim.run", "run a scenario: log, metrics, pictures"),
+    "open": Subcommand("cosim.live", "a page in which a scenario runs, to look at and to change"),
     "metrics": Subcommand("cosim.metrics", "metrics of a finished run"),
     "plots": Subcommand("cosim.plots", "pictures of runs in the same axes; PNG, SVG or PDF"),
     "trial": Subcommand(

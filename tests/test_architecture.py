@@ -31,7 +31,7 @@ COSIM_LAYERS = (
     ("trials",),
     ("master", "supervision"),
     ("dispatch",),
-    ("export", "campaign"),
+    ("export", "campaign", "live"),
     ("simulating", "run", "metrics", "plots", "interface"),  # Python, commands
 )
 

@@ -28,6 +28,7 @@ class Stepper:
         settle: ``settle(t, status, saved)`` does the rest of :attr:`advance` where another loop has
             called fmi2DoStep and stopped at what it returned; see :class:`cosim.fmu.stepping.Steps`.
         input_effects, output_effects: act on the values on their way, in this order.
+        put, got: signals that the FMU gets and gives.
         copies: connections without conversion: first target, first source, how many.
         access: the calls of the FMU.
     """
@@ -56,8 +57,9 @@ class Stepper:
         self._inputs = [s for s in own if s.variable.causality == "input"]
         # Inputs without a source that events may change.
         self._free = [s for s in own if s.name in settable and s.name not in sourced]
+        self.put = [s for s in own if s.name in settable]
         self.access = instance.bind(
-            [Port(s.variable, table.slots[s.name]) for s in own if s.name in settable],
+            [Port(s.variable, table.slots[s.name]) for s in self.put],
             [Port(s.variable, table.slots[s.name]) for s in self.got],
             table,
             self.step_size,

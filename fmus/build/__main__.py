@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--overwrite",
         action="store_true",
-        help="with --out or --source: replace existing files of these names",
+        help="with --out, --source or --webassembly: replace existing files of these names",
     )
     parser.add_argument(
         "--list",
@@ -99,6 +99,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--source", type=_folder, metavar="DIR", help="with --native: write plain C to this folder, build no FMU"
     )
+    parser.add_argument(
+        "--webassembly", type=_folder, metavar="DIR", help="write WebAssembly for pages to this folder, build no FMU"
+    )
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):
         parser.error("--target and --source need --native")
@@ -113,9 +116,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _print_list(options.names, make_ship(effects, ship), options.native)
         else:
             starts = None if options.parameters is None else read_starts(options.parameters)
-            if options.source is not None:
+            if (folder := options.source or options.webassembly) is not None:
                 made = export(
-                    options.names, options.source, starts, _note, effects, options.overwrite, ship
+                    options.names,
+                    folder,
+                    starts,
+                    _note,
+                    effects,
+                    options.overwrite,
+                    ship,
+                    webassembly=options.source is None,
                 )
             else:
                 native = native_targets(options.target) if options.native else None

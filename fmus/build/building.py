@@ -85,20 +85,22 @@ def export(
     effects: EffectSet = STANDARD,
     overwrite: bool = False,
     ship: Description | str | Path | None = None,
+    webassembly: bool = False,
 ) -> list[Path]:
-    """Components as plain C; arguments and errors are those of :func:`build`.
+    """Components as plain C, or as WebAssembly; other arguments and errors are those of :func:`build`.
 
     Returns:
         The files written.
     """
     from ..native.export_source import exported_source
+    from ..native.webassembly import exported_webassembly
 
     of = make_ship(effects, described_ship(ship))
     found = [load(*which(name), of)[1] for name in _every(names, starts, of)]
     if starts is not None:
         found = [starts.baked(component) for component in found]
         _tell_unused(starts, [component.name for component in found], of, note)
-    files = exported_source(found)
+    files = exported_webassembly(found) if webassembly else exported_source(found)
     with scratch_folder() as work:
         for name, text in files.items():
             (work / name).write_text(text, encoding="utf-8")

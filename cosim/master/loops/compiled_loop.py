@@ -65,12 +65,8 @@ def compiled_run(
     for stepper in master.steppers:
         if stepper.access.direct is None:
             raise PlainLoopError(f"{stepper.instance.name} has a process of its own")
-        for effect in (*stepper.input_effects, *stepper.output_effects):
-            if type(effect) not in (*OPERATIONS, Changes):
-                raise PlainLoopError(
-                    f"a fault of {stepper.instance.name} is a Python function, not an operation "
-                    "(cosim.scenario.operations)"
-                )
+        if why := function_among(stepper):
+            raise PlainLoopError(why)
     try:
         functions = library(with_zig=native is True)
     except NoLibraryError as error:
@@ -80,7 +76,43 @@ def compiled_run(
     return _CompiledLoop(master, rows, functions, patience).run()
 
 
-def _operations(effects: list[Effect]) -> list[Operation]:
+def function_among(stepper: Stepper) -> str:
+    """Which fault of an FMU is no operation, in a sentence; empty if none is."""
+    known = (*OPERATIONS, Changes)
+    if all(type(effect) in known for effect in (*stepper.input_effects, *stepper.output_effects)):
+        return ""
+    return (
+        f"a fault of {stepper.instance.name} is a Python function, not an operation "
+        "(cosim.scenario.operations)"
+    )
+
+
+def ask_stepper_ahead(
+    stepper: Stepper, times: np.ndarray, first: int, steps: range, is_jacobi: bool
+) -> None:
+    """Plan the calls of the operations on the inputs and outputs of an FMU.
+
+    Args:
+        stepper: the FMU.
+        times: of base steps from ``first`` on [s].
+        first: at most the last step of the FMU before ``steps``.
+        steps: base steps; the calls are those behind the first, up to the end of the last.
+        is_jacobi: whether inputs are those of the base step's beginning, else those of its end.
+    """
+    every = stepper.every
+    due = np.arange((steps.start // every + 1) * every, steps.stop + 1, every)
+    if on_inputs := operations_of(stepper.input_effects):
+        inputs = times[due - first - is_jacobi]
+        for operation in on_inputs:
+            operation.ask_ahead(inputs)
+    if on_outputs := operations_of(stepper.output_effects):
+        outputs = times[due - every - first] + stepper.step_size
+        for operation in on_outputs:
+            operation.ask_ahead(outputs)
+
+
+def operations_of(effects: list[Effect]) -> list[Operation]:
+    """The operations among effects, those of events included."""
     found: list[Operation] = []
     for effect in effects:
         if isinstance(effect, Changes):
@@ -161,26 +193,14 @@ class _CompiledLoop:
         self._times = array("d", times.tobytes())
         loop.first, loop.times = first, address(self._times)
         for stepper in self._steppers:
-            every, h = stepper.every, stepper.step_size
-            due = np.arange((done // every + 1) * every, horizon + 1, every)
-            if on_inputs := _operations(stepper.input_effects):
-                # Inputs of a step are those of its end; with Jacobi's method of the base step's
-                # beginning.
-                shift = first + master.is_jacobi
-                inputs = times[due - shift]
-                for operation in on_inputs:
-                    operation.ask_ahead(inputs)
-            if on_outputs := _operations(stepper.output_effects):
-                outputs = times[due - every - first] + h
-                for operation in on_outputs:
-                    operation.ask_ahead(outputs)
+            ask_stepper_ahead(stepper, times, first, range(done, horizon), master.is_jacobi)
         self._horizon = horizon
 
     def _lay_out_operations(self) -> None:
         kept: list[Any] = []
         for place, stepper in zip(self._fmus, self._steppers, strict=True):
-            inputs = operations_layout(_operations(stepper.input_effects), kept)
-            outputs = operations_layout(_operations(stepper.output_effects), kept)
+            inputs = operations_layout(operations_of(stepper.input_effects), kept)
+            outputs = operations_layout(operations_of(stepper.output_effects), kept)
             place.inputs, place.on_inputs = len(inputs), inputs
             place.outputs, place.on_outputs = len(outputs), outputs
         self._kept_operations = kept

@@ -1,0 +1,105 @@
+"""Write a page in which a scenario runs: ``python -m cosim.live SCENARIO --out PAGE.html``."""
+
+if __name__ == "__main__":
+    from cosim.supervision.supervising import supervised
+
+    supervised()  # before all other imports, which take a while
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from ..command import BAD_INPUT, command_parser, complain, positive, printable, run_command, whole_number
+from ..errors import InputError, SimulationError
+from ..scenario.load import cut_short, load_scenario, with_settings
+from ..scenario.setting import parse_assignment
+from ..scenario.shipped import find_parameters
+from ..system.preparation import prepare
+from .page_file import write_live_page
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    try:
+        overrides = list(find_parameters(options.parameters))
+        scenario = load_scenario(options.scenario, {"stop": options.stop, "seed": options.seed})
+        settings = [parse_assignment(text) for text in options.set]
+        settings += [] if options.ship is None else [("ship", options.ship)]
+        # The page starts from values of the FMUs in Python, which no compiler has to make.
+        scenario = with_settings(scenario, [*settings, ("native", False)], Path.cwd(), "--set")
+        system = prepare(scenario if options.stop is None else cut_short(scenario), overrides)
+        try:
+            out = options.out or Path(f"{scenario.name}.html")
+            with console.status("writing the page"):
+                write_live_page(system, out, overrides)
+        finally:
+            system.close()
+    except (InputError, SimulationError) as error:
+        complain(error)
+        return BAD_INPUT
+    for warning in system.warnings:
+        complain(warning, "warning: ")
+    print(printable(str(out)))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = command_parser(
+        "cosim.live",
+        "Write one HTML file in which a scenario runs in real time or faster: open it in a browser. "
+        "It needs neither a server nor a network.",
+        "examples:  %(prog)s ellipse\n"
+        "           %(prog)s waypoints --ship otter --out otter.html\n"
+        "           %(prog)s ellipse --set controller=controller_bs.fmu --seed 3\n"
+        "exit codes: 0 done, 2 bad input, or a scenario that a page cannot run",
+    )
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default="ellipse",
+        metavar="SCENARIO",
+        help="JSON file, or the name of a shipped one (default: ellipse)",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="PAGE.html", help="file to write (default: <name>.html)"
+    )
+    parser.add_argument(
+        "--stop",
+        type=positive,
+        metavar="SECONDS",
+        help="end of the run [s] (default: that of the scenario)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=whole_number(0),
+        metavar="N",
+        help="seed of noise and faults (default: that of the scenario)",
+    )
+    parser.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="another ship for FMUs with a bare name: a shipped one, or a file of your own",
+    )
+    parser.add_argument(
+        "--set",
+        metavar="PATH=VALUE",
+        action="append",
+        default=[],
+        help="a value of the scenario, such as vessel.m=15; may be given several times",
+    )
+    parser.add_argument(
+        "--parameters",
+        metavar="FILE.ssv",
+        action="append",
+        default=[],
+        help="SSP parameter set whose values override the scenario's; may be given several times",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    run_command(main)
