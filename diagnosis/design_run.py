@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from .design import Question
 
 DIAGNOSIS, POSTERIOR, PLAN = "diagnosis.json", "posterior.json", "next.json"
-MOST = 9  # runs; chosen
 NO_RUNS = (
     "'{}' does not state the runs that the diagnosis was made of, or is not there: no run is designed; "
     "the advice is that of the diagnosis"
@@ -129,8 +128,10 @@ def _task(path: Path) -> Task | None:
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= MOST:
-        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to {MOST}, not '{text}'")
+    from .design import MOST_RUNS
+
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_RUNS:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to {MOST_RUNS}, not '{text}'")
     return int(text)
 
 
