@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import multivariate_normal
 from support.command import command
@@ -13,7 +14,7 @@ import cosim
 import diagnosis
 from cosim import InputError
 from diagnosis import Model, design_run
-from diagnosis.design import Basin, Limits, Question, plan_next
+from diagnosis.design import DIMENSIONS, Basin, Limits, Question, plan_next, prepared, write_run
 from diagnosis.design.designing import Designer, likely
 from diagnosis.design.hypotheses import knowledge, rivals
 from diagnosis.design.information import (
@@ -31,8 +32,9 @@ from diagnosis.design.information import (
 )
 from diagnosis.design.limits import limits_of
 from diagnosis.design.manoeuvre_library import LIBRARY, NUMBERS, PlanStep, Reach, poses, sequence, usual
-from diagnosis.design.planned_motion import PlannedMotion
+from diagnosis.design.planned_motion import EVERY, PlannedMotion
 from diagnosis.design.spread import STEP, drawn, followed, spread
+from diagnosis.predictors import ship_with
 from diagnosis.search.prior import NominalPrior
 
 Q, OWN = 3, 2  # nuisance parameters, and those of each of two hypotheses
@@ -216,8 +218,6 @@ def question():
 
 
 def diagnosis_frame(run):
-    import pandas as pd
-
     columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
     return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=columns)
 
@@ -377,3 +377,65 @@ def test_a_basin_smaller_than_the_ship_and_an_unknown_criterion_are_refused(ques
         plan_next(replace(question, criterion="certain"))
     with pytest.raises(InputError, match="minutes or more"):
         plan_next(replace(question, limits=Limits(5.0)))
+
+
+def steered(name, amplitude):
+    """A run of another ship at one thrust, with rudder or moment to both sides in turn, and its orders."""
+    craft = ship_with((), name)
+    t = np.arange(0.0, 120.0, 0.2) * craft.scale.time
+    sign = np.where((t / (8.0 * craft.scale.time)) % 2.0 < 1.0, 1.0, -1.0)
+    orders = np.zeros((t.size, len(craft.thrusters.inputs().request)))
+    orders[:, 0], orders[:, -1] = amplitude[0], amplitude[1] * sign
+    still = np.zeros((t.size, 3))
+    (eta,) = followed([Model(ship=craft)], PlannedMotion(t, still, still, still, orders))
+    eta += 0.002 * craft.scale.length * np.random.default_rng(0).standard_normal(eta.shape)
+    names = ("tau_X", "tau_Y", "tau_N") if craft.description.allocates else craft.commands
+    frame = pd.DataFrame(np.column_stack([t, eta, orders]), columns=["time", "x", "y", "psi", *names])
+    model = Model(ship=craft)
+    return Question(
+        diagnosis.load(frame, model=model), content(others=("X_u",)), model, 0.1,
+        Limits(120.0 * craft.scale.time, size=(200.0, 200.0)), ship=name,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[("kvlcc2", (9.0, 0.15)), ("otter", (60.0, 8.0))])
+def steering(request):
+    return prepared(steered(*request.param))
+
+
+def test_a_ship_with_rudder_or_two_propellers_is_asked_what_it_can_do(steering):
+    d, k = steering
+    assert set(d.library) == {"straight", "turn", "swing", "stop", "spiral", "order steps"}
+    rng, craft = np.random.default_rng(1), d.model.ship
+    for _ in range(4):
+        plan = sequence(rng.random(2 * DIMENSIONS), d.limits.seconds, d.library)
+        asked = d.motion(plan, (1.0, 1.0), EVERY * d.scale).orders
+        if craft.description.allocates:
+            assert not asked[:, 1].any()  # no force sideways
+        else:
+            low, high = np.array(craft.layout.limits(craft.nominal_drive.params)).T
+            assert (asked >= low).all() and (asked <= high).all()
+            assert np.abs(asked[:, 1]).max() <= np.radians(35.0) + 1e-9
+
+
+def test_steps_of_the_thrust_discriminate_what_one_speed_does_not(steering):
+    d, k = steering
+    steps = d.scored(k, [PlanStep("straight", (0.0, 0.5, 1.0, 0.0, 0.0), d.limits.seconds, 0.0)])
+    around = d.usual(k, "circle")
+    assert steps.excess == around.excess == 0.0
+    assert buzzi_ferraris(k, steps.gram) > buzzi_ferraris(k, around.gram)
+
+
+@pytest.mark.slow
+def test_orders_of_a_plan_give_its_track(steering, tmp_path):
+    d, k = steering
+    found = d.scored(k, [PlanStep("swing", (0.5,) * NUMBERS, d.limits.seconds, 0.3)])
+    write_run(d, found, 1, tmp_path, d.model.ship.name)
+    result = cosim.simulate(
+        tmp_path / "scenario_1.json", tmp_path / "run", stop=40.0, parameters=[], pictures=False
+    )
+    assert result.status == "done"
+    track = pd.read_csv(tmp_path / "commands_1.csv")
+    log = pd.read_csv(tmp_path / "run" / "log.csv")
+    # The likeliest model is hardly the nominal one, which the scenario has.
+    assert np.interp(40.0, track["time"], track["x"]) == pytest.approx(log["vessel.x"].iloc[-1], abs=0.5)

@@ -1,7 +1,7 @@
 """The search for the plan that discriminates best: Sobol points over the library, then evolution."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,7 +17,8 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from .hypotheses import LIKELY, Space
 from .information import CRITERIA, Knowledge, inseparable
-from .manoeuvre_library import DIMENSIONS, PlanStep, Reach, sequence, usual
+from .manoeuvre_library import DIMENSIONS, LIBRARY, USUAL, PlanStep, Reach, UsualRuns, sequence, usual
+from .order_library import ORDERS, USUAL_ORDERS, Orders
 from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
@@ -97,11 +98,6 @@ class Designer:
                 f"no criterion '{self.criterion}'{nearest(self.criterion, CRITERIA)}; "
                 f"there are {', '.join(CRITERIA)}"
             )
-        if not self.model.ship.fully_actuated:
-            raise InputError(
-                f"a run is designed for ships whose actuators give a force on all three axes; "
-                f"{self.model.ship.name} cannot"
-            )
         room = self.basin.size - 2.0 * (self.margin + np.ptp(self.outline[:, 0]) / 2.0)
         if room.min() <= 0.0:
             need = self.basin.size - room
@@ -156,9 +152,28 @@ class Designer:
         rate = max(FASTER * rate, FASTER * speed / max(0.5 * room, half))
         return Reach(float(FASTER * speed), float(rate), room, self.scale, -half, half)
 
+    @cached_property
+    def orders(self) -> Orders | None:
+        """What the thrusters are asked; None: they follow a controller, which any pose is given to."""
+        if self.model.ship.fully_actuated:
+            return None
+        return Orders.of(self.model, self.data, FASTER)
+
+    @property
+    def library(self) -> Iterable[str]:
+        """Names of the manoeuvres of such a ship."""
+        return LIBRARY if self.orders is None else ORDERS
+
+    @property
+    def usual_runs(self) -> UsualRuns:
+        """Usual runs of such a ship."""
+        return USUAL if self.orders is None else USUAL_ORDERS
+
     def motion(self, steps: Sequence[PlanStep], size: tuple[float, float], h: float) -> PlannedMotion:
-        """The target of a plan every h [s], at shares of the largest speeds and of the room."""
+        """The motion of a plan every h [s], at shares of the largest speeds and of the room."""
         pace, room = size
+        if self.orders is not None:
+            return self.orders.motion(steps, self.limits.seconds, h, pace, self.model, self.basin)
         r = self.reach
         smaller = r._replace(speed=pace * r.speed, rate=pace * r.rate, room=room * r.room)
         return PlannedMotion.of(steps, self.limits.seconds, h, smaller, self.basin)
@@ -193,7 +208,9 @@ class Designer:
         fast = max(speed, float(nu[:, 2].max() / self.reach.rate)) / ROUNDED
         margin = float(self.basin.margin(motion.eta, self.outline).min())
         outside = (self.margin - margin) / float(np.ptp(self.outline[:, 0]))
-        share = load(tau, self.model) / MOST_THRUST
+        # Orders of commands are within their limits.
+        free = self.model.ship.description.allocates
+        share = load(tau, self.model) / MOST_THRUST if free else 0.0
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
     def search(self, k: Knowledge, seed: int) -> ScoredPlan:
@@ -211,7 +228,9 @@ class Designer:
             if time.monotonic() > end or len(found) >= len(points) + EVOLVED:
                 raise _OutOfTimeError
             self.advance(f"searching a plan: {len(found)} of {len(points) + EVOLVED}")
-            found.append((self.scored(k, sequence(np.clip(point, 0.0, 1.0 - 1e-9), T)), point))
+            found.append(
+                (self.scored(k, sequence(np.clip(point, 0.0, 1.0 - 1e-9), T, self.library)), point)
+            )
             return -found[-1][0].score
 
         with suppress(_OutOfTimeError):
@@ -230,7 +249,7 @@ class Designer:
 
     def usual(self, k: Knowledge, name: str) -> ScoredPlan:
         """A usual run of the same length."""
-        return self.scored(k, usual(name, self.limits.seconds))
+        return self.scored(k, usual(name, self.limits.seconds, self.usual_runs))
 
     def inseparable(self, k: Knowledge) -> list[tuple[int, int]]:
         """Pairs that no plan tried so far separates, see :func:`.information.inseparable`."""

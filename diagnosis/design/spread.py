@@ -52,13 +52,13 @@ def drawn(space: Space, k: Knowledge, n: int, rng: np.random.Generator) -> list[
 
 
 def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
-    """(p, n, 3), poses of models that a controller keeps on a target, started on it at rest.
+    """(p, n, 3), poses of models from rest, by their orders, or kept on a target by a controller.
 
     The controller gets the true motion: noise of the measurement moves a ship much less than its margin.
 
     Args:
         models: of one ship.
-        motion: the target, at equal steps.
+        motion: the target or the orders, at equal steps.
     """
     of, h = merged(models, lambda values: values), float(motion.time[1] - motion.time[0])
     start = dict(zip(("x_0", "y_0", "psi_0"), map(float, motion.eta[0]), strict=True))
@@ -67,6 +67,7 @@ def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
     drive = LoopPart(craft.thrusters, of.thrusters)
     controller = LoopPart(craft.serving(adaptive.COMPONENT), {})
     targets = np.column_stack([motion.eta, motion.eta_dot, motion.eta_ddot])
+    nothing = craft.thrusters.inputs().request
     found = np.empty((len(models), len(targets), 3))
     with np.errstate(all="ignore"):  # a ship that runs away gives infinities, which count as outside
         s, out = ship.begin(craft.vessel.inputs())
@@ -76,11 +77,15 @@ def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
             for axis in range(3):
                 found[:, k, axis] = out.pose[axis]
             v = out.velocity
-            x, y, psi = out.pose[:3]
-            known = Estimate(x, y, psi, v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
-            given = Inputs(known, Target(*map(float, row)))
-            c, demand = controller.begin(given) if c is None else controller.advance(c, given, h)
-            asked = craft.thrusters.inputs(demand.tau, v)
+            if motion.orders is not None:
+                request = nothing._make(motion.orders[k].tolist())
+            else:
+                x, y, psi = out.pose[:3]
+                known = Estimate(x, y, psi, v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
+                given = Inputs(known, Target(*map(float, row)))
+                c, demand = controller.begin(given) if c is None else controller.advance(c, given, h)
+                request = demand.tau
+            asked = craft.thrusters.inputs(request, v)
             t, thrust = drive.begin(asked) if t is None else drive.advance(t, asked, h)
             acting = craft.vessel.inputs(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
             s, out = ship.advance(s, acting, h)
