@@ -18,7 +18,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.black_box import TAU
 from .manoeuvre_library import TEXTS, PlanStep
 from .planned_motion import MOST_THRUST, Basin, PlannedMotion
-from .spread import followed
+from .spread import driven
 
 # Time (n,) [s], duration [s], numbers from 0 to 1, time scale -> shares (n, 2) of thrust and rudder.
 OrderCourse = Callable[[np.ndarray, float, Sequence[float], float], np.ndarray]
@@ -149,32 +149,44 @@ class Orders:
             )
         return found
 
-    def motion(
-        self, plan: Sequence[PlanStep], seconds: float, h: float, pace: float, model: Model, basin: Basin
-    ) -> PlannedMotion:
-        """The motion of a model from rest by the orders of a plan, about the middle of the basin.
+    def motions(
+        self,
+        plans: Sequence[Sequence[PlanStep]],
+        seconds: float,
+        h: float,
+        pace: float,
+        model: Model,
+        basin: Basin,
+    ) -> list[PlannedMotion]:
+        """The motions of a model from rest by the orders of plans, each about the middle of the basin.
 
         Args:
-            plan: its courses.
+            plans: their courses.
             seconds, h: length and step [s].
             pace: share of the largest thrust and rudder.
             model: that is simulated.
-            basin: in which it lies.
+            basin: in which they lie.
         """
-        t, scale = h * np.arange(round(seconds / h) + 1), model.ship.scale.time
-        parts, begin = [], 0.0
-        for s in plan:
-            own = t[(t >= begin - 1e-9) & (t < begin + s.seconds - 1e-9)] - begin
-            parts.append(ORDERS[s.name](own, s.seconds, s.numbers, scale))
-            begin += s.seconds
-        shares = np.concatenate(parts)
-        shares = pace * np.concatenate([shares, np.repeat(shares[-1:], t.size - len(shares), axis=0)])
-        thrust, rudder = shares[:, :1], shares[:, 1:]
-        asked = np.where(thrust > 0.0, thrust * self.high, -thrust * self.low) + rudder * self.rudder
-        still = np.zeros((t.size, 3))
-        still[:, 2] = plan[0].heading
-        (eta,) = followed([model], PlannedMotion(t, still, still, still, asked))
-        return PlannedMotion.along(eta, h, basin, asked)
+        t = h * np.arange(round(seconds / h) + 1)
+        asked = np.stack([self._asked(plan, t, pace, model) for plan in plans], axis=2)
+        headings = np.array([plan[0].heading for plan in plans])
+        tracks = driven([model], asked, np.stack([0.0 * headings, 0.0 * headings, headings]), h)
+        pairs = zip(tracks, np.moveaxis(asked, 2, 0), strict=True)
+        return [PlannedMotion.along(eta, h, basin, orders) for eta, orders in pairs]
+
+    def _asked(self, plan: Sequence[PlanStep], t: np.ndarray, pace: float, model: Model) -> np.ndarray:
+        """(n, k), the orders of a plan."""
+        ends = np.cumsum([s.seconds for s in plan])
+        which = np.minimum(np.searchsorted(ends - 1e-9, t, side="right"), len(plan) - 1)
+        parts = [
+            ORDERS[s.name](
+                t[which == k] - (end - s.seconds), s.seconds, s.numbers, model.ship.scale.time
+            )
+            for k, (s, end) in enumerate(zip(plan, ends, strict=True))
+        ]
+        thrust, rudder = np.hsplit(pace * np.concatenate(parts), 2)
+        ahead = np.where(thrust > 0.0, thrust * self.high, -thrust * self.low)
+        return ahead + rudder * self.rudder
 
 
 def asked_of(w: WeakWindows, ship: Ship) -> np.ndarray:

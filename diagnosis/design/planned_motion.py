@@ -105,14 +105,11 @@ class PlannedMotion:
 def load(tau: np.ndarray, model: Model) -> float:
     """The largest share of its limit that a force (n, 3) [N, N, N m] asks of an actuator."""
     layout, p = model.drive.effects.layout, model.drive.params
-    # The allocation is linear below its limits: a small force shows what a large one would ask.
-    full = np.array(layout.full(p))
-    small = 1e-3 * full[full > 0.0]
-    rows = 1e-3 * np.diag(full)[full > 0.0]
-    unit = np.array([np.ravel(layout.allocate(tuple(row), p)) for row in rows]) / small[:, None]
-    tau = tau[:, full > 0.0]
-    limits = np.array([[float(low), float(high)] for low, high in layout.limits(p)])
-    return float(np.max(np.maximum(tau @ unit / limits[:, 1], tau @ unit / limits[:, 0])))
+    # Where the allocation is linear below its limits, a small force shows what a large one would ask.
+    small = 1.0 if layout.curved else 1e-3
+    given = layout.allocate(tuple(small * tau.T), p)
+    limits = zip(given, layout.limits(p), strict=True)
+    return max(float(np.max(np.maximum(x / high, x / low))) / small for x, (low, high) in limits)
 
 
 def as_windows(
