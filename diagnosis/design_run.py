@@ -53,6 +53,8 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.diagnosis
     content = _diagnosis(folder / DIAGNOSIS)
+    if "parameters" in content:
+        raise InputError(_of_fmu(folder / DIAGNOSIS, content))
     task = _task(folder / POSTERIOR)
     if task is None:
         return _advised(options, content, folder)
@@ -103,6 +105,18 @@ def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path)
     with together(options.out, [PLAN]) as new:
         (new / PLAN).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
     return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
+
+
+def _of_fmu(path: Path, content: dict[str, Any]) -> str:
+    """Why no run is designed for parameters of an FMU, and what its diagnosis leaves open."""
+    groups = [" and ".join(group) for group in content["indistinguishable_groups"]]
+    rivals = [[e["id"], *e["indistinguishable"]] for e in content["effects"]]
+    groups += [" and ".join(ids) for ids in rivals if len(ids) > 1]
+    left = f"; indistinguishable: {'; '.join(groups)}" if groups else ""
+    return (
+        f"'{path}' is of the parameters of an FMU{left}: runs are designed for the effects of a ship's "
+        "model. Run with inputs of other levels and rates, and learn from all runs"
+    )
 
 
 def _diagnosis(path: Path) -> dict[str, Any]:

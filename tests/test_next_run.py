@@ -352,6 +352,26 @@ def test_bad_input_is_one_message(folder, task, options, words):
     assert not (folder / "plan").exists()
 
 
+def test_parameters_of_an_fmu_are_refused_with_what_is_open(tmp_path):
+    told = {"verdict": "ambiguous", "parameters": [], "effects": [], "possibilities": []}
+    told["indistinguishable_groups"] = [["c", "m"]]
+    (tmp_path / "diagnosis.json").write_text(json.dumps(told))
+    done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
+    assert done.returncode == 2
+    assert "c and m" in done.stderr
+    assert not (tmp_path / "plan").exists()
+
+
+def test_rivals_of_two_effects_are_pairs_of_candidates(question):
+    two = content()
+    two["effects"].append({**two["effects"][0], "id": "N_r", "indistinguishable": ["N_|r|r"]})
+    prior = NominalPrior.of(question.start, question.prior)
+    _, k = knowledge(question.data, question.start, prior, rivals(two))
+    expected = {(x, n) for x in ("X_|u|u", "X_uu") for n in ("N_r", "N_|r|r")}
+    assert {h.ids for h in k.hypotheses} == expected
+    assert k.weights.sum() == pytest.approx(1.0)
+
+
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
     done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
     assert done.returncode == 2
