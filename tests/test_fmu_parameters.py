@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -31,6 +32,7 @@ from diagnosis.fmu_parameters.parameter_file import (
 )
 from diagnosis.fmu_parameters.residuals import Whitening, laid
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
+from diagnosis.fmu_parameters.system_remainder import change_of_squares
 
 pytestmark = needs_compiler
 
@@ -231,6 +233,16 @@ def test_linear_model_of_the_oscillator_is_its_equation(fmu, work, seen):
     mat = loadmat(work / "linear/linear.mat")
     assert np.array_equal(mat["A"], found["A"])
     assert [str(x[0]) for x in mat["states"].ravel()] == ["x0", "v0"]
+
+
+def test_the_change_of_squares_has_the_error_of_its_blocks():
+    w = SimpleNamespace(run="a", measured=np.zeros((80, 1)))
+    r = SimpleNamespace(windows=[w], parts=lambda x: [(w, x)])
+    before, after = np.random.default_rng(0).standard_normal((2, 80))
+    each = (after**2 - before**2).reshape(8, 10).sum(axis=1)
+    expected = each.sum(), each.std(ddof=1) * np.sqrt(8)
+    assert change_of_squares(r, before, after, ["a"]) == pytest.approx(expected)
+    assert change_of_squares(r, before, after, ["b"]) == (0.0, 0.0)
 
 
 # In place of that of support.foreign: T der(y) = u - y^3, with its derivatives if the last one is asked.

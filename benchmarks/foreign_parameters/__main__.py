@@ -134,7 +134,8 @@ def summary(results: Sequence[dict[str, Any]]) -> str:
     return (
         f"{total('right')} of {len(results)} right; {total('inside')} of {total('intervals')} intervals "
         f"hold the truth; {total('false cause')} false causes at 0.9 or more; {total('worse')} test "
-        f"runs predicted worse by more than two paired standard errors; {np.median(seconds):.0f} s a case, {max(seconds):.0f} s at most"
+        "runs predicted worse by more than two paired standard errors; "
+        f"{np.median(seconds):.0f} s a case, {max(seconds):.0f} s at most"
     )
 
 

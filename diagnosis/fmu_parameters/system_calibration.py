@@ -145,8 +145,8 @@ def calibrate(
         errors |= _errors(part, start, learned, names)
         if use != "train":
             part.whiten_about(start)
-            both = part.whitened([start, learned])
-            changes |= {w.run: change_of_squares(part, *both, [w.run]) for w in part.windows}
+            old, new = part.whitened([start, learned])
+            changes |= {w.run: change_of_squares(part, old, new, [w.run]) for w in part.windows}
     every = [*(p.name for p in train.parameters), *(f.id for f in best.setting.forces)]
     return SystemCalibration(
         verdict,
