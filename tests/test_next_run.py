@@ -418,7 +418,10 @@ def steered(name, amplitude):
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=[("kvlcc2", (9.0, 0.15)), ("otter", (60.0, 8.0))])
+@pytest.fixture(
+    scope="module",
+    params=[("kvlcc2", (9.0, 0.15)), pytest.param(("otter", (60.0, 8.0)), marks=pytest.mark.slow)],
+)
 def steering(request):
     return prepared(steered(*request.param))
 
@@ -427,7 +430,7 @@ def test_a_ship_with_rudder_or_two_propellers_is_asked_what_it_can_do(steering):
     d, _ = steering
     assert set(d.library) == {"straight", "turn", "swing", "stop", "spiral", "order steps"}
     rng, craft = np.random.default_rng(1), d.model.ship
-    for _ in range(4):
+    for _ in range(2):
         plan = sequence(rng.random(2 * DIMENSIONS), d.limits.seconds, d.library)
         asked = d.motion(plan, (1.0, 1.0), EVERY * d.scale).orders
         if craft.description.allocates:
