@@ -26,7 +26,6 @@ from diagnosis.design import (
     Designer,
     Knowledge,
     Limits,
-    PlannedRun,
     Question,
     ScoredPlan,
     checked,
@@ -139,11 +138,11 @@ def cell_rows(cell: Cell, folder: Path, kinds: Sequence[str], limits: Limits) ->
             try:
                 d, k = prepared(replace(q, criterion=criterion))
                 scored = chosen(d, k, kind, cell.seed)
-                run, known, tracks = checked(d, k, scored, cell.seed)
+                run, *_ = checked(d, k, scored, cell.seed)
                 sure = sure_of(k, run.gram, cell.seed)
                 target = work / kind
                 target.mkdir()
-                write_run(PlannedRun(d, run, known, tracks, sure, {}), 1, target, None)
+                write_run(d, run, 1, target, None)
                 after = simulated(target / scenario_file(1), truth, target / "log", cell.seed + 1000)
                 both = [*data, *diagnosis.load(after, model=start)]
                 result, best, found, width = judged(learned(q, both), hidden)

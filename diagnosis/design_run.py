@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from .design import Question
 
 DIAGNOSIS, POSTERIOR, PLAN = "diagnosis.json", "posterior.json", "next.json"
-MOST = 9  # runs; chosen
 NO_RUNS = (
     "'{}' does not state the runs that the diagnosis was made of, or is not there: no run is designed; "
     "the advice is that of the diagnosis"
@@ -54,6 +53,8 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.diagnosis
     content = _diagnosis(folder / DIAGNOSIS)
+    if "parameters" in content:
+        raise InputError(_of_fmu(folder / DIAGNOSIS, content))
     task = _task(folder / POSTERIOR)
     if task is None:
         return _advised(options, content, folder)
@@ -105,6 +106,18 @@ def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path)
     return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
 
 
+def _of_fmu(path: Path, content: dict[str, Any]) -> str:
+    """Why no run is designed for parameters of an FMU, and what its diagnosis leaves open."""
+    groups = [" and ".join(group) for group in content["indistinguishable_groups"]]
+    rivals = [[e["id"], *e["indistinguishable"]] for e in content["effects"]]
+    groups += [" and ".join(ids) for ids in rivals if len(ids) > 1]
+    left = f"; indistinguishable: {'; '.join(groups)}" if groups else ""
+    return (
+        f"'{path}' is of the parameters of an FMU{left}: runs are designed for the effects of a ship's "
+        "model. Run with inputs of other levels and rates, and learn from all runs"
+    )
+
+
 def _diagnosis(path: Path) -> dict[str, Any]:
     content = json_content(path, "a diagnosis (give the result folder of cybership learn)")
     if not isinstance(content, dict) or not {"effects", "possibilities", "verdict"} <= content.keys():
@@ -128,8 +141,10 @@ def _task(path: Path) -> Task | None:
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= MOST:
-        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to {MOST}, not '{text}'")
+    from .design import MOST_RUNS
+
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_RUNS:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to {MOST_RUNS}, not '{text}'")
     return int(text)
 
 

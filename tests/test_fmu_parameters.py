@@ -1,12 +1,15 @@
 """An FMU's own parameters on data: what is read, how sure values are, and the verdict."""
 
 import json
+import re
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import loadmat
+from support import foreign
 from support.foreign import needs_compiler
 from support.oscillator import build_oscillator
 
@@ -17,6 +20,7 @@ from diagnosis import learn, linearise, parameters
 from diagnosis.fmu_parameters.additional_force import AdditionalForce
 from diagnosis.fmu_parameters.fmu_playback import InputCourse, Playback, PlaybackRequest, Processes
 from diagnosis.fmu_parameters.force_search import candidates
+from diagnosis.fmu_parameters.linear_model import linearised, states_of
 from diagnosis.fmu_parameters.measured_system import MeasuredRun, noise_of, noises, windows_of
 from diagnosis.fmu_parameters.output.found_fmu import write_found
 from diagnosis.fmu_parameters.parameter_file import (
@@ -28,6 +32,7 @@ from diagnosis.fmu_parameters.parameter_file import (
 )
 from diagnosis.fmu_parameters.residuals import Whitening, laid
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
+from diagnosis.fmu_parameters.system_remainder import change_of_squares
 
 pytestmark = needs_compiler
 
@@ -228,6 +233,55 @@ def test_linear_model_of_the_oscillator_is_its_equation(fmu, work, seen):
     mat = loadmat(work / "linear/linear.mat")
     assert np.array_equal(mat["A"], found["A"])
     assert [str(x[0]) for x in mat["states"].ravel()] == ["x0", "v0"]
+
+
+def test_the_change_of_squares_has_the_error_of_its_blocks():
+    w = SimpleNamespace(run="a", measured=np.zeros((80, 1)))
+    r = SimpleNamespace(windows=[w], parts=lambda x: [(w, x)])
+    before, after = np.random.default_rng(0).standard_normal((2, 80))
+    each = (after**2 - before**2).reshape(8, 10).sum(axis=1)
+    expected = each.sum(), each.std(ddof=1) * np.sqrt(8)
+    assert change_of_squares(r, before, after, ["a"]) == pytest.approx(expected)
+    assert change_of_squares(r, before, after, ["b"]) == (0.0, 0.0)
+
+
+# In place of that of support.foreign: T der(y) = u - y^3, with its derivatives if the last one is asked.
+CUBIC = {
+    "double all[] = {m->u, m->y, m->T};": "double all[] = {m->u, m->y, m->T, RATE};",
+    "if (vr[k] > 2) return 3;": "if (vr[k] > 3) return 3;",
+    "if (vr[k] == 0) m->u": "if (vr[k] == 1) m->y = v[k]; else if (vr[k] == 0) m->u",
+    "const double dk[], double du[]) { return 3; }": """const double dk[], double du[]) {
+    Lag *m = c; for (size_t i = 0; i < nu; i++) { du[i] = 0.0; for (size_t j = 0; j < nk; j++) {
+        if (u[i] == 1) du[i] += dk[j] * (k[j] == 1);
+        else du[i] += dk[j] * (k[j] == 1 ? -3.0 * m->y * m->y / m->T : 1.0 / m->T); } } return 0; }""",
+}
+CUBIC_VARIABLES = """<ScalarVariable name="der(y)" valueReference="3" causality="output" initial="calculated">
+<Real derivative="2"/></ScalarVariable></ModelVariables>"""
+CUBIC_STRUCTURE = """<ModelStructure><Outputs><Unknown index="2"/><Unknown index="6"/></Outputs>
+<Derivatives><Unknown index="6"/></Derivatives></ModelStructure>"""
+
+
+@pytest.mark.parametrize("provided", [True, False])
+def test_derivatives_of_the_fmu_are_those_of_differences(work, monkeypatch, provided):
+    source, described = foreign.SOURCE, foreign.DESCRIPTION
+    for old, new in CUBIC.items():
+        assert old in source
+        source = source.replace(old, new.replace("RATE", "(m->u - m->y * m->y * m->y) / m->T"))
+    described = described.replace("</ModelVariables>", CUBIC_VARIABLES)
+    described = re.sub("<ModelStructure>.*</ModelStructure>", CUBIC_STRUCTURE, described)
+    monkeypatch.setattr(foreign, "SOURCE", source)
+    monkeypatch.setattr(foreign, "DESCRIPTION", described)
+    told = f'{foreign.ANY_STEP} providesDirectionalDerivative="{str(provided).lower()}"'
+    model = FmuModel(foreign.build_lag(work, capabilities=told))
+    at = {"out, filtered": 0.7, "in[1]": 0.2, "T": 2.0}
+    found = linearised(model, states_of(model, None), at, ["out, filtered"])
+    # A central difference of a cube is off by the square of its step, which is 1e-3 here.
+    error = {"abs": 1e-12 if provided else 1e-6}
+    assert pytest.approx(np.array([[-3.0 * 0.49 / 2.0]]), **error) == found.A
+    assert pytest.approx(np.array([[0.5]]), abs=1e-9) == found.B
+    assert pytest.approx(np.array([[1.0]]), abs=1e-9) == found.C
+    assert pytest.approx(np.array([[0.0]]), abs=1e-9) == found.D
+    assert found.x_dot == pytest.approx([(0.2 - 0.343) / 2.0])
 
 
 @pytest.mark.parametrize(

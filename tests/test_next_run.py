@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import multivariate_normal
 from support.command import command
@@ -13,7 +14,7 @@ import cosim
 import diagnosis
 from cosim import InputError
 from diagnosis import Model, design_run
-from diagnosis.design import Basin, Limits, Question, plan_next
+from diagnosis.design import DIMENSIONS, Basin, Limits, Question, plan_next, prepared, write_run
 from diagnosis.design.designing import Designer, likely
 from diagnosis.design.hypotheses import knowledge, rivals
 from diagnosis.design.information import (
@@ -31,8 +32,9 @@ from diagnosis.design.information import (
 )
 from diagnosis.design.limits import limits_of
 from diagnosis.design.manoeuvre_library import LIBRARY, NUMBERS, PlanStep, Reach, poses, sequence, usual
-from diagnosis.design.planned_motion import PlannedMotion
+from diagnosis.design.planned_motion import EVERY, PlannedMotion
 from diagnosis.design.spread import STEP, drawn, followed, spread
+from diagnosis.predictors import ship_with
 from diagnosis.search.prior import NominalPrior
 
 Q, OWN = 3, 2  # nuisance parameters, and those of each of two hypotheses
@@ -216,8 +218,6 @@ def question():
 
 
 def diagnosis_frame(run):
-    import pandas as pd
-
     columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
     return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=columns)
 
@@ -352,6 +352,26 @@ def test_bad_input_is_one_message(folder, task, options, words):
     assert not (folder / "plan").exists()
 
 
+def test_parameters_of_an_fmu_are_refused_with_what_is_open(tmp_path):
+    told = {"verdict": "ambiguous", "parameters": [], "effects": [], "possibilities": []}
+    told["indistinguishable_groups"] = [["c", "m"]]
+    (tmp_path / "diagnosis.json").write_text(json.dumps(told))
+    done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
+    assert done.returncode == 2
+    assert "c and m" in done.stderr
+    assert not (tmp_path / "plan").exists()
+
+
+def test_rivals_of_two_effects_are_pairs_of_candidates(question):
+    two = content()
+    two["effects"].append({**two["effects"][0], "id": "N_r", "indistinguishable": ["N_|r|r"]})
+    prior = NominalPrior.of(question.start, question.prior)
+    _, k = knowledge(question.data, question.start, prior, rivals(two))
+    expected = {(x, n) for x in ("X_|u|u", "X_uu") for n in ("N_r", "N_|r|r")}
+    assert {h.ids for h in k.hypotheses} == expected
+    assert k.weights.sum() == pytest.approx(1.0)
+
+
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
     done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
     assert done.returncode == 2
@@ -377,3 +397,69 @@ def test_a_basin_smaller_than_the_ship_and_an_unknown_criterion_are_refused(ques
         plan_next(replace(question, criterion="certain"))
     with pytest.raises(InputError, match="minutes or more"):
         plan_next(replace(question, limits=Limits(5.0)))
+
+
+def steered(name, amplitude):
+    """A run of another ship at one thrust, with rudder or moment to both sides in turn, and its orders."""
+    craft = ship_with((), name)
+    t = np.arange(0.0, 120.0, 0.2) * craft.scale.time
+    sign = np.where((t / (8.0 * craft.scale.time)) % 2.0 < 1.0, 1.0, -1.0)
+    orders = np.zeros((t.size, len(craft.thrusters.inputs().request)))
+    orders[:, 0], orders[:, -1] = amplitude[0], amplitude[1] * sign
+    still = np.zeros((t.size, 3))
+    (eta,) = followed([Model(ship=craft)], PlannedMotion(t, still, still, still, orders))
+    eta += 0.002 * craft.scale.length * np.random.default_rng(0).standard_normal(eta.shape)
+    names = ("tau_X", "tau_Y", "tau_N") if craft.description.allocates else craft.commands
+    frame = pd.DataFrame(np.column_stack([t, eta, orders]), columns=["time", "x", "y", "psi", *names])
+    model = Model(ship=craft)
+    return Question(
+        diagnosis.load(frame, model=model), content(others=("X_u",)), model, 0.1,
+        Limits(120.0 * craft.scale.time, size=(200.0, 200.0)), ship=name,
+    )  # fmt: skip
+
+
+@pytest.fixture(
+    scope="module",
+    params=[("kvlcc2", (9.0, 0.15)), pytest.param(("otter", (60.0, 8.0)), marks=pytest.mark.slow)],
+)
+def steering(request):
+    return prepared(steered(*request.param))
+
+
+def test_a_ship_with_rudder_or_two_propellers_is_asked_what_it_can_do(steering):
+    d, _ = steering
+    assert set(d.library) == {"straight", "turn", "swing", "stop", "spiral", "order steps"}
+    rng, craft = np.random.default_rng(1), d.model.ship
+    for _ in range(2):
+        plan = sequence(rng.random(2 * DIMENSIONS), d.limits.seconds, d.library)
+        asked = d.motion(plan, (1.0, 1.0), EVERY * d.scale).orders
+        if craft.description.allocates:
+            assert not asked[:, 1].any()  # no force sideways
+        else:
+            low, high = np.array(craft.layout.limits(craft.nominal_drive.params)).T
+            assert (asked >= low).all()
+            assert (asked <= high).all()
+            assert np.abs(asked[:, 1]).max() <= np.radians(35.0) + 1e-9
+
+
+def test_steps_of_the_thrust_discriminate_what_one_speed_does_not(steering):
+    d, k = steering
+    steps = d.scored(k, [PlanStep("straight", (0.0, 0.5, 1.0, 0.0, 0.0), d.limits.seconds, 0.0)])
+    around = d.usual(k, "circle")
+    assert steps.excess == around.excess == 0.0
+    assert steps.score > around.score
+
+
+@pytest.mark.slow
+def test_orders_of_a_plan_give_its_track(steering, tmp_path):
+    d, k = steering
+    found = d.scored(k, [PlanStep("swing", (0.5,) * NUMBERS, d.limits.seconds, 0.3)])
+    write_run(d, found, 1, tmp_path, d.model.ship.name)
+    scenario = tmp_path / "scenario_1.json"
+    stop = 1000 * json.loads(scenario.read_text())["step"]
+    result = cosim.simulate(scenario, tmp_path / "run", stop=stop, pictures=False)
+    assert result.status == "done"
+    track = pd.read_csv(tmp_path / "commands_1.csv")
+    log = pd.read_csv(tmp_path / "run" / "log.csv")
+    # The likeliest model is hardly the nominal one, which the scenario has.
+    assert np.interp(stop, track["time"], track["x"]) == pytest.approx(log["vessel.x"].iloc[-1], abs=0.5)

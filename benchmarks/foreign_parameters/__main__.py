@@ -23,6 +23,7 @@ from .foreign_systems import CASES, ForeignSystem, built
 from .hidden_causes import PARAMETER, PHYSICS, measured, truth
 from .other_tools import unpacked
 
+WORSE = 2.0  # paired standard errors; contract
 CAUSES = ("nothing", "parameter", "physics", "both")
 
 
@@ -54,7 +55,8 @@ def one(path: Path, s: ForeignSystem, cause: str, seed: int, folder: Path) -> di
     off, true = {s.off} if cause in PARAMETER else set(), truth(s, cause)
     moved = {p["name"] for p in found["parameters"] if p["moved"]}
     inside = [p["ci95"][0] <= true[p["name"]] <= p["ci95"][1] for p in found["parameters"]]
-    (test,) = (e["outputs"][s.output] for e in found["errors"] if e["held_out"])
+    (test,) = (e for e in found["errors"] if e["held_out"])
+    errors, change = test["outputs"][s.output], test["change"]
     true_id = f"{s.force}:{_shape(*s.lacks)}"
     ids = [e["id"] for e in found["effects"]]
     right = found["verdict"] == expected(s, cause)
@@ -71,7 +73,11 @@ def one(path: Path, s: ForeignSystem, cause: str, seed: int, folder: Path) -> di
         ),
         "inside": sum(inside) if found["verdict"] != "unexplained" else 0,
         "intervals": len(inside) if found["verdict"] != "unexplained" else 0,
-        "worse": test["after"] > 1.02 * test["before"],
+        "before": errors["before"],
+        "after": errors["after"],
+        # Paired standard errors by which the sum of squares of the run kept aside grows.
+        "change": change["squares"] / max(change["standard_error"], 1e-300),
+        "worse": change["squares"] > max(WORSE * change["standard_error"], 0.0),
         "seconds": seconds,
     }
 
@@ -96,7 +102,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         results = []
         for group, systems in groups.items():
             chosen = [x for x in systems if not options.systems or x[0].name in options.systems]
-            shown = Table("system", "cause", "seed", "verdict", "off", "forces", "right", "s", box=None)
+            shown = Table(
+                "system", "cause", "seed", "verdict", "off", "forces", "right", "change", "s", box=None
+            )
             for s, path in chosen:
                 for cause in CAUSES:
                     for seed in options.seeds:
@@ -106,7 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                         )
                         cells = [", ".join(r.get(key, [])) for key in ("moved", "forces")]
                         right = "yes" if r["right"] else "NO"
-                        shown.add_row(s.name, cause, str(seed), r["verdict"], *cells, right,
+                        change = f"{r['change']:+.1f}" if "change" in r else ""
+                        shown.add_row(s.name, cause, str(seed), r["verdict"], *cells, right, change,
                                       f"{r['seconds']:.0f}")  # fmt: skip
                         if options.json is not None:
                             options.json.write_text(json.dumps(results, indent=1))
@@ -125,7 +134,8 @@ def summary(results: Sequence[dict[str, Any]]) -> str:
     return (
         f"{total('right')} of {len(results)} right; {total('inside')} of {total('intervals')} intervals "
         f"hold the truth; {total('false cause')} false causes at 0.9 or more; {total('worse')} test "
-        f"runs predicted worse; {np.median(seconds):.0f} s a case, {max(seconds):.0f} s at most"
+        "runs predicted worse by more than two paired standard errors; "
+        f"{np.median(seconds):.0f} s a case, {max(seconds):.0f} s at most"
     )
 
 

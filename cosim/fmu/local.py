@@ -91,6 +91,15 @@ class LocalInstance:
         self._call(f"getting {variable.name}", action)
         return float(values[0])
 
+    def directional_derivative(self, unknown: Sequence[int], known: int) -> list[float]:
+        """Partial derivatives of variables by one, all by reference (fmi2GetDirectionalDerivative)."""
+        found: list[float] = []
+        self._call(
+            "fmi2GetDirectionalDerivative",
+            lambda: found.extend(self._slave.getDirectionalDerivative(unknown, [known], [1.0])),
+        )
+        return found
+
     def enter_initialization(self) -> None:
         self._call("fmi2EnterInitializationMode", self._slave.enterInitializationMode)
 

@@ -5,10 +5,12 @@ from .information import SURE, Knowledge
 from .manoeuvre_library import DIMENSIONS, sequence
 from .next_plan import Question, checked, plan_next, prepared
 from .planned_motion import Basin
-from .run_plan import Plan, PlannedRun, scenario_file, sure_of, write_run
+from .run_files import scenario_file, write_run
+from .run_plan import MOST_RUNS, Plan, PlannedRun, sure_of
 
 __all__ = [
     "DIMENSIONS",
+    "MOST_RUNS",
     "SURE",
     "Basin",
     "Designer",

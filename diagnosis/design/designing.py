@@ -1,10 +1,11 @@
 """The search for the plan that discriminates best: Sobol points over the library, then evolution."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.optimize import differential_evolution
@@ -17,7 +18,8 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from .hypotheses import LIKELY, Space
 from .information import CRITERIA, Knowledge, inseparable
-from .manoeuvre_library import DIMENSIONS, PlanStep, Reach, sequence, usual
+from .manoeuvre_library import DIMENSIONS, LIBRARY, USUAL, PlanStep, Reach, UsualRuns, sequence, usual
+from .order_library import ORDERS, USUAL_ORDERS, Orders
 from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
@@ -97,11 +99,6 @@ class Designer:
                 f"no criterion '{self.criterion}'{nearest(self.criterion, CRITERIA)}; "
                 f"there are {', '.join(CRITERIA)}"
             )
-        if not self.model.ship.fully_actuated:
-            raise InputError(
-                f"a run is designed for ships whose actuators give a force on all three axes; "
-                f"{self.model.ship.name} cannot"
-            )
         room = self.basin.size - 2.0 * (self.margin + np.ptp(self.outline[:, 0]) / 2.0)
         if room.min() <= 0.0:
             need = self.basin.size - room
@@ -156,35 +153,62 @@ class Designer:
         rate = max(FASTER * rate, FASTER * speed / max(0.5 * room, half))
         return Reach(float(FASTER * speed), float(rate), room, self.scale, -half, half)
 
+    @cached_property
+    def orders(self) -> Orders | None:
+        """What the thrusters are asked; None: they follow a controller, which any pose is given to."""
+        if self.model.ship.fully_actuated:
+            return None
+        return Orders.of(self.model, self.data, FASTER)
+
+    @property
+    def library(self) -> Iterable[str]:
+        """Names of the manoeuvres of such a ship."""
+        return LIBRARY if self.orders is None else ORDERS
+
+    @property
+    def usual_runs(self) -> UsualRuns:
+        """Usual runs of such a ship."""
+        return USUAL if self.orders is None else USUAL_ORDERS
+
     def motion(self, steps: Sequence[PlanStep], size: tuple[float, float], h: float) -> PlannedMotion:
-        """The target of a plan every h [s], at shares of the largest speeds and of the room."""
-        pace, room = size
+        """The motion of a plan every h [s], at shares of the largest speeds and of the room."""
+        (found,) = self._motions([steps], size, h)
+        return found
+
+    def _motions(
+        self, plans: Sequence[Sequence[PlanStep]], size: tuple[float, float], h: float
+    ) -> list[PlannedMotion]:
+        """The same of several plans."""
+        (pace, room), T = size, self.limits.seconds
+        if self.orders is not None:
+            return self.orders.motions(plans, T, h, pace, self.model, self.basin)
         r = self.reach
         smaller = r._replace(speed=pace * r.speed, rate=pace * r.rate, room=room * r.room)
-        return PlannedMotion.of(steps, self.limits.seconds, h, smaller, self.basin)
+        return [PlannedMotion.of(steps, T, h, smaller, self.basin) for steps in plans]
 
     def scored(self, k: Knowledge, steps: Sequence[PlanStep]) -> ScoredPlan:
         """A plan, evaluated at the largest speeds at which it keeps the limits."""
-        size, motion, tau, excess = self._fitting(steps)
-        gram, score = np.zeros_like(k.G), -FORBIDDEN * excess
-        if excess == 0.0:
-            gram = self.space.gram([as_windows(motion, tau, self.data[0].smoothed)])
-            score = CRITERIA[self.criterion](k, gram)
-        found = ScoredPlan(steps, size, motion, gram, excess, score)
-        self.tried.append(found)
+        (found,) = self.scored_all(k, [steps])
         return found
 
-    def _fitting(
-        self, steps: Sequence[PlanStep]
-    ) -> tuple[tuple[float, float], PlannedMotion, np.ndarray, float]:
-        """The first size with which a plan keeps the limits, else the last: motion, force and excess."""
+    def scored_all(self, k: Knowledge, plans: Sequence[Sequence[PlanStep]]) -> list[ScoredPlan]:
+        """The same of several plans: each with the first size that keeps the limits, else the last."""
+        found: dict[int, ScoredPlan] = {}
         for size in SMALLER:
-            motion = self.motion(steps, size, EVERY * self.scale)
-            tau = motion.thrust(self.model)
-            excess = self.excess(motion, tau)
-            if excess == 0.0 or size == SMALLER[-1]:
-                return size, motion, tau, excess
-        raise AssertionError
+            left = [n for n in range(len(plans)) if n not in found]
+            motions = self._motions([plans[n] for n in left], size, EVERY * self.scale) if left else []
+            for n, motion in zip(left, motions, strict=True):
+                tau = motion.thrust(self.model)
+                excess = self.excess(motion, tau)
+                if excess == 0.0:
+                    gram = self.space.gram([as_windows(motion, tau, self.data[0].smoothed)])
+                    score = CRITERIA[self.criterion](k, gram)
+                    found[n] = ScoredPlan(plans[n], size, motion, gram, excess, score)
+                elif size == SMALLER[-1]:
+                    none = np.zeros_like(k.G)
+                    found[n] = ScoredPlan(plans[n], size, motion, none, excess, -FORBIDDEN * excess)
+        self.tried += (each := [found[n] for n in range(len(plans))])
+        return each
 
     def excess(self, motion: PlannedMotion, tau: np.ndarray) -> float:
         """By how much a motion with a force (n, 3) exceeds basin, actuators and speeds [1]."""
@@ -193,7 +217,7 @@ class Designer:
         fast = max(speed, float(nu[:, 2].max() / self.reach.rate)) / ROUNDED
         margin = float(self.basin.margin(motion.eta, self.outline).min())
         outside = (self.margin - margin) / float(np.ptp(self.outline[:, 0]))
-        share = load(tau, self.model) / MOST_THRUST
+        share = load(tau, self.model) / MOST_THRUST if motion.orders is None else 0.0
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
     def search(self, k: Knowledge, seed: int) -> ScoredPlan:
@@ -207,19 +231,25 @@ class Designer:
         points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(LOG_POINTS)
         found: list[tuple[ScoredPlan, np.ndarray]] = []
 
-        def cost(point: np.ndarray) -> float:
+        def cost(some: np.ndarray) -> np.ndarray | float:
             if time.monotonic() > end or len(found) >= len(points) + EVOLVED:
                 raise _OutOfTimeError
             self.advance(f"searching a plan: {len(found)} of {len(points) + EVOLVED}")
-            found.append((self.scored(k, sequence(np.clip(point, 0.0, 1.0 - 1e-9), T)), point))
-            return -found[-1][0].score
+            each = np.clip(some.T.reshape(-1, points.shape[1]), 0.0, 1.0 - 1e-9)
+            plans = [sequence(point, T, self.library) for point in each]
+            found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))
+            costs = np.array([-s.score for s in scored])
+            return costs if some.ndim > 1 else float(costs[0])
 
+        # Simulated tracks take a fraction of the time at once; targets need no simulation.
+        at_once = self.orders is not None
         with suppress(_OutOfTimeError):
-            for point in points:
-                cost(point)
-            first = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:POPULATION]])
-            spans = [(0.0, 1.0)] * len(points[0])
-            differential_evolution(cost, spans, init=first, rng=seed, polish=False)  # pyright: ignore
+            for part in [points] if at_once else points:
+                cost(part.T)
+            first: Any = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:POPULATION]])
+            spans: Any = [(0.0, 1.0)] * len(points[0])
+            how: Any = {"vectorized": True, "updating": "deferred"} if at_once else {}
+            differential_evolution(cost, spans, init=first, rng=seed, polish=False, **how)
         best = max((s for s, _ in found), key=lambda s: s.score)
         if best.excess > 0.0:
             raise InputError(
@@ -230,7 +260,7 @@ class Designer:
 
     def usual(self, k: Knowledge, name: str) -> ScoredPlan:
         """A usual run of the same length."""
-        return self.scored(k, usual(name, self.limits.seconds))
+        return self.scored(k, usual(name, self.limits.seconds, self.usual_runs))
 
     def inseparable(self, k: Knowledge) -> list[tuple[int, int]]:
         """Pairs that no plan tried so far separates, see :func:`.information.inseparable`."""

@@ -6,7 +6,7 @@ relative to the pose at its start. A plan is a sequence of manoeuvres, with a tu
 two where the next one begins with another heading.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -255,10 +255,10 @@ def poses(plan: Sequence[PlanStep], seconds: float, h: float, r: Reach) -> np.nd
 DIMENSIONS = NUMBERS + 2  # of a manoeuvre: which one, how it begins, its numbers
 
 
-def sequence(point: np.ndarray, seconds: float) -> list[PlanStep]:
-    """The plan at a point of the unit cube, DIMENSIONS numbers for each manoeuvre."""
+def sequence(point: np.ndarray, seconds: float, library: Iterable[str] = LIBRARY) -> list[PlanStep]:
+    """The plan at a point of the unit cube, DIMENSIONS numbers for each manoeuvre of a library."""
     rows = point.reshape(-1, DIMENSIONS)
-    names, each = list(LIBRARY), seconds / len(rows)
+    names, each = list(library), seconds / len(rows)
     # Any heading at first; then half of the numbers keep it, the others turn by up to a right angle.
     bends = np.where(rows[:, 1] < 0.5, 0.0, 2.0 * np.pi * (rows[:, 1] - 0.75))
     bends[0] = 2.0 * np.pi * rows[0, 1]
@@ -274,7 +274,8 @@ def sequence(point: np.ndarray, seconds: float) -> list[PlanStep]:
 
 
 # Usual runs of the same length, for comparison.
-USUAL: Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]] = {
+UsualRuns = Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]]
+USUAL: UsualRuns = {
     "ellipse": (("circle", (0.0, 0.0, 1.0, 0.4, 0.6)),),
     "circle": (("circle", (0.0, 0.0, 0.7, 1.0, 0.6)),),
     "zig-zag": (("zigzag", (0.6, 0.5, 1.0, 0.5, 0.3)),),
@@ -282,7 +283,7 @@ USUAL: Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]] = {
 }
 
 
-def usual(name: str, seconds: float) -> list[PlanStep]:
+def usual(name: str, seconds: float, runs: UsualRuns = USUAL) -> list[PlanStep]:
     """A usual run as a plan."""
-    parts = USUAL[name]
+    parts = runs[name]
     return [PlanStep(m, numbers, seconds / len(parts), 0.0) for m, numbers in parts]

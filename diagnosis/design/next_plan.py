@@ -16,7 +16,6 @@ from ..search.prior import NominalPrior
 from .designing import Designer, Limits, ScoredPlan, likely
 from .hypotheses import knowledge, rivals
 from .information import Knowledge
-from .manoeuvre_library import USUAL
 from .run_plan import MOST_RUNS, Plan, PlannedRun, sure_of
 from .spread import STEP, spread
 
@@ -85,7 +84,7 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
     now = k
     for n in range(runs):
         found = designer.search(now, seed + n)
-        usual = {name: designer.usual(now, name) for name in USUAL}
+        usual = {name: designer.usual(now, name) for name in designer.usual_runs}
         if n == 0:
             pairs = designer.inseparable(k)
         run = checked(designer, now, found, seed + n)

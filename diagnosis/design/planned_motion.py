@@ -55,23 +55,31 @@ class PlannedMotion:
     Attributes:
         time: (n,) [s].
         eta, eta_dot, eta_ddot: (n, 3), in the basin.
+        orders: (n, k), what the thrusters' FMU is asked; None: a controller follows the target.
     """
 
     time: np.ndarray
     eta: np.ndarray
     eta_dot: np.ndarray
     eta_ddot: np.ndarray
+    orders: np.ndarray | None = None
 
     @classmethod
     def of(
         cls, plan: Sequence[PlanStep], seconds: float, h: float, reach: Reach, basin: Basin
     ) -> "PlannedMotion":
         """The target of a plan every h [s], about the middle of the basin."""
-        eta = poses(plan, seconds, h, reach)
+        return cls.along(poses(plan, seconds, h, reach), h, basin)
+
+    @classmethod
+    def along(
+        cls, eta: np.ndarray, h: float, basin: Basin, orders: np.ndarray | None = None
+    ) -> "PlannedMotion":
+        """The motion along a track (n, 3), one sample every h [s], moved to the middle of the basin."""
         low, high = eta[:, :2].min(axis=0), eta[:, :2].max(axis=0)
-        eta[:, :2] += basin.middle - 0.5 * (low + high)
+        eta = np.column_stack([eta[:, :2] + basin.middle - 0.5 * (low + high), eta[:, 2]])
         first = np.gradient(eta, h, axis=0)
-        return cls(h * np.arange(len(eta)), eta, first, np.gradient(first, h, axis=0))
+        return cls(h * np.arange(len(eta)), eta, first, np.gradient(first, h, axis=0), orders)
 
     @property
     def nu(self) -> np.ndarray:
@@ -80,7 +88,10 @@ class PlannedMotion:
         return np.column_stack([u, v, self.eta_dot[:, 2]])
 
     def thrust(self, model: Model) -> np.ndarray:
-        """(n, 3), force that a model needs for the motion [N, N, N m]."""
+        """(n, 3), force that is commanded, or that a model needs for the motion [N, N, N m]."""
+        if self.orders is not None:
+            ship = model.ship
+            return self.orders if ship.description.allocates else ship.commanded_force(self.orders)
         nu = self.nu
         u, v = rotate_to_body(self.eta[:, 2], self.eta_ddot[:, 0], self.eta_ddot[:, 1])
         r = nu[:, 2]
@@ -94,13 +105,11 @@ class PlannedMotion:
 def load(tau: np.ndarray, model: Model) -> float:
     """The largest share of its limit that a force (n, 3) [N, N, N m] asks of an actuator."""
     layout, p = model.drive.effects.layout, model.drive.params
-    # The allocation is linear below its limits: a small force shows what a large one would ask.
-    small = 1e-3 * np.array(layout.full(p))
-    unit = (
-        np.array([np.ravel(layout.allocate(tuple(row), p)) for row in np.diag(small)]) / small[:, None]
-    )
-    limits = np.array([[float(low), float(high)] for low, high in layout.limits(p)])
-    return float(np.max(np.maximum(tau @ unit / limits[:, 1], tau @ unit / limits[:, 0])))
+    # Where the allocation is linear below its limits, a small force shows what a large one would ask.
+    small = 1.0 if layout.curved else 1e-3
+    given = layout.allocate(tuple(small * tau.T), p)
+    limits = zip(given, layout.limits(p), strict=True)
+    return max(float(np.max(np.maximum(x / high, x / low))) / small for x, (low, high) in limits)
 
 
 def as_windows(
@@ -116,7 +125,9 @@ def as_windows(
     """
     n, period = motion.time.size, float(motion.time[1] - motion.time[0])
     old, known = like.track, np.isfinite(like.nu[:, 0])
-    run = Run(name, motion.time, motion.eta, tau, ship=old.run.ship, signals=old.run.signals)
+    commands = None if motion.orders is tau else motion.orders
+    signals = old.run.signals
+    run = Run(name, motion.time, motion.eta, tau, commands, ship=old.run.ship, signals=signals)
     no, yes = np.zeros(n, bool), np.ones(n, bool)
     every = np.ones((n, 3), bool)
     track = replace(

@@ -1,14 +1,11 @@
 """A plan that can be carried out: what is expected of it, and its files."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from cosim.scenario import find_scenario
 
 from ..execution.result_folder import together
 from ..execution.short_text import ShortRepr
@@ -17,15 +14,13 @@ from ..runs.cleaning import Z95
 from .designing import Designer, ScoredPlan
 from .hypotheses import Space
 from .information import CRITERIA, SURE, Knowledge, expected, pairs, projected
-from .manoeuvre_library import TEXTS, USUAL
+from .manoeuvre_library import TEXTS
+from .run_files import commands_file, picture_file, scenario_file, write_run
 from .spread import Spread
 from .track_picture import draw
 
 JSON, PAGE = "next.json", "plan.md"
 MOST_RUNS = 9  # of a plan; chosen
-STEP = 0.02  # s, times the time scale: base step of the scenarios
-TARGET = [f"{axis}_t{order}" for order in ("", "_dot", "_ddot") for axis in ("x", "y", "psi")]
-POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 
 
 def files(count: int) -> list[str]:
@@ -36,18 +31,6 @@ def files(count: int) -> list[str]:
         PAGE,
         *(f for n in each for f in (scenario_file(n), commands_file(n), picture_file(n))),
     ]
-
-
-def scenario_file(n: int) -> str:
-    return f"scenario_{n}.json"
-
-
-def commands_file(n: int) -> str:
-    return f"commands_{n}.csv"
-
-
-def picture_file(n: int) -> str:
-    return f"track_{n}.png"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,6 +56,16 @@ class PlannedRun(ShortRepr):
     @property
     def minutes(self) -> float:
         return self.designer.limits.seconds / 60.0
+
+    @property
+    def commands_text(self) -> str:
+        """What its table of commands has."""
+        if self.designer.orders is None:
+            return (
+                "the set points for the controller of a real ship, and the force that the likeliest "
+                "model needs"
+            )
+        return "the orders for the actuators, and the track of the likeliest model"
 
     @property
     def worst(self) -> float:
@@ -197,45 +190,11 @@ class Plan:
         written = files(len(self.runs))
         with together(Path(out), files(MOST_RUNS)) as new:
             for n, r in enumerate(self.runs, 1):
-                write_run(r, n, new, self.ship)
+                write_run(r.designer, r.scored, n, new, self.ship)
                 draw(r.designer, r.before, r.scored.motion, r.spread, new / picture_file(n))
             (new / PAGE).write_text(page(self), encoding="utf-8")
             (new / JSON).write_text(as_json(finite(self.content())) + "\n", encoding="utf-8")
         return written
-
-
-def write_run(r: PlannedRun, number: int, folder: Path, ship: str | None) -> None:
-    """Write the scenario of a run, and its set points, which the controller of a real ship can take.
-
-    The columns tau_X, tau_Y and tau_N are the force that the likeliest model needs: feed-forward.
-    """
-    d = r.designer
-    h = STEP * d.scale
-    fine = d.motion(r.scored.steps, r.scored.size, h)
-    table = np.column_stack([fine.time, fine.eta, fine.eta_dot, fine.eta_ddot, fine.thrust(d.model)])
-    header = ",".join(["time", *TARGET, "tau_X", "tau_Y", "tau_N"])
-    np.savetxt(folder / commands_file(number), table, "%.7g", delimiter=",", header=header, comments="")
-    content = json.loads(find_scenario("ellipse").read_text(encoding="utf-8"))
-    del content["fmus"]["guidance"]
-    x, y, psi = map(float, fine.eta[0])
-    noise = [float(s) for s in d.data[0].smoothed.noise]
-    content["fmus"]["vessel"]["parameters"] = {"x_0": x, "y_0": y, "psi_0": psi}
-    content |= {
-        "name": f"next_{number}",
-        "description": "Designed by cybership next",
-        "step": h,
-        "stop": round(round(d.limits.seconds / h) * h, 9),
-        "connections": [c for c in content["connections"] if not c[0].startswith("guidance.")],
-        "recordings": [
-            {"path": commands_file(number), "inputs": {f"controller.{n}": n for n in TARGET}}
-        ],
-        "roles": {"target": [f"controller.{n}" for n in TARGET[:3]]},
-        "faults": [{"kind": "noise", "signals": POSE, "std": noise}],
-        "metrics": {},
-    }
-    if ship is not None:
-        content["ship"] = ship
-    (folder / scenario_file(number)).write_text(as_json(content) + "\n", encoding="utf-8")
 
 
 def page(plan: Plan) -> str:
@@ -250,16 +209,15 @@ def page(plan: Plan) -> str:
             f"![Track of run {n}]({picture_file(n)})",
             "",
             f"- Simulate it: `python -m cosim.run {scenario_file(n)}`.",
-            f"- `{commands_file(n)}` has the set points for the controller of a real ship, and the "
-            "force that the likeliest model needs.",
+            f"- `{commands_file(n)}` has {r.commands_text}.",
             "- Begin at rest at the first set point. Log pose and commands at "
             f"{1.0 / like.period:.3g} Hz, the rate of the runs so far.",
             f"- Basin: north {basin.north[0]:.2f} to {basin.north[1]:.2f} m, east {basin.east[0]:.2f} "
             f"to {basin.east[1]:.2f} m. The hull keeps {r.spread.margin.min():.2f} m from the walls "
             "under every candidate above 5 %.",
             "",
-            "| parameter | half of the 95 % interval before | after | " + " | ".join(USUAL) + " |",
-            "|---|--:|--:|" + "--:|" * len(USUAL),
+            "| parameter | half of the 95 % interval before | after | " + " | ".join(r.usual) + " |",
+            "|---|--:|--:|" + "--:|" * len(r.usual),
         ]
         for row in r.intervals():
             cells = " | ".join(f"{x:.3g}" for x in row["half_width"].values())

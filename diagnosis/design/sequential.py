@@ -14,7 +14,8 @@ from ..report.report_data import ReportData
 from ..session import begin
 from .information import SURE
 from .next_plan import Question, plan_next
-from .run_plan import Plan, scenario_file
+from .run_files import scenario_file
+from .run_plan import Plan
 
 
 class Round(NamedTuple):

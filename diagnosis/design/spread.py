@@ -1,6 +1,6 @@
 """Where the ship may be during a plan: the closed loop of many models drawn from the posterior."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,35 +52,69 @@ def drawn(space: Space, k: Knowledge, n: int, rng: np.random.Generator) -> list[
 
 
 def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
-    """(p, n, 3), poses of models that a controller keeps on a target, started on it at rest.
+    """(p, n, 3), poses of models that a controller keeps on a target, or by orders, started at rest.
 
     The controller gets the true motion: noise of the measurement moves a ship much less than its margin.
 
     Args:
         models: of one ship.
-        motion: the target, at equal steps.
+        motion: the target or the orders, at equal steps.
     """
-    of, h = merged(models, lambda values: values), float(motion.time[1] - motion.time[0])
-    start = dict(zip(("x_0", "y_0", "psi_0"), map(float, motion.eta[0]), strict=True))
-    craft = of.ship
-    ship = LoopPart(craft.vessel, {**of.vessel, **start})
-    drive = LoopPart(craft.thrusters, of.thrusters)
-    controller = LoopPart(craft.serving(adaptive.COMPONENT), {})
+    h, controller = float(motion.time[1] - motion.time[0]), models[0].ship.serving(adaptive.COMPONENT)
+    if motion.orders is not None:
+        return driven(models, motion.orders[..., None], motion.eta[0], h)
+    part, now = LoopPart(controller, {}), None
     targets = np.column_stack([motion.eta, motion.eta_dot, motion.eta_ddot])
-    found = np.empty((len(models), len(targets), 3))
+
+    def request(k: int, out: Any) -> Any:
+        nonlocal now
+        v, (x, y, psi) = out.velocity, out.pose[:3]
+        known = Estimate(x, y, psi, v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
+        given = Inputs(known, Target(*map(float, targets[k])))
+        now, demand = part.begin(given) if now is None else part.advance(now, given, h)
+        return demand.tau
+
+    return _tracks(models, motion.eta[0], h, len(targets), request)
+
+
+def driven(models: Sequence[Model], orders: np.ndarray, start: np.ndarray, h: float) -> np.ndarray:
+    """(p, n, 3), poses of models whose thrusters get orders, started at rest.
+
+    Args:
+        models: of one ship; one, or as many as there are orders.
+        orders: (n, k, p or 1), what the thrusters' FMU is asked in each step.
+        start: (3,) or (3, p), first pose.
+        h: step [s].
+    """
+    asked = models[0].ship.thrusters.inputs().request
+    rows = [[x.item() if x.size == 1 else x for x in row] for row in orders]
+    return _tracks(models, start, h, len(rows), lambda k, _: asked._make(rows[k]), orders.shape[2])
+
+
+def _tracks(
+    models: Sequence[Model],
+    start: np.ndarray,
+    h: float,
+    steps: int,
+    request: Callable[[int, Any], Any],
+    count: int = 1,
+) -> np.ndarray:
+    """Poses (p, steps, 3) from rest, of models or by requests (step, outputs of the ship) of several."""
+    of = merged(models, lambda values: values)
+    craft = of.ship
+    begin = {
+        n: x if x.size > 1 else x.item() for n, x in zip(("x_0", "y_0", "psi_0"), start, strict=True)
+    }
+    ship = LoopPart(craft.vessel, {**of.vessel, **begin})
+    drive = LoopPart(craft.thrusters, of.thrusters)
+    found = np.empty((max(len(models), count), steps, 3))
     with np.errstate(all="ignore"):  # a ship that runs away gives infinities, which count as outside
         s, out = ship.begin(craft.vessel.inputs())
-        c: Any = None
         t: Any = None
-        for k, row in enumerate(targets):
+        for k in range(steps):
             for axis in range(3):
                 found[:, k, axis] = out.pose[axis]
-            v = out.velocity
-            x, y, psi = out.pose[:3]
-            known = Estimate(x, y, psi, v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
-            given = Inputs(known, Target(*map(float, row)))
-            c, demand = controller.begin(given) if c is None else controller.advance(c, given, h)
-            asked = craft.thrusters.inputs(demand.tau, v)
+            asked = craft.thrusters.inputs(request(k, out), out.velocity)
             t, thrust = drive.begin(asked) if t is None else drive.advance(t, asked, h)
             acting = craft.vessel.inputs(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
             s, out = ship.advance(s, acting, h)

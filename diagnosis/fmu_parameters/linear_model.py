@@ -1,4 +1,4 @@
-"""A, B, C, D of an FMU about a state, by central differences of its first moments from there."""
+"""A, B, C, D of an FMU about a state, by its own derivatives, else by differences from there."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.io import savemat
 
-from cosim import InputError
-from cosim.fmu import FmuModel
+from cosim import InputError, SimulationError
+from cosim.fmu import ConfinedFmu, FmuModel
 from cybership.message_text import quoted
 
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, TAU
-from ..predictors.fmu.instances import confined
+from ..predictors.fmu.instances import FmuRun, confined
 from ..predictors.fmu.short_steps import ShortSteps
 from ..predictors.fmu.variable_map import VariableMap, propose
 from ..report.document import write_json
@@ -187,19 +187,21 @@ def linearised(
             return np.array([*rates, *(found[n][0] for n in outputs)])
 
         base = answer(start, driven)
-        columns = []
-        for name in (*(s.name for s in states), *inputs):
-            value = {**start, **driven}[name]
-            d = SMALL * max(abs(value), 1.0)
-            sides = []
-            for moved in (value - d, value + d):
-                changed = {name: moved}
-                if name in driven:
-                    sides.append(answer(start, {**driven, **changed}))
-                else:
-                    sides.append(answer({**start, **changed}, driven))
-            columns.append((sides[1] - sides[0]) / (2.0 * d))
-    J = np.column_stack([*columns, np.zeros((base.size, 0))])
+        J = _exact(fmu, states, start, driven, outputs, h)
+        if J is None:
+            columns = []
+            for name in (*(s.name for s in states), *inputs):
+                value = {**start, **driven}[name]
+                d = SMALL * max(abs(value), 1.0)
+                sides = []
+                for moved in (value - d, value + d):
+                    changed = {name: moved}
+                    if name in driven:
+                        sides.append(answer(start, {**driven, **changed}))
+                    else:
+                        sides.append(answer({**start, **changed}, driven))
+                columns.append((sides[1] - sides[0]) / (2.0 * d))
+            J = np.column_stack([*columns, np.zeros((base.size, 0))])
     if not (np.isfinite(J).all() and np.isfinite(base).all()):
         raise InputError(f"'{model.path.name}' has no finite derivatives in this state")
     n, m = len(states), len(states)
@@ -208,3 +210,28 @@ def linearised(
     return LinearModel(
         names, inputs, list(outputs), values, base[:n], J[:n, :m], J[:n, m:], J[n:, :m], J[n:, m:]
     )
+
+
+def _exact(
+    fmu: ConfinedFmu,
+    states: Sequence[LinearState],
+    start: Mapping[str, float],
+    driven: Mapping[str, float],
+    outputs: Sequence[str],
+    h: float,
+) -> np.ndarray | None:
+    """The slopes of rates and outputs by states and inputs, from the FMU itself; None: it has none.
+
+    FMI 2.0.4, 2.1.9. Rates that are seen by differences of other variables have no such slopes.
+    """
+    told = fmu.model.description.coSimulation
+    if told is None or not told.providesDirectionalDerivative or any(s.order for s in states):
+        return None
+    run = FmuRun(fmu, [*driven], outputs, h)
+    try:
+        run.initialise(start, [*driven.values()], h)
+        return run.slopes([*(s.seen for s in states), *outputs], [*(s.name for s in states), *driven])
+    except SimulationError:
+        return None
+    finally:
+        run.free()

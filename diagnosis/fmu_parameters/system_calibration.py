@@ -13,7 +13,7 @@ from .force_search import Accepted, search
 from .parameter_file import CalibratedParameter
 from .parameter_fit import ParameterFit, fit, fitted, intervals
 from .residuals import Setting, WindowResiduals, rms_of
-from .system_remainder import CHANCE, SystemRemainder, blocks, inflation, remainder
+from .system_remainder import CHANCE, SystemRemainder, change_of_squares, inflation, remainder
 
 FOUND, EVEN_ODDS = 0.8, 0.5  # contract
 MOST_MOVED = 3.0  # prior standard deviations; contract
@@ -55,6 +55,8 @@ class SystemCalibration:
         fit: the most likely values.
         covariance: (q, q), of z and of coefficients, the latter in their units.
         errors: run -> output -> rms before and after.
+        changes: run that was not learned from -> change of the whitened sum of squares, and its paired
+            standard error [1].
         faults: what could not be asked.
     """
 
@@ -68,6 +70,7 @@ class SystemCalibration:
     fit: ParameterFit
     covariance: np.ndarray
     errors: Mapping[str, Mapping[str, tuple[float, float]]]
+    changes: Mapping[str, tuple[float, float]]
     faults: Sequence[str]
 
     @property
@@ -137,8 +140,13 @@ def calibrate(
     ]
     learned = best.setting if kept else start
     errors: dict[str, dict[str, tuple[float, float]]] = {}
-    for part in parts.values():
+    changes: dict[str, tuple[float, float]] = {}
+    for use, part in parts.items():
         errors |= _errors(part, start, learned, names)
+        if use != "train":
+            part.whiten_about(start)
+            old, new = part.whitened([start, learned])
+            changes |= {w.run: change_of_squares(part, old, new, [w.run]) for w in part.windows}
     every = [*(p.name for p in train.parameters), *(f.id for f in best.setting.forces)]
     return SystemCalibration(
         verdict,
@@ -151,6 +159,7 @@ def calibrate(
         best,
         covariance,
         errors,
+        changes,
         (*before.faults, *best.faults, *filter(None, [train.failures])),
     )
 
@@ -215,9 +224,8 @@ def _rejected(validate: WindowResiduals | None, best: ParameterFit, start: Setti
     before, after = validate.whitened([start, best.setting])
     if not np.isfinite(after).all():
         return "with it the FMU fails on the validation runs"
-    change = blocks(validate, after) - blocks(validate, before)
-    error = float(np.std(change, ddof=1) * np.sqrt(change.size)) if change.size > 1 else 0.0
-    worse = float(change.sum()) > WORSE * error and change.sum() > 0.0
+    change, error = change_of_squares(validate, before, after, {w.run for w in validate.windows})
+    worse = change > WORSE * error and change > 0.0
     return "with it the prediction error of the validation runs is larger" if worse else ""
 
 

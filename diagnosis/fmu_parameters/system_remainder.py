@@ -1,6 +1,6 @@
 """What a model leaves of the measurement: whether that is more than noise, and whether it matters."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -166,10 +166,17 @@ def _blocks(r: WindowResiduals, w: Window) -> int:
     return max(1, BLOCKS // sum(v.run == w.run for v in r.windows))
 
 
-def blocks(r: WindowResiduals, white: np.ndarray) -> np.ndarray:
-    """Sum of squares of whitened residuals (size,) in each block of time."""
-    found = []
-    for w, x in r.parts(white):
-        e = (x**2).reshape(w.measured.shape).sum(axis=1)
-        found += [part.sum() for part in np.array_split(e, _blocks(r, w))]
-    return np.array(found)
+def change_of_squares(
+    r: WindowResiduals, before: np.ndarray, after: np.ndarray, runs: Collection[str]
+) -> tuple[float, float]:
+    """Change of the sum of squares of whitened residuals (size,) in some runs, and its standard error.
+
+    The error is that of pairs, over blocks of time.
+    """
+    change = []
+    for (w, x), (_, y) in zip(r.parts(before), r.parts(after), strict=True):
+        if w.run in runs:
+            e = (y**2 - x**2).reshape(w.measured.shape).sum(axis=1)
+            change += [part.sum() for part in np.array_split(e, _blocks(r, w))]
+    error = np.std(change, ddof=1) * np.sqrt(len(change)) if len(change) > 1 else 0.0
+    return float(np.sum(change)), float(error)

@@ -194,6 +194,15 @@ class IsolatedInstance:
     def get_value(self, variable: FmuVariable) -> float:
         return float(self._call(f"getting {variable.name}", "get_value", variable.name))
 
+    def directional_derivative(self, unknown: Sequence[FmuVariable], known: FmuVariable) -> list[float]:
+        """Partial derivatives of variables by one, after initialisation.
+
+        Raises:
+            SimulationError: the FMU refuses.
+        """
+        what, references = "fmi2GetDirectionalDerivative", [v.reference for v in unknown]
+        return list(self._call(what, "directional_derivative", references, known.reference))
+
     def set_up(self, stop: float) -> None:
         self._call("fmi2SetupExperiment", "set_up", stop)
 

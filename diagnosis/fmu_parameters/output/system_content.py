@@ -97,6 +97,12 @@ class CalibrationReport:
             text += f" The fitted values are rejected: {r.rejected}."
         return text
 
+    def _change(self, run: str) -> dict[str, Any]:
+        if run not in self.result.changes:
+            return {}
+        squares, error = self.result.changes[run]
+        return {"change": {"squares": squares, "standard_error": error}}
+
     def content(self) -> dict[str, Any]:
         """``diagnosis.json``."""
         r = self.result
@@ -132,6 +138,7 @@ class CalibrationReport:
                         n: {"before": before, "after": after, "unit": self.units[n]}
                         for n, (before, after) in each.items()
                     },
+                    **self._change(run),
                 }
                 for run, each in r.errors.items()
             ],

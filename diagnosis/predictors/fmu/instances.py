@@ -92,6 +92,16 @@ class FmuRun:
         rows = np.frombuffer(told).reshape(-1, len(self.outputs))
         return np.array([self._finite(row, k) for k, row in enumerate(rows)])
 
+    def slopes(self, unknown: Sequence[str], known: Sequence[str]) -> np.ndarray:
+        """(u, k), partial derivatives after :meth:`initialise`.
+
+        Raises:
+            SimulationError: the FMU refuses.
+        """
+        of = [self._variables[n] for n in unknown]
+        columns = [self._instance.directional_derivative(of, self._variables[n]) for n in known]
+        return np.array(columns).reshape(len(known), len(unknown)).T
+
     def _told(self, k: int) -> np.ndarray:
         told = np.array(self._memory.values[self._count : self._count + len(self.outputs)])
         return self._finite(told, k)

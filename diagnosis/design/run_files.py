@@ -1,0 +1,86 @@
+"""The files of a planned run that a simulation or a real ship takes: scenario, and table of commands."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.scenario import find_scenario
+
+from ..predictors.black_box import POSE, TAU
+from ..report.formatting import as_json
+from .designing import Designer, ScoredPlan
+
+STEP = 0.02  # s, times the time scale: base step of the scenarios
+TARGET = [f"{axis}_t{order}" for order in ("", "_dot", "_ddot") for axis in ("x", "y", "psi")]
+MEASURED = ["observer.x_m", "observer.y_m", "observer.psi_m"]
+
+
+def scenario_file(n: int) -> str:
+    return f"scenario_{n}.json"
+
+
+def commands_file(n: int) -> str:
+    return f"commands_{n}.csv"
+
+
+def picture_file(n: int) -> str:
+    return f"track_{n}.png"
+
+
+def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: str | None) -> None:
+    """Write the scenario of a run, and its set points or orders, which a real ship can take.
+
+    With set points, the columns tau_X, tau_Y and tau_N are the force that the likeliest model needs:
+    feed-forward. With orders, the track is that of this model.
+    """
+    h = STEP * d.scale
+    fine = d.motion(found.steps, found.size, h)
+    orders = d.orders
+    if orders is None:
+        parts = [fine.eta_dot, fine.eta_ddot, fine.thrust(d.model)]
+        given, names, header = "controller", TARGET, [*TARGET, *TAU]
+    else:
+        assert fine.orders is not None
+        parts, given, names = [fine.orders], "thrusters", orders.names
+        header = [*POSE, *names]
+    table = np.column_stack([fine.time, fine.eta, *parts])
+    header = ",".join(["time", *header])
+    np.savetxt(folder / commands_file(number), table, "%.7g", delimiter=",", header=header, comments="")
+    content = _open_loop() if orders is not None else _closed_loop()
+    x, y, psi = map(float, fine.eta[0])
+    noise = [float(s) for s in d.data[0].smoothed.noise]
+    content["fmus"]["vessel"]["parameters"] = {"x_0": x, "y_0": y, "psi_0": psi}
+    content |= {
+        "name": f"next_{number}",
+        "description": "Designed by cybership next",
+        "step": h,
+        "stop": round(round(d.limits.seconds / h) * h, 9),
+        "recordings": [{"path": commands_file(number), "inputs": {f"{given}.{n}": n for n in names}}],
+        "faults": [{"kind": "noise", "signals": MEASURED, "std": noise}],
+        "metrics": {},
+    }
+    if ship is not None:
+        content["ship"] = ship
+    (folder / scenario_file(number)).write_text(as_json(content) + "\n", encoding="utf-8")
+
+
+def _closed_loop() -> dict[str, Any]:
+    """A scenario in which a controller follows recorded set points."""
+    content = json.loads(find_scenario("ellipse").read_text(encoding="utf-8"))
+    del content["fmus"]["guidance"]
+    connections = [c for c in content["connections"] if not c[0].startswith("guidance.")]
+    return content | {
+        "connections": connections,
+        "roles": {"target": [f"controller.{n}" for n in TARGET[:3]]},
+    }
+
+
+def _open_loop() -> dict[str, Any]:
+    """A scenario in which the thrusters follow recorded orders."""
+    content = json.loads(find_scenario("kvlcc2_zigzag").read_text(encoding="utf-8"))
+    del content["fmus"]["guidance"]
+    content["fmus"]["thrusters"]["parameters"] = {}
+    kept = [c for c in content["connections"] if not any(name.startswith("guidance.") for name in c)]
+    return content | {"connections": kept}
