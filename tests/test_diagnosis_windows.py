@@ -16,6 +16,7 @@ from diagnosis import InputError, Model, Windows, clean, read, smooth
 from diagnosis.predictors import DescribedShip
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.predictors.weak_form import HORIZON
+from diagnosis.predictors.windows import free_runs
 
 # The first window starts where the smoother sees one side only: a velocity error of a millimetre a second.
 POSITION, HEADING, USUAL = 6e-3, 4e-3, 1.5e-3
@@ -247,6 +248,9 @@ def test_half_the_power_is_half_the_force():
     weaker = replace(full, power=np.tile([0.5, 0.25], (base().time.size, 1)))
     thrusters = {"plant_F_vsp": 0.5 * 1.165, "plant_F_bow": 0.25 * 2.629}
     assert rms(windows_of(weaker)) == pytest.approx(rms(windows_of(full), thrusters=thrusters), rel=1e-9)
+    runs = (weaker, Model()), (full, Model(thrusters=thrusters))
+    free, by_thrusters = (free_runs(smooth(clean(r)), [m])[1][0] for r, m in runs)
+    assert free == pytest.approx(by_thrusters, abs=1e-9), "of one model, in plain numbers"
 
 
 def test_unknown_parameter_names_the_nearest():
