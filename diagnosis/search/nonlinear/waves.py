@@ -91,8 +91,7 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     at = float(frequency[found.row])
     near = np.abs(frequency - at) < at / 2.0
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
-    at_peak = segments[max(found.row - 1, 0) : found.row + 2, found.axis].max(axis=0)
-    lasting = int(np.count_nonzero(at_peak > level[found.row, found.axis]))
+    lasting = segments_above(segments, found, level)
     rare = any(2.0 * at * command_interval(s.track.run) > 1.0 for s in runs)
     return Waves(
         2.0 * np.pi * at,
@@ -188,6 +187,12 @@ def peak(
     height = np.where(band & above, power / np.maximum(level, np.finfo(float).tiny), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
+
+
+def segments_above(segments: np.ndarray, found: Peak, level: np.ndarray) -> int:
+    """In how many of the spectra (m, 3, segments) a peak is above the spectrum around (m, 3)."""
+    at_peak = segments[max(found.row - 1, 0) : found.row + 2, found.axis].max(axis=0)
+    return int(np.count_nonzero(at_peak > level[found.row, found.axis]))
 
 
 def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.ndarray:
