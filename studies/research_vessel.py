@@ -164,8 +164,11 @@ def sensors(report: Report, trials: Sequence[tuple[Run, Examined]]) -> None:
         report.items([*others, *examined.notes])
 
 
-def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: bool) -> Path:
-    """Repair the trials, learn from their manoeuvres, some left out in turn, and write what came out."""
+Trials = list[tuple[Run, Examined]]
+
+
+def manoeuvres(data: Path) -> tuple[list[Run], Model, Trials]:
+    """The manoeuvres of the repaired trials, the ship with the place of its antenna, and the trials."""
     ship = ship_with((), "gunnerus")
     trials = []
     for name in MANOEUVRES:
@@ -173,8 +176,14 @@ def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: boo
         trials.append((run, examine(run, ship.scale)))
     places = [f.value for _, e in trials for f in e.findings if (f.channel, f.kind) == ("x", "place")]
     ahead = AHEAD + (float(np.mean(places)) if places else 0.0)
-    model = Model(vessel={"marker_offset_dx": ahead}, ship=ship)
     parts = [p for run, e in trials for p in cut(run, e, MANOEUVRES[run.name])]
+    return parts, Model(vessel={"marker_offset_dx": ahead}, ship=ship), trials
+
+
+def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: bool) -> Path:
+    """Repair the trials, learn from their manoeuvres, some left out in turn, and write what came out."""
+    parts, model, trials = manoeuvres(data)
+    ahead = model.vessel["marker_offset_dx"]
     parts = parts[::3] if quick else parts
     runs = diagnosis.gather(parts, model=model, anyway=True, horizon=HORIZON)
     report = Report(out, titled("R/V Gunnerus: sea trial", by))

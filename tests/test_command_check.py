@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis import Model, Run
-from diagnosis.assessment.command_check import beyond_thrusters
+from diagnosis.assessment.command_check import beyond_thrusters, lasting
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors.thrust import full_thrust
 
@@ -66,3 +66,10 @@ def test_a_cell_that_is_larger_but_does_not_matter_is_not_the_one_named(axis):
     text = beyond_thrusters(run_of(ratios), MODEL)
     assert text.split(maxsplit=1)[0].endswith("XYN"[other])
     assert "in 20 of 400 rows" in text
+
+
+def test_a_force_that_lasts_is_counted_and_one_that_averages_out_is_not():
+    block = np.repeat(np.arange(6), 40)
+    gusts = np.random.default_rng(1).standard_normal((block.size, 3))
+    assert (lasting(gusts, block) < 2.0 * np.sqrt(1.0 / 40.0)).all(), "of a standard deviation of 1"
+    assert lasting(gusts + np.array([2.0, -1.0, 0.0]), block)[:2] == pytest.approx([2.0, 1.0], rel=0.1)

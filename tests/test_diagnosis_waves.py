@@ -11,11 +11,13 @@ from diagnosis.predictors import Model
 from diagnosis.search.nonlinear.waves import (
     BAND,
     PEAK,
+    Peak,
     command_interval,
     find_waves,
     followed,
     inside,
     peak,
+    segments_above,
 )
 
 MASS = Model().reference_mass
@@ -104,3 +106,13 @@ def test_the_flank_of_a_slow_motion_is_no_peak(line, found):
     assert (highest.height > PEAK) == found
     if found:
         assert frequency[highest.row] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_burst_is_above_the_spectrum_in_one_segment_and_waves_are_in_most():
+    drawn = np.random.default_rng(3).exponential(size=(126, 3, 6))
+    level, at = np.ones((126, 3)), Peak(12, 1, 20.0)
+    drawn[11:14, 1] *= 0.1  # quiet but for one
+    drawn[12, 1, 2] = 100.0
+    assert segments_above(drawn, at, level) == 1
+    drawn[12, 1] = 20.0 * np.random.default_rng(4).exponential(size=6)
+    assert segments_above(drawn, at, level) >= 5

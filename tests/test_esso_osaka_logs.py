@@ -8,15 +8,17 @@ import pytest
 from support.measured import DATA
 from test_diagnosis_commands import run
 
-from diagnosis import propose_columns
-from diagnosis.predictors import ship_with
-from diagnosis.runs import prepare
+from diagnosis import Model, propose_columns
+from diagnosis.assessment.command_check import contradicted_commands
+from diagnosis.predictors import ship_with, weak_windows
+from diagnosis.runs import prepare, read_frame
 from diagnosis.runs.measured_channels import channels_of
 
 ESSO = DATA / "esso_osaka"
 # The shortest of three kinds, one whose receiver repeats poses, and one that ends with a minute of zero
 # commands in which the tanker accelerates. All 31 are read likewise, in three minutes.
 HELD, UNLOGGED = "berthing_12-Nov-2020_11_14_47", "random_31-Jul-2020_14_52_18"
+DRIFT = "random_06-Aug-2020_16_24_25_6"  # ends with 49 s at rest in the wind, with zero commands
 RUNS = [
     "berthing_12-Nov-2020_13_37_05",
     HELD,
@@ -34,10 +36,13 @@ NAMES = POSE | {
 }
 
 
-@pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not ESSO.is_dir(), reason=f"no measured runs in {ESSO}"),
+]
+
+
 def test_one_side_car_for_all(tmp_path):
-    if not ESSO.is_dir():
-        pytest.skip(f"no measured runs in {ESSO}")
     paths = [tmp_path / f"{name}.csv" for name in RUNS]
     for path in paths:
         path.write_bytes((ESSO / path.name).read_bytes())
@@ -57,3 +62,11 @@ def test_one_side_car_for_all(tmp_path):
         assert (min(rates[name] for name in POSE) < 9.9) == (path.stem == HELD)
     (unusable,) = " ".join(shown.split()).split("not usable yet: ")[1:]
     assert unusable.startswith(f"run '{UNLOGGED}': all commands are zero for ")
+
+
+@pytest.mark.parametrize(("name", "asked"), [(DRIFT, False), (UNLOGGED, True)])
+def test_a_drift_in_the_measured_wind_is_no_missing_command(name, asked):
+    craft, table = ship_with((), "esso_osaka"), pd.read_csv(ESSO / f"{name}.csv")
+    frame = pd.DataFrame({signal: table[column] for signal, column in NAMES.items()})
+    w = weak_windows(prepare(read_frame(frame, of=craft), craft).smoothed)
+    assert bool(contradicted_commands(w, Model(ship=craft))) is asked

@@ -105,11 +105,25 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
                 f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
                 "if nothing was commanded there, give it a column of zeros"
             )
-    return _moves_on(w, model, size)
+    return _moves_on(w, model, lasting(z, w.block))
+
+
+def lasting(force: np.ndarray, block: np.ndarray) -> np.ndarray:
+    """RMS (3,) of the mean of a force (K, 3) [N, N, N m] over the windows of each block (K,).
+
+    A command lasts, so its force does; gusts over the measured wind and noise average out.
+    """
+    _, at = np.unique(block, return_inverse=True)
+    mean = np.stack([np.bincount(at, f) for f in force.T], axis=1) / np.bincount(at)[:, None]
+    return np.sqrt((mean[at] ** 2).mean(axis=0))
 
 
 def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
-    """A clause about a ship that goes on as before while all of its commands are zero."""
+    """A clause about a ship that goes on as before while all of its commands are zero.
+
+    What it needs is compared with the usual size (3,) of it, both as :func:`lasting` and in excess of
+    the measured wind.
+    """
     s, tau = w.smoothed, w.run.tau_cmd
     # Beyond a limit it is a command, though it gives no force; a rudder has one under way.
     given = np.abs(tau if w.run.commands is None else w.run.commands)
@@ -120,7 +134,7 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     idle = (every.held @ given).max(axis=1) == 0.0
     if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
-    still = np.sqrt((needed_force(every, model)[idle] ** 2).mean(axis=0))
+    still = lasting(needed_force(every, model)[idle], every.block[idle])
     if (still < SETTINGS.explained * size).any():
         return None
     return (

@@ -40,9 +40,10 @@ class Waves:
         peak: frequency [rad/s].
         force: standard deviation of the horizontal force around the peak [N].
         share: of the model error's power, on the axis where they stand out most.
-        confidence: share of bootstrap replicates in which they stand out; at most (n + 1) / (n + 2) of n
-            segments (rule of succession): what was seen in few may be by chance; at most one half
-            where commands were recorded less than twice in a period: forces in between look the same.
+        confidence: share of bootstrap replicates in which they stand out; at most (k + 1) / (n + 2),
+            with k of n segments above the spectrum around (rule of succession): what was seen in few
+            may be by chance, and waves last, where a burst does not; at most one half where commands
+            were recorded less than twice in a period: forces in between look the same.
     """
 
     peak: float
@@ -91,12 +92,13 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     at = float(frequency[found.row])
     near = np.abs(frequency - at) < at / 2.0
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
+    lasting = segments_above(segments, found, level)
     rare = any(2.0 * at * command_interval(s.track.run) > 1.0 for s in runs)
     return Waves(
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        min(float(np.mean(heights >= least)), (count + 1) / (count + 2), 0.5 if rare else 1.0),
+        min(float(np.mean(heights >= least)), (lasting + 1) / (count + 2), 0.5 if rare else 1.0),
     )
 
 
@@ -186,6 +188,12 @@ def peak(
     height = np.where(band & above, power / np.maximum(level, np.finfo(float).tiny), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
+
+
+def segments_above(segments: np.ndarray, found: Peak, level: np.ndarray) -> int:
+    """In how many of the spectra (m, 3, segments) a peak is above the spectrum around (m, 3)."""
+    at_peak = segments[max(found.row - 1, 0) : found.row + 2, found.axis].max(axis=0)
+    return int(np.count_nonzero(at_peak > level[found.row, found.axis]))
 
 
 def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.ndarray:

@@ -3,7 +3,6 @@
 Windows, start states, samples and errors are those of :class:`diagnosis.Windows`; the law is another's.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -14,6 +13,7 @@ from fmus.ops import wrap
 from fmus.signals import Force
 from fmus.vessel.vessel import State, nominal
 
+DELAYS = (0.0, 0.4)  # s, of the commands; a search goes on beyond the last
 UNSURE = 3.0  # times the median standard deviation of acceleration: there none is known; chosen
 
 
@@ -146,46 +146,36 @@ def mean_commands(smoothed: Smoothed, start: np.ndarray, h: float) -> np.ndarray
     return (at(edges, sums, start + h) - at(edges, sums, start)) / h
 
 
-class Held:
-    """Runs that a law is held against, in the project's windows.
-
-    Args:
-        runs: smoothed.
-        length: of the windows [s].
-    """
-
-    def __init__(self, runs: Sequence[Smoothed], length: float) -> None:
-        self.runs, self.windows = runs, Windows(runs, length)
-
-    def errors(self, law: Law) -> tuple[float, float]:
-        """Root mean square errors of position [m] and heading [rad] over all windows."""
-        w, h = self.windows, law.h
-        steps = int(np.ceil(w.length / h - 1e-6))
-        back = h * np.arange(1 - law.lags, 1)
-        parts = [(smoothed, w.start[w.run == k]) for k, smoothed in enumerate(self.runs)]
-        ahead = h * np.arange(1 - law.lags, steps)
-        given = np.concatenate(
-            [mean_commands(s, start + ahead[:, None] - law.delay, h) for s, start in parts], axis=1
-        )
-        nu = np.concatenate([at(s.time, s.nu, start + back[:, None]) for s, start in parts], axis=1)
-        eta = np.concatenate([at(s.time, s.eta, start) for s, start in parts])
-        nu = np.where(np.isfinite(nu), nu, nu[-1:])  # before the first sample: as at the start
-        poses = [eta]
-        with np.errstate(all="ignore"):
-            for k in range(steps):
-                after = np.clip(np.nan_to_num(law.step(nu, given[k : k + law.lags]), nan=1e6), -1e6, 1e6)
-                poses.append(moved(poses[-1], 0.5 * (nu[-1] + after), h))
-                nu = np.concatenate([nu[1:], after[None]])
-            return self._over_all(np.array(poses), w.since / h)
-
-    def _over_all(self, poses: np.ndarray, place: np.ndarray) -> tuple[float, float]:
-        w = self.windows
-        k = np.clip(np.floor(place + 1e-6).astype(int), 0, len(poses) - 2)
-        low, high = poses[k, w.sample_window], poses[k + 1, w.sample_window]
+def law_residuals(law: Law, w: Windows) -> np.ndarray:
+    """Measured minus predicted pose (samples, 3) [m, m, rad] of windows, by a law."""
+    h, runs = law.h, enumerate(w.runs)
+    steps = int(np.ceil(w.length / h - 1e-6))
+    parts = [(smoothed, w.start[w.run == k]) for k, smoothed in runs]
+    back, ahead = h * np.arange(1 - law.lags, 1), h * np.arange(1 - law.lags, steps)
+    given = np.concatenate(
+        [mean_commands(s, start + ahead[:, None] - law.delay, h) for s, start in parts], axis=1
+    )
+    nu = np.concatenate([at(s.time, s.nu, start + back[:, None]) for s, start in parts], axis=1)
+    eta = np.concatenate([at(s.time, s.eta, start) for s, start in parts])
+    nu = np.where(np.isfinite(nu), nu, nu[-1:])  # before the first sample: as at the start
+    poses, place = [eta], w.since / h
+    with np.errstate(all="ignore"):
+        for k in range(steps):
+            after = np.clip(np.nan_to_num(law.step(nu, given[k : k + law.lags]), nan=1e6), -1e6, 1e6)
+            poses.append(moved(poses[-1], 0.5 * (nu[-1] + after), h))
+            nu = np.concatenate([nu[1:], after[None]])
+        k = np.clip(np.floor(place + 1e-6).astype(int), 0, steps - 1)
+        track = np.array(poses)
+        low, high = track[k, w.sample_window], track[k + 1, w.sample_window]
         residuals = w.measured - (low + (place - k)[:, None] * (high - low))
         residuals[:, 2] = wrap(residuals[:, 2])
-        position, heading = w.summary(residuals).over_all()
-        return float(position), float(heading)
+    return residuals
+
+
+def law_errors(law: Law, w: Windows) -> tuple[float, float]:
+    """Root mean square errors of position [m] and heading [rad] over all windows."""
+    position, heading = w.summary(law_residuals(law, w)).over_all()
+    return float(position), float(heading)
 
 
 def moved(eta: np.ndarray, nu: np.ndarray, h: float) -> np.ndarray:

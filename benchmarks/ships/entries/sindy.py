@@ -8,13 +8,14 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from diagnosis import Smoothed
 
-from .same_windows import Continuous, Nominal, table
+from ..chosen_settings import searched
+from ..same_windows import DELAYS, Continuous, Nominal, table
 
 STEP = 0.2  # s
 FASTEST = 1e3  # m/s, rad/s; beyond it the prediction is lost
 SETTINGS = {
     "inputs": ("forces", "commands"),
-    "delay": (0.0, 0.4),
+    "delay": DELAYS,
     "library": ("linear", "drag", "cubic"),
     "threshold": (0.0, 0.02, 0.1),
     "derivative": ("own", "smoothed differences"),
@@ -40,7 +41,7 @@ def columns(library: str, x: np.ndarray) -> np.ndarray:
     return np.hstack([polynomials, np.abs(x) * x]) if drag else polynomials
 
 
-def fit(
+def law(
     runs: Sequence[Smoothed],
     nominal: Nominal,
     inputs: str,
@@ -81,3 +82,6 @@ def fit(
         return columns(library, np.hstack([nu, nominal.inputs(inputs, nu, given)])) @ factors
 
     return Continuous(acceleration, STEP, delay)
+
+
+fit = searched("sindy", law, SETTINGS)

@@ -14,7 +14,8 @@ from sysidentpy.parameter_estimation import LeastSquares
 
 from diagnosis import Smoothed
 
-from .same_windows import Nominal, table
+from ..chosen_settings import searched
+from ..same_windows import Nominal, table
 
 SETTINGS = {
     "inputs": ("forces", "commands"),
@@ -66,7 +67,7 @@ class Narx:
         return np.column_stack(found)
 
 
-def fit(
+def law(
     runs: Sequence[Smoothed], nominal: Nominal, inputs: str, h: float, lags: int, degree: int
 ) -> Narx:
     """Models of the next velocity from the last ones and the last inputs.
@@ -101,3 +102,6 @@ def fit(
         model.fit(X=others, y=rows[:, [axis]])
         models.append((np.asarray(model.final_model), np.asarray(model.theta).ravel()))
     return Narx(models, nominal, inputs, h, lags)
+
+
+fit = searched("narx", law, SETTINGS)

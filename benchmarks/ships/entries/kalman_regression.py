@@ -14,12 +14,13 @@ import numpy as np
 
 from diagnosis import Smoothed
 
-from .same_windows import Continuous, Nominal, Table, moved, table
+from ..chosen_settings import searched
+from ..same_windows import DELAYS, Continuous, Nominal, Table, moved, table
 
 STEP = 0.2  # s
 SETTINGS = {
     "inputs": ("forces", "commands"),
-    "delay": (0.0, 0.4),
+    "delay": DELAYS,
     "terms": ("linear", "quadratic", "cubic"),
     "process": (0.02, 0.1),  # m/s2, m/s2, rad/s2 that the predictor may be off by, over a step
 }
@@ -78,7 +79,7 @@ def regressors(terms: str, nu: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     return np.column_stack([*columns, inputs, np.ones_like(u)])
 
 
-def fit(
+def law(
     runs: Sequence[Smoothed],
     nominal: Nominal,
     inputs: str,
@@ -115,10 +116,10 @@ def fit(
         factors = np.linalg.lstsq(np.vstack(left), np.vstack(right), rcond=None)[0]
         return Continuous(partial(acceleration, factors), STEP, delay)
 
-    law = fitted([by_nominal(r, nominal, process) for r in runs])
+    found = fitted([by_nominal(r, nominal, process) for r in runs])
     for _ in range(passes - 1):
-        law = fitted([smoothed_velocity(law, t, process) for t in tables])
-    return law
+        found = fitted([smoothed_velocity(found, t, process) for t in tables])
+    return found
 
 
-final = partial(fit, passes=2)
+fit = searched("kalman_regression", law, SETTINGS, final=partial(law, passes=2))

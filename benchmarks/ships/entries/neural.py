@@ -10,19 +10,19 @@ from sklearn.preprocessing import StandardScaler
 
 from diagnosis import Smoothed
 
-from .chosen_settings import SEED
-from .same_windows import Continuous, Nominal, table
+from ..chosen_settings import SEED, searched
+from ..same_windows import DELAYS, Continuous, Nominal, table
 
 STEP = 0.2  # s
 SETTINGS = {
     "inputs": ("forces", "commands"),
-    "delay": (0.0, 0.4),
+    "delay": DELAYS,
     "hidden": ((16,), (32, 32)),
     "alpha": (1e-2, 10.0),
 }
 
 
-def fit(
+def law(
     runs: Sequence[Smoothed],
     nominal: Nominal,
     inputs: str,
@@ -61,3 +61,6 @@ def fit(
         return nominal.acceleration(nu, given) + network.predict(np.clip(features, -1e6, 1e6))
 
     return Continuous(acceleration, STEP, delay)
+
+
+fit = searched("neural", law, SETTINGS)

@@ -1,0 +1,180 @@
+"""Methods on measured ships: ``python -m benchmarks.ships DATA``.
+
+DATA has a folder for each data set (``--datasets``). The runs of each fold are left out in turn. Every
+method learns from all others and predicts these in the same windows, from the same start states. An
+installed package adds a method by an entry point of the group ``cybership.methods``.
+"""
+
+import argparse
+import json
+import resource
+import warnings
+from collections.abc import Iterator, Sequence
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, entry_points, version
+from math import degrees
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+import cosim
+from cosim.command import complain, run_command
+from cosim.errors import nearest
+from diagnosis import Windows
+from studies.study_report import Report
+
+from .chosen_settings import SEED
+from .datasets import DATASETS, DataSet, Runs
+from .predictor import Entry, Score, Training, score, spread
+
+GROUP = "cybership.methods"
+# Own entries, each with the package that it needs beside the project's.
+OWN = {
+    "nominal": "",
+    "steady": "",
+    "calibration": "",
+    "learn": "",
+    "ridge": "",
+    "narx": "sysidentpy",
+    "sindy": "pysindy",
+    "kalman_regression": "",
+    "neural": "scikit-learn",
+}
+
+
+def entry(name: str) -> Entry | None:
+    """The entry of a name; None: it needs a package that is not installed.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name in OWN:
+        try:
+            return import_module(f".entries.{name}", __package__).fit
+        except ModuleNotFoundError:
+            complain(f"'{name}' is left out: it needs {OWN[name]}", kind="")
+            return None
+    found = entry_points(group=GROUP, name=name)
+    if not found:
+        known = [*OWN, *(e.name for e in entry_points(group=GROUP))]
+        raise cosim.InputError(f"no entry '{name}'{nearest(name, known)}")
+    return next(iter(found)).load().fit
+
+
+def seconds() -> float:
+    """Processor time of this process and of those that it has started [s]."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
+def answers(data: DataSet, loaded: Runs, fit: Entry) -> Iterator[tuple[str, list[Score], float]]:
+    """Of each run, left out with its fold: its scores by horizon, and the time of the fit [s]."""
+    runs, model = loaded
+    for out in data.split(runs):
+        begin = seconds()
+        rest = [w for w in runs if w not in out]
+        predictor = fit(Training(rest, model, data.horizons[-1]))
+        took = seconds() - begin
+        usual = [spread(predictor, [*_windows(rest, h)]) for h in data.horizons]
+        for w in out:
+            scores = [
+                score(predictor, own, std)
+                for h, std in zip(data.horizons, usual, strict=True)
+                for own in _windows([w], h)
+            ]
+            yield w.run.name, scores, took
+
+
+def _windows(runs: Sequence, horizon: float) -> Iterator[Windows]:
+    """The windows of each run that has some."""
+    for w in runs:
+        try:
+            yield Windows([w.smoothed], horizon)
+        except cosim.InputError:
+            continue
+
+
+def rows(folder: Path, horizon: int) -> Iterator[list[str]]:
+    """Of each method with answers in a folder: means over the runs in windows of a horizon."""
+    read = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
+
+    def scores(name: str, runs: Sequence[str]) -> np.ndarray:
+        return np.array([read[name][r]["scores"][horizon] for r in runs])
+
+    for name, found in sorted(read.items(), key=lambda item: [*OWN, item[0]].index(item[0])):
+        runs = [r for r in found if len(found[r]["scores"]) > horizon]
+        own = scores(name, runs)
+        position, heading = np.exp(np.mean(np.log(own[:, :2]), axis=0))
+        falls = ["–", "–"]
+        if {*runs} <= {*read.get("nominal", {})}:
+            ratio = scores("nominal", runs)[:, :2] / own[:, :2]
+            falls = [f"{x:.2f}x" for x in np.exp(np.mean(np.log(ratio), axis=0))]
+        took = np.mean([found[r]["seconds"] for r in runs])
+        cells = [f"{position:.3g}", f"{degrees(heading):.3g}", *falls]
+        likelihood, inside = own[:, 2:].mean(axis=0)
+        yield [name, str(len(runs)), *cells, f"{likelihood:.3g}", f"{100 * inside:.0f}", f"{took:.3g}"]
+
+
+def write(folder: Path, names: Sequence[str]) -> Path:
+    """The report of all answers in a folder; its path."""
+    report = Report(folder, "Methods on measured ships", [SEED])
+    packages = {p for p in ("sysidentpy", "pysindy", "scikit-learn") if _version(p)}
+    report.text(
+        """Errors in windows of runs that were left out of the training: geometric means over the runs,
+        and of the errors of the nominal model over own ones. NLL: negative log likelihood of the poses,
+        mean over the samples. Inside: positions and headings inside the bands of 90 %. Time: of the
+        processor for a fit, search included. A method that states no uncertainty has that of its errors
+        in training. """
+        f"{', '.join(f'{p} {_version(p)}' for p in sorted(packages))}."
+    )
+    head = ["method", "runs", "position [m]", "heading [°]", "position", "heading", "NLL", "inside [%]"]
+    for name in names:
+        data = DATASETS[name]
+        for k, horizon in enumerate(data.horizons):
+            if found := [*rows(folder / name, k)]:
+                report.heading(f"{name}, {horizon:g} s")
+                report.text(f"Data: {data.source}. Licence: {data.licence}.")
+                report.table([*head, "time [s]"], found)
+    return report.write()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.ships", description=__doc__)
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder with a folder for each data set")
+    parser.add_argument("--datasets", nargs="+", choices=[*DATASETS], default=[*DATASETS], help="(all)")
+    parser.add_argument(
+        "--methods", nargs="+", default=[*OWN], metavar="NAME", help="entries (own ones)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("results/ships"), help="folder of answers and report"
+    )
+    options = parser.parse_args(arguments)
+    warnings.simplefilter("ignore")  # of fits that fail, which the search sees
+    with threadpool_limits(1):
+        for dataset in options.datasets:
+            folder = options.out / dataset
+            folder.mkdir(parents=True, exist_ok=True)
+            loaded = DATASETS[dataset].load(options.data)
+            for name in options.methods:
+                if (fit := entry(name)) is None:
+                    continue
+                found = {}
+                for run, scores, took in answers(DATASETS[dataset], loaded, fit):
+                    print(f"{dataset}, {name}, without {run}: {scores}", flush=True)
+                    found[run] = {"scores": scores, "seconds": took}
+                (folder / f"{name}.json").write_text(json.dumps(found, indent=1) + "\n")
+    print(write(options.out, options.datasets).read_text())
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(main)

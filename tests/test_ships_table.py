@@ -1,0 +1,235 @@
+"""The table of methods: windows are the project's, what is left out stays left out, others can join."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+
+import numpy as np
+import pytest
+from support.cse1 import THREE
+from support.measured import DATA, needs_data, sail
+
+import diagnosis
+from benchmarks.ships import __main__ as ships
+from benchmarks.ships.chosen_settings import searched
+from benchmarks.ships.datasets import DATASETS, digest_of
+from benchmarks.ships.predictor import OfLaw, OfModel, Score, Training, score, spread
+from benchmarks.ships.same_windows import Continuous, Nominal, law_errors, moved, table
+from cosim import InputError
+from diagnosis import Model, Run
+from diagnosis.predictors.thrust import commanded_shares
+
+LENGTH = 8.0
+DAMPED = np.array([[-0.2, 0.0, 0.0], [0.0, -0.3, 0.05], [0.0, 0.1, -0.5]])
+PUSHED = np.array([[0.05, 0.0, 0.0], [0.0, 0.03, 0.01], [0.0, 0.02, 0.2]])
+
+
+def linear(nu, given):
+    return nu @ DAMPED.T + given @ PUSHED.T
+
+
+class Ignorant:
+    """Knows of no force, and takes commands for forces."""
+
+    def inputs(self, kind, nu, given):
+        return given
+
+    def acceleration(self, nu, given):
+        return np.zeros_like(nu)
+
+
+@cache
+def toy(seed):
+    """A smoothed run of a ship that is linear."""
+    h, rng = 0.05, np.random.default_rng(seed)
+    time = np.arange(0.0, 48.0, h)
+    omega, phase = rng.uniform(0.2, 1.5, (3, 4)), rng.uniform(0.0, 6.3, (3, 4))
+    given = 0.4 * np.sin(omega * time[:, None, None] + phase).sum(axis=2)
+    law, nu, eta = Continuous(linear, h), np.zeros((1, 3)), np.zeros((1, 3))
+    poses = []
+    for c in given:
+        poses.append(eta[0])
+        after = law.step(nu[None], c[None, None])
+        nu, eta = after, moved(eta, 0.5 * (nu + after), h)
+    pose = np.array(poses) + rng.normal(0.0, 1e-4, (time.size, 3))
+    pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
+    run = Run(f"toy{seed}", time, pose, given, commands=given, signals=THREE)
+    return diagnosis.smooth(diagnosis.clean(run))
+
+
+@cache
+def windows_of(seed):
+    return diagnosis.Windows([toy(seed)], LENGTH)
+
+
+def steady_error():
+    return law_errors(Continuous(lambda nu, given: 0.0 * nu, 0.1), windows_of(3))
+
+
+def test_nominal_model_misses_by_what_the_project_says():
+    run, _ = sail(32.0, h=0.05)
+    run = replace(run, commands=commanded_shares(run, Model()), signals=THREE)
+    smoothed = diagnosis.smooth(diagnosis.clean(run))
+    wrong = Model(vessel={"X_u": -2.0, "N_r": -0.5})
+    windows = diagnosis.Windows([smoothed], LENGTH)
+    expected = windows.errors(wrong).over_all()
+    law = Continuous(Nominal(wrong, run.commands).acceleration, 0.05)
+    assert law_errors(law, windows) == pytest.approx(expected, rel=0.01)
+
+
+def test_law_that_is_true_predicts_and_one_that_is_not_does_not():
+    assert law_errors(Continuous(linear, 0.05), windows_of(3)) < (0.01, 0.02)
+    assert min(steady_error()) > 0.05
+
+
+def test_diverging_law_is_worse_than_any():
+    law = Continuous(lambda nu, given: 1e9 * nu, 0.1)
+    position, heading = law_errors(law, windows_of(3))
+    assert position > 1e3
+    assert heading > 0.5
+
+
+def test_table_has_the_motion_of_the_run():
+    t = table(toy(1), 0.2)
+    (part,) = t.parts
+    assert t.nu_dot[part] == pytest.approx(linear(t.nu, t.given)[part], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "package", "setting"),
+    [
+        ("narx", "sysidentpy", {"inputs": "commands", "h": 0.2, "lags": 2, "degree": 1}),
+        (
+            "sindy",
+            "pysindy",
+            {
+                "inputs": "commands",
+                "delay": 0.0,
+                "library": "linear",
+                "threshold": 0.0,
+                "derivative": "own",
+            },
+        ),
+        (
+            "kalman_regression",
+            "numpy",
+            {"inputs": "commands", "delay": 0.0, "terms": "linear", "process": 0.1},
+        ),
+        (
+            "ridge",
+            "numpy",
+            {"inputs": "commands", "delay": 0.0, "terms": "linear", "weight": 1.0},
+        ),
+        ("neural", "sklearn", {"inputs": "commands", "delay": 0.0, "hidden": (16,), "alpha": 1e-4}),
+    ],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_method_predicts_a_linear_ship(name, package, setting):
+    pytest.importorskip(package, reason=f"not in the extra dev: {package}")
+    law = import_module(f"benchmarks.ships.entries.{name}").law([toy(1), toy(2)], Ignorant(), **setting)
+    errors = law_errors(law, windows_of(3))
+    assert np.divide(errors, steady_error()).max() < (0.6 if name == "neural" else 0.1)
+
+
+@pytest.mark.parametrize("library", ["linear", "drag", "cubic"])
+def test_columns_are_those_of_the_library(library):
+    sindy = pytest.importorskip("benchmarks.ships.entries.sindy")
+    x = np.random.default_rng(1).normal(size=(20, 5))
+    theirs = sindy.functions(library).fit(x).transform(x)
+    assert sindy.columns(library, x) == pytest.approx(np.asarray(theirs))
+
+
+def training(*seeds):
+    runs = [diagnosis.predictors.weak_windows(toy(k)) for k in seeds]
+    return Training(runs, Model(), LENGTH)
+
+
+def test_runs_that_are_left_out_reach_no_fit_and_a_delay_is_searched_beyond_its_grid():
+    seen = []
+
+    def fit(runs, nominal, slower, delay):
+        seen.append({r.track.run.name for r in runs})
+        return Continuous(lambda nu, given: slower * linear(nu, given), 0.1, delay - 0.4)
+
+    found = searched("spy", fit, {"slower": (0.0, 1.0, 0.5), "delay": (0.0, 0.2)})(training(1, 2))
+    assert found.law.delay == pytest.approx(0.0), "0.4 s, beyond the grid"
+    assert seen[-1] == {"toy1", "toy2"}
+    assert {frozenset(names) for names in seen[:-1]} == {frozenset({"toy1"}), frozenset({"toy2"})}
+
+
+def test_uncertainty_counts():
+    """A method that states twice its error is as accurate, and less likely; one that states half too."""
+    predictor = OfLaw(Continuous(lambda nu, given: 0.0 * nu, 0.1))
+    usual = spread(predictor, [windows_of(3)])
+    right, wide, narrow = (score(predictor, windows_of(3), k * usual) for k in (1.0, 3.0, 0.3))
+    assert right[:2] == wide[:2] == narrow[:2] == pytest.approx(steady_error())
+    assert right.likelihood < min(wide.likelihood, narrow.likelihood)
+    assert narrow.inside < right.inside < wide.inside
+
+
+def test_bands_of_a_model_are_its_uncertainty():
+    class Sure:
+        at_samples = np.broadcast_to(1e-6 * np.eye(3), (*windows_of(3).measured.shape, 3))
+
+    run, _ = sail(32.0, h=0.05)
+    windows = diagnosis.Windows([diagnosis.smooth(diagnosis.clean(run))], LENGTH)
+    Sure.at_samples = np.broadcast_to(1e-6 * np.eye(3), (len(windows.measured), 3, 3))
+    wrong = OfModel(Model(vessel={"X_u": -2.0}), lambda smoothed, windows: Sure)
+    assert score(wrong, windows, np.ones((8, 3))).inside < 0.5
+    assert score(replace(wrong, bands=None), windows, np.ones((8, 3))).inside == 1.0
+
+
+def test_outsider_joins_by_an_entry_point(monkeypatch):
+    class Point:
+        name = "mine"
+
+        def load(self):
+            return import_module("benchmarks.ships.entries.steady")
+
+    def installed(group, name=None):
+        return [Point()] if group == "cybership.methods" and name in (None, "mine") else []
+
+    monkeypatch.setattr(ships, "entry_points", installed)
+    predictor = ships.entry("mine")(training(1, 2))
+    assert law_errors(predictor.law, windows_of(3)) == pytest.approx(steady_error(), rel=0.01)
+    with pytest.raises(InputError, match="no entry 'mind'; did you mean 'mine'"):
+        ships.entry("mind")
+
+
+def test_what_is_not_installed_is_reported_in_one_line(monkeypatch, capsys):
+    def missing(name, package):
+        raise ModuleNotFoundError(name)
+
+    monkeypatch.setattr(ships, "import_module", missing)
+    assert ships.entry("narx") is None
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == "'narx' is left out: it needs sysidentpy"
+
+
+def test_other_files_than_those_of_the_split_are_refused(tmp_path):
+    data = DATASETS["kvlcc2"]
+    with pytest.raises(InputError, match="get them: HSVA"):
+        data.load(tmp_path)
+    (tmp_path / data.folder).mkdir()
+    (tmp_path / data.folder / "z_1.csv").write_text("t\n")
+    with pytest.raises(InputError, match="not those of the split"):
+        data.load(tmp_path)
+
+
+@needs_data
+def test_hashes_are_those_of_the_public_files():
+    for data in DATASETS.values():
+        files = [f for pattern in data.files for f in (DATA / data.folder).glob(pattern)]
+        assert not files or digest_of(files) == data.digest, data.folder
+
+
+def test_table_compares_with_the_nominal_model(tmp_path):
+    folder = tmp_path / "cse1"
+    folder.mkdir()
+    for name, errors in {"nominal": (0.4, 0.2), "learn": (0.1, 0.4), "ridge": (0.3, 0.3)}.items():
+        found = {"scores": [Score(*errors, -1.0, 0.9)], "seconds": 2.0}
+        (folder / f"{name}.json").write_text(json.dumps({"a": found, "b": found}))
+    found = {name: cells for name, *cells in ships.rows(folder, 0)}
+    assert found["learn"] == ["2", "0.1", "22.9", "4.00x", "0.50x", "-1", "90", "2"]
+    assert "| ridge | 2 | 0.3 |" in ships.write(tmp_path, ["cse1"]).read_text()
