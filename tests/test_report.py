@@ -2,10 +2,7 @@
 
 import base64
 import html
-import os
 import re
-import shutil
-import subprocess
 from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -16,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support import reported
+from support.chromium import opened
 from support.cse1 import EFFECTS
 from support.measured import sail, smoothed
 from support.project import ROOT
@@ -43,7 +41,6 @@ from fmus.ships.naming import described_ship
 
 HIDDEN = {"thrust_curve_deadband": 0.1, "thrust_curve_astern": -0.3}
 EVIL = "<script>alert(1)</script> & $x_1$ \" id=\"body' onload='x"
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 @pytest.fixture(scope="module")
@@ -282,29 +279,7 @@ def test_dead_band_is_seen_in_its_shape(evaluations):
 @pytest.fixture
 def browser(tmp_path):
     """A function that runs headless Chromium without network, and gives what it printed."""
-    if BROWSER is None:
-        pytest.skip("no chromium, chromium-browser or google-chrome on the PATH")
-
-    def run(page, *options):
-        command = [
-            BROWSER,
-            "--headless",
-            "--disable-gpu",
-            "--hide-scrollbars",
-            "--enable-logging=stderr",
-            "--host-resolver-rules=MAP * ~NOTFOUND",
-            "--virtual-time-budget=5000",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            *(["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []),
-            *options,
-            page.as_uri(),
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-        assert done.returncode == 0, done.stderr
-        assert not re.findall(r".*CONSOLE.*", done.stderr)
-        return done.stdout
-
-    return run
+    return lambda page, *options: opened(page, tmp_path, *options)
 
 
 MEASURE = """<!DOCTYPE html><html><body style="margin:0"><iframe style="border:0;width:{width}px;height:800px"

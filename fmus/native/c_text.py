@@ -115,7 +115,7 @@ class Body:
     def _mark(self, statement: RecordedValue | Branch | Call) -> bool:
         """Note what a statement needs, if it is needed itself: for its value, or as it may fail."""
         if isinstance(statement, RecordedValue):
-            wanted = id(statement) in self.needed or _may_fail(statement)
+            wanted = id(statement) in self.needed or may_fail(statement)
             if wanted:
                 self.needed.add(id(statement))
                 self.need(statement.args)
@@ -157,7 +157,7 @@ class Body:
 
     def _operation(self, x: RecordedValue) -> Iterator[str]:
         args = [self.of(a) for a in x.args]
-        if _may_fail(x):
+        if may_fail(x):
             yield f"if ({args[1]} == 0.0) return 1;"
         if x.operation in INFIX:
             value = f"{args[0]} {INFIX[x.operation]} {args[1]}"
@@ -195,6 +195,6 @@ def _type(x: RecordedValue) -> str:
     return "int" if x.condition else "double"
 
 
-def _may_fail(x: RecordedValue) -> bool:
+def may_fail(x: RecordedValue) -> bool:
     """Whether Python might raise: on a division by what may be zero."""
     return x.operation == "div" and (isinstance(x.args[1], RecordedValue) or x.args[1] == 0.0)
