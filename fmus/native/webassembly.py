@@ -1,4 +1,4 @@
-"""Recordings as WebAssembly, without a compiler: an operation is an instruction or a function of ``Math``.
+"""Recordings as WebAssembly, without a compiler: operations are instructions or functions of ``Math``.
 
 A module has its own memory, in which each array has a fixed place. Its functions take no arguments: they
 read arrays and write arrays, and return 1 where a denominator is zero, else 0. The module imports
