@@ -19,6 +19,7 @@ from .glossary import linked
 from .headline import boundedness, finding_sentence, gain_of_search, headline, verdict_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
+from .what_if import what_if
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -90,6 +91,7 @@ def write_report(
         sentence=headline(data),
         gain=gain_of_search(data),
         pictures=drawn,
+        what_if=what_if(data),
         tiles=[*_tiles(data)],
         trials=[*trial_rows(data)],
         coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],

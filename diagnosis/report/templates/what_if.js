@@ -1,0 +1,300 @@
+"use strict";
+// Predicts the windows of a report again while a reader moves values of the model. All text of the data becomes
+// text of the page, never HTML. Units are SI: m, rad, s. An array of poses is x, y, psi of one step after the other.
+(async () => {
+  const NODES = 4; // of the interpolation between steps, as in the report
+  const POINTS = 24; // of a window's line in a picture
+  const STEPS = 8, ENOUGH = 1e-4, SECONDS = 1.3; // of a fit: at most, fall of the cost to end, time for a further step
+  const SMALL = 1e-3; // of a slider's length: step of a finite difference
+  const SVG = "http://www.w3.org/2000/svg";
+  const at = (id) => document.getElementById(`what-if-${id}`);
+  const say = (text) => { at("status").textContent = text; };
+
+  // The data.
+
+  async function unpacked(text) {
+    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const buffer = await new Response(stream).arrayBuffer();
+    const [head, size] = new Uint32Array(buffer, 0, 2);
+    const data = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, head)));
+    const module = new Uint8Array(buffer, 8 + head, size);
+    const { instance } = await WebAssembly.instantiate(module, { Math });
+    let place = 8 + head + size;
+    const arrays = data.arrays.map(({ count, scale }) => {
+      const width = scale ? 4 : 8;
+      const mixed = new Uint8Array(buffer, place, width * count);
+      place += width * count;
+      const rows = new Uint8Array(width * count);
+      for (let k = 0; k < count; k++) for (let j = 0; j < width; j++) rows[width * k + j] = mixed[count * j + k];
+      if (!scale) return new Float64Array(rows.buffer);
+      let slope = 0, value = 0; // second differences, modulo 2^32
+      return Float64Array.from(new Int32Array(rows.buffer), (x) => {
+        slope = (slope + x) | 0;
+        value = (value + slope) | 0;
+        return scale * value;
+      });
+    });
+    return { data, exports: instance.exports, arrays };
+  }
+
+  const { data, exports, arrays } = await unpacked(at("data").textContent);
+  const memory = (name, count) => new Float64Array(exports.memory.buffer, exports[name].value, count);
+  const params = memory("params", data.params.length), step = memory("h", 1), outputs = memory("outputs", 3);
+  const state = memory("state", 7), after = memory("after", 7);
+  const runs = data.runs.map((run) => {
+    const given = run.given.map((k) => arrays[k]), since = arrays[run.since];
+    const inputs = memory("inputs", data.start + given.length);
+    const [measured, track] = [run.measured, run.track].map((part) => part.map((k) => arrays[k]));
+    const nodes = Math.min(NODES, run.steps + 1);
+    const first = new Int32Array(since.length), shares = new Float64Array(NODES * since.length);
+    since.forEach((t, k) => {
+      const place = t / run.h;
+      first[k] = Math.min(Math.max(Math.floor(place + 1e-6) - 1, 0), Math.max(run.steps + 1 - NODES, 0));
+      for (let n = 1; n < nodes; n++) {
+        let share = 1;
+        for (let j = 0; j < nodes; j++) if (j !== n) share *= (place - first[k] - j) / (n - j);
+        shares[NODES * k + n] = share;
+      }
+    });
+    return { ...run, given, inputs, measured, track, begin: arrays[run.begin], first, shares, nodes };
+  });
+
+  // Predictions.
+
+  const wrapped = (angle) => angle + 2 * Math.PI * Math.floor((Math.PI - angle) / (2 * Math.PI));
+
+  // Poses of all windows of a run.
+  function predicted(run, values) {
+    const width = run.given.length, start = data.start, length = 3 * (run.steps + 1);
+    const poses = new Float64Array(length * run.windows).fill(Infinity);
+    params.set(values);
+    if (exports.prepare()) return poses;
+    for (let w = 0; w < run.windows; w++) {
+      let row = w * run.steps, to = w * length;
+      for (let j = 0; j < start; j++) run.inputs[j] = run.begin[start * w + j];
+      for (let j = 0; j < width; j++) run.inputs[start + j] = run.given[j][row];
+      if (exports.init()) continue;
+      for (step[0] = 0; !exports.step(); step[0] = run.h) {
+        poses[to] = outputs[0], poses[to + 1] = outputs[1], poses[to + 2] = outputs[2];
+        if ((to += 3) === (w + 1) * length) break;
+        for (let j = 0; j < 7; j++) state[j] = after[j];
+        for (let j = 0; j < width; j++) run.inputs[start + j] = run.given[j][row];
+        row++;
+      }
+    }
+    return poses;
+  }
+
+  // Measured less predicted pose at each sample, and their root mean squares by window and over all.
+  function compared(run, poses) {
+    const { first, shares, nodes, samples } = run, [x, y, psi] = run.measured;
+    const off = new Float64Array(3 * first.length), position = [], heading = [];
+    const all = [0, 0];
+    for (let w = 0, k = 0; w < run.windows; w++) {
+      let squares = 0, turns = 0;
+      for (const end = k + samples[w]; k < end; k++) {
+        const p = 3 * (w * (run.steps + 1) + first[k]);
+        let px = poses[p], py = poses[p + 1], turn = poses[p + 2];
+        for (let n = 1; n < nodes; n++) {
+          const share = shares[NODES * k + n];
+          px += share * (poses[p + 3 * n] - poses[p]);
+          py += share * (poses[p + 3 * n + 1] - poses[p + 1]);
+          turn += share * wrapped(poses[p + 3 * n + 2] - poses[p + 2]);
+        }
+        const dx = off[3 * k] = x[k] - px, dy = off[3 * k + 1] = y[k] - py, d = off[3 * k + 2] = wrapped(psi[k] - turn);
+        squares += dx * dx + dy * dy, turns += d * d;
+      }
+      position.push(Math.sqrt(squares / samples[w])), heading.push(Math.sqrt(turns / samples[w]));
+      all[0] += squares, all[1] += turns;
+    }
+    return { off, position, heading, all: all.map((sum) => Math.sqrt(sum / first.length)) };
+  }
+
+  const sliders = [];
+  for (const choice of data.choices) {
+    choice.sliders.forEach((s) => { s.choice = choice, s.value = s.after; });
+    if (!choice.fixed) sliders.push(...choice.sliders);
+  }
+
+  // The parameters of a run by the ticks and the values of sliders.
+  function parameters(run, k) {
+    const values = [...run.base];
+    for (const s of sliders) if (s.choice.ticked && (s.run < 0 || s.run === k)) values[s.param] += s.value - s.before;
+    return values;
+  }
+
+  const answers = () => runs.map((run, k) => {
+    const poses = predicted(run, parameters(run, k));
+    return { poses, ...compared(run, poses) };
+  });
+
+  // What is shown.
+
+  const shown = (x, digits = 3) => (Number.isFinite(x) ? String(Number(x.toPrecision(digits))).replace("-", "−") : "–");
+
+  function made(name, attributes = {}, ...content) {
+    const element = name.startsWith("svg:") ? document.createElementNS(SVG, name.slice(4)) : document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    element.append(...content);
+    return element;
+  }
+
+  const key = () => made("p", { class: "key note" }, ...["measured", "before", "now"].map((name) =>
+    made("span", {}, made("i", { class: name }), { measured: "measured", before: "no tick", now: "as ticked" }[name])));
+
+  // Lines of the predictions of all windows in a picture: north up, east to the right.
+  function lines(run, poses) {
+    const every = Math.max(1, Math.floor(run.steps / POINTS)), text = [];
+    for (let w = 0; w < run.windows; w++) {
+      let word = "M";
+      for (let n = 0; n <= run.steps; n += every) {
+        const p = 3 * (w * (run.steps + 1) + n);
+        if (!(Math.abs(poses[p]) + Math.abs(poses[p + 1]) < run.far)) break;
+        text.push(word, poses[p + 1].toFixed(run.digits), " ", (-poses[p]).toFixed(run.digits));
+        word = "L";
+      }
+    }
+    return text.join("");
+  }
+
+  function trackPicture(run) {
+    const [north, east] = run.track;
+    const low = [Math.min(...east), -Math.max(...north)], high = [Math.max(...east), -Math.min(...north)];
+    const size = Math.max(high[0] - low[0], high[1] - low[1], 1e-9), edge = 0.06 * size;
+    run.far = 1e3 * (size + Math.abs(low[0]) + Math.abs(low[1]) + Math.abs(high[0]) + Math.abs(high[1]));
+    run.digits = Math.max(0, 3 - Math.floor(Math.log10(size)));
+    const box = [low[0] - edge, low[1] - edge, high[0] - low[0] + 2 * edge, Math.max(high[1] - low[1], 0.3 * size) + 2 * edge];
+    const whole = Array.from(north, (x, k) => `${k ? "L" : "M"}${east[k].toFixed(run.digits)} ${(-x).toFixed(run.digits)}`);
+    run.now = made("svg:path", { class: "now" }), run.old = made("svg:path", { class: "before" });
+    const picture = made("svg:svg", { viewBox: box.join(" "), role: "img", "aria-label": `Track of ${run.name}, measured and predicted` },
+      made("svg:path", { class: "measured", d: whole.join("") }), run.old, run.now);
+    return made("figure", {}, picture, made("figcaption", {}, `${run.name}: tracks, north up; ${shown(size)} m along the longer side.`));
+  }
+
+  // Errors of windows [m] over their number, as steps.
+  const WIDE = 600, HIGH = 160, LEFT = 48;
+  function steps(values, most) {
+    const each = (WIDE - LEFT) / values.length;
+    return values.map((x, w) => {
+      const y = HIGH - (HIGH - 14) * Math.min(Number.isFinite(x) ? x / most : 1, 1);
+      return `${w ? "L" : "M"}${(LEFT + w * each).toFixed(1)} ${y.toFixed(1)}h${each.toFixed(1)}`;
+    }).join("");
+  }
+
+  function errorPicture(run) {
+    run.errors = made("svg:path", { class: "now" }), run.firstErrors = made("svg:path", { class: "before" });
+    run.most = made("svg:text", { x: LEFT - 4, y: 20, "text-anchor": "end" });
+    const picture = made("svg:svg", { viewBox: `0 0 ${WIDE} ${HIGH + 2}`, role: "img", "aria-label": `Position error of each window of ${run.name}` },
+      made("svg:path", { class: "axis", d: `M${LEFT} 0V${HIGH}H${WIDE}` }), run.most,
+      made("svg:text", { x: LEFT - 4, y: HIGH, "text-anchor": "end" }, "0"), run.firstErrors, run.errors);
+    return made("figure", {}, picture, made("figcaption", {}, `${run.name}: position error of each window, in time [mm].`));
+  }
+
+  const cells = []; // of the table, by run
+  function table() {
+    const body = made("tbody"), columns = ["no tick", "learned", "as ticked"];
+    runs.forEach((run) => {
+      const row = Array.from({ length: 6 }, () => made("td"));
+      cells.push(row);
+      body.append(made("tr", run.train ? {} : { class: "held" },
+        made("th", { scope: "row" }, run.name, " ", made("small", {}, run.use)), ...row));
+    });
+    const head = (text) => made("th", { scope: "col" }, text);
+    return made("div", { class: "table" }, made("table", {}, made("thead", {},
+      made("tr", {}, head(""), made("th", { scope: "colgroup", colspan: 3 }, "position [mm]"), made("th", { scope: "colgroup", colspan: 3 }, "heading [°]")),
+      made("tr", {}, head("run"), ...[...columns, ...columns].map(head))), body));
+  }
+
+  function fill(cell, value, factor) {
+    cell.textContent = shown(factor * value);
+    cell.dataset.value = value; // in SI, all digits
+  }
+
+  let first; // without any tick
+  function update() {
+    const began = performance.now(), found = answers();
+    found.forEach((answer, k) => {
+      const run = runs[k];
+      run.now.setAttribute("d", lines(run, answer.poses));
+      const finite = [...answer.position, ...first[k].position].filter(Number.isFinite), most = Math.max(...finite, 1e-9);
+      run.errors.setAttribute("d", steps(answer.position, most));
+      run.firstErrors.setAttribute("d", steps(first[k].position, most));
+      run.most.textContent = shown(1e3 * most);
+      [1e3, 180 / Math.PI].forEach((factor, j) => fill(cells[k][3 * j + 2], answer.all[j], factor));
+    });
+    at("results").dataset.milliseconds = (performance.now() - began).toFixed(2);
+    return found;
+  }
+
+  // Controls.
+
+  function show(s) {
+    s.input.value = s.value;
+    s.output.textContent = `${shown(s.value, 4)} ${s.unit === "1" ? "" : s.unit}`;
+    s.input.setAttribute("aria-valuetext", s.output.textContent);
+  }
+
+  function sliderRow(s) {
+    const [low, high] = [Math.min(s.low, s.after), Math.max(s.high, s.after)];
+    const part = (x) => 100 * Math.min(Math.max((x - low) / (high - low || 1), 0), 1);
+    const mark = (kind, from, to) => {
+      const element = made("span", { class: kind });
+      element.style.left = `${part(from)}%`, element.style.width = `${part(to) - part(from)}%`;
+      return element;
+    };
+    s.input = made("input", { type: "range", min: low, max: high, step: "any", "aria-label": `${s.name} [${s.unit}], ${s.description}` });
+    s.output = made("output");
+    s.input.addEventListener("input", () => {
+      s.value = Number(s.input.value), s.choice.ticked = s.choice.tick.checked = true;
+      show(s), update();
+    });
+    const slide = made("span", { class: "slide" }, s.input, mark("mark estimate", s.after, s.after));
+    if (s.ci95) slide.append(mark("mark", ...s.ci95));
+    slide.title = s.ci95 ? `learned: ${shown(s.after, 4)}, 95 %: ${shown(s.ci95[0])} to ${shown(s.ci95[1])}` : `learned: ${shown(s.after, 4)}`;
+    show(s);
+    return made("div", { class: "value" }, made("span", { title: s.description }, s.name), slide, s.output);
+  }
+
+  function choiceBox(choice) {
+    choice.tick = made("input", { type: "checkbox" });
+    choice.tick.checked = choice.ticked, choice.tick.disabled = Boolean(choice.fixed);
+    choice.tick.addEventListener("change", () => { choice.ticked = choice.tick.checked, update(); });
+    const label = made("label", {}, choice.tick, " ", choice.name, " ", made("small", {}, choice.note));
+    const rows = choice.fixed ? [made("small", {}, choice.fixed)] : choice.sliders.map(sliderRow);
+    return made("fieldset", {}, made("legend", {}, label), ...rows);
+  }
+
+  function reset(ticked) {
+    for (const s of sliders) s.value = s.after, s.choice.ticked = ticked(s.choice), s.choice.tick.checked = s.choice.ticked, show(s);
+    update();
+  }
+
+  const button = (text, action) => {
+    const element = made("button", { type: "button" }, text);
+    element.addEventListener("click", action);
+    return element;
+  };
+
+  const learned = new Map(data.choices.map((choice) => [choice, choice.ticked]));
+  const effects = data.choices.filter((c) => c.effect), rest = data.choices.filter((c) => !c.effect);
+  at("controls").append(...effects.map(choiceBox));
+  if (rest.length) at("controls").append(made("details", {}, made("summary", {}, `Coefficients of the ship (${rest.length})`), ...rest.map(choiceBox)));
+  at("controls").append(
+    button("Initial model", () => reset(() => false)), button("Learned model", () => reset((c) => learned.get(c))));
+  at("results").append(table(), key(), made("div", { class: "gallery" }, ...runs.flatMap((run) => [trackPicture(run), errorPicture(run)])));
+
+  for (const s of sliders) s.choice.ticked = false;
+  first = answers();
+  for (const choice of data.choices) choice.ticked = learned.get(choice);
+  runs.forEach((run, k) => {
+    run.old.setAttribute("d", lines(run, first[k].poses));
+    [1e3, 180 / Math.PI].forEach((factor, j) => {
+      fill(cells[k][3 * j], first[k].all[j], factor), fill(cells[k][3 * j + 1], run.after[j], factor);
+    });
+  });
+  update();
+  say("");
+})().catch((error) => {
+  document.getElementById("what-if-status").textContent = `The page cannot compute the model here: ${error.message}`;
+});
