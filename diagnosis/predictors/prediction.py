@@ -311,7 +311,7 @@ def true_motion(
 ) -> tuple[list[Any], list[Any]]:
     """Pose and body-fixed velocity, each three of (p, w), of a measured pose and its rate (3, w).
 
-    ``solved`` gives the pose that is measured as another one: :func:`true_pose`, or the same for symbols.
+    ``solved`` gives the pose behind a measured one: :func:`true_pose`, or the same for symbols.
     """
     b, step, solved = model.hull, LONGEST_STEP, solved or true_pose
     poses = ([y + h * y_dot for y, y_dot in zip(eta, eta_dot, strict=True)] for h in (0.0, step, -step))

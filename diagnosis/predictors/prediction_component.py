@@ -60,9 +60,11 @@ def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bo
 
     def init(i: Fields, p: Fields) -> vessel.State:
         pose, nu = true_motion(i[:3], i[3:6], _with(model, names, p), _true_pose)
-        return vessel.State(*pose, *nu, i[6])
+        return vessel.State._make([*pose, *nu, i[6]])
 
-    def prepared_step(s: vessel.State, i: Fields, b: Ready, h: Number) -> tuple[vessel.State, Measurement]:
+    def prepared_step(
+        s: vessel.State, i: Fields, b: Ready, h: Number
+    ) -> tuple[vessel.State, Measurement]:
         drive = layout.powered(b.drive, i[power]) if settings else b.drive
         u_c, v_c = vessel.water_velocity(s, b.hull)
         now = layout.running(s.t + h, s.u - u_c, s.v - v_c, s.r, i[given], drive)
@@ -89,8 +91,10 @@ def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bo
 
 
 def _with(model: Model, names: Sequence[str], values: Fields) -> Model:
-    """A model with other values of some parameters, which may be symbols; those of single runs are gone."""
-    parts: dict[str, dict[str, Any]] = {part: dict(getattr(model, part)) for part in model.ship.parameters}
+    """A model with other values, which may be symbols, in all runs."""
+    parts: dict[str, dict[str, Any]] = {
+        part: dict(getattr(model, part)) for part in model.ship.parameters
+    }
     for name, value in zip(names, values, strict=True):
         parts[model.owner(name)][name] = value
     return replace(model, **parts, runs={})

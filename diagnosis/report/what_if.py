@@ -29,6 +29,7 @@ from ..predictors.ship_model import of_run, parameter_and_run
 from ..predictors.windows import WindowStarts
 from ..runs.cleaning import Z95
 from ..search.prior import NominalPrior
+from ..session import Diagnosis
 from .report_data import ReportData
 
 if TYPE_CHECKING:
@@ -161,6 +162,11 @@ class Bench:
         self.choices.extend(self._choices())
 
     @property
+    def diagnosis(self) -> Diagnosis:
+        assert self.r.diagnosis is not None
+        return self.r.diagnosis
+
+    @property
     def runs(self) -> list[Evaluation]:
         """The runs that have windows."""
         return [e for e in self.r.evaluations if e.windows is not None]
@@ -180,12 +186,14 @@ class Bench:
 
     def content(self, module: bytes) -> str:
         """All of it as one text."""
-        store = Store()
+        store = ArrayStore()
         runs = [self._run(e, store) for e in self.runs]
         header = {
             "params": self.names,
             "start": len(START),
-            "choices": [c._replace(sliders=[s._asdict() for s in c.sliders])._asdict() for c in self.choices],
+            "choices": [
+                c._replace(sliders=[s._asdict() for s in c.sliders])._asdict() for c in self.choices
+            ],
             "runs": runs,
             "model": self._ssv(),
             "arrays": store.entries,
@@ -197,7 +205,11 @@ class Bench:
     def _ssv(self) -> str:
         """The learned model as a file, with all that can be moved; empty if no FMU would accept it."""
         every = [s for c in self.choices if not c.fixed for s in c.sliders if s.run < 0]
-        nominal = {s.name: 0.5 * (s.high - s.after) or s.low - s.after for s in every if s.nominal == self.learned.value(s.name)}
+        nominal = {
+            s.name: 0.5 * (s.high - s.after) or s.low - s.after
+            for s in every
+            if s.nominal == self.learned.value(s.name)
+        }
         with TemporaryDirectory() as folder:
             path = Path(folder) / "model.ssv"
             try:
@@ -219,7 +231,7 @@ class Bench:
             effect = effects[ranked.id]
             if ranked.id not in done and len(effect.parameters) <= MOST_VALUES and effect.function:
                 yield self._choice(effect, "candidate", {}, False)
-        prior = NominalPrior.of(self.start, self.r.diagnosis.prior)  # type: ignore[union-attr]
+        prior = NominalPrior.of(self.start, self.diagnosis.prior)
         for name, std in prior.std.items():
             if std or self.learned.value(name) != self.start.value(name):
                 slider = self._slider(name, self.learned.value(name), std)
@@ -234,16 +246,24 @@ class Bench:
         sliders = []
         for name in (*(n for n in free if n not in single), *of_runs):
             present = self.start.value(name)
-            given = told.get(name, 0.0) + present if name in effect.coefficients else told.get(name, present)
+            given = (
+                told.get(name, 0.0) + present if name in effect.coefficients else told.get(name, present)
+            )
             sliders.append(self._slider(name, self.learned.value(name) if in_model else given, None))
         return Choice(effect.id, True, note, in_model, *self._movable(sliders))
 
     def _slider(self, name: str, after: float, std: float | None) -> Slider:
         parameter, run = parameter_and_run(name)
         declared, before = self.start.declared(name), self.start.value(name)
-        posterior = self.r.diagnosis.posterior.std  # type: ignore[union-attr]
-        ci95 = (after - Z95 * posterior[name], after + Z95 * posterior[name]) if name in posterior else None
-        away = [REACH * abs(after - before), *(abs(x - before) for x in ci95 or ()), REACH * (std or 0.0)]
+        posterior = self.diagnosis.posterior.std
+        ci95 = (
+            (after - Z95 * posterior[name], after + Z95 * posterior[name]) if name in posterior else None
+        )
+        away = [
+            REACH * abs(after - before),
+            *(abs(x - before) for x in ci95 or ()),
+            REACH * (std or 0.0),
+        ]
         reach = max(away) or self.start.unit(name)
         low, high = declared.range.min, declared.range.max
         return Slider(
@@ -287,10 +307,11 @@ class Bench:
         ((starts, _),) = e.windows.groups
         return starts
 
-    def _run(self, e: Evaluation, store: "Store") -> dict[str, Any]:
+    def _run(self, e: Evaluation, store: "ArrayStore") -> dict[str, Any]:
         """A run for the page; arrays by their numbers."""
         starts, windows, model = self._group(e), e.windows, self.learned.during(e.name)
-        assert windows is not None and e.before.errors is not None and e.after.errors is not None
+        assert windows is not None
+        assert e.before.errors is not None
         given, acting = (np.moveaxis(x[:, :, 0], -1, 0) for x in starts.arriving(model))
         shape = (*given.shape[:2], -1)
         parts = [given, acting]
@@ -303,7 +324,9 @@ class Bench:
         columns = np.concatenate([x.reshape(shape) for x in parts], axis=2)
         pose, rate = starts.motion(model)
         begin = np.concatenate([pose, rate, starts.first(lambda s: s.time)[None]]).T
-        base = replace(self.start, runs={}) if e.name not in self.start.runs else self.start.during(e.name)
+        base = (
+            replace(self.start, runs={}) if e.name not in self.start.runs else self.start.during(e.name)
+        )
         smooth = e.smoothed.eta[np.isfinite(e.smoothed.eta[:, 0])]
         return {
             "name": e.name,
@@ -324,7 +347,7 @@ class Bench:
         }
 
 
-class Store:
+class ArrayStore:
     """Arrays one after the other, and where each is."""
 
     def __init__(self) -> None:
@@ -333,14 +356,18 @@ class Store:
 
     def exact(self, values: np.ndarray) -> int:
         """The number of an array that keeps every bit."""
-        return self._keep(np.ascontiguousarray(values, "<f8").reshape(-1).view(np.uint8).reshape(-1, 8), 0.0)
+        return self._keep(
+            np.ascontiguousarray(values, "<f8").reshape(-1).view(np.uint8).reshape(-1, 8), 0.0
+        )
 
     def near(self, values: np.ndarray) -> int:
-        """The number of an array that is kept to a 2^31st of its largest value, as second differences."""
+        """The number of an array, kept to a 2^31st of its largest value as second differences."""
         scale = float(np.abs(values).max(initial=0.0)) / LEVELS or 1.0
         whole = np.round(values / scale).astype(np.int64)
         slope = np.diff(whole, prepend=0)
-        change = np.diff(slope, prepend=0).astype(np.int32)  # modulo 2^32, as the page adds them up again
+        change = np.diff(slope, prepend=0).astype(
+            np.int32
+        )  # modulo 2^32, as the page adds them up again
         return self._keep(change.astype("<i4").view(np.uint8).reshape(-1, 4), scale)
 
     def _keep(self, rows: np.ndarray, scale: float) -> int:

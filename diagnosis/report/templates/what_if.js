@@ -129,6 +129,97 @@
     return { poses, ...compared(run, poses) };
   });
 
+  // The fit: least squares of the predictions of training runs, in which each window counts once, and of priors.
+
+  // Residuals in units of the learned model's errors, then offsets from prior means in standard deviations.
+  function residuals(found, moved, units) {
+    const parts = runs.flatMap((run, k) => (run.train ? [[run, found[k].off]] : []));
+    const all = new Float64Array(parts.reduce((n, [, off]) => n + off.length, moved.length));
+    let to = 0;
+    for (const [run, off] of parts) {
+      for (let w = 0, k = 0; w < run.windows; w++) {
+        const root = Math.sqrt(run.samples[w]);
+        for (const end = k + 3 * run.samples[w]; k < end; k++) all[to++] = off[k] / (units[k % 3] * root);
+      }
+    }
+    for (const s of moved) all[to++] = s.std ? (s.value - s.before) / s.std : 0;
+    return all;
+  }
+
+  const dot = (a, b) => { let sum = 0; for (let k = 0; k < a.length; k++) sum += a[k] * b[k]; return sum; };
+
+  // x of H x = g, H symmetric and positive, by Cholesky's factor.
+  function solved(H, g) {
+    const q = g.length, L = H.map((row) => [...row]), x = [...g];
+    for (let i = 0; i < q; i++) {
+      for (let j = 0; j <= i; j++) {
+        let sum = L[i][j];
+        for (let k = 0; k < j; k++) sum -= L[i][k] * L[j][k];
+        L[i][j] = i === j ? Math.sqrt(sum) : sum / L[j][j];
+      }
+      x[i] = (x[i] - L[i].slice(0, i).reduce((sum, l, k) => sum + l * x[k], 0)) / L[i][i];
+    }
+    for (let i = q - 1; i >= 0; i--) {
+      for (let k = i + 1; k < q; k++) x[i] -= L[k][i] * x[k];
+      x[i] /= L[i][i];
+    }
+    return x;
+  }
+
+  const within = (s, x) => Math.min(Math.max(x, s.limits[0] ?? -Infinity), s.limits[1] ?? Infinity);
+
+  // Moves the ticked values by Gauss-Newton's method; gives the seconds that it took.
+  function fit() {
+    const began = performance.now(), seconds = () => (performance.now() - began) / 1e3;
+    const moved = sliders.filter((s) => s.choice.ticked), small = moved.map((s) => SMALL * (s.high - s.low || 1));
+    const errors = runs.flatMap((run) => (run.train ? [run.after] : []));
+    const [p, h] = [0, 1].map((j) => Math.sqrt(errors.reduce((sum, e) => sum + e[j] * e[j], 0) / errors.length) || 1);
+    const units = [p / Math.SQRT2, p / Math.SQRT2, h];
+    const missed = () => residuals(answers(), moved, units);
+    let left = missed(), cost = dot(left, left);
+    for (let n = 0; n < STEPS && seconds() < SECONDS; n++) {
+      const slopes = moved.map((s, j) => {
+        const value = s.value;
+        s.value = within(s, value + small[j]) === value ? value - small[j] : within(s, value + small[j]);
+        const other = missed(), change = s.value - value;
+        s.value = value;
+        return other.map((x, k) => (left[k] - x) / change * small[j]);
+      });
+      const H = slopes.map((a) => slopes.map((b) => dot(a, b)));
+      H.forEach((row, j) => { row[j] += 1e-9 * row[j] + 1e-12; });
+      const values = moved.map((s) => s.value), move = solved(H, slopes.map((a) => dot(a, left))), before = cost;
+      for (let share = 1; share > 0.05; share /= 4) {
+        moved.forEach((s, j) => { s.value = within(s, values[j] + share * move[j] * small[j]); });
+        const tried = missed(), value = dot(tried, tried);
+        if (value < cost) { left = tried, cost = value; break; }
+        moved.forEach((s, j) => { s.value = values[j]; });
+      }
+      if (!(cost < (1 - ENOUGH) * before)) break;
+    }
+    moved.forEach(show);
+    return seconds();
+  }
+
+  // The model as it is ticked, as a file of SSP 1.0: that of the learned model with other values.
+  function file() {
+    const xml = new DOMParser().parseFromString(data.model, "application/xml"), root = xml.documentElement;
+    root.setAttribute("description", "Changed in the page of a report: not checked for soundness");
+    const given = new Map([...root.firstElementChild.children].map((element) => [element.getAttribute("name"), element]));
+    for (const s of sliders.filter((each) => each.run < 0)) {
+      const element = given.get(`${s.part}.${s.name}`), value = s.choice.ticked ? s.value : s.before;
+      if (value === s.nominal) element.remove();
+      else element.firstElementChild.setAttribute("value", value);
+    }
+    return new XMLSerializer().serializeToString(xml);
+  }
+
+  function save() {
+    const link = made("a", { download: "model.ssv", href: URL.createObjectURL(new Blob([file()], { type: "application/xml" })) });
+    link.click();
+    URL.revokeObjectURL(link.href);
+    say("Saved as model.ssv, not checked for soundness.");
+  }
+
   // What is shown.
 
   const shown = (x, digits = 3) => (Number.isFinite(x) ? String(Number(x.toPrecision(digits))).replace("-", "−") : "–");
@@ -281,7 +372,14 @@
   at("controls").append(...effects.map(choiceBox));
   if (rest.length) at("controls").append(made("details", {}, made("summary", {}, `Coefficients of the ship (${rest.length})`), ...rest.map(choiceBox)));
   at("controls").append(
-    button("Initial model", () => reset(() => false)), button("Learned model", () => reset((c) => learned.get(c))));
+    button("Initial model", () => reset(() => false)), button("Learned model", () => reset((c) => learned.get(c))),
+    button("Fit this", () => {
+      const moved = sliders.filter((s) => s.choice.ticked).length;
+      if (!moved) return say("Nothing is ticked.");
+      const seconds = fit();
+      update();
+      return say(`Fitted ${moved} values to the training runs in ${shown(seconds, 2)} s.`);
+    }), ...(data.model ? [button("Save model.ssv", save)] : []));
   at("results").append(table(), key(), made("div", { class: "gallery" }, ...runs.flatMap((run) => [trackPicture(run), errorPicture(run)])));
 
   for (const s of sliders) s.choice.ticked = false;
