@@ -7,6 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from support import reported
 from support.chromium import opened
@@ -79,6 +80,23 @@ window.onload = async () => {{
   document.querySelector("pre").textContent = JSON.stringify(found);
 }};
 </script></body></html>"""
+
+
+OWN_RUN = r"""
+const { DataTransfer, File, Event } = frame.contentWindow, input = page.querySelector("#what-if input[type=file]");
+const add = async (text) => {
+  const moved = new DataTransfer();
+  moved.items.add(new File([text], "<b>own</b>.csv"));
+  input.files = moved.files;
+  input.dispatchEvent(new Event("change"));
+  await new Promise((done) => setTimeout(done, 200));
+  return page.querySelector("#what-if-status").textContent;
+};
+found.wrong = await add("time,x,y,psi\n0,0,0,0");
+found.said = await add(TEXT);
+found.errors = errors();
+found.bold = page.querySelectorAll("#what-if b").length;
+"""
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +184,19 @@ def test_fit_of_what_is_ticked_lowers_the_errors_and_is_saved(driven, report, da
     assert not model.vessel
     again = [evaluate_run(w, model).before.position for w in data]
     assert np.allclose(rows[:, 2], again, rtol=1e-6, atol=0.0)
+
+
+def test_own_run_is_compared_as_the_report_compares_it(driven, report, data):
+    """From a file, by windows that start from the poses about their starts in place of a smoother."""
+    run = data[1].run
+    table = pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]))
+    text = json.dumps(table.to_csv(index=False, header=["time", "x", "y", "psi", *run.commanded]))
+    found = driven(OWN_RUN.replace("TEXT", text))
+    assert found["wrong"] == "<b>own</b>.csv has no column tau_X, tau_Y, tau_N"
+    assert found["said"] == "<b>own</b>.csv: 5 windows compared."
+    assert found["bold"] == 0
+    rows = np.array(found["errors"], float).reshape(3, 6)
+    assert np.allclose(rows[2, [0, 2, 3, 5]], rows[1, [0, 2, 3, 5]], rtol=0.25)
 
 
 def test_what_changes_the_past_of_commands_stays_as_it_is(report):

@@ -90,6 +90,21 @@ def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bo
     )
 
 
+def allocation_component(model: Model) -> Component:
+    """The commands that the thrusters of a model get for a force."""
+    layout, p = model.drive.effects.layout, model.drive.params
+    outputs = group_of("Shares", [Variable(n, "1", n, 0.0) for n in layout.commands])
+    nothing = group_of("Nothing", [])
+
+    def init(i: Force, _: Fields) -> Fields:
+        return nothing()
+
+    def step(s: Fields, i: Force, _: Fields, h: Number) -> tuple[Fields, Fields]:
+        return s, outputs(*layout.allocate((i.tau_X, i.tau_Y, i.tau_N), p))
+
+    return Component("allocation", "Commands for a force", nothing, nothing, Force, outputs, init, step)
+
+
 def _with(model: Model, names: Sequence[str], values: Fields) -> Model:
     """A model with other values, which may be symbols, in all runs."""
     parts: dict[str, dict[str, Any]] = {

@@ -24,8 +24,9 @@ from fmus.native.program import program
 from fmus.native.webassembly import component_module
 
 from ..predictors import Evaluation, Model, Response, write_model
-from ..predictors.prediction_component import START, prediction_component
+from ..predictors.prediction_component import START, allocation_component, prediction_component
 from ..predictors.ship_model import of_run, parameter_and_run
+from ..predictors.thrust import LONGEST_STEP
 from ..predictors.windows import WindowStarts
 from ..runs.cleaning import Z95
 from ..search.prior import NominalPrior
@@ -39,6 +40,7 @@ SCRIPT = Path(__file__).parent / "templates" / "what_if.js"
 CANDIDATES = 12  # effects of the ranking that a reader may try; chosen: of more the list is not read
 MOST_VALUES = 6  # of an effect that was not found: a shape of more has no use as sliders; chosen
 REACH = 3.0  # a slider ends so many standard deviations, or changes, from the first value; chosen
+SEEN = 0.75  # s, times the scale of the ship, on both sides of a start, without a smoother; chosen
 FIXED = "It changes the delay or the filter of commands or of the measurement: it stays as it is here."
 # Whole numbers in which values are stored, as shares of the largest: far below 1e-6 of any error.
 LEVELS = 2.0**31 - 1.0
@@ -196,11 +198,14 @@ class Bench:
             ],
             "runs": runs,
             "model": self._ssv(),
+            "csv": self._csv(),
             "arrays": store.entries,
         }
         head = json.dumps(header, allow_nan=False).encode()
-        parts = [len(head).to_bytes(4, "little"), len(module).to_bytes(4, "little"), head, module]
-        return b64encode(zlib.compress(b"".join([*parts, *store.parts]), 9)).decode()
+        allocation = component_module(program(allocation_component(self.learned)))
+        parts = head, module, allocation
+        sizes = [len(part).to_bytes(4, "little") for part in parts]
+        return b64encode(zlib.compress(b"".join([*sizes, *parts, *store.parts]), 9)).decode()
 
     def _ssv(self) -> str:
         """The learned model as a file, with all that can be moved; empty if no FMU would accept it."""
@@ -217,6 +222,20 @@ class Bench:
             except InputError:
                 return ""
             return path.read_text(encoding="utf-8")
+
+    def _csv(self) -> dict[str, Any] | None:
+        """What the page needs to predict a run of the reader's own; None where commands are delayed,
+        have power settings, or a wind acts."""
+        run, w, model = self.runs[0].smoothed.track.run, self.runs[0].weak_windows, self.learned
+        if Response(run, model).slow or model.clock or self.windy or run.power is not None:
+            return None
+        return {
+            "columns": [*run.commanded],
+            "force": run.commands is None,
+            "length": w.horizon,
+            "longest": LONGEST_STEP * w.scale.time,
+            "reach": SEEN * w.scale.time,
+        }
 
     # Coefficients.
 

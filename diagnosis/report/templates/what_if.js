@@ -6,6 +6,7 @@
   const POINTS = 24; // of a window's line in a picture
   const STEPS = 8, ENOUGH = 1e-4, SECONDS = 1.3; // of a fit: at most, fall of the cost to end, time for a further step
   const SMALL = 1e-3; // of a slider's length: step of a finite difference
+  const FACTORS = [1e3, 180 / Math.PI]; // mm, degrees
   const SVG = "http://www.w3.org/2000/svg";
   const at = (id) => document.getElementById(`what-if-${id}`);
   const say = (text) => { at("status").textContent = text; };
@@ -16,11 +17,11 @@
     const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
     const buffer = await new Response(stream).arrayBuffer();
-    const [head, size] = new Uint32Array(buffer, 0, 2);
-    const data = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, head)));
-    const module = new Uint8Array(buffer, 8 + head, size);
-    const { instance } = await WebAssembly.instantiate(module, { Math });
-    let place = 8 + head + size;
+    const sizes = new Uint32Array(buffer, 0, 3);
+    let place = sizes.byteLength;
+    const [head, ...modules] = Array.from(sizes, (size) => new Uint8Array(buffer, (place += size) - size, size));
+    const data = JSON.parse(new TextDecoder().decode(head));
+    const made = await Promise.all(modules.map((module) => WebAssembly.instantiate(module, { Math })));
     const arrays = data.arrays.map(({ count, scale }) => {
       const width = scale ? 4 : 8;
       const mixed = new Uint8Array(buffer, place, width * count);
@@ -35,18 +36,17 @@
         return scale * value;
       });
     });
-    return { data, exports: instance.exports, arrays };
+    return { data, arrays, modules: made.map(({ instance }) => instance.exports) };
   }
 
-  const { data, exports, arrays } = await unpacked(at("data").textContent);
-  const memory = (name, count) => new Float64Array(exports.memory.buffer, exports[name].value, count);
+  const { data, arrays, modules: [exports, allocation] } = await unpacked(at("data").textContent);
+  const memory = (name, count, of = exports) => new Float64Array(of.memory.buffer, of[name].value, count);
   const params = memory("params", data.params.length), step = memory("h", 1), outputs = memory("outputs", 3);
   const state = memory("state", 7), after = memory("after", 7);
-  const runs = data.runs.map((run) => {
-    const given = run.given.map((k) => arrays[k]), since = arrays[run.since];
-    const inputs = memory("inputs", data.start + given.length);
-    const [measured, track] = [run.measured, run.track].map((part) => part.map((k) => arrays[k]));
-    const nodes = Math.min(NODES, run.steps + 1);
+
+  // A run with places of its samples among the steps, by the time [s] of each since its window began.
+  function placed(run, since) {
+    const inputs = memory("inputs", data.start + run.given.length), nodes = Math.min(NODES, run.steps + 1);
     const first = new Int32Array(since.length), shares = new Float64Array(NODES * since.length);
     since.forEach((t, k) => {
       const place = t / run.h;
@@ -57,7 +57,12 @@
         shares[NODES * k + n] = share;
       }
     });
-    return { ...run, given, inputs, measured, track, begin: arrays[run.begin], first, shares, nodes };
+    return { ...run, inputs, nodes, first, shares };
+  }
+
+  const runs = data.runs.map((run) => {
+    const [given, measured, track] = [run.given, run.measured, run.track].map((part) => part.map((k) => arrays[k]));
+    return placed({ ...run, given, measured, track, begin: arrays[run.begin] }, arrays[run.since]);
   });
 
   // Predictions.
@@ -124,10 +129,12 @@
     return values;
   }
 
-  const answers = () => runs.map((run, k) => {
-    const poses = predicted(run, parameters(run, k));
+  function answer(run, values) {
+    const poses = predicted(run, values);
     return { poses, ...compared(run, poses) };
-  });
+  }
+
+  const answers = () => runs.map((run, k) => answer(run, parameters(run, k)));
 
   // The fit: least squares of the predictions of training runs, in which each window counts once, and of priors.
 
@@ -282,19 +289,26 @@
     return made("figure", {}, picture, made("figcaption", {}, `${run.name}: position error of each window, in time [mm].`));
   }
 
+  const first = []; // of each run without any tick
   const cells = []; // of the table, by run
+  const body = made("tbody"), gallery = made("div", { class: "gallery" });
+
   function table() {
-    const body = made("tbody"), columns = ["no tick", "learned", "as ticked"];
-    runs.forEach((run) => {
-      const row = Array.from({ length: 6 }, () => made("td"));
-      cells.push(row);
-      body.append(made("tr", run.train ? {} : { class: "held" },
-        made("th", { scope: "row" }, run.name, " ", made("small", {}, run.use)), ...row));
-    });
-    const head = (text) => made("th", { scope: "col" }, text);
+    const columns = ["no tick", "learned", "as ticked"], head = (text) => made("th", { scope: "col" }, text);
+    const over = (text) => made("th", { scope: "colgroup", colspan: 3 }, text);
     return made("div", { class: "table" }, made("table", {}, made("thead", {},
-      made("tr", {}, head(""), made("th", { scope: "colgroup", colspan: 3 }, "position [mm]"), made("th", { scope: "colgroup", colspan: 3 }, "heading [°]")),
+      made("tr", {}, head(""), over("position [mm]"), over("heading [°]")),
       made("tr", {}, head("run"), ...[...columns, ...columns].map(head))), body));
+  }
+
+  function added(run) {
+    const row = Array.from({ length: 6 }, () => made("td")), without = answer(run, run.base);
+    first.push(without), cells.push(row);
+    body.append(made("tr", run.train ? {} : { class: "held" },
+      made("th", { scope: "row" }, run.name, " ", made("small", {}, run.use)), ...row));
+    gallery.append(trackPicture(run), errorPicture(run));
+    run.old.setAttribute("d", lines(run, without.poses));
+    FACTORS.forEach((factor, j) => { fill(row[3 * j], without.all[j], factor), fill(row[3 * j + 1], run.after[j], factor); });
   }
 
   function fill(cell, value, factor) {
@@ -302,7 +316,6 @@
     cell.dataset.value = value; // in SI, all digits
   }
 
-  let first; // without any tick
   function update() {
     const began = performance.now(), found = answers();
     found.forEach((answer, k) => {
@@ -312,10 +325,74 @@
       run.errors.setAttribute("d", steps(answer.position, most));
       run.firstErrors.setAttribute("d", steps(first[k].position, most));
       run.most.textContent = shown(1e3 * most);
-      [1e3, 180 / Math.PI].forEach((factor, j) => fill(cells[k][3 * j + 2], answer.all[j], factor));
+      FACTORS.forEach((factor, j) => fill(cells[k][3 * j + 2], answer.all[j], factor));
     });
     at("results").dataset.milliseconds = (performance.now() - began).toFixed(2);
     return found;
+  }
+
+  // Runs of the reader's own, in windows as the report's; each starts from a parabola through the poses about it.
+
+  function ownRun(name, text) {
+    const [names, ...rows] = text.trim().split(/\r?\n/).map((line) => line.split(",").map((cell) => cell.trim()));
+    const wanted = ["time", "x", "y", "psi", ...data.csv.columns], places = wanted.map((column) => names.indexOf(column));
+    const missing = wanted.filter((_, k) => places[k] < 0);
+    if (missing.length) throw new Error(`${name} has no column ${missing.join(", ")}`);
+    const table = rows.map((row) => places.map((k) => (row[k] ? Number(row[k]) : NaN))).filter((row) => row.every(Number.isFinite));
+    const time = table.map(([t]) => t), gaps = time.slice(1).map((t, k) => t - time[k]);
+    const period = [...gaps].sort((a, b) => a - b)[gaps.length >> 1], { length, longest, reach } = data.csv;
+    if (!(period > 0 && time[time.length - 1] - time[0] + period > length)) throw new Error(`${name} has no window of ${shown(length)} s`);
+    const h = period / Math.ceil(period / longest - 1e-6), steps = Math.ceil(length / h - 1e-6);
+    const shares = table.map((row) => allocated(row.slice(4)));
+    // Integral of each share over time, which is held from its sample to the next.
+    const sums = [shares[0].map(() => 0)];
+    gaps.forEach((gap, k) => sums.push(sums[k].map((sum, j) => sum + gap * shares[k][j])));
+    let row = 0;
+    const integral = (t, j) => {
+      while (row > 0 && time[row] > t) row--;
+      while (row + 1 < time.length && time[row + 1] <= t) row++;
+      return sums[row][j] + (t - time[row]) * shares[row][j];
+    };
+    const begin = [], given = [...shares[0], ...shares[0]].map(() => []), samples = [], since = [], kept = [];
+    for (let n = 0; time[0] + (n + 1) * length <= time[time.length - 1] + 1.25 * period; n++) {
+      const low = time[0] + n * length - 0.25 * period, inside = [...time.keys()].filter((k) => time[k] >= low && time[k] < low + length);
+      if (2 * inside.length * period < length || time[inside[0]] > low + period) continue;
+      const start = time[inside[0]], near = [...time.keys()].filter((k) => Math.abs(time[k] - start) <= reach);
+      const powers = near.map((k) => [1, (time[k] - start) / reach, ((time[k] - start) / reach) ** 2]);
+      const H = [0, 1, 2].map((i) => [0, 1, 2].map((j) => powers.reduce((sum, p) => sum + p[i] * p[j], 0)));
+      const poses = near.map((k) => [table[k][1], table[k][2], table[inside[0]][3] + wrapped(table[k][3] - table[inside[0]][3])]);
+      const fits = [0, 1, 2].map((j) => solved(H, [0, 1, 2].map((i) => powers.reduce((sum, p, k) => sum + p[i] * poses[k][j], 0))));
+      begin.push(...fits.map((c) => c[0]), ...fits.map((c) => c[1] / reach), start);
+      for (let j = 0; j < shares[0].length; j++) for (let k = 0; k < steps; k++) {
+        const mean = (integral(start + (k + 1) * h, j) - integral(start + k * h, j)) / h;
+        given[j].push(mean), given[shares[0].length + j].push(mean);
+      }
+      samples.push(inside.length), since.push(...inside.map((k) => time[k] - start)), kept.push(...inside);
+    }
+    if (!samples.length) throw new Error(`${name} has no window of ${shown(length)} s`);
+    const measured = [1, 2, 3].map((j) => kept.map((k) => table[k][j])), track = [1, 2].map((j) => table.map((each) => each[j]));
+    const run = { name, use: "own", train: false, h, steps, windows: samples.length, base: runs[0].base, begin, given, samples, measured, track, after: [NaN, NaN] };
+    return placed(run, since);
+  }
+
+  // What the thrusters are commanded, of a force or of commands.
+  function allocated(values) {
+    if (!data.csv.force) return values;
+    memory("inputs", 3, allocation).set(values);
+    allocation.step();
+    return [...memory("outputs", (runs[0].given.length / 2), allocation)];
+  }
+
+  async function own(files) {
+    try {
+      for (const each of files) {
+        const run = ownRun(each.name, await each.text());
+        runs.push(run), added(run), say(`${each.name}: ${run.windows} windows compared.`);
+      }
+    } catch (error) {
+      say(error.message);
+    }
+    update();
   }
 
   // Controls.
@@ -380,17 +457,17 @@
       update();
       return say(`Fitted ${moved} values to the training runs in ${shown(seconds, 2)} s.`);
     }), ...(data.model ? [button("Save model.ssv", save)] : []));
-  at("results").append(table(), key(), made("div", { class: "gallery" }, ...runs.flatMap((run) => [trackPicture(run), errorPicture(run)])));
-
-  for (const s of sliders) s.choice.ticked = false;
-  first = answers();
-  for (const choice of data.choices) choice.ticked = learned.get(choice);
-  runs.forEach((run, k) => {
-    run.old.setAttribute("d", lines(run, first[k].poses));
-    [1e3, 180 / Math.PI].forEach((factor, j) => {
-      fill(cells[k][3 * j], first[k].all[j], factor), fill(cells[k][3 * j + 1], run.after[j], factor);
-    });
-  });
+  if (data.csv) {
+    const input = made("input", { type: "file", accept: ".csv", multiple: "" });
+    input.addEventListener("change", () => own(input.files));
+    at("controls").append(made("label", { class: "file" }, "Compare your own run (CSV, or drop it here): ", input,
+      made("small", {}, ` columns time, x, y, psi, ${data.csv.columns.join(", ")} in SI units`)));
+    const section = document.getElementById("what-if");
+    section.addEventListener("dragover", (event) => event.preventDefault());
+    section.addEventListener("drop", (event) => { event.preventDefault(), own(event.dataTransfer.files); });
+  }
+  at("results").append(table(), key(), gallery);
+  runs.forEach(added);
   update();
   say("");
 })().catch((error) => {
