@@ -72,6 +72,7 @@ window.onload = async () => {{
     slider.dispatchEvent(new frame.contentWindow.Event("input"));
   }};
   try {{
+    page.querySelector("#what-if details").open = true;
     while (!results().dataset.milliseconds) await new Promise((done) => setTimeout(done, 20));
     {script}
   }} catch (error) {{
@@ -89,8 +90,9 @@ const add = async (text) => {
   moved.items.add(new File([text], "<b>own</b>.csv"));
   input.files = moved.files;
   input.dispatchEvent(new Event("change"));
-  await new Promise((done) => setTimeout(done, 200));
-  return page.querySelector("#what-if-status").textContent;
+  const status = page.querySelector("#what-if-status"), before = status.textContent;
+  while (status.textContent === before) await new Promise((done) => setTimeout(done, 20));
+  return status.textContent;
 };
 found.wrong = await add("time,x,y,psi\n0,0,0,0");
 found.said = await add(TEXT);

@@ -1,7 +1,7 @@
 "use strict";
 // Predicts the windows of a report again while a reader moves values of the model. All text of the data becomes
 // text of the page, never HTML. Units are SI: m, rad, s. An array of poses is x, y, psi of one step after the other.
-(async () => {
+async function changeTheModel() {
   const NODES = 4; // of the interpolation between steps, as in the report
   const POINTS = 24; // of a window's line in a picture
   const STEPS = 8, ENOUGH = 1e-4, SECONDS = 1.3; // of a fit: at most, fall of the cost to end, time for a further step
@@ -470,6 +470,10 @@
   runs.forEach(added);
   update();
   say("");
-})().catch((error) => {
-  document.getElementById("what-if-status").textContent = `The page cannot compute the model here: ${error.message}`;
-});
+}
+
+document.getElementById("what-if-open").addEventListener("toggle", () => {
+  changeTheModel().catch((error) => {
+    document.getElementById("what-if-status").textContent = `The page cannot compute the model here: ${error.message}`;
+  });
+}, { once: true });
