@@ -55,11 +55,11 @@ def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bo
     given, acting, power, wind = map(slice, ends[:-1], ends[1:])
 
     def ready(p: Fields) -> Ready:
-        m = _with(model, names, p)
+        m = with_values(model, names, p)
         return Ready(m.hull, m.drive._replace(effects=m.drive.effects._replace(layout=layout)))
 
     def init(i: Fields, p: Fields) -> vessel.State:
-        pose, nu = true_motion(i[:3], i[3:6], _with(model, names, p), _true_pose)
+        pose, nu = true_motion(i[:3], i[3:6], with_values(model, names, p), solved_pose)
         return vessel.State._make([*pose, *nu, i[6]])
 
     def prepared_step(
@@ -105,7 +105,7 @@ def allocation_component(model: Model) -> Component:
     return Component("allocation", "Commands for a force", nothing, nothing, Force, outputs, init, step)
 
 
-def _with(model: Model, names: Sequence[str], values: Fields) -> Model:
+def with_values(model: Model, names: Sequence[str], values: Fields) -> Model:
     """A model with other values, which may be symbols, in all runs."""
     parts: dict[str, dict[str, Any]] = {
         part: dict(getattr(model, part)) for part in model.ship.parameters
@@ -115,7 +115,7 @@ def _with(model: Model, names: Sequence[str], values: Fields) -> Model:
     return replace(model, **parts, runs={})
 
 
-def _true_pose(measured: Sequence[Number], b: vessel.PreparedVessel) -> list[Number]:
+def solved_pose(measured: Sequence[Number], b: vessel.PreparedVessel) -> list[Number]:
     """As :func:`.prediction.true_pose`, of numbers and with as many iterations for all."""
     pose = [*measured]
     for _ in range(SOLVED):

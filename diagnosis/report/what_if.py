@@ -9,6 +9,7 @@ import zlib
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from hashlib import sha256
 from math import inf, isfinite
 from pathlib import Path
@@ -18,12 +19,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cosim import InputError
+from fmus.declare import Component
 from fmus.effects import Effect
 from fmus.fmi.trace import TraceError
 from fmus.native.program import program
 from fmus.native.webassembly import component_module
 
 from ..predictors import Evaluation, Model, Response, write_model
+from ..predictors.balance_component import balance_component
+from ..predictors.prediction import at_rest
 from ..predictors.prediction_component import START, allocation_component, prediction_component
 from ..predictors.ship_model import of_run, parameter_and_run
 from ..predictors.thrust import LONGEST_STEP
@@ -199,11 +203,13 @@ class Bench:
             "runs": runs,
             "model": self._ssv(),
             "csv": self._csv(),
+            "inertia": self.learned.reference_mass.tolist(),
             "arrays": store.entries,
         }
         head = json.dumps(header, allow_nan=False).encode()
         allocation = component_module(program(allocation_component(self.learned)))
-        parts = head, module, allocation
+        balance = component_module(program(self._balance))
+        parts = head, module, allocation, balance
         sizes = [len(part).to_bytes(4, "little") for part in parts]
         return b64encode(zlib.compress(b"".join([*sizes, *parts, *store.parts]), 9)).decode()
 
@@ -346,8 +352,9 @@ class Bench:
         base = (
             replace(self.start, runs={}) if e.name not in self.start.runs else self.start.during(e.name)
         )
+        found = {} if self.windy else {"force": self._force(e, store)}
         smooth = e.smoothed.eta[np.isfinite(e.smoothed.eta[:, 0])]
-        return {
+        return found | {
             "name": e.name,
             "use": self.r.use(e),
             "train": e.use == "train",
@@ -363,6 +370,41 @@ class Bench:
             "track": [store.near(x) for x in smooth[:: max(1, len(smooth) // 1500), :2].T],
             "before": [e.before.position, e.before.heading],
             "after": [e.after.position, e.after.heading],
+        }
+
+    @cached_property
+    def _points(self) -> int:
+        """At how many points from a sample to the next shares act, in any run."""
+        return max(len(self._between(e)) - 1 for e in self.runs) or 1
+
+    def _between(self, e: Evaluation) -> np.ndarray:
+        """(points, k, n): commands that arrive, then shares that act; or one for both."""
+        w = e.weak_windows
+        return Response(w.run, self.learned.during(e.name), not at_rest(w.smoothed)).between_samples
+
+    @property
+    def _balance(self) -> Component:
+        """The model error of a sample."""
+        return balance_component(self.learned, self.names, self.runs[0].weak_windows.run, self._points)
+
+    def _force(self, e: Evaluation, store: "ArrayStore") -> dict[str, Any]:
+        """What the page needs for the model error of a run, see :mod:`..predictors.weak_form`."""
+        w, between = e.weak_windows, self._between(e)
+        given, *acting = between if len(between) > 1 else [between[0]] * 2
+        acting = [acting[k % len(acting)] for k in range(self._points)]
+        power = [] if w.run.power is None else [*w.run.power.T]
+        motion = np.where(w.known[:, None], np.hstack([w.smoothed.eta, w.smoothed.eta_dot]), 0.0)
+        columns = [*given, *(x for shares in acting for x in shares), *power]
+        first = w.smooth.indptr[:-1]
+        return {
+            "time": store.exact(w.run.time),
+            "motion": [store.near(x) for x in motion.T],
+            "columns": [store.near(x) for x in columns],
+            "middle": store.exact(w.middle),
+            "half": 0.5 * w.width,
+            "first": w.smooth.indices[first].tolist() if first.size else [],
+            "rows": np.diff(w.smooth.indptr).tolist(),
+            "after": e.after.omega_rms.tolist() if first.size else [],
         }
 
 

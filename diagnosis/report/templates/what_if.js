@@ -17,7 +17,7 @@ async function changeTheModel() {
     const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
     const buffer = await new Response(stream).arrayBuffer();
-    const sizes = new Uint32Array(buffer, 0, 3);
+    const sizes = new Uint32Array(buffer, 0, 4);
     let place = sizes.byteLength;
     const [head, ...modules] = Array.from(sizes, (size) => new Uint8Array(buffer, (place += size) - size, size));
     const data = JSON.parse(new TextDecoder().decode(head));
@@ -39,7 +39,7 @@ async function changeTheModel() {
     return { data, arrays, modules: made.map(({ instance }) => instance.exports) };
   }
 
-  const { data, arrays, modules: [exports, allocation] } = await unpacked(at("data").textContent);
+  const { data, arrays, modules: [exports, allocation, balance] } = await unpacked(at("data").textContent);
   const memory = (name, count, of = exports) => new Float64Array(of.memory.buffer, of[name].value, count);
   const params = memory("params", data.params.length), step = memory("h", 1), outputs = memory("outputs", 3);
   const state = memory("state", 7), after = memory("after", 7);
@@ -60,9 +60,13 @@ async function changeTheModel() {
     return { ...run, inputs, nodes, first, shares };
   }
 
+  const kernelIntegral = (s) => 35 / 32 * (s - s ** 3 + 0.6 * s ** 5 - s ** 7 / 7);
+  const kernelMoment = (s) => -35 / 256 * (1 - s * s) ** 4;
+
   const runs = data.runs.map((run) => {
     const [given, measured, track] = [run.given, run.measured, run.track].map((part) => part.map((k) => arrays[k]));
-    return placed({ ...run, given, measured, track, begin: arrays[run.begin] }, arrays[run.since]);
+    const force = run.force && run.force.rows.length ? weighted(run.force) : null;
+    return placed({ ...run, given, measured, track, force, begin: arrays[run.begin] }, arrays[run.since]);
   });
 
   // Predictions.
@@ -115,6 +119,69 @@ async function changeTheModel() {
     }
     return { off, position, heading, all: all.map((sum) => Math.sqrt(sum / first.length)) };
   }
+
+  // The residual force: the model error over the windows of the weak form, as diagnosis/predictors/weak_form.py has it.
+
+  // Arrays of a run's force, with the weights of its windows: of a smooth signal, of its slope, of one that is held.
+  function weighted(force) {
+    const [time, middle] = [arrays[force.time], arrays[force.middle]], { half, first, rows } = force;
+    const [motion, columns] = [force.motion, force.columns].map((part) => part.map((k) => arrays[k]));
+    const size = rows.reduce((sum, n) => sum + n, 0), weights = [0, 1, 2].map(() => new Float64Array(size));
+    const limited = (x) => Math.min(Math.max(x, -1), 1);
+    const span = (center, row) => {
+      const a = time[Math.max(row, 0)], b = time[Math.min(row + 1, time.length - 1)];
+      const low = limited((a - center) / half), high = limited((b - center) / half), length = b > a ? b - a : 1;
+      const area = kernelIntegral(high) - kernelIntegral(low);
+      return [area, (half * (kernelMoment(high) - kernelMoment(low)) + (center - a) * area) / length, length];
+    };
+    middle.forEach((center, w) => {
+      const to = rows.slice(0, w).reduce((sum, n) => sum + n, 0);
+      for (let n = 0; n < rows[w]; n++) {
+        const [area, share, length] = span(center, first[w] + n), [before, old, last] = span(center, first[w] + n - 1);
+        weights[0][to + n] = area - share + old;
+        weights[1][to + n] = before / last - area / length;
+        weights[2][to + n] = area;
+      }
+    });
+    const known = Array.from(time, (_, k) => motion.some((x) => x[k]));
+    const place = Array.from(middle, (center) => time.findIndex((t) => t >= center - 1e-9));
+    const at = (j) => place.map((k) => motion[j][k]), psi = at(2), [north, east] = [at(3), at(4)];
+    const surge = psi.map((a, k) => Math.cos(a) * north[k] + Math.sin(a) * east[k]);
+    return { time, middle, motion, columns, first, rows, weights, known, north: at(0), east: at(1), psi, surge, after: force.after };
+  }
+
+  // Force (X, Y, N) [N, N, N m] of each window, one after the other.
+  function residualForce(f, values) {
+    const { time, motion, columns, weights, known, first, rows } = f, count = time.length, start = data.start, met = start + 3;
+    const inputs = memory("inputs", met + columns.length, balance), at = memory("state", 9, balance), push = memory("outputs", 3, balance);
+    const signals = new Float64Array(9 * count), by = new Float64Array(3 * count), omega = new Float64Array(3 * rows.length);
+    memory("params", data.params.length, balance).set(values);
+    if (balance.prepare()) return omega.fill(NaN);
+    for (let k = 0; k < count; k++) {
+      for (let j = 0; j < 6; j++) inputs[j] = motion[j][k];
+      inputs[6] = time[k];
+      balance.init();
+      for (let j = 0; j < 9; j++) signals[9 * k + j] = at[j];
+    }
+    for (let k = 0; k < count; k++) {
+      const part = k + 1 < count && known[k] && known[k + 1] ? 0.5 : 0;
+      inputs[6] = time[k];
+      for (let j = 0; j < 3; j++) inputs[start + j] = signals[9 * k + 6 + j] + (part ? part * (signals[9 * k + 15 + j] - signals[9 * k + 6 + j]) : 0);
+      for (let j = 0; j < columns.length; j++) inputs[met + j] = columns[j][k];
+      balance.step();
+      for (let j = 0; j < 3; j++) by[3 * k + j] = push[j];
+    }
+    const [smooth, slope, held] = weights;
+    for (let w = 0, n = 0; w < rows.length; w++) {
+      const rate = [0, 0, 0];
+      for (let k = first[w]; k < first[w] + rows[w]; k++, n++)
+        for (let j = 0; j < 3; j++) rate[j] += slope[n] * signals[9 * k + j] - smooth[n] * signals[9 * k + 3 + j] - held[n] * by[3 * k + j];
+      data.inertia.forEach((row, j) => { omega[3 * w + j] = row[0] * rate[0] + row[1] * rate[1] + row[2] * rate[2]; });
+    }
+    return omega;
+  }
+
+  const rms = (omega, j) => Math.sqrt(omega.reduce((sum, x, k) => sum + (k % 3 === j ? x * x : 0), 0) / (omega.length / 3));
 
   const sliders = [];
   for (const choice of data.choices) {
@@ -289,26 +356,88 @@ async function changeTheModel() {
     return made("figure", {}, picture, made("figcaption", {}, `${run.name}: position error of each window, in time [mm].`));
   }
 
+  // The residual force of a run in pictures: each axis over time and over surge speed, and arrows at its places.
+
+  const AXES = ["X [N]", "Y [N]", "N [N·m]"], BINS = 16, STRIP = 80;
+
+  function strips(label, caption) {
+    const lines = AXES.map((axis, j) => {
+      const low = made("svg:path", { class: "before" }), high = made("svg:path", { class: "now" });
+      const middle = STRIP * (j + 0.5), text = made("svg:text", { x: 2, y: middle - 24 }, axis), most = made("svg:text", { x: 2, y: middle - 8 });
+      return { low, high, most, parts: [made("svg:path", { class: "axis", d: `M${LEFT} ${middle}H${WIDE}` }), text, most, low, high] };
+    });
+    const picture = made("svg:svg", { viewBox: `0 0 ${WIDE} ${3 * STRIP}`, role: "img", "aria-label": label }, ...lines.flatMap(({ parts }) => parts));
+    return { lines, figure: made("figure", {}, picture, made("figcaption", {}, caption)) };
+  }
+
+  function forcePictures(run) {
+    const f = run.force, range = (x) => [Math.min(...x), Math.max(...x)];
+    const [from, to] = range(f.surge), bin = f.surge.map((u) => Math.min(Math.floor(BINS * (u - from) / (to - from || 1)), BINS - 1));
+    const [begin, end] = range(f.middle), size = Math.max(...[f.north, f.east].map((x) => range(x)[1] - range(x)[0]), 1e-9);
+    f.over = strips(`Residual force over time, ${run.name}`, `${run.name}: residual force from ${shown(begin)} to ${shown(end)} s.`);
+    f.by = strips(`Residual force by surge speed, ${run.name}`, `${run.name}: mean residual force by surge speed, ${shown(from)} to ${shown(to)} m/s.`);
+    f.arrows = [made("svg:path", { class: "before" }), made("svg:path", { class: "now" })];
+    const box = [Math.min(...f.east) - 0.15 * size, -Math.max(...f.north) - 0.15 * size, 1.3 * size, 1.3 * size];
+    const map = made("svg:svg", { viewBox: box.join(" "), role: "img", "aria-label": `Residual force at its places, ${run.name}` },
+      made("svg:path", { class: "measured", d: f.east.map((x, k) => `${k ? "L" : "M"}${x.toFixed(run.digits)} ${(-f.north[k]).toFixed(run.digits)}`).join("") }), ...f.arrows);
+    const place = made("figure", {}, map, made("figcaption", {}, `${run.name}: residual force at its places, north up.`));
+    f.draw = (omega, now) => {
+      const axis = (j) => Array.from(f.middle, (_, w) => omega[3 * w + j]), name = now ? "high" : "low";
+      if (!now) {
+        f.most = AXES.map((_, j) => Math.max(...axis(j).map(Math.abs), 1e-9));
+        f.length = 0.12 * size / Math.max(...axis(0).map((x, w) => Math.hypot(x, omega[3 * w + 1])), 1e-9);
+      }
+      const line = (x, y, j) => x.map((at, k) => {
+        const height = STRIP * (j + 0.5) - 0.46 * STRIP * Math.min(Math.max(y[k] / f.most[j], -1), 1);
+        return Number.isFinite(height) ? `${k ? "L" : "M"}${(LEFT + (WIDE - LEFT) * at).toFixed(1)} ${height.toFixed(1)}` : "";
+      }).join("");
+      AXES.forEach((_, j) => {
+        const y = axis(j), sums = new Float64Array(BINS), counts = new Float64Array(BINS), filled = [];
+        bin.forEach((k, w) => { sums[k] += y[w], counts[k]++; });
+        counts.forEach((n, k) => { if (n) filled.push(k); });
+        f.over.lines[j][name].setAttribute("d", line(Array.from(f.middle, (t) => (t - begin) / (end - begin || 1)), y, j));
+        f.by.lines[j][name].setAttribute("d", line(filled.map((k) => (k + 0.5) / BINS), filled.map((k) => sums[k] / counts[k]), j));
+        if (!now) for (const picture of [f.over, f.by]) picture.lines[j].most.textContent = `±${shown(f.most[j], 2)}`;
+      });
+      f.arrows[now ? 1 : 0].setAttribute("d", f.psi.map((a, w) => {
+        const [X, Y] = [f.length * omega[3 * w], f.length * omega[3 * w + 1]], c = Math.cos(a), s = Math.sin(a);
+        return Number.isFinite(X + Y) ? `M${f.east[w].toFixed(run.digits)} ${(-f.north[w]).toFixed(run.digits)}l${(s * X + c * Y).toFixed(run.digits)} ${(s * Y - c * X).toFixed(run.digits)}` : "";
+      }).join(""));
+    };
+    return [f.over.figure, f.by.figure, place];
+  }
+
   const first = []; // of each run without any tick
   const cells = []; // of the table, by run
-  const body = made("tbody"), gallery = made("div", { class: "gallery" });
+  const forces = []; // cells of the residual force, by run
+  const body = made("tbody"), forceBody = made("tbody"), gallery = made("div", { class: "gallery" });
 
-  function table() {
+  function table(titles, rows) {
     const columns = ["no tick", "learned", "as ticked"], head = (text) => made("th", { scope: "col" }, text);
     const over = (text) => made("th", { scope: "colgroup", colspan: 3 }, text);
-    return made("div", { class: "table" }, made("table", {}, made("thead", {},
-      made("tr", {}, head(""), over("position [mm]"), over("heading [°]")),
-      made("tr", {}, head("run"), ...[...columns, ...columns].map(head))), body));
+    return made("div", { class: "table", tabindex: 0 }, made("table", {}, made("thead", {},
+      made("tr", {}, head(""), ...titles.map(over)),
+      made("tr", {}, head("run"), ...titles.flatMap(() => columns).map(head))), rows));
+  }
+
+  function newRow(run, rows, count) {
+    const cells = Array.from({ length: 3 * count }, () => made("td"));
+    rows.append(made("tr", run.train ? {} : { class: "held" },
+      made("th", { scope: "row" }, run.name, " ", made("small", {}, run.use)), ...cells));
+    return cells;
   }
 
   function added(run) {
-    const row = Array.from({ length: 6 }, () => made("td")), without = answer(run, run.base);
-    first.push(without), cells.push(row);
-    body.append(made("tr", run.train ? {} : { class: "held" },
-      made("th", { scope: "row" }, run.name, " ", made("small", {}, run.use)), ...row));
+    const row = newRow(run, body, 2), without = answer(run, run.base);
+    first.push(without), cells.push(row), forces.push(null);
     gallery.append(trackPicture(run), errorPicture(run));
     run.old.setAttribute("d", lines(run, without.poses));
     FACTORS.forEach((factor, j) => { fill(row[3 * j], without.all[j], factor), fill(row[3 * j + 1], run.after[j], factor); });
+    if (!run.force) return;
+    const own = forces[forces.length - 1] = newRow(run, forceBody, 3), omega = residualForce(run.force, run.base);
+    gallery.append(...forcePictures(run));
+    run.force.draw(omega, false);
+    AXES.forEach((_, j) => { fill(own[3 * j], rms(omega, j), 1), fill(own[3 * j + 1], run.force.after[j], 1); });
   }
 
   function fill(cell, value, factor) {
@@ -326,6 +455,10 @@ async function changeTheModel() {
       run.firstErrors.setAttribute("d", steps(first[k].position, most));
       run.most.textContent = shown(1e3 * most);
       FACTORS.forEach((factor, j) => fill(cells[k][3 * j + 2], answer.all[j], factor));
+      if (!run.force) return;
+      const omega = residualForce(run.force, parameters(run, k));
+      run.force.draw(omega, true);
+      AXES.forEach((_, j) => fill(forces[k][3 * j + 2], rms(omega, j), 1));
     });
     at("results").dataset.milliseconds = (performance.now() - began).toFixed(2);
     return found;
@@ -466,7 +599,8 @@ async function changeTheModel() {
     section.addEventListener("dragover", (event) => event.preventDefault());
     section.addEventListener("drop", (event) => { event.preventDefault(), own(event.dataTransfer.files); });
   }
-  at("results").append(table(), key(), gallery);
+  at("results").append(table(["position [mm]", "heading [°]"], body),
+    ...(data.runs.some((run) => run.force) ? [table(AXES.map((axis) => `residual force ${axis}`), forceBody)] : []), key(), gallery);
   runs.forEach(added);
   update();
   say("");
