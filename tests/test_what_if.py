@@ -64,7 +64,9 @@ window.onload = async () => {{
   const frame = document.querySelector("iframe"), page = frame.contentDocument, found = {{}};
   const results = () => page.querySelector("#what-if-results");
   const press = (text) => [...page.querySelectorAll("#what-if button")].find((b) => b.textContent === text).click();
-  const errors = () => [...results().querySelectorAll("td")].map((cell) => Number(cell.dataset.value));
+  const numbers = (table) => [...table.querySelectorAll("td")].map((cell) => Number(cell.dataset.value));
+  const errors = () => numbers(results().querySelectorAll("table")[0]);
+  const forces = () => numbers(results().querySelectorAll("table")[1]);
   const choice = (name) => [...page.querySelectorAll("#what-if fieldset")].find((f) => f.querySelector("legend").textContent.trim().startsWith(name + " "));
   const move = (name, value) => {{
     const slider = page.querySelector(`#what-if input[aria-label^="${{name}} ["]`);
@@ -147,13 +149,14 @@ def test_component_predicts_as_windows_are_predicted(data):
 def test_page_computes_the_errors_of_the_report_and_of_any_other_values(driven, report, data):
     found = driven(
         """found.first = errors(); press("Initial model"); found.initial = errors();
-        move("thrust_curve_deadband", 0.05); move("F_n", 0.1); found.moved = errors();
+        move("thrust_curve_deadband", 0.05); move("F_n", 0.1); found.moved = errors(); found.forces = forces();
         press("Learned model"); found.again = errors();"""
     )
     expected = [
         [e.before.position, e.after.position, e.before.heading, e.after.heading]
         for e in report.evaluations
     ]
+    forces = np.reshape(found.pop("forces"), (2, 3, 3))
     rows = {name: np.reshape(values, (2, 6)) for name, values in found.items()}
     assert np.allclose(rows["first"][:, [0, 2, 3, 5]], expected, rtol=1e-6, atol=0.0)
     assert np.array_equal(rows["first"], rows["again"])
@@ -164,6 +167,9 @@ def test_page_computes_the_errors_of_the_report_and_of_any_other_values(driven, 
     assert np.allclose(
         rows["moved"][:, [2, 5]], [[e.position, e.heading] for e in known], rtol=1e-6, atol=0.0
     )
+    told = [[e.before.omega_rms, e.after.omega_rms] for e in report.evaluations]
+    assert np.allclose(np.moveaxis(forces[:, :, :2], 1, 2), told, rtol=1e-6, atol=0.0)
+    assert np.allclose(forces[:, :, 2], [e.omega_rms for e in known], rtol=1e-6, atol=0.0)
     assert (np.abs(rows["moved"][:, 2] / rows["initial"][:, 2] - 1.0) > 0.1).all()
 
 

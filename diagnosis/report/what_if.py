@@ -414,25 +414,25 @@ class ArrayStore:
     def __init__(self) -> None:
         self.parts: list[bytes] = []
         self.entries: list[dict[str, Any]] = []
+        self._known: dict[tuple[bytes, float], int] = {}
 
     def exact(self, values: np.ndarray) -> int:
         """The number of an array that keeps every bit."""
-        return self._keep(
-            np.ascontiguousarray(values, "<f8").reshape(-1).view(np.uint8).reshape(-1, 8), 0.0
-        )
+        whole = np.ascontiguousarray(values, "<f8").reshape(-1)
+        return self._keep(whole.view(np.uint8).reshape(-1, 8), 0.0)
 
     def near(self, values: np.ndarray) -> int:
         """The number of an array, kept to a 2^31st of its largest value as second differences."""
         scale = float(np.abs(values).max(initial=0.0)) / LEVELS or 1.0
         whole = np.round(values / scale).astype(np.int64)
-        slope = np.diff(whole, prepend=0)
-        change = np.diff(slope, prepend=0).astype(
-            np.int32
-        )  # modulo 2^32, as the page adds them up again
-        return self._keep(change.astype("<i4").view(np.uint8).reshape(-1, 4), scale)
+        change = np.diff(np.diff(whole, prepend=0), prepend=0).astype("<i4")  # modulo 2^32
+        return self._keep(change.view(np.uint8).reshape(-1, 4), scale)
 
     def _keep(self, rows: np.ndarray, scale: float) -> int:
         """Bytes of the same weight next to each other, which compresses."""
-        self.parts.append(rows.T.tobytes())
-        self.entries.append({"count": len(rows), "scale": scale})
-        return len(self.entries) - 1
+        content = rows.T.tobytes()
+        if (content, scale) not in self._known:
+            self._known[content, scale] = len(self.entries)
+            self.parts.append(content)
+            self.entries.append({"count": len(rows), "scale": scale})
+        return self._known[content, scale]
