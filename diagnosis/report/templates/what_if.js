@@ -154,34 +154,45 @@ async function changeTheModel() {
   function residualForce(f, values) {
     const { time, motion, columns, weights, known, first, rows } = f, count = time.length, start = data.start, met = start + 3;
     const inputs = memory("inputs", met + columns.length, balance), at = memory("state", 9, balance), push = memory("outputs", 3, balance);
-    const signals = new Float64Array(9 * count), by = new Float64Array(3 * count), omega = new Float64Array(3 * rows.length);
+    const speeds = new Float64Array(3 * count), rates = new Float64Array(3 * count), flows = new Float64Array(3 * count);
+    const pushes = new Float64Array(3 * count), omega = new Float64Array(3 * rows.length);
     memory("params", data.params.length, balance).set(values);
     if (balance.prepare()) return omega.fill(NaN);
     for (let k = 0; k < count; k++) {
       for (let j = 0; j < 6; j++) inputs[j] = motion[j][k];
       inputs[6] = time[k];
       balance.init();
-      for (let j = 0; j < 9; j++) signals[9 * k + j] = at[j];
+      for (let j = 0; j < 3; j++) {
+        speeds[3 * k + j] = at[j], rates[3 * k + j] = at[3 + j], flows[3 * k + j] = at[6 + j];
+      }
     }
     for (let k = 0; k < count; k++) {
       const part = k + 1 < count && known[k] && known[k + 1] ? 0.5 : 0;
       inputs[6] = time[k];
-      for (let j = 0; j < 3; j++) inputs[start + j] = signals[9 * k + 6 + j] + (part ? part * (signals[9 * k + 15 + j] - signals[9 * k + 6 + j]) : 0);
+      for (let j = 3 * k; j < 3 * k + 3; j++) inputs[start + j - 3 * k] = flows[j] + (part ? part * (flows[j + 3] - flows[j]) : 0);
       for (let j = 0; j < columns.length; j++) inputs[met + j] = columns[j][k];
       balance.step();
-      for (let j = 0; j < 3; j++) by[3 * k + j] = push[j];
+      pushes[3 * k] = push[0], pushes[3 * k + 1] = push[1], pushes[3 * k + 2] = push[2];
     }
     const [smooth, slope, held] = weights;
     for (let w = 0, n = 0; w < rows.length; w++) {
-      const rate = [0, 0, 0];
-      for (let k = first[w]; k < first[w] + rows[w]; k++, n++)
-        for (let j = 0; j < 3; j++) rate[j] += slope[n] * signals[9 * k + j] - smooth[n] * signals[9 * k + 3 + j] - held[n] * by[3 * k + j];
-      data.inertia.forEach((row, j) => { omega[3 * w + j] = row[0] * rate[0] + row[1] * rate[1] + row[2] * rate[2]; });
+      let u = 0, v = 0, r = 0;
+      for (let k = 3 * first[w]; k < 3 * (first[w] + rows[w]); k += 3, n++) {
+        const a = smooth[n], b = slope[n], c = held[n];
+        u += b * speeds[k] - a * rates[k] - c * pushes[k];
+        v += b * speeds[k + 1] - a * rates[k + 1] - c * pushes[k + 1];
+        r += b * speeds[k + 2] - a * rates[k + 2] - c * pushes[k + 2];
+      }
+      for (let j = 0; j < 3; j++) omega[3 * w + j] = data.inertia[j][0] * u + data.inertia[j][1] * v + data.inertia[j][2] * r;
     }
     return omega;
   }
 
-  const rms = (omega, j) => Math.sqrt(omega.reduce((sum, x, k) => sum + (k % 3 === j ? x * x : 0), 0) / (omega.length / 3));
+  function rms(omega, j) {
+    let sum = 0;
+    for (let k = j; k < omega.length; k += 3) sum += omega[k] * omega[k];
+    return Math.sqrt(sum / (omega.length / 3));
+  }
 
   const sliders = [];
   for (const choice of data.choices) {
