@@ -214,6 +214,7 @@ def propagate(
     if single:
         s, steps = vessel.State._make([x.item() for x in s]), [x[..., 0, 0].tolist() for x in thrust]
         air = None if air is None else air[..., 0, 0].tolist()
+        power = None if power is None else power[..., 0].tolist()
     yield s
     for k, (given, shares) in enumerate(zip(*steps, strict=True)):
         with np.errstate(all="ignore"):
