@@ -308,11 +308,16 @@ def before_filters(s: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
     return pose, rate
 
 
-def true_motion(eta: Any, eta_dot: Any, model: Model) -> tuple[list[Any], list[Any]]:
-    """Pose and body-fixed velocity, each three of (p, w), of a measured pose and its rate (3, w)."""
-    b, step = model.hull, LONGEST_STEP
+def true_motion(
+    eta: Any, eta_dot: Any, model: Model, solved: Callable[..., list[Any]] | None = None
+) -> tuple[list[Any], list[Any]]:
+    """Pose and body-fixed velocity, each three of (p, w), of a measured pose and its rate (3, w).
+
+    ``solved`` gives the pose behind a measured one: :func:`true_pose`, or the same for symbols.
+    """
+    b, step, solved = model.hull, LONGEST_STEP, solved or true_pose
     poses = ([y + h * y_dot for y, y_dot in zip(eta, eta_dot, strict=True)] for h in (0.0, step, -step))
-    (x, y, psi), ahead, astern = (true_pose(pose, b) for pose in poses)
+    (x, y, psi), ahead, astern = (solved(pose, b) for pose in poses)
     x_dot, y_dot, r = ((a - b) / (2.0 * step) for a, b in zip(ahead, astern, strict=True))
     return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 

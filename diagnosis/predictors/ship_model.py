@@ -12,6 +12,7 @@ from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
 from fmus.effects.linear_map import AXES, parameter
 from fmus.effects.measurement import CLOCK_OFFSET, MEASURED_BEHIND
+from fmus.fmi.trace import Symbol
 from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
 from fmus.vessel.vessel import PreparedVessel
@@ -63,7 +64,7 @@ def parameters(component: Component, values: Values) -> Any:
 
     Args:
         component: vessel or thrusters.
-        values: name -> number, or array (p, 1) for p sets of parameters.
+        values: name -> number, or array (p, 1) for p sets of parameters, or symbol.
 
     Raises:
         InputError: a name that the component does not have.
@@ -73,7 +74,7 @@ def parameters(component: Component, values: Values) -> Any:
     for name, value in values.items():
         if name not in places:
             raise InputError(f"{component.name} has no parameter '{name}'{nearest(name, places)}")
-        flat[places[name]] = value if isinstance(value, np.ndarray) else float(value)
+        flat[places[name]] = value if isinstance(value, (np.ndarray, Symbol)) else float(value)
     return packer(component.params)(flat)
 
 

@@ -108,6 +108,11 @@ class Windows:
             group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
+    @property
+    def groups(self) -> Sequence[tuple[WindowStarts, np.ndarray]]:
+        """Windows that are predicted together, and the number of each."""
+        return self._groups
+
     def after(self, seconds: float) -> "Windows":
         """The same windows without the samples of their first seconds.
 

@@ -21,6 +21,7 @@ from .glossary import linked
 from .headline import boundedness, cause, finding_sentence, first_sentences, gain_of_search, page_title
 from .report_data import USES, ReportData, trial_rows
 from .shape import curves
+from .what_if import what_if
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -94,6 +95,7 @@ def write_report(
         pictures=drawn,
         of_runs=of_runs,
         changes=[error_changes(data, k) for k in range(len(data.evaluations))],
+        what_if=what_if(data),
         tiles=[*_tiles(data)],
         trials=[*trial_rows(data)],
         coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
