@@ -14,7 +14,7 @@ import diagnosis
 from benchmarks.ships import __main__ as ships
 from benchmarks.ships.chosen_settings import searched
 from benchmarks.ships.datasets import DATASETS, digest_of
-from benchmarks.ships.predictor import OfLaw, OfModel, Score, Training, score, spread
+from benchmarks.ships.entry_predictor import OfLaw, OfModel, Score, Training, score, spread
 from benchmarks.ships.same_windows import Continuous, Nominal, law_errors, moved, table
 from cosim import InputError
 from diagnosis import Model, Run

@@ -26,15 +26,15 @@ from studies.study_report import Report
 
 from .chosen_settings import SEED
 from .datasets import DATASETS, DataSet, Runs
-from .predictor import Entry, Score, Training, score, spread
+from .entry_predictor import Entry, Score, Training, score, spread
 
 GROUP = "cybership.methods"
 # Own entries, each with the package that it needs beside the project's.
 OWN = {
     "nominal": "",
     "steady": "",
-    "calibration": "",
-    "learn": "",
+    "calibrated": "",
+    "learned": "",
     "ridge": "",
     "narx": "sysidentpy",
     "sindy": "pysindy",

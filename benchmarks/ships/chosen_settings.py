@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis import Smoothed, Windows
 
-from .predictor import Entry, OfLaw, Training
+from .entry_predictor import Entry, OfLaw, Training
 from .same_windows import Law, law_errors
 
 SEED = 1  # of first weights and of what early stopping sets aside

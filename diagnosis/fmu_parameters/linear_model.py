@@ -234,4 +234,4 @@ def _exact(
     except SimulationError:
         return None
     finally:
-        run.free()
+        run.instance.free()

@@ -120,8 +120,12 @@ class BlackBox(ABC):
             return 0.0
         return FORGOTTEN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
 
-    @cached_property
+    @property
     def model(self) -> Model:
+        return self._along_runs
+
+    @cached_property
+    def _along_runs(self) -> Model:
         """A model that moves as the black box does along its runs."""
         body = Model({**self.ship.vessel, **self._inertia()}, self.ship.thrusters, ship=self.ship.ship)
         given = {w.run.name: self._beyond_along(w, body) for w in self.runs}

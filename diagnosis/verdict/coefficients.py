@@ -91,5 +91,5 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         now = still
     if harm(now, first) or gain(other, now) <= 0.0:
         return None
-    rejected = data.validate and harm(*data.losses(best.findings.model, start))
-    return None if rejected else best
+    its, others = data.losses(best.findings.model, start)
+    return None if data.validate and harm(its, others) else best

@@ -125,9 +125,10 @@ def judge(
     advance("fit to predictions")
     changed = bool(learned.effects) or refitted
     fit = to_predictions(learned, train, prior, changed)
-    if data.validate and harm(*data.losses(fit.findings.model, start)):
-        # The fit by the model error was compared with these runs already.
-        fit = fit.about(learned)
+    if data.validate:
+        its, others = data.losses(fit.findings.model, start)
+        if harm(its, others):  # the fit by the model error was compared with these runs already
+            fit = fit.about(learned)
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (changed and not left)

@@ -1,6 +1,6 @@
 """The description of the ship, or the published model that it holds: nothing is learned."""
 
-from ..predictor import OfModel, Training
+from ..entry_predictor import OfModel, Training
 
 
 def fit(train: Training) -> OfModel:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..predictor import OfLaw, Training
+from ..entry_predictor import OfLaw, Training
 from ..same_windows import Continuous
 
 STEP = 0.05  # s; chosen, ten steps in half a second

@@ -242,13 +242,13 @@ class FmuPredictor(BlackBox):
         return [s for s in started if first[s] == 0.0 and abs(values[s]) > SMALL * sizes[s]]
 
     @cached_property
-    def model(self) -> Model:
+    def _along_runs(self) -> Model:
         inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
         time = self.runs[0].scale.time
         h = self.fmu.fixed_step or min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
         late = bool(self.late)
         with closing(ShortSteps(self.confined, inputs, outputs, h, late)) as self._steps:
-            return super().model
+            return super()._along_runs
 
     def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
         found = super().windows(runs, length)

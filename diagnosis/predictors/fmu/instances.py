@@ -99,7 +99,7 @@ class FmuRun:
             SimulationError: the FMU refuses.
         """
         of = [self._variables[n] for n in unknown]
-        columns = [self._instance.directional_derivative(of, self._variables[n]) for n in known]
+        columns = [self.instance.directional_derivative(of, self._variables[n]) for n in known]
         return np.array(columns).reshape(len(known), len(unknown)).T
 
     def _told(self, k: int) -> np.ndarray:

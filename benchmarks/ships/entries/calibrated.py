@@ -2,7 +2,7 @@
 
 import diagnosis
 
-from ..predictor import OfModel, Training
+from ..entry_predictor import OfModel, Training
 
 
 def fit(train: Training) -> OfModel:
