@@ -212,7 +212,7 @@ def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.nd
 
 def stretches(error: np.ndarray, time: np.ndarray, step: float) -> list[np.ndarray]:
     """Parts (m, 3) without a gap and long enough for a spectrum, a row each ``step`` [s]."""
-    known = np.isfinite(error).all(axis=1, keepdims=False)
+    known = np.all(np.isfinite(error), axis=1, keepdims=False)
     found = []
     for first, end in groups_of(known):
         even = np.arange(float(time[first]), float(time[end - 1]), step)
