@@ -206,7 +206,8 @@ class Page {
       .map((m) => row(m.name, found[m.name], m.unit, null, m.meaning)));
     $("nometrics").hidden = found !== null;
     if (this.data.roles.target.includes(-1)) $("nometrics").textContent = "Metrics need a target, which this scenario lacks.";
-    this.largest ??= this.data.actuators.map((a) => Math.max(Math.abs(a.min ?? 0), Math.abs(a.max ?? 0)));
+    // A command without a unit is a share of the full one; another one without limits fills its bar at its largest.
+    this.largest ??= this.data.actuators.map((a) => Math.max(Math.abs(a.min ?? 0), Math.abs(a.max ?? 0)) || (a.unit === "1" ? 1 : 0));
     $("actuators").replaceChildren(...this.data.actuators.map((a, k) => {
       const value = run.table[a.slot];
       this.largest[k] = Math.max(this.largest[k], Math.abs(value) || 0);
