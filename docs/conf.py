@@ -3,7 +3,12 @@
 The notebooks run while it is built; ``-D nb_execution_mode=off`` leaves that out.
 """
 
+import subprocess
+import sys
 from importlib.metadata import version as installed
+from pathlib import Path
+
+from sphinx.application import Sphinx
 
 project = "cybership"
 copyright = "2026, the cybership developers"  # noqa: A001 - the name that Sphinx reads
@@ -26,3 +31,15 @@ autodoc_member_order = "alphabetical"
 autodoc_typehints = "description"
 # Links to files of the repository that are no pages: tests/test_docs.py sees that they exist.
 suppress_warnings = ["myst.xref_missing"]
+
+
+def write_live_page(app: Sphinx, exception: Exception | None) -> None:
+    """Write the page that the front page embeds, in which a scenario runs."""
+    if exception is None and app.builder.name == "html":
+        page = Path(app.outdir, "_static", "ellipse.html")
+        options = ["ellipse", "--stop", "60", "--out", str(page)]
+        subprocess.run([sys.executable, "-m", "cosim.live", *options], check=True, cwd=app.outdir)
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("build-finished", write_live_page)
