@@ -53,7 +53,9 @@ def test_shipped_scenario_runs_through(path, tmp_path):
         "otter_waypoints": 2.5, "otter_los": 8.0, "kvlcc2_waypoints": 14.0, "gunnerus_waypoints": 70.0
     }  # fmt: skip
     assert result.metrics["e_pos_max"] < most.get(path.stem, 0.5)
-    assert len(list(tmp_path.glob("*.png"))) == 5
+    commands = json.loads((tmp_path / "log.json").read_text()).get("commands")
+    assert len(list(tmp_path.glob("*.png"))) == (6 if commands else 5)
+    assert (tmp_path / "commands.png").is_file() == bool(commands)
     assert not list(Path(tmp_path).glob("*.part"))
 
 

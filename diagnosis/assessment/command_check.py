@@ -135,7 +135,7 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
     still = lasting(needed_force(every, model)[idle], every.block[idle])
-    if (still < SETTINGS.explained * size).any():
+    if np.median(still / size) < SETTINGS.explained:  # on two axes of three: one may be so by chance
         return None
     return (
         f"all commands are zero for {w.every * idle.sum():.0f} s, and the motion needs "
