@@ -237,3 +237,13 @@ def test_page_runs_its_own_program_alone(page):
     assert len(re.findall("<script", text)) == 2
     assert EVIL not in text
     assert "innerHTML" not in text
+
+
+def test_a_term_that_a_calibration_added_is_ticked(data):
+    """It is no finding, and the learned model has it all the same."""
+    effect = Model().ship.effects["N_ur"]
+    (name,) = (p.name for p in effect.parameters)
+    choices = {c.name: c for c in Bench(diagnosed(data, Model().plus({name: 0.3})))._choices()}
+    (slider,) = choices["N_ur"].sliders
+    assert choices["N_ur"].ticked
+    assert (slider.before, slider.after) == (0.0, pytest.approx(0.3))

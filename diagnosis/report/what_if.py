@@ -252,11 +252,18 @@ class Bench:
             told = {n: c.value for n, c in e.coefficients.items()}
             note = "found" if e in self.r.effects else "possibility"
             yield self._choice(effects[e.id], note, told, e.in_model)
+        prior = NominalPrior.of(self.start, self.diagnosis.prior)
+        for (
+            effect
+        ) in effects.values():  # terms that a calibration fits in addition to the ship's coefficients
+            free = [p.name for p in effect.parameters if p.name not in prior.std]
+            if effect.id not in done and any(self.learned.value(n) != self.start.value(n) for n in free):
+                done.add(effect.id)
+                yield self._choice(effect, "calibrated", {}, True)
         for ranked in self.r.ranking[:CANDIDATES]:
             effect = effects[ranked.id]
             if ranked.id not in done and len(effect.parameters) <= MOST_VALUES and effect.function:
                 yield self._choice(effect, "candidate", {}, False)
-        prior = NominalPrior.of(self.start, self.diagnosis.prior)
         for name, std in prior.std.items():
             if std or self.learned.value(name) != self.start.value(name):
                 slider = self._slider(name, self.learned.value(name), std)
