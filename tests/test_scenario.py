@@ -370,3 +370,11 @@ def test_metrics_of_a_run_that_is_cut_short_are_from_its_start(ellipse, tmp_path
 def test_a_run_is_cut_short_that_ends_where_its_window_begins(ellipse, window, short):
     scenario = load_scenario(ellipse | {"stop": 2.0, "metrics": window})
     assert (cut_short(scenario) is scenario) == (not short)
+
+
+def test_a_hidden_file_is_not_proposed_as_a_scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".settings.json").touch()
+    with pytest.raises(InputError, match="there are ") as error:  # those that are shipped
+        cosim.load_scenario("qqq")
+    assert ".settings" not in str(error.value)

@@ -52,7 +52,8 @@ def load_scenario(
         content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=unique_keys)
         json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
-        near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
+        files = path.parent.glob("*.json") if path.parent.is_dir() else []
+        near = [p.name for p in files if not p.name.startswith(".")]
         shipped = shipped_names() if path.name == str(source) else []
         meant = most_alike(path.stem, shipped)
         hint = nearest(path.stem, shipped) if meant or not near else nearest(path.name, near)
