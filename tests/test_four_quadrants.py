@@ -230,7 +230,7 @@ def test_a_prediction_is_that_of_the_published_model(u, n):
 
 @given(sway, rate, st.floats(0.1, 3.0))
 def test_the_cross_flow_in_closed_form_is_its_integral(v, r, C):
-    edges = [-0.5, *([-v / (C * r)] if r and abs(v / (C * r)) < 0.5 else []), 0.5]
+    edges = [-0.5, *([-v / (C * r)] if abs(v) < 0.5 * abs(C * r) else []), 0.5]
     for power, found in enumerate(swept(v, C * r)):
         parts = [
             quad(lambda x: x**power * abs(v + C * r * x) * (v + C * r * x), a, b)[0]  # noqa: B023
