@@ -3,6 +3,7 @@
 Windows, start states, samples and errors are those of :class:`diagnosis.Windows`; the law is another's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -125,6 +126,17 @@ def table(smoothed: Smoothed, h: float, delay: float = 0.0) -> Table:
         raw[row],
         smoothed.noise,
     )
+
+
+def stacked(
+    runs: Sequence[Smoothed], h: float, delay: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Velocities and accelerations (n, 3), commands (n, k) of all parts of runs; see :func:`table`."""
+    parts = [(t, p) for t in (table(r, h, delay) for r in runs) for p in t.parts]
+    nu, nu_dot, given = (
+        np.vstack([getattr(t, name)[p] for t, p in parts]) for name in ("nu", "nu_dot", "given")
+    )
+    return nu, nu_dot, given
 
 
 def at(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from sklearn.preprocessing import StandardScaler
 from diagnosis import Smoothed
 
 from ..chosen_settings import SEED, searched
-from ..same_windows import DELAYS, Continuous, Nominal, table
+from ..same_windows import DELAYS, Continuous, Nominal, stacked
 
 STEP = 0.2  # s
 SETTINGS = {
@@ -40,11 +40,7 @@ def law(
         hidden: units of each layer.
         alpha: weight of the squared weights.
     """
-    tables = [table(r, STEP, delay) for r in runs]
-    nu, nu_dot, given = (
-        np.vstack([getattr(t, name)[p] for t in tables for p in t.parts])
-        for name in ("nu", "nu_dot", "given")
-    )
+    nu, nu_dot, given = stacked(runs, STEP, delay)
     network = TransformedTargetRegressor(
         make_pipeline(
             StandardScaler(),

@@ -7,7 +7,7 @@ import numpy as np
 from diagnosis import Smoothed
 
 from ..chosen_settings import searched
-from ..same_windows import DELAYS, Continuous, Nominal, table
+from ..same_windows import DELAYS, Continuous, Nominal, stacked
 from .kalman_regression import regressors
 
 STEP = 0.2  # s
@@ -32,10 +32,7 @@ def law(
         terms: of the linear model.
         weight: of the squared factors.
     """
-    parts = [(t, p) for t in (table(r, STEP, delay) for r in runs) for p in t.parts]
-    nu, nu_dot, given = (
-        np.vstack([getattr(t, name)[p] for t, p in parts]) for name in ("nu", "nu_dot", "given")
-    )
+    nu, nu_dot, given = stacked(runs, STEP, delay)
     x = regressors(terms, nu, nominal.inputs(inputs, nu, given))
     size = np.sqrt(np.mean(x**2, axis=0)) + np.finfo(float).tiny
     x = x / size
