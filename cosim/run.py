@@ -35,6 +35,7 @@ from .process.run_state import STATE
 from .process.spawned import mute_started_processes
 from .results.performance import METRICS, table
 from .scenario.load import cut_short, load_scenario, with_settings
+from .scenario.scenario_options import add_scenario_options
 from .scenario.schema import Scenario
 from .scenario.setting import parse_assignment
 from .trials.trial_outcome import sheet
@@ -219,37 +220,12 @@ def _parser() -> argparse.ArgumentParser:
         help="JSON file, or the name of a shipped one; or an SSP archive, an OSP directory or its "
         "OspSystemStructure.xml",
     )
-    parser.add_argument(
-        "--stop",
-        type=positive,
-        metavar="SECONDS",
-        help="end of the run [s] (default: that of the scenario)",
-    )
+    add_scenario_options(parser, "--stop", "--ship", "--seed", "--set", "--parameters")
     parser.add_argument(
         "--step",
         type=positive,
         metavar="SECONDS",
         help="base step [s] (default: that of the scenario)",
-    )
-    parser.add_argument(
-        "--ship",
-        metavar="NAME|FILE.toml",
-        help="ship for FMUs that the scenario names without a path: a shipped one, or a file of your "
-        "own (default: that of the scenario)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=whole_number(0),
-        metavar="N",
-        help="seed of noise and faults (default: that of the scenario)",
-    )
-    parser.add_argument(
-        "--set",
-        metavar="PATH=VALUE",
-        action="append",
-        default=[],
-        help="a value of the scenario, such as vessel.m=15 (a parameter), controller=./mine.fmu, "
-        "faults.0.std=0.001; may be given several times",
     )
     parser.add_argument(
         "--out",
@@ -269,14 +245,6 @@ def _parser() -> argparse.ArgumentParser:
         "(default: those of the scenario)",
     )
     parser.add_argument("--parquet", action="store_true", help="write log.parquet in place of log.csv")
-    parser.add_argument(
-        "--parameters",
-        metavar="FILE.ssv",
-        action="append",
-        default=[],
-        help="SSP parameter set for the plant, the simulated ship; its values override those of the "
-        "scenario; may be given several times",
-    )
     renamed_option(
         parser.add_mutually_exclusive_group(),
         "--controller-model",

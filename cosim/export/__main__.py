@@ -14,6 +14,7 @@ from rich.console import Console
 from ..command import BAD_INPUT, command_parser, complain, printable, run_command
 from ..errors import InputError
 from ..scenario.load import load_scenario, with_settings
+from ..scenario.scenario_options import add_scenario_options
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
 from ..system.system import System
@@ -75,19 +76,7 @@ def _parser() -> argparse.ArgumentParser:
         "--osp", type=Path, metavar="DIR", help="for libcosim, cosim-cli and the OSP demo app"
     )
     target.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="for any tool that runs FMUs")
-    parser.add_argument(
-        "--parameters",
-        type=Path,
-        metavar="FILE.ssv",
-        action="append",
-        default=[],
-        help="SSP parameter set whose values override the scenario's; may be given several times",
-    )
-    parser.add_argument(
-        "--ship",
-        metavar="NAME|FILE.toml",
-        help="another ship for FMUs with a bare name: a shipped one, or a file of your own",
-    )
+    add_scenario_options(parser, "--parameters", "--ship")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
     parser.add_argument(
         "--drop-faults",

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ..command import BAD_INPUT, command_parser, complain, positive, printable, run_command, whole_number
+from ..command import BAD_INPUT, command_parser, complain, printable, run_command
 from ..errors import InputError, SimulationError
 from ..scenario.load import cut_short, load_scenario, with_settings
+from ..scenario.scenario_options import add_scenario_options
 from ..scenario.setting import parse_assignment
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
@@ -67,37 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--out", type=Path, metavar="PAGE.html", help="file to write (default: <name>.html)"
     )
-    parser.add_argument(
-        "--stop",
-        type=positive,
-        metavar="SECONDS",
-        help="end of the run [s] (default: that of the scenario)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=whole_number(0),
-        metavar="N",
-        help="seed of noise and faults (default: that of the scenario)",
-    )
-    parser.add_argument(
-        "--ship",
-        metavar="NAME|FILE.toml",
-        help="another ship for FMUs with a bare name: a shipped one, or a file of your own",
-    )
-    parser.add_argument(
-        "--set",
-        metavar="PATH=VALUE",
-        action="append",
-        default=[],
-        help="a value of the scenario, such as vessel.m=15; may be given several times",
-    )
-    parser.add_argument(
-        "--parameters",
-        metavar="FILE.ssv",
-        action="append",
-        default=[],
-        help="SSP parameter set whose values override the scenario's; may be given several times",
-    )
+    add_scenario_options(parser, "--stop", "--seed", "--ship", "--set", "--parameters")
     return parser
 
 

@@ -1,0 +1,44 @@
+"""Options of commands that say which ship a scenario has, and what differs from its file."""
+
+import argparse
+from typing import Any
+
+from ..command import positive, whole_number
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    "--stop": {
+        "type": positive,
+        "metavar": "SECONDS",
+        "help": "end of the run [s] (default: that of the scenario)",
+    },
+    "--seed": {
+        "type": whole_number(0),
+        "metavar": "N",
+        "help": "seed of noise and faults (default: that of the scenario)",
+    },
+    "--ship": {
+        "metavar": "NAME|FILE.toml",
+        "help": "ship for FMUs that the scenario names without a path: a shipped one, or a file of your "
+        "own (default: that of the scenario)",
+    },
+    "--set": {
+        "metavar": "PATH=VALUE",
+        "action": "append",
+        "default": [],
+        "help": "a value of the scenario, such as vessel.m=15 (a parameter), controller=./mine.fmu, "
+        "faults.0.std=0.001; may be given several times",
+    },
+    "--parameters": {
+        "metavar": "FILE.ssv",
+        "action": "append",
+        "default": [],
+        "help": "SSP parameter set for the plant, the simulated ship; its values override those of the "
+        "scenario; may be given several times",
+    },
+}
+
+
+def add_scenario_options(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add the options of these names, in their order."""
+    for name in names:
+        parser.add_argument(name, **OPTIONS[name])
