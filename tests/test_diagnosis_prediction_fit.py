@@ -4,13 +4,16 @@ import json
 from dataclasses import replace
 from functools import cache, partial
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 from support.measured import commands, sail, smoothed
 
+from diagnosis import Smoothed
 from diagnosis.predictors import Model, shooting, weak_windows
+from diagnosis.predictors.prediction import at_rest
 from diagnosis.predictors.shooting import Linear, Shooting
 from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.predictors.windows import Windows
@@ -24,6 +27,7 @@ from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.refit import fit_model_error, prediction_bands, to_predictions
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
+from fmus.scale import REFERENCE
 from fmus.vessel import vessel
 
 STEPS = {
@@ -363,3 +367,20 @@ def test_states_of_runs_stand_side_by_side_though_parameters_move_one_of_them_al
     assert {x.shape for x in both} == {(3, 6)}
     np.testing.assert_array_equal(both.u[:, :4], moved.u)
     assert (both.u[:, 4:] == still.u).all()
+
+
+@pytest.mark.parametrize(
+    ("first", "later", "rests"),
+    [
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), True),  # nothing happens
+        ((-0.14, 0.01, 0.01), (0.6, 0.0, 0.1), True),  # smoothed ahead of the first push
+        ((1.0, 0.02, 0.1), (0.9, 0.05, 0.3), False),  # under way
+        ((0.3, 0.0, 0.0), (0.1, 0.0, 0.0), False),  # it slows down
+        ((0.0, 0.2, 0.0), (0.6, 0.2, 0.0), False),  # it drifts, and is pushed ahead
+    ],
+)
+def test_a_ship_is_at_rest_if_it_is_idle_or_its_speeds_only_begin(first, later, rests):
+    time = np.arange(0.0, 20.0, 0.1)
+    nu = np.array(first) + np.minimum(time / 3.0, 1.0)[:, None] * np.subtract(later, first)
+    smoothed = SimpleNamespace(time=time, nu=nu, nu_std=np.full((time.size, 3), 0.02), scale=REFERENCE)
+    assert at_rest(cast(Smoothed, smoothed)) is rests

@@ -118,6 +118,17 @@ def test_part_of_a_command_that_comes_and_goes_is_told_from_a_force_that_does(la
     assert [axis.in_part for axis in recurrence(lap, left)] == [at_times] * 3
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_an_error_of_one_run_alone_is_told_from_one_of_all_runs(lap, alone):
+    (w,) = lap
+    slow = np.random.default_rng(3).standard_normal(w.middle.size)[:, None] * np.ones(3)
+    track = replace(w.smoothed.track, run=replace(w.run, name="other"))
+    runs = [w, replace(w, smoothed=replace(w.smoothed, track=track))]
+    how = recurrence(runs, np.concatenate([slow, 0.1 * slow if alone else slow]))
+    assert [axis.run for axis in how] == [w.run.name if alone else ""] * 3
+    assert [axis.run for axis in recurrence(lap, slow)] == [""] * 3
+
+
 def learned(runs, prior):
     return diagnosis.diagnose(runs[:-1], runs[-1:], prior)
 

@@ -19,6 +19,7 @@ from diagnosis.report.headline import (
     SEARCH_GAINED,
     SEARCH_GAINED_NOTHING,
     first_sentences,
+    gain_sentences,
 )
 from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
@@ -206,6 +207,16 @@ def test_a_comparison_has_its_data_and_errors_before():
 def test_a_diagnosis_has_what_is_sure_first_and_errors_before_and_after():
     shown = lines(show_diagnosis(found(), "out/folder"))
     assert shown == DIAGNOSIS.splitlines()
+
+
+@pytest.mark.parametrize(("heading", "told"), [(-2.1, True), (-1.9, False), (2.1, False)])
+def test_a_gain_in_position_that_costs_heading_says_so(heading, told):
+    better = PairedChange(0.032, 0.0089, 9.4e-4, 1.1e-4)
+    other = PairedChange(0.01, 0.02, heading * 1e-5, 1e-5)
+    gain = PredictionGain("validation runs", 54, better, other, True, "calibrated")
+    said = " ".join(gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, 10.0))
+    assert said.startswith(SEARCH_GAINED)
+    assert ("However, predictions of the heading are worse." in said) is told
 
 
 @pytest.mark.parametrize("gained", [True, False])

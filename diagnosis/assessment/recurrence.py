@@ -26,11 +26,13 @@ class Recurrence(NamedTuple):
         shares: space -> share of the sum of squares that repeats in it; 0 where that is chance.
         lasts: s, how long the error stays correlated.
         in_part: whether it is in proportion to the command of its axis, at times more and at times less.
+        run: the only one of several runs that has it, but for a negligible rest; empty: there is none.
     """
 
     shares: dict[str, float]
     lasts: float
     in_part: bool
+    run: str = ""
 
     @property
     def best(self) -> str | None:
@@ -67,7 +69,10 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> 
         error = left[:, k]
         shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
         in_part = _in_part(error, command[:, k], stretch, shares["command"])
-        found.append(Recurrence(shares, float(lasts[k]), in_part))
+        size = np.bincount(run, error**2) / np.bincount(run)
+        one = int(size.argmax())
+        alone = len(data) > 1 and size[one] > (1.0 - SETTINGS.negligible) * size.sum()
+        found.append(Recurrence(shares, float(lasts[k]), in_part, data[one].run.name if alone else ""))
     return found
 
 

@@ -56,6 +56,10 @@ IN_PART = (
     "is proportional to the command of its axis for some time only",
     "a thruster that fails and recovers, or whose power changes",
 )
+IN_ONE_RUN = (
+    "occurs in {0} alone, so that these runs do not show what it depends on",
+    "something that differed in that run, such as its place, load, water or weather",
+)
 LASTS = (
     ("depends on neither position, motion, command nor time, but lasts for about {0:.0f} s at a time"),
     "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
@@ -235,6 +239,8 @@ def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
         return IN_PART
     if r.best is not None:
         return REPEATS[r.best]
+    if r.run:
+        return IN_ONE_RUN[0].format(r.run), IN_ONE_RUN[1]
     if r.lasts > briefly:
         return LASTS[0].format(r.lasts), LASTS[1]
     return BRIEF

@@ -19,11 +19,10 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
-from ..runs.cleaning import DIGITS
+from ..runs.cleaning import DIGITS, WIDTH
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
 
-HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
 # Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).
 FAR_OFF = 3.0
@@ -118,11 +117,17 @@ class WindowStarts:
 
 
 def at_rest(smoothed: Smoothed) -> bool:
-    """Whether a ship hardly moves at the start of a run, for its noise and its usual speeds."""
-    first = np.isfinite(smoothed.nu[:, 0]).argmax()
-    usual = np.sqrt(np.nanmean(smoothed.nu**2, axis=0))
+    """Whether a ship is at rest at the start of a run, so that nothing was commanded before.
+
+    Its speeds are below those of an idle ship or their uncertainty, or they change by more than
+    themselves within a window. A ship under way that has followed its first command hardly changes them.
+    """
+    rows = np.flatnonzero(np.isfinite(smoothed.nu[:, 0]))
+    first = rows[0] if rows.size else 0
+    soon = smoothed.time[first] + WIDTH * smoothed.scale.time
+    later = rows[min(np.searchsorted(smoothed.time[rows], soon), rows.size - 1)] if rows.size else first
     still = np.maximum(idle(smoothed.scale), FAR_OFF * smoothed.nu_std[first])
-    still = np.maximum(still, HARDLY * usual)
+    still = np.maximum(still, np.abs(smoothed.nu[later] - smoothed.nu[first]))
     return bool((np.abs(smoothed.nu[first]) < still).all())
 
 

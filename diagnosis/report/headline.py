@@ -75,7 +75,7 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
     """What a model gains in windows of so many seconds, in words and numbers; empty: not known."""
     if gain is None:
         return []
-    parts = []
+    parts, worse = [], []
     for name, unit, factor, change in (
         ("position", "mm", 1e3, gain.position),
         ("heading", "°", degrees(1.0), gain.heading),
@@ -83,8 +83,10 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
         errors = " → ".join(number(x, 3, factor) for x in (change.before, change.after))
         fall, std = (number(x, 2, factor**2) for x in (change.difference, change.standard_error))
         parts.append(f"{name} {errors} {unit} (the mean square falls by {fall} ± {std} {unit}²)")
+        worse += [name] if change.is_worse else []
     where = f"Predictions over {number(over)} s in {gain.windows} windows of {gain.where}"
-    return [gained if gain.gained else nothing, f"{where}: {', '.join(parts)}."]
+    but = [f"However, predictions of the {worse[0]} are worse."] if gain.gained and worse else []
+    return [gained if gain.gained else nothing, *but, f"{where}: {', '.join(parts)}."]
 
 
 def gain_of_search(r: ReportData) -> list[str]:

@@ -38,7 +38,7 @@ def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
     known = np.isfinite(others)
     if not np.isfinite(its[known]).all():
         return True
-    d = (its - others)[known]
+    d = its[known] - others[known]
     if not d.size:
         return charge > 0.0
     return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())

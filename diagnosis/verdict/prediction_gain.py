@@ -7,6 +7,7 @@ import numpy as np
 
 from ..predictors import Model
 from ..search.findings import Findings
+from ..search.shortlist import TIE
 from .paired_errors import predicts_worse
 from .validation_data import ValidationData
 
@@ -36,6 +37,11 @@ class PairedChange:
         d = before - after
         error = float(d.std(ddof=1) / np.sqrt(d.size))
         return cls(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())), float(d.mean()), error)
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether the error grows by more than twice its paired standard error."""
+        return self.difference < -TIE * self.standard_error
 
 
 @dataclass(frozen=True)
