@@ -37,11 +37,11 @@ def later(seed, t):
     return commands(t + 700.0 * seed)
 
 
-# A force, which is linear like inertia and environment, an actuator with a memory, and the measurement.
+# An actuator with a memory, and the measurement; of a force the next test has what decides.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "hidden"),
-    [("cse1", (DRAG, {}, 0.0)), ("otter", ({}, {"lag": 0.8}, 0.0)), ("cse1", ({}, {}, OFF))],
+    [("otter", ({}, {"lag": 0.8}, 0.0)), ("cse1", ({}, {}, OFF))],
 )
 def test_another_test_run_changes_nothing_that_is_learned(tmp_path, name, hidden):
     ship = ship_with((), name)

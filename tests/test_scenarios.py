@@ -13,6 +13,13 @@ import cosim
 from benchmarks.ellipse import CONTROLLERS, over_seeds
 
 SCENARIOS = ROOT / "scenarios"
+SHIPPED = sorted(SCENARIOS.glob("*.json"))
+ROUTES = (
+    "otter_waypoints",
+    "otter_los",
+    "kvlcc2_waypoints",
+    "gunnerus_waypoints",
+)  # test_heading_control.py
 
 
 @pytest.mark.slow
@@ -37,7 +44,7 @@ def test_error_of_the_benchmark_is_that_of_the_log(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.json")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", [p for p in SHIPPED if p.stem not in ROUTES], ids=lambda p: p.stem)
 def test_shipped_scenario_runs_through(path, tmp_path):
     result = cosim.simulate(cosim.load_scenario(path), tmp_path, pictures=True)
     assert result.status == "done"
@@ -49,12 +56,8 @@ def test_shipped_scenario_runs_through(path, tmp_path):
         assert result.metrics
         assert pictures - {"commands.png"} == {"trajectory.png", "trial.png"}
         return
-    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind, what is not
-    # told to the controller of the Otter is its drag, and a new leg begins a circle of acceptance away.
-    most = {
-        "otter_waypoints": 2.5, "otter_los": 8.0, "kvlcc2_waypoints": 14.0, "gunnerus_waypoints": 70.0
-    }  # fmt: skip
-    assert result.metrics["e_pos_max"] < most.get(path.stem, 0.5)
+    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind.
+    assert result.metrics["e_pos_max"] < 0.5
     assert len(pictures - {"commands.png"}) == 5
     assert not list(Path(tmp_path).glob("*.part"))
 
