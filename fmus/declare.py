@@ -24,6 +24,7 @@ from typing import (
     NamedTuple,
     Protocol,
     TypeVar,
+    cast,
     get_args,
     get_origin,
     get_type_hints,
@@ -209,7 +210,7 @@ def redeclared(cls: Declared, change: Callable[[Variable], Variable]) -> type[Fi
     before = variables(cls)
     after = [change(v) for v in before]
     if after == list(before):
-        return cls
+        return cast("type[Fields]", cls)
     nested = _shape(cls)
     if not any(nested):
         return group_of(cls.__name__, after)
