@@ -24,6 +24,7 @@ from typing import (
     NamedTuple,
     Protocol,
     TypeVar,
+    cast,
     get_args,
     get_origin,
     get_type_hints,
@@ -206,11 +207,15 @@ def redeclared(cls: Declared, change: Callable[[Variable], Variable]) -> type[Fi
         cls: a declared NamedTuple class, nested or not.
         change: gives a variable of the same name, with another start value, range or origin.
     """
+    before = variables(cls)
+    after = [change(v) for v in before]
+    if after == list(before):
+        return cast("type[Fields]", cls)
     nested = _shape(cls)
     if not any(nested):
-        return group_of(cls.__name__, map(change, variables(cls)))
+        return group_of(cls.__name__, after)
     names: tuple[str, ...] = getattr(cls, "_fields")  # noqa: B009 - of every NamedTuple class
-    own = iter(change(v) for v in variables(cls) if v.name in names)
+    own = iter(v for v in after if v.name in names)
     starts: dict[str, object] = {}
     annotations: dict[str, object] = {}
     for name, inner in zip(names, nested, strict=True):

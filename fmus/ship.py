@@ -12,7 +12,7 @@ from .actuators.actuation import command_units
 from .actuators.law import Law
 from .actuators.response import CommandLayout, PreparedThrusters, layouts
 from .actuators.weighted_allocation import axes
-from .declare import Component, Known, Variable, variables
+from .declare import Component, Known, Variable, discover, variables
 from .effects import STANDARD, EffectSet
 from .hull_functions import FUNCTIONS
 from .scale import Scale
@@ -166,6 +166,11 @@ class Ship:
         if component is None or not (component.any_ship or self.name == DEFAULT):
             return None
         return self.serving(component)
+
+    @cached_property
+    def components(self) -> Mapping[str, tuple[str, Component]]:
+        """Name of every FMU that it can have -> module name and component."""
+        return {component.name: (module, component) for module, component in discover(self)}
 
     @property
     def candidates(self) -> list[str]:

@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import signal
+import sys
 from functools import partial
 from types import SimpleNamespace
 
@@ -48,6 +49,9 @@ def pytest_configure(config):
     """
     for name in ("PYTHONDONTWRITEBYTECODE", "PYTHONUNBUFFERED"):
         os.environ.pop(name, None)
+    sys.dont_write_bytecode = (
+        False  # else each worker rewrites the assertions of all tests in each session
+    )
     if getattr(config.option, "numprocesses", None):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the worker processes take the cores
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -16,7 +16,7 @@ from diagnosis import InputError
 from diagnosis.runs.columns.columns import TAU
 
 N = 120
-MANY = int(os.environ.get("CYBERSHIP_FILES", "200"))
+MANY = int(os.environ.get("CYBERSHIP_FILES", "120"))
 TIME = np.arange(N) * 0.1
 WILD = [np.nan, np.inf, -np.inf, 0.0, -1.0, 1e308, -1e308, 1e-308, 1e15, 360.0]
 WORDS = ["", "x", "1e400", "0x1", "1,5", '"', "NaN", "9" * 60, "true", "\0", "-", "1e"]

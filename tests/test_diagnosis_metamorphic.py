@@ -94,8 +94,14 @@ def errors_of_whole(kind):
     return errors(measured(kind), kind)
 
 
-CASES = [(kind, change) for kind in KINDS for change in CHANGES]
-QUICK = [("jumps", "unix"), ("jumps", "freezes"), ("slow", "drops")]
+# Each change with two or three kinds, each kind with two or more changes.
+CASES = [
+    (kind, change)
+    for k, kind in enumerate(KINDS)
+    for j, change in enumerate(CHANGES)
+    if (k + j) % 5 in (0, 2)
+]
+QUICK = [("jumps", "unix"), ("jumps", "freezes"), ("quiet", "drops")]
 
 
 @pytest.mark.parametrize(("kind", "change"), in_part(CASES, keep=QUICK))

@@ -326,7 +326,9 @@ def test_a_ship_rounds_its_route(name, current, rms, largest, digit, tmp_path):
     content["fmus"]["vessel"]["parameters"] |= dict(zip(("V_n", "V_e"), current, strict=True))
     guidance = content["fmus"]["guidance"]
     route = guidance["table"] = str(ROOT / "scenarios" / guidance["table"])
-    log = cosim.simulate(content, tmp_path).log
+    result = cosim.simulate(content, tmp_path)
+    log = result.log
+    assert (result.status, result.warnings) == ("done", [])
     late = np.asarray(log["time"]) > 100.0
     off = off_route(log, np.loadtxt(route, delimiter=",", skiprows=1))[late]
     assert np.sqrt(np.mean(off**2)) == pytest.approx(rms, abs=0.6 * digit)

@@ -5,6 +5,7 @@ import random
 
 import numpy as np
 import pytest
+from support.cases import slow
 from support.ccode import stepped
 from support.project import COMPONENTS, with_values
 
@@ -90,13 +91,7 @@ def velocity_error(estimates, nu, rows=slice(None)):
 
 @pytest.mark.parametrize(
     ("hidden", "frozen"),
-    [
-        pytest.param(
-            hidden, frozen, marks=() if (hidden, frozen) == ("drag", True) else pytest.mark.slow
-        )
-        for hidden in HIDDEN
-        for frozen in (True, False)
-    ],
+    [case if case[0] == "drag" else slow(case) for case in zip(HIDDEN, (False, True) * 3, strict=True)],
 )
 def test_best_of_all_observers_on_the_same_log(hidden, frozen, tmp_path):
     """Rich motion with noise: every velocity and acceleration, model right or wrong."""

@@ -187,9 +187,7 @@ def test_a_tracker_is_found_in_addition_to_the_hidden_effect():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("thrusters", [{"lag": 0.5}, {"delay": 0.4}])
-def test_no_filter_is_found_where_none_is(thrusters):
+def test_no_filter_is_found_where_none_is():
     """Thrusters that lag are its opposite: the force is late, and not the measurement."""
-    w = weak_windows(smoothed(sail(120.0, h=0.1, thrusters=thrusters)[0]))
-    found = {e.id for e in diagnose([w]).content.effects}
-    assert found == {*thrusters}
+    w = weak_windows(smoothed(sail(120.0, h=0.1, thrusters={"lag": 0.5})[0]))
+    assert {e.id for e in diagnose([w]).content.effects} == {"lag"}

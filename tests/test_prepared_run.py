@@ -28,6 +28,7 @@ from thesis.open_loop import loop_of
 from thesis.open_loop.playback import fed
 
 SPIKES = (500, 2500, 4000, 5200)  # rows at which one begins
+FEW = 2500  # rows, to which the runs are thinned
 LOST = 10.0  # s, that the log's clock leaves out
 
 
@@ -58,20 +59,17 @@ def spoilt(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def both(spoilt):
-    """The run as it is, and thinned: of each the rows that are not too many, and the prepared run."""
-    found = {}
-    for most in (100_000, 2500):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(thinning, "MOST_ROWS", most)
-            found[most] = prepare(spoilt)
-    return found
+def thinned(spoilt):
+    """The prepared run, which has more rows than are not too many."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(thinning, "MOST_ROWS", FEW)
+        return prepare(spoilt)
 
 
-@pytest.fixture(params=[slow(100_000), 2500], ids=["as it is", "thinned"])
-def prepared(request, monkeypatch, both):
-    monkeypatch.setattr(thinning, "MOST_ROWS", request.param)
-    return both[request.param]
+@pytest.fixture
+def prepared(monkeypatch, thinned):
+    monkeypatch.setattr(thinning, "MOST_ROWS", FEW)
+    return thinned
 
 
 def samples(prepared):

@@ -393,8 +393,8 @@ def repeat(count):
     return len(gc.get_objects()), int(Path("/proc/self/statm").read_text().split()[1])
 
 repeat(5)
-before, after = repeat(1), repeat(20)
-print((after[0] - before[0]) / 20, (after[1] - before[1]) / 20)
+before, after = repeat(1), repeat(10)
+print((after[0] - before[0]) / 10, (after[1] - before[1]) / 10)
 """
 
 
@@ -416,12 +416,12 @@ def test_runs_in_one_process_leave_nothing(ellipse, tmp_path):
 @linux_only
 def test_campaign_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
-    assert mutations.broken_scenarios(60, 2, tmp_path, nothing) == []
-    assert mutations.broken_files(30, 2, tmp_path, nothing) == []
-    assert endings.kills(2, 2, tmp_path, nothing) == []
-    assert endings.signals(2, 2, tmp_path, nothing) == []
+    assert mutations.broken_scenarios(20, 2, tmp_path, nothing) == []
+    assert mutations.broken_files(10, 2, tmp_path, nothing) == []
+    assert endings.kills(1, 2, tmp_path, nothing) == []
+    assert endings.signals(1, 2, tmp_path, nothing) == []
     assert endings.short_of_disk(1, 2, tmp_path, nothing) == []
-    assert endings.deaths(5, 2, tmp_path, nothing) == []
+    assert endings.deaths(3, 2, tmp_path, nothing) == []
     assert campaigns.interrupted_campaigns(1, 2, tmp_path, nothing) == []
     assert campaigns.deaths_elsewhere(2, 2, tmp_path, nothing) == []
     assert campaigns.spoilt_cache(1, 2, tmp_path, nothing) == []
@@ -447,4 +447,4 @@ def test_killed_commands_in_small(tmp_path):
 @linux_only
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 def test_random_calls_under_sanitizers(tmp_path):
-    assert sanitized.sanitized_calls(20, 2, tmp_path, lambda: None) == []
+    assert sanitized.sanitized_calls(8, 2, tmp_path, lambda: None) == []

@@ -9,11 +9,9 @@ import pytest
 from support.measured import commands, sail
 
 import diagnosis
-from benchmarks import ship_effects
 from diagnosis import Model
-from diagnosis.predictors import ship_with, write_model
+from diagnosis.predictors import write_model
 from diagnosis.report import diagnosis_content
-from diagnosis.runs import read_frame
 
 SECONDS = 60.0  # at the size of CyberShip Enterprise 1: a few blocks
 DRAG = {"delta_X_absu_u": -6.0}  # for a ship of unit scale
@@ -22,14 +20,10 @@ OFF = 0.15  # rad, that the heading is off
 OF_RUNS = {"data", "runs", "errors", "windows", "where", "where_after", "sensors", "inseparable"}
 
 
-def measured(ship, seed, vessel=None, thrusters=None, off=0.0):
+def measured(seed, vessel=None, thrusters=None, off=0.0):
     """A run of a ship with something hidden."""
-    if ship.name == "cse1":
-        run, _ = sail(SECONDS, 0.1, vessel, thrusters, seed=seed, given=partial(later, seed))
-        return replace(run, name=f"run {seed}", pose=run.pose + np.array([0.0, 0.0, off]))
-    cause = ship_effects.Cause("", vessel or {}, thrusters or {})
-    table = ship_effects.sail(ship, cause, np.random.default_rng(seed), None, seconds=SECONDS)
-    return replace(read_frame(table, of=ship), name=f"run {seed}")
+    run, _ = sail(SECONDS, 0.1, vessel, thrusters, seed=seed, given=partial(later, seed))
+    return replace(run, name=f"run {seed}", pose=run.pose + np.array([0.0, 0.0, off]))
 
 
 def later(seed, t):
@@ -37,19 +31,15 @@ def later(seed, t):
     return commands(t + 700.0 * seed)
 
 
-# A force, which is linear like inertia and environment, an actuator with a memory, and the measurement.
+# An actuator with a memory, and the measurement; of a force the next test has what decides.
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "hidden"),
-    [("cse1", (DRAG, {}, 0.0)), ("otter", ({}, {"lag": 0.8}, 0.0)), ("cse1", ({}, {}, OFF))],
-)
-def test_another_test_run_changes_nothing_that_is_learned(tmp_path, name, hidden):
-    ship = ship_with((), name)
-    start = Model(ship=ship)
-    train = measured(ship, 1, *hidden)
+@pytest.mark.parametrize("hidden", [({}, {"lag": 0.8}), ({}, {}, OFF)])
+def test_another_test_run_changes_nothing_that_is_learned(tmp_path, hidden):
+    start = Model()
+    train = measured(1, *hidden)
     told = []
     # Of the same ship, and of one without the effect whose file has the name of the training run.
-    for test in (measured(ship, 2, *hidden), replace(measured(ship, 3), name="run 1")):
+    for test in (measured(2, *hidden), replace(measured(3), name="run 1")):
         runs = diagnosis.gather([train, test], model=start)
         found = diagnosis.diagnose(runs[:1], runs[1:], 0.1, start)
         write_model(tmp_path / "model.ssv", found.learned.model)
@@ -63,8 +53,8 @@ def test_another_test_run_changes_nothing_that_is_learned(tmp_path, name, hidden
 
 def test_validation_runs_decide_what_is_kept():
     """The same training run: a validation run without the drag rejects it, one with it keeps it."""
-    start, runs = Model(), [measured(ship_with((), "cse1"), k, DRAG) for k in (1, 2)]
-    other = measured(ship_with((), "cse1"), 3)
+    start, runs = Model(), [measured(k, DRAG) for k in (1, 2)]
+    other = measured(3)
     train, with_it, without_it = diagnosis.gather([*runs, other], model=start)
     kept, rejected = (
         diagnosis.diagnose([train], (), 0.0, start, validate=[w]) for w in (with_it, without_it)

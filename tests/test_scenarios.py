@@ -7,19 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.cases import slow
 from support.project import COMPONENTS, ROOT
 
 import cosim
 from benchmarks.ellipse import CONTROLLERS, over_seeds
 
 SCENARIOS = ROOT / "scenarios"
+SHIPPED = sorted(SCENARIOS.glob("*.json"))
+ROUTES = (
+    "otter_waypoints",
+    "otter_los",
+    "kvlcc2_waypoints",
+    "gunnerus_waypoints",
+)  # test_heading_control.py
 
 
 @pytest.mark.slow
 def test_adaptation_pays_on_the_ellipse():
-    """Four seeds: at most 0.10 m without adaptation, at least 15 % less with it."""
-    errors = over_seeds(range(4))
+    """Two seeds: at most 0.10 m without adaptation, at least 15 % less with it."""
+    errors = over_seeds(range(2))
     plain, adaptive, learned = (statistics.median(errors[c]) for c in CONTROLLERS)
     assert learned <= 0.5 * adaptive
     assert plain <= 0.10
@@ -38,7 +44,7 @@ def test_error_of_the_benchmark_is_that_of_the_log(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.json")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", [p for p in SHIPPED if p.stem not in ROUTES], ids=lambda p: p.stem)
 def test_shipped_scenario_runs_through(path, tmp_path):
     result = cosim.simulate(cosim.load_scenario(path), tmp_path, pictures=True)
     assert result.status == "done"
@@ -50,12 +56,8 @@ def test_shipped_scenario_runs_through(path, tmp_path):
         assert result.metrics
         assert pictures - {"commands.png"} == {"trajectory.png", "trial.png"}
         return
-    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind, what is not
-    # told to the controller of the Otter is its drag, and a new leg begins a circle of acceptance away.
-    most = {
-        "otter_waypoints": 2.5, "otter_los": 8.0, "kvlcc2_waypoints": 14.0, "gunnerus_waypoints": 70.0
-    }  # fmt: skip
-    assert result.metrics["e_pos_max"] < most.get(path.stem, 0.5)
+    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind.
+    assert result.metrics["e_pos_max"] < 0.5
     assert len(pictures - {"commands.png"}) == 5
     assert not list(Path(tmp_path).glob("*.part"))
 
@@ -63,13 +65,9 @@ def test_shipped_scenario_runs_through(path, tmp_path):
 OBSERVERS, THRUSTERS = ([n for n in COMPONENTS if n.startswith(k)] for k in ("observer", "thrusters"))
 
 
-# In the quick part each observer with the first thrusters, and each thrusters with the first observer.
 @pytest.mark.parametrize(
     ("observer", "thrusters"),
-    [
-        pair if OBSERVERS[0] in pair or THRUSTERS[0] in pair else slow(pair)
-        for pair in product(OBSERVERS, THRUSTERS)
-    ],
+    [pair for pair in product(OBSERVERS, THRUSTERS) if OBSERVERS[0] in pair or THRUSTERS[0] in pair],
 )
 def test_parts_are_swapped_by_one_line_each(observer, thrusters, tmp_path):
     """No algebraic loop and no other warning: the force that moved the ship is that of the last row."""

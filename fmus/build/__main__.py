@@ -15,7 +15,7 @@ from pathlib import Path
 from cybership.message_text import printable
 from cybership.scratch_folder import sweep
 
-from ..declare import DeclarationError, Range, discover, variables
+from ..declare import DeclarationError, Range, variables
 from ..effects import STANDARD
 from ..installed import plus_files
 from ..interruption import program, run_interruptible
@@ -166,7 +166,7 @@ def _verify(names: Sequence[str]) -> None:
 
 def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
     """Print the FMUs there are, or every variable of those that are named."""
-    for _, component in discover(of) if not names else ():
+    for _, component in of.components.values() if not names else ():
         if not native or came_compiled(component.name):
             print(f"{component.name:24} {component.description}")
     for name in names:

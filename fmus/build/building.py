@@ -11,7 +11,7 @@ from typing import Any
 
 from cybership.scratch_folder import scratch_folder
 
-from ..declare import Component, discover
+from ..declare import Component
 from ..effects import STANDARD, EffectSet
 from ..ship import Ship
 from ..ship import ship as make_ship
@@ -140,7 +140,7 @@ def _every(names: Sequence[str], starts: StartValues | None, of: Ship) -> Sequen
     """The components asked for; without names those of the parameter set, or all that a ship has."""
     if starts is not None:
         return names or list(starts.values)
-    return names or [component.name for _, component in discover(of)]
+    return names or list(of.components)
 
 
 def _tell_unused(starts: StartValues, built: Sequence[str], of: Ship, note: Callable[[str], None]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..base_units import base_exponents
 from cybership.message_text import PrintableError
 
-from ..declare import Component, DeclarationError, discover, nearest, width
+from ..declare import Component, DeclarationError, nearest, width
 from ..effects import EffectSet
 from ..fmi.trace import trace_init, trace_step
 from ..ship import Ship, ship
@@ -40,7 +40,7 @@ def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str,
     """Module name and component of an FMU of ours, made for a ship, or of a user's file."""
     if own_file is None:
         of = of or ship()
-        known = {component.name: (module, component) for module, component in discover(of)}
+        known = of.components
         if name in known:
             if of.effects.files:
                 _check_effects(known[name][1], of.effects)
