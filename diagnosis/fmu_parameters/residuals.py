@@ -6,7 +6,7 @@ start value, and are whitened by the inverse root of that.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -265,7 +265,7 @@ def laid(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
 
 def replaced(f: AdditionalForce, coefficient: float) -> AdditionalForce:
     """A force with another coefficient."""
-    return AdditionalForce(f.input, f.output, f.shape, f.rate, coefficient)
+    return replace(f, coefficient=coefficient)
 
 
 def rms_of(
