@@ -17,7 +17,7 @@ from typing import NamedTuple
 from .declare import Component, Fields, Variable, bundle, flatten, group_of, packer, variables, width
 from .frames import rotate_to_body, rotate_to_earth
 from .hull import Triple, accelerated, inertia_force
-from .ops import Number, atan2, fmax, sqrt, where, wrap
+from .ops import Number, atan2, cos, fmax, sqrt, where, wrap
 from .ship import Ship
 from .signals import Force, VelocityInCurrent
 from .vessel.vessel import State, disturbed
@@ -150,6 +150,8 @@ class AddedTerm(NamedTuple):
         power: 0: constant; else of the output, with its sign.
         rate: whether it is a function of the output's derivative by time.
         coefficient: in units of both.
+        turn: angle by the output, whose cosine then takes its place [rad by its unit]; 0: none.
+        phase: of the cosine [rad].
     """
 
     input: int
@@ -157,6 +159,8 @@ class AddedTerm(NamedTuple):
     power: int
     rate: bool
     coefficient: float
+    turn: float = 0.0
+    phase: float = 0.0
 
 
 def added_terms(starts: Sequence[float], outputs: int, terms: Sequence[AddedTerm]) -> Component:
@@ -185,10 +189,11 @@ def added_terms(starts: Sequence[float], outputs: int, terms: Sequence[AddedTerm
     def step(s: Fields, i: Fields, p: Params, h: Number) -> tuple[Fields, Fields]:
         values, before = flatten(i), flatten(s)
         sums, seen, begun = [*values[:n]], values[n:], (before[-1] > 0.5) & (h > LEAST)
-        for slot, place, power, rate, coefficient in terms:
+        for slot, place, power, rate, coefficient, turn, phase in terms:
             y = seen[place] if power else 1.0
             if rate:
                 y = where(begun, (y - before[place]) / fmax(h, LEAST), 0.0)
+            y = cos(turn * y + phase) if turn else y
             size = 1.0
             for _ in range(power - 1):
                 size = size * abs(y)

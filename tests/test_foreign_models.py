@@ -465,3 +465,32 @@ def test_what_an_fmu_of_another_tool_lacks_is_found(tmp_path):
     assert found.values == {"delta_X_u": pytest.approx(1.0 - damper, rel=0.05)}
     held_out = d.comparison.evaluations[1]
     assert held_out.after.position < 0.2 * held_out.before.position
+
+
+@pytest.mark.slow
+def test_a_force_in_the_earth_frame_is_found_in_addition_to_parameters(vendor, tmp_path):
+    """On every heading it acts on other inputs; the FMU with it predicts what the fit does."""
+    hidden = VENDOR | {"F_n": 0.25}
+    runs = [
+        as_csv(tmp_path / f"{k}.csv", sail(s, ship=hidden, seed=k)[0])
+        for k, s in enumerate((150.0, 80.0))
+    ]
+    parameters = [
+        {"name": n, "value": VENDOR[n], "prior": {"rel_std": 0.2}} for n in ("m", "X_u", "Y_v", "N_r")
+    ]
+    given, out = tmp_path / "parameters.json", tmp_path / "out"
+    given.write_text(json.dumps({"parameters": parameters}))
+    named = ["--model", str(vendor), "--parameters", str(given), "--out", str(out)]
+    assert learn.main([runs[0], "--test", runs[1], *named]) == 0
+    content = json.loads((out / "diagnosis.json").read_text())
+    assert content["verdict"] == "found"
+    (effect,) = content["effects"]
+    assert effect["id"] == "earth_force:F_n"
+    (coefficient,) = effect["coefficients"].values()
+    assert coefficient["value"] == pytest.approx(0.25, rel=0.1)
+    assert not any(p["moved"] for p in content["parameters"])
+    (test,) = (e for e in content["errors"] if e["held_out"])
+    assert all(o["after"] < 0.3 * o["before"] for n, o in test["outputs"].items() if n != "psi")
+    found = Fmu(out / "found.fmu", out / "map.json")
+    before, after = (errors(diagnosis.compare(runs[1], model=m)) for m in (vendor, found))
+    assert after[0] < 0.3 * before[0]

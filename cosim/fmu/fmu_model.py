@@ -18,7 +18,7 @@ from fmpy.model_description import ModelDescription, read_model_description
 from cybership.scratch_folder import Scratch
 
 from ..conversion import BASE_UNITS, Unit
-from ..errors import InputError
+from ..errors import InputError, nearest
 from . import archive_check
 
 DESCRIPTION = "modelDescription.xml"
@@ -80,7 +80,8 @@ class FmuModel:
     def __init__(self, path: Path, folder: Path | None = None) -> None:
         self.path = path
         if not os.path.isfile(path):  # Path.is_file raises for names that are too long
-            raise InputError(f"no such FMU: '{path}'")
+            near = (p.name for p in path.parent.glob("*.fmu"))
+            raise InputError(f"no such FMU: '{path}'{nearest(path.name, near)}")
         entries = {entry.filename for entry in archive_check.check_archive(path)}
         if DESCRIPTION not in entries:
             raise InputError(f"'{path}' is not an FMU: it has no {DESCRIPTION}")

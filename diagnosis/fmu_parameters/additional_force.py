@@ -22,6 +22,22 @@ SHAPES = (
 CONSTANT = Shape("1", 0)
 
 
+class EarthDirection(NamedTuple):
+    """Along which a force in the earth frame acts, whatever the heading.
+
+    Attributes:
+        name: of the force, as ``F_n``.
+        heading: output that is the ship's heading.
+        turn: heading by that output [rad by its unit].
+        parts: input, change of it by 1 N along it, and angle that is added to the heading [rad].
+    """
+
+    name: str
+    heading: str
+    turn: float
+    parts: tuple[tuple[str, float, float], ...]
+
+
 @dataclass(frozen=True)
 class AdditionalForce:
     """A term on one input.
@@ -31,7 +47,8 @@ class AdditionalForce:
         output: that it is a function of; empty: constant.
         shape: number of the function in :data:`SHAPES`; -1: constant.
         rate: whether it is a function of the output's derivative by time.
-        coefficient: what the function is multiplied with.
+        coefficient: what the function is multiplied with [N in the earth frame].
+        earth: direction of a force in the earth frame, which has parts on several inputs.
     """
 
     input: str
@@ -39,6 +56,17 @@ class AdditionalForce:
     shape: int = -1
     rate: bool = False
     coefficient: float = 1.0
+    earth: EarthDirection | None = None
+
+    @property
+    def inputs(self) -> list[str]:
+        """All variables that it acts on."""
+        return [self.input] if self.earth is None else [name for name, *_ in self.earth.parts]
+
+    @property
+    def signal(self) -> str:
+        """The output that its terms need; empty: none."""
+        return self.output if self.earth is None else self.earth.heading
 
     @property
     def _shape(self) -> Shape:
@@ -47,18 +75,28 @@ class AdditionalForce:
     @property
     def id(self) -> str:
         """As ``f:|v|v``: the input, and what the force goes with."""
+        if self.earth is not None:
+            return f"earth_force:{self.earth.name}"
         y = f"der({self.output})" if self.rate else self.output
         return f"{self.input}:{self._shape.symbol.format(y=y)}"
 
     def unit(self, of_input: str, of_output: str) -> str:
         """Unit of the coefficient."""
+        if self.earth is not None:
+            return "N"
         if not self._shape.power:
             return of_input
         y = f"{of_output}/s" if self.rate else of_output
         return f"{of_input}/({y})" + (f"^{self._shape.power}" if self._shape.power > 1 else "")
 
-    def term(self, inputs: Sequence[str], outputs: Sequence[str]) -> FeedbackTerm:
+    def terms(self, inputs: Sequence[str], outputs: Sequence[str]) -> list[FeedbackTerm]:
         """The force by the numbers of its variables."""
-        place = outputs.index(self.output) if self.output else 0
-        slot = inputs.index(self.input)
-        return FeedbackTerm(slot, place, self._shape.power, self.rate, self.coefficient)
+        place = outputs.index(self.signal) if self.signal else 0
+        if self.earth is None:
+            slot = inputs.index(self.input)
+            return [FeedbackTerm(slot, place, self._shape.power, self.rate, self.coefficient)]
+        turn = self.earth.turn
+        return [
+            FeedbackTerm(inputs.index(name), place, 1, False, self.coefficient * gain, turn, phase)
+            for name, gain, phase in self.earth.parts
+        ]

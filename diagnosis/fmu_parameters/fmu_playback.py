@@ -143,7 +143,7 @@ class Playback:
         # An input that is calibrated keeps its value.
         for k, name in enumerate(self.inputs):
             rows[:, k] = start.pop(name, rows[:, k])
-        terms = [f.term(self.inputs, self.outputs) for f in request.forces]
+        terms = [t for f in request.forces for t in f.terms(self.inputs, self.outputs)]
         outputs, instance = self._nothing(request), self._ready(course.h)
         told = np.frombuffer(instance.whole_run(start, rows.tobytes(), len(rows), course.h, terms))
         known = told.reshape(-1, len(self.outputs))

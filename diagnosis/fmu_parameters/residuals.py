@@ -2,14 +2,17 @@
 
 What a window begins with is known by some samples only. Its uncertainty is integrated out: by a start
 value of variance p the residuals of a window have the covariance I + S p S^T, S their slopes by the
-start value, and are whitened by the inverse root of that.
+start value, and are whitened by the inverse root of that. Where a prediction is not linear in its start,
+the slopes are those about the most likely start (Laplace's method).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from cosim import InputError
 from fmus.frames import rotate_to_earth
@@ -23,7 +26,9 @@ from .parameter_file import CalibratedParameter
 STEP = 0.02  # of a central difference, in prior standard deviations; chosen: solvers keep some digits
 REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit
 LARGEST = 1e50  # of a residual: more is not finite, and its square is; chosen
-START_STEP = 0.5  # of a difference by a start value, in its standard deviations; chosen
+START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
+MOST_STARTS = 30  # tried in a window; chosen: a dozen suffices
+LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
 
 @dataclass(frozen=True)
@@ -41,10 +46,18 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Of one window: the directions in which its start moves the residuals, and what is left of them."""
+    """Of one window: the directions in which its start moves the residuals, and what is left of them.
+
+    Attributes:
+        along, kept: singular vectors (n, k), and the factor (k,) of the residuals along each.
+        begin: start value -> value about which the slopes are.
+        lead: (n,), change of the residuals by the slopes, from the measured start to ``begin``.
+    """
 
     along: np.ndarray
     kept: np.ndarray
+    begin: Mapping[str, float] = field(default_factory=dict)
+    lead: np.ndarray | None = None
 
     def __call__(self, r: np.ndarray) -> np.ndarray:
         """Whitened residuals (n,), or slopes (n, q)."""
@@ -83,9 +96,9 @@ class WindowResiduals:
         self.noise, self.parameters, self.angles = noise, parameters, [*angles]
         m = noise.size
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
-        self._known: dict[Setting, np.ndarray] = {}
+        self._known: dict[tuple[Setting, bool], np.ndarray] = {}
         self.failed: list[tuple[dict[str, float], str]] = []
-        self._whitening: list[Whitening] | None = None
+        self._whitening: list[Whitening] = []
         sizes = [w.measured.size for w in windows]
         ends = np.cumsum([0, *sizes])
         self.rows = [slice(a, b) for a, b in pairwise(ends.tolist())]
@@ -134,14 +147,28 @@ class WindowResiduals:
 
     def raw(self, settings: Sequence[Setting]) -> list[np.ndarray]:
         """Of each setting the residuals (size,) in units of the noise; NaN where the FMU fails."""
-        new = [s for s in dict.fromkeys(settings) if s not in self._known]
-        for s, each in zip(new, self.predict(new), strict=True):
+        return self._residuals(settings, [{}] * len(self.windows))
+
+    def _residuals(
+        self, settings: Sequence[Setting], begins: Sequence[Mapping[str, float]]
+    ) -> list[np.ndarray]:
+        """The same where the windows begin with other start values."""
+        moved = any(begins)
+        new = [s for s in dict.fromkeys(settings) if (s, moved) not in self._known]
+        requests = [
+            PlaybackRequest(k, {**self.values(s), **begin}, s.forces)
+            for s in new
+            for k, begin in enumerate(begins, self._first)
+        ]
+        predicted = iter(self.processes.run(requests))
+        for s in new:
+            each = [next(predicted) for _ in self.windows]
             why = next((p.fault for p in each if p.fault), "")
             if why:
                 self.failed.append((self.values(s), why))
             off = [self._off(w, p) for w, p in zip(self.windows, each, strict=True)]
-            self._known[s] = np.concatenate(off)
-        found = [self._known[s] for s in settings]
+            self._known[s, moved] = np.concatenate(off)
+        found = [self._known[s, moved] for s in settings]
         while len(self._known) > REMEMBERED:
             del self._known[next(iter(self._known))]
         return found
@@ -166,14 +193,19 @@ class WindowResiduals:
 
     def whiten(self, r: np.ndarray) -> np.ndarray:
         """Whitened residuals (size,), or slopes (size, q)."""
-        assert self._whitening is not None
         return np.concatenate(
             [white(r[rows]) for white, rows in zip(self._whitening, self.rows, strict=True)]
         )
 
     def whitened(self, settings: Sequence[Setting]) -> list[np.ndarray]:
         """Of each setting the whitened residuals (size,)."""
-        return [self.whiten(r) for r in self.raw(settings)]
+        found = self._residuals(settings, [white.begin for white in self._whitening])
+        led = [
+            np.zeros(w.measured.size) if x.lead is None else x.lead
+            for w, x in zip(self.windows, self._whitening, strict=True)
+        ]
+        lead = np.concatenate(led)
+        return [self.whiten(r - lead) for r in found]
 
     def whiten_about(self, setting: Setting) -> None:
         """Take the slopes by the start values about a setting.
@@ -181,24 +213,48 @@ class WindowResiduals:
         Raises:
             InputError: the FMU fails there.
         """
-        values, requests = self.values(setting), []
-        for k, w in enumerate(self.windows, self._first):
-            requests.append(PlaybackRequest(k, values, setting.forces))
-            for name, std in w.start_std.items():
-                moved = {name: w.course.start[name] + START_STEP * std}
-                requests.append(PlaybackRequest(k, {**values, **moved}, setting.forces))
-        found = iter(self.processes.run(requests))
-        self._whitening = []
-        for w in self.windows:
-            here = next(found)
-            if here.fault:
-                raise InputError(f"'{self.processes.name}' fails on run '{w.run}': {here.fault}")
-            base = self._off(w, here)
-            slopes = [(self._off(w, next(found)) - base) / START_STEP for _ in w.start_std]
-            S = np.column_stack([*slopes, np.zeros((base.size, 0))])
-            S[:, ~np.isfinite(S).all(axis=0)] = 0.0
-            U, size, _ = np.linalg.svd(S, full_matrices=False)
-            self._whitening.append(Whitening(U, 1.0 / np.sqrt(1.0 + size**2)))
+        self._known = {key: r for key, r in self._known.items() if not key[1]}
+        self._whitening = [
+            self._whitening_of(w, k, setting) for k, w in enumerate(self.windows, self._first)
+        ]
+
+    def _whitening_of(self, w: Window, course: int, setting: Setting) -> Whitening:
+        """Of one window, about the most likely start where its prediction is not linear in that."""
+        names, std = [*w.start_std], np.array([*w.start_std.values()])
+        middle, z = np.array([w.course.start[n] for n in names]), np.zeros(len(names))
+
+        def begin(z: np.ndarray) -> dict[str, float]:
+            return dict(zip(names, (middle + z * std).tolist(), strict=True)) if z.any() else {}
+
+        def at(starts: Sequence[np.ndarray]) -> list[PlayedBack]:
+            values = self.values(setting)
+            each = [PlaybackRequest(course, {**values, **begin(x)}, setting.forces) for x in starts]
+            return self.processes.run(each)
+
+        def off(z: np.ndarray) -> np.ndarray:
+            (there,) = at([z])
+            return np.concatenate([np.nan_to_num(self._off(w, there), nan=LARGEST), z])
+
+        def slopes(z: np.ndarray) -> np.ndarray:
+            base, *moved = (self._off(w, p) for p in at([z, *(z + START_STEP * np.eye(z.size))]))
+            S = np.column_stack([(r - base) / START_STEP for r in moved])
+            return np.where(np.isfinite(S).all(axis=0), S, 0.0)
+
+        (here,) = at([z])
+        if here.fault:
+            raise InputError(f"'{self.processes.name}' fails on run '{w.run}': {here.fault}")
+        base = self._off(w, here)
+        if not names:
+            return Whitening(np.zeros((base.size, 0)), np.zeros(0))
+        S = slopes(z)
+        best = -np.linalg.solve(np.eye(z.size) + S.T @ S, S.T @ base)
+        bend = off(best)[: base.size] - base - S @ best
+        if np.sqrt(np.mean(bend**2)) > LINEAR:
+            jacobian: Any = lambda z: np.concatenate([slopes(z), np.eye(z.size)])  # noqa: E731
+            z = least_squares(off, z, jacobian, max_nfev=MOST_STARTS).x
+            S = slopes(z)
+        U, size, _ = np.linalg.svd(S, full_matrices=False)
+        return Whitening(U, 1.0 / np.sqrt(1.0 + size**2), begin(z), S @ z)
 
     def slopes(self, setting: Setting, sizes: Sequence[float]) -> tuple[np.ndarray, list[str]]:
         """Slopes (size, p + e) of the whitened residuals by each z and each coefficient.
@@ -265,7 +321,7 @@ def laid(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
 
 def replaced(f: AdditionalForce, coefficient: float) -> AdditionalForce:
     """A force with another coefficient."""
-    return AdditionalForce(f.input, f.output, f.shape, f.rate, coefficient)
+    return replace(f, coefficient=coefficient)
 
 
 def rms_of(

@@ -1,7 +1,7 @@
 """The FMU of a ship, and the windows in which its predictions are compared with measured poses."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import chain
@@ -16,10 +16,10 @@ from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.variable_map import DISTURBANCES
+from ..predictors.fmu.variable_map import DISTURBANCES, QUARTER
 from ..predictors.windows import step_of, usable_windows
 from ..runs import Smoothed
-from .additional_force import AdditionalForce
+from .additional_force import AdditionalForce, EarthDirection
 from .fmu_playback import InputCourse, of_predictions
 from .force_search import candidates
 from .measured_system import FEWEST, Window
@@ -30,6 +30,8 @@ from .system_task import numbered, processes_of
 MOST_SAMPLES = (
     60  # of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion
 )
+# Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
+EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": QUARTER}, "F_e": {"tau_X": -QUARTER, "tau_Y": 0.0}}
 UNITS = {"x": "m", "y": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
 
 
@@ -94,9 +96,27 @@ class ShipTask:
 
     @property
     def possible(self) -> list[AdditionalForce]:
-        """Forces that may act in addition: constant, or a function of one velocity."""
+        """Forces that may act in addition: constant in body or earth frame, or of one velocity."""
         told = self.predictor.map.told("outputs")
-        return candidates(self.forces_on, [told[s].name for s in VELOCITY if s in told], ())
+        of_velocity = candidates(self.forces_on, [told[s].name for s in VELOCITY if s in told], ())
+        return [*of_velocity, *self._earth_forces()]
+
+    def _earth_forces(self) -> Iterator[AdditionalForce]:
+        """A force to the north, and one to the east, where the FMU has both inputs and a heading."""
+        told, lines = self.predictor.map, self.predictor.lines
+        found = {
+            s: (c.name, 1.0 / lines[group][s].gain)
+            for group in ("inputs", DISTURBANCES)
+            for s, c in told.told(group).items()
+            if s in EARTH["F_n"]
+        }
+        if len(found) < len(EARTH["F_n"]) or "psi" not in told.told("outputs"):
+            return
+        heading, line = told.told("outputs")["psi"].name, lines["outputs"]["psi"]
+        for name, angles in EARTH.items():
+            parts = tuple((*found[s], line.offset + angle) for s, angle in angles.items())
+            direction = EarthDirection(name, heading, line.gain, parts)
+            yield AdditionalForce(parts[0][0], earth=direction)
 
     def residuals(self) -> dict[str, WindowResiduals]:
         """Use -> the residuals of its runs, of those that there are.

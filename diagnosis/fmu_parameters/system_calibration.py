@@ -12,7 +12,7 @@ from .additional_force import AdditionalForce
 from .force_search import Accepted, search
 from .parameter_file import CalibratedParameter
 from .parameter_fit import ParameterFit, fit, fitted, intervals
-from .residuals import Setting, WindowResiduals, rms_of
+from .residuals import Setting, WindowResiduals, replaced, rms_of
 from .system_remainder import CHANCE, SystemRemainder, change_of_squares, inflation, remainder
 
 FOUND, EVEN_ODDS = 0.8, 0.5  # contract
@@ -176,6 +176,8 @@ def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
     """Which parameters the runs show to be off, forces fitted anew where they are not."""
     p = len(best.setting.z)
     held = Setting((0.0,) * p, best.setting.forces)
+    if not np.isfinite(r.whitened([held])[0]).all():  # forces of other parameters make the FMU diverge
+        held = Setting(held.z, tuple(replaced(f, 0.0) for f in held.forces))
     other = fit(r, held, best.sizes, range(p))
     ratio = (other.data_cost - best.data_cost) / grown
     some = ratio > float(chi2.ppf(1.0 - CHANCE, p))

@@ -26,12 +26,16 @@ DIVERGED = 1e50
 class FeedbackTerm(NamedTuple):
     """What is added to an input before each step: ``coefficient`` times ``y |y|^(power - 1)``.
 
+    With a ``turn`` y is ``cos(turn * output + phase)``.
+
     Attributes:
         input: its number.
         output: number of the output y.
         power: 0: the term is constant.
         rate: whether y is the output's derivative by time, from the last two steps.
         coefficient: in units of the input and of y.
+        turn: angle by the output [rad by its unit]; 0: y is the output.
+        phase: [rad].
     """
 
     input: int
@@ -39,6 +43,8 @@ class FeedbackTerm(NamedTuple):
     power: int
     rate: bool
     coefficient: float
+    turn: float = 0.0
+    phase: float = 0.0
 
 
 class GarbledError(Exception):

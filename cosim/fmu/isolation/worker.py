@@ -9,6 +9,7 @@ and ends when the master does, also when that is killed.
 import ctypes
 import io
 import json
+import math
 import os
 import signal
 import sys
@@ -125,8 +126,9 @@ class Worker:
         told, before = bytearray(self._outputs), [*seen]
         for k in range(steps):
             self._inputs[:] = rows[k * width : (k + 1) * width]
-            for slot, place, power, rate, coefficient in terms:
+            for slot, place, power, rate, coefficient, turn, phase in terms:
                 y = (seen[place] - before[place]) / h if rate else seen[place] if power else 1.0
+                y = math.cos(turn * y + phase) if turn else y
                 driven[slot] += coefficient * y * abs(y) ** max(0, power - 1)
             before = [*seen]
             self._access.put()

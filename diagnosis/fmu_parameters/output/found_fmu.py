@@ -41,13 +41,21 @@ def write_found(
         forces: with their coefficients.
         h: length of a step [s].
     """
-    driven = [*dict.fromkeys([*map(_name, given["inputs"].values()), *(f.input for f in forces)])]
-    seen = [*dict.fromkeys(f.output for f in forces if f.output)]
+    # A signal that the FMU lacks is null in the map of a ship.
+    given = {
+        key: {s: c for s, c in group.items() if c is not None} if isinstance(group, dict) else group
+        for key, group in given.items()
+    }
+    driven = [
+        *dict.fromkeys([*map(_name, given["inputs"].values()), *(n for f in forces for n in f.inputs)])
+    ]
+    seen = [*dict.fromkeys(f.signal for f in forces if f.signal)]
     inputs_kept = [n for n in values if model.variables[n].causality == "input"]
     if inputs_kept:
         return f"No {FOUND} is written: calibrated values are inputs: {', '.join(inputs_kept)}."
     starts = [float(model.variables[n].start or 0.0) for n in driven]
-    terms = ", ".join(f"AddedTerm{tuple(f.term(driven, seen))!r}" for f in forces)
+    every = [t for f in forces for t in f.terms(driven, seen)]
+    terms = ", ".join(f"AddedTerm{tuple(t)!r}" for t in every)
     wires = [(f"{FOREIGN}.{n}", f"{ADDED}.from_{k}") for k, n in enumerate(seen)]
     wires += [(f"{ADDED}.sum_{k}", f"{FOREIGN}.{n}") for k, n in enumerate(driven)]
     start = {

@@ -173,7 +173,7 @@ class CalibrationReport:
         }
         return {
             "id": f.force.id,
-            "input": f.force.input,
+            "input": ", ".join(f.force.inputs),
             "axis": "",
             "coefficients": {f.force.id: value},
             "confidence": f.probability,
