@@ -20,7 +20,7 @@ from studies.study_report import Report
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
 from .tracking.outcome import LEARNED_FROM, PHI, TrackingOutcome, columns, outcome, true_states
-from .tracking.statements import statements
+from .tracking.seed_statements import statements
 from .tracking.store_verdicts import store_claims
 from .tracking.verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
 

@@ -14,7 +14,7 @@ import cosim
 from cosim.results import draw, read_options
 from diagnosis.predictors import read_model
 from studies.study_command import run_study, study_parser
-from studies.study_report import Report
+from studies.study_report import Report, Verdict
 
 from .basin_trials import sysid4
 from .basin_trials.chapter6_runs import FEW, Plant, folder, run
@@ -65,6 +65,11 @@ def numbered(first: int) -> dict[str, str]:
     return {name: f"Fig. 6.{number}" for name, number in zip(names, numbers, strict=True)}
 
 
+def of_section(rows: Sequence[Verdict], number: str) -> list[Verdict]:
+    """Verdicts whose statements end with the number of the section."""
+    return [row._replace(thesis=f"{row.thesis} {number}") for row in rows]
+
+
 def hidden(model: Path | None) -> tuple[str, Plant]:
     """What is hidden in the plant, in words and as parameters.
 
@@ -111,13 +116,13 @@ def study(
         "the thesis' measurements are not public, and another ship is hidden here; with the guidance "
         "fault RBS is lost at 0.16 m/s; most of the error is along the ship, where none adapts."
         if model is None
-        else "the learned ship lacks the loss of thrust of SYSID4, which makes concurrent learning fail."
+        else "the learned ship has no such loss of thrust as SYSID4, and every controller keeps up."
     )
     report.heading("The ellipse at 0.16 m/s (6.4.4)")
-    report.verdicts("observations", observations(found))
+    report.verdicts("observations", of_section(observations(found), "(6.4.4)"))
     for section, rows in other_sections(found).items():
         report.heading(section)
-        report.verdicts(section, rows)
+        report.verdicts(section, of_section(rows, section[section.index("(6") :]))
     report.heading("Lessons learned (6.5)")
     report.verdicts("lessons", lessons(found), "numbers and cause")
     report.heading("The trials")

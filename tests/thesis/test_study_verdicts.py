@@ -11,12 +11,12 @@ from thesis import allocation, chapter7, lost_thrust, realtime, store_weight
 from thesis.analysis import Samples
 from thesis.basin_trials import observations, sysid4, trials
 from thesis.basin_trials.found import FAULTY, REGULAR, TrialRuns
-from thesis.error_models import analysis_tables, lost_signals, model_loops, statements
-from thesis.error_models.statements import LoopResult
+from thesis.error_models import analysis_tables, lost_signals, model_loops, model_statements
+from thesis.error_models.model_statements import LoopResult
 from thesis.monte_carlo import SampleMean, shipped
 from thesis.store_weight import FORMS, PLAIN, UNTOLD, WEIGHTS, tables
 from thesis.tracking.outcome import BROKEN, TRUE_PHI
-from thesis.tracking.statements import EVERY, STATEMENTS, in_seeds, judged_statement
+from thesis.tracking.seed_statements import EVERY, STATEMENTS, in_seeds, judged_statement
 from thesis.tracking.store_verdicts import full_rank, lack_of_rank, order, richer, saturated, stale
 from thesis.tracking.verdict import (
     CONTROLLERS,
@@ -664,37 +664,45 @@ def loop_result(z1_x=-0.2, z1_y=0.1, position=0.3, omega=(0.4, 0.2, 0.1), estima
 
 def test_model_in_the_ship_is_alike_or_not():
     measured = loop_result()
-    assert statements.alike(measured, loop_result(position=0.32)).here == "yes"
-    other = statements.alike(measured, loop_result(position=0.6, omega=(0.4, 0.2, 0.3)))
+    assert model_statements.alike(measured, loop_result(position=0.32)).here == "yes"
+    other = model_statements.alike(measured, loop_result(position=0.6, omega=(0.4, 0.2, 0.3)))
     assert other.here == "position: no; z1_x: yes; ω X: yes; ω Y: yes; ω N: no"
-    assert statements.alike(measured, loop_result(position=float("nan"))).here.startswith("position: no")
+    assert model_statements.alike(measured, loop_result(position=float("nan"))).here.startswith(
+        "position: no"
+    )
 
 
 def test_concurrent_learning_removes_the_error_across_and_not_that_along():
     plain = {"SYSID4": loop_result()}
-    good = statements.controlled(plain, {"SYSID4": loop_result(z1_y=0.01, estimate=0.9)})
+    good = model_statements.controlled(plain, {"SYSID4": loop_result(z1_y=0.01, estimate=0.9)})
     assert [v.here for v in good] == ["yes", "yes", "yes"]
-    bad = statements.controlled(plain, {"SYSID4": loop_result(z1_x=-0.1, z1_y=0.09, estimate=0.1)})
+    bad = model_statements.controlled(plain, {"SYSID4": loop_result(z1_x=-0.1, z1_y=0.09, estimate=0.1)})
     assert [v.here for v in bad] == ["no", "no", "no"]
+    none = {"SYSID1": loop_result(omega=(0.4, 0.0, 0.1)), "SYSID4": loop_result(estimate=0.9)}
+    adapting = model_statements.controlled(none, none)[2]
+    assert adapting.here == "yes", "a model without an error in sway leaves nothing to adapt to"
+    assert "SYSID1" not in adapting.numbers
 
 
 def test_model_error_of_one_model_differs_in_yaw():
     reference, near = loop_result(), loop_result(omega=(0.4, 0.2, 0.11))
     far = loop_result(omega=(0.4, 0.2, 0.3))
-    assert statements.reacting(reference, {"a": near, "b": far}, "b").here == "reproduced"
-    assert statements.reacting(reference, {"a": far, "b": near}, "b").here == "not reproduced"
+    assert model_statements.reacting(reference, {"a": near, "b": far}, "b").here == "reproduced"
+    assert model_statements.reacting(reference, {"a": far, "b": near}, "b").here == "not reproduced"
 
 
 def test_model_explains_the_main_part_and_is_linear_or_not():
     good, bad = np.array([0.9, 0.6, 0.5]), np.array([0.9, 0.4, 0.9])
-    assert statements.explaining("", {"a": good, "b": good}).here == "yes"
-    assert statements.explaining("", {"a": good, "b": bad}).here == "a: yes; b: no"
-    assert statements.linear({"a": np.array([0.6, 0.9, 0.51])}).here == "yes"
-    assert statements.linear({"a": np.array([0.6, 0.4, 0.9])}).here == "no"
-    assert statements.systematic(np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6])).here == "yes"
-    assert statements.systematic(np.array([0.5, 0.2, 0.3]), np.array([0.4, 0.5, 0.6])).here.startswith(
-        "X: no; Y: yes"
+    assert model_statements.explaining("", {"a": good, "b": good}).here == "yes"
+    assert model_statements.explaining("", {"a": good, "b": bad}).here == "a: yes; b: no"
+    assert model_statements.linear({"a": np.array([0.6, 0.9, 0.51])}).here == "yes"
+    assert model_statements.linear({"a": np.array([0.6, 0.4, 0.9])}).here == "no"
+    assert (
+        model_statements.systematic(np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6])).here == "yes"
     )
+    assert model_statements.systematic(
+        np.array([0.5, 0.2, 0.3]), np.array([0.4, 0.5, 0.6])
+    ).here.startswith("X: no; Y: yes")
 
 
 def test_share_of_the_linear_coefficients():
@@ -702,10 +710,10 @@ def test_share_of_the_linear_coefficients():
     ones = np.ones((5, 3))
     s = Samples(np.full(5, "a"), np.arange(5.0), ones, 0.0 * ones, ones, ones)
     phi = np.zeros(14)
-    phi[[statements.NAMES.index(n) for n in ("X_u", "Y_r", "N_r")]] = -1.0
-    assert statements.linear_share(s, phi) == pytest.approx([1.0, 1.0, 1.0])
-    phi[[statements.NAMES.index(n) for n in ("X_absu_u", "Y_absr_r", "N_absr_r")]] = -1.0
-    assert statements.linear_share(s, phi) == pytest.approx([0.5, 0.5, 0.5])
+    phi[[model_statements.NAMES.index(n) for n in ("X_u", "Y_r", "N_r")]] = -1.0
+    assert model_statements.linear_share(s, phi) == pytest.approx([1.0, 1.0, 1.0])
+    phi[[model_statements.NAMES.index(n) for n in ("X_absu_u", "Y_absr_r", "N_absr_r")]] = -1.0
+    assert model_statements.linear_share(s, phi) == pytest.approx([0.5, 0.5, 0.5])
 
 
 def test_signals_that_were_lost_come_back_or_not():

@@ -12,7 +12,7 @@ from studies.study_report import Report, Verdict
 from .. import analysis
 from ..analysis import NU, OMEGA, TAU, Regressed, Samples, correlations
 from ..tracking.outcome import AXES, Log
-from .statements import explaining, systematic
+from .model_statements import explaining, systematic
 
 RECIPES = ("PLS1", "PLS2", "PLS3", "PLS4")
 UNIT = dict(zip([*NU, *TAU], ("m/s", "m/s", "rad/s", "N", "N", "N m"), strict=True))

@@ -15,7 +15,7 @@ from ..basin_trials.trials import CLE, CLZ, RBS, TRIALS, scenario
 from ..monte_carlo import Content, run_all, vary
 from ..tracking.outcome import LEARNED_FROM, Log, rms
 from .lap_pictures import errors_picture, force_picture
-from .statements import LoopResult, alike, controlled, reacting
+from .model_statements import LoopResult, alike, controlled, reacting
 
 SLOW, EIGHT = TRIALS[0], TRIALS[1]
 TRACK = ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"]

@@ -16,6 +16,7 @@ MAIN = 0.5  # 1, R² from which a model explains the main part of the model erro
 SIMILAR = 0.25  # 1, difference of two runs, relative, up to which they are similar; chosen
 REMOVES = 0.5  # 1, share of an error that may remain where a controller "minimises" it; chosen
 KEEPS = 0.9  # 1, share of an error from which a controller does not remove it; chosen
+NOTHING = 1e-3  # N, model error below which there is none to adapt to; chosen: far below the noise's
 LINEAR = tuple(NAMES.index(f"{axis}_{speed}") for axis, speed in zip(AXES, "urr", strict=True))
 HYDRODYNAMIC = [k for k, name in enumerate(NAMES) if not name.startswith("delta")]
 
@@ -133,7 +134,7 @@ def controlled(plain: Mapping[str, LoopResult], learning: Mapping[str, LoopResul
     """What concurrent learning does to both parts of z1, model by model, against backstepping."""
     across = {n: learning[n].aside() / max(plain[n].aside(), 1e-9) for n in learning}
     along = {n: abs(learning[n].lag / plain[n].lag) for n in learning}
-    known = {n: r.known("Y") for n, r in learning.items()}
+    known = {n: r.known("Y") for n, r in learning.items() if rms(r.omega()[:, 1]) > NOTHING}
 
     def numbers(values: Mapping[str, float]) -> str:
         return ", ".join(f"{n} {x:.2f}" for n, x in values.items())
