@@ -3,6 +3,7 @@
 import math
 import os
 import platform
+import re
 from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
@@ -49,11 +50,35 @@ def cell(value: Any) -> str:
 
 
 class Verdict(NamedTuple):
-    """What the thesis says, what comes out here, and the numbers or the reason."""
+    """A statement of the thesis, its verdict, and the numbers or the reason.
+
+    Attributes:
+        thesis: the statement.
+        here: the verdict on today's algorithms; its words decide :attr:`holds`.
+        numbers: on which it rests.
+        printed: the verdict on the algorithms as printed; empty where there is one form alone.
+    """
 
     thesis: str
     here: str
     numbers: str
+    printed: str = ""
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the statement holds in every setting, or in none; None: in part, or undecided."""
+        said = {bool(HOLDS.fullmatch(word)) for word in DECIDES.findall(self.here)}
+        return said.pop() if len(said) == 1 and not OPEN.search(self.here) else None
+
+
+# Words of a verdict: those that decide, those of them by which it holds, and those that leave it open.
+DECIDES = re.compile(r"not reproduced|not reached|reproduced|reversed|reached|\byes\b|\bno\b(?! run)")
+HOLDS = re.compile("reproduced|reached|yes")
+OPEN = re.compile("undecided|no run|in part|not by all")
+
+
+def _listed(statements: Sequence[str]) -> str:
+    return f": {'; '.join(statements)}" if statements else ""
 
 
 class Report:
@@ -73,6 +98,8 @@ class Report:
         self.folder = folder
         self._pieces = [f"# {title}"]
         self._tables: list[dict[str, Any]] = []
+        self._verdicts: list[Verdict] = []
+        self._why = ""
         self._results: dict[str, Any] = {"title": title, "seeds": list(seeds), "machine": machine()}
         ran = f"{seeds_line(seeds).capitalize()}. " if seeds else ""
         self.text(f"{ran}{machine()}.")
@@ -103,8 +130,30 @@ class Report:
             rows: the verdicts.
             numbers: heading of the last column.
         """
-        self.table(["thesis", "here", numbers], rows, words=True)
+        if any(row.printed for row in rows):
+            header = ["thesis", "today", "as printed", numbers]
+            cells = [[r.thesis, r.here, r.printed or "–", r.numbers] for r in rows]
+        else:
+            header, cells = ["thesis", "here", numbers], [r[:3] for r in rows]
+        self.table(header, cells, words=True)
+        self._verdicts += rows
         self.result(name, rows)
+
+    def why(self, reason: str) -> None:
+        """The reason for what did not hold, for the head of the report."""
+        self._why = reason
+
+    def _opening(self) -> list[str]:
+        """What held, what did not, and why; nothing where no statement was judged."""
+        by = {h: [v.thesis for v in self._verdicts if v.holds is h] for h in (True, False, None)}
+        count = len(self._verdicts)
+        lines = [
+            f"{len(by[True])} of {count} statements held{_listed(by[True])}.",
+            f"{len(by[False])} did not hold{_listed(by[False])}; "
+            f"{len(by[None])} hold in part or are undecided{_listed(by[None])}.",
+            *([f"Reason: {self._why}"] if self._why else []),
+        ]
+        return ["\n".join(f"- {line}" for line in lines)] if count else []
 
     def figure(self, name: str, figure: "Figure", caption: str) -> None:
         """Write ``<name>.png`` and embed it."""
@@ -126,7 +175,9 @@ class Report:
     def write(self) -> Path:
         """Write ``results.json``, then ``report.md``; returns the latter's path."""
         text = as_json({**self._results, "tables": self._tables})
-        for name, content in ((RESULTS, text), (REPORT, "\n\n".join(self._pieces))):
+        title, *rest = self._pieces
+        page = "\n\n".join([title, *self._opening(), *rest])
+        for name, content in ((RESULTS, text), (REPORT, page)):
             with atomic_write(self.folder / name) as scratch:
                 scratch.write_text(content + "\n", encoding="utf-8")
         return self.folder / REPORT

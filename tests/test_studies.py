@@ -184,7 +184,9 @@ def test_report_holds_what_was_put_in(tmp_path):
     results = json.loads((tmp_path / "new" / "results.json").read_text())
     assert "| thesis | here | numbers and cause |" in text
     assert "| said | reproduced | 1 to 2 |" in text
-    assert results["claims"] == [{"thesis": "said", "here": "reproduced", "numbers": "1 to 2"}]
+    assert results["claims"] == [
+        {"thesis": "said", "here": "reproduced", "numbers": "1 to 2", "printed": ""}
+    ]
     assert results["error"] == {"x": {"mean": 1.0, "low": 0.5, "high": 1.5}, "y": [1.0, None]}
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
         "picture.png",

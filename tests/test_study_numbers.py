@@ -2,12 +2,15 @@
 
 import json
 import re
+import shutil
+from string import Formatter
 
 import numpy as np
 import pytest
 from support.project import ROOT
 
 from studies.study_report import cell
+from thesis import results_page
 
 STUDIES = ROOT / "docs" / "studies"
 WITH_TABLES = [
@@ -110,3 +113,58 @@ def test_tables_of_a_report_are_those_of_its_results(folder):
             assert f"| {' | '.join(cell(np.nan if c is None else c) for c in row)} |" in text
     rules = len(re.findall(r"^\| :-- ", text, re.MULTILINE))
     assert len(tables) == rules, "each table of the report is in the results"
+
+
+def test_page_of_the_thesis_has_the_numbers_of_its_results():
+    given = (ROOT / "docs" / "thesis_results.md").read_text("utf-8")
+    assert results_page.page() == given, "python -m thesis.results_page > docs/thesis_results.md"
+
+
+def test_template_has_every_number_once_and_no_other():
+    """A number that is typed in changes with no result; only sections, gains and limits may be."""
+    template = (STUDIES / results_page.TEMPLATE).read_text("utf-8")
+    names = [name for _, name, _, _ in Formatter().parse(template) if name]
+    assert sorted(names) == sorted(results_page.numbers())
+    text = re.sub(
+        r"\{\w+\}|\(?[Ff]ootnote 1 of 4\.1\.4|\d\.\d\.\d|Chapter \d|\*\*7\.5\*\*|thesis 0\.4",
+        "",
+        template,
+    )
+    typed = set(re.findall(r"(?<![\w.])\d+(?:\.\d+)?", text))
+    chosen = {
+        "0",
+        "0.1",
+        "1",
+        "10",
+        "0.01",
+        "2",
+        "6.4.4",
+        "0.16",
+        "0.08",
+        "9.9",
+        "50",
+        "6",
+        "9",
+        "95",
+        "7.1",
+    }
+    assert typed <= chosen
+
+
+def test_a_result_that_changes_changes_the_page(tmp_path):
+    """The page follows the outcomes of runs, not only the tables."""
+    shutil.copytree(STUDIES, tmp_path / "s", ignore=shutil.ignore_patterns("*.png", "*.md"))
+    file = tmp_path / "s" / "chapter5" / "results.json"
+    content = json.loads(file.read_text("utf-8"))
+    for run in content["outcomes"]["ellipse"]["mdf"]["controller_abs"]:
+        run["position"] *= 0.5
+    file.write_text(json.dumps(content), "utf-8")
+    assert results_page.numbers(tmp_path / "s")["abs_ellipse"] != results_page.numbers()["abs_ellipse"]
+    assert results_page.page(tmp_path / "s") != results_page.page()
+
+
+@pytest.mark.parametrize(
+    ("values", "said"), [([1.2, 3.9], "1 to 4"), ([2.0, 2.1], "2"), ([1.0, float("nan")], "1")]
+)
+def test_range_of_numbers(values, said):
+    assert results_page.ends(values) == said

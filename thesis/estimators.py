@@ -122,7 +122,8 @@ def examples(report: Report, stop: float) -> None:
     log, estimates = logs["ellipse"]
     figure = pictures.wrap(log, estimates)
     if figure is not None:
-        report.figure("wrap", figure, "Through a wrap of the heading, Fig. 6.9; cut off at the edges")
+        caption = "Pose (6.9a) and yaw rate (6.9b) through a wrap of the heading; cut off at the edges"
+        report.figure("wrap", figure, caption)
 
 
 def measured(report: Report, files: Sequence[Path]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ def log(**changes):
     t = np.arange(0.0, 100.01, 0.1)
     zero = np.zeros_like(t)
     names = ("vessel.x", "vessel.y", "vessel.v", "vessel.r", "guidance.x_t", "guidance.y_t")
+    names += ("guidance.psi_t",)
     names += ("controller.z1_x", "controller.tau_N", *chapter5.LEARNED_FROM)
     found = {"time": t, **{name: zero.copy() for name in names}}
     found["vessel.x"] = np.where(t < METRICS["from"], 50.0, 1.0)
@@ -136,3 +137,21 @@ def test_conditions_differ_in_what_they_say():
 )
 def test_seeds_of_a_condition(condition, count):
     assert list(chapter5.seeds_of(condition, range(5))) == list(range(count))
+
+
+def test_side_of_the_path_bias_forces_and_agreement():
+    """A ship 0.1 m inside of a circle that turns to starboard; the estimate in yaw has the wrong sign."""
+    t = np.arange(0.0, 100.01, 0.1)
+    angle = 0.05 * t
+    circle = {"guidance.x_t": 2.0 * np.sin(angle), "guidance.y_t": -2.0 * np.cos(angle)}
+    inner = {"vessel.x": 1.9 * np.sin(angle), "vessel.y": -1.9 * np.cos(angle)}
+    force = {"controller.tau_lin_X": 3.0, "controller.tau_lin_N": 4.0, "controller.tau_nonlin_Y": -2.0}
+    learned = {"vessel.omega_star_N": np.sin(t), "controller.omega_hat_N": -0.5 * np.sin(t)}
+    made = log(**circle, **inner, **force, **learned, **{"guidance.psi_t": angle})
+    found = outcome(FinishedRun({}, metrics=METRICS, log=made))
+    assert found.inside == pytest.approx(0.1, abs=1e-3)
+    assert found.bias == pytest.approx(0.1), "to starboard, which is inside"
+    assert found.end == pytest.approx(0.1)
+    assert (found.linear, found.nonlinear) == pytest.approx((5.0, 2.0))
+    assert found.agree_N == pytest.approx(-1.0)
+    assert np.isnan(found.agree_Y), "there is none in sway"

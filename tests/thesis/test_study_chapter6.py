@@ -173,7 +173,7 @@ def test_swift_gains_bear_less_delay():
 
 
 def sailed(**values):
-    zero = trials.Sailed(*[0.0] * 17)
+    zero = trials.Sailed(*[0.0] * 21)
     return zero._replace(
         **{"position": 0.25, "along": 0.25, "lag": -0.25, "first": -0.25, "swing": 0.01} | values
     )
@@ -531,7 +531,7 @@ def test_whole_study_in_small(tmp_path, monkeypatch):
     ]
     assert set(surge) == {0.0}
     pictures = [line.split("](")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
-    assert len(pictures) == 20
+    assert len(pictures) == 24
     assert len(sets) == 4
     drawn, names = next(iter(sets.items()))
     assert len(names) == 5

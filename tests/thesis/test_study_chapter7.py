@@ -198,6 +198,7 @@ def test_the_row_that_made_the_samples_explains_them(tmp_path, drawn):
     assert rows["SYSID4"] == rows["least squares"] == ["1.000"] * 3
     assert rows["SYSID1"] != ["1.000"] * 3
     assert set(rows) == {
+        "thesis", "The identified model has the main dynamics of the model error (7.2.4, Fig. 7.2): made",
         "model", ":--", *analysis.TABLE_7_1, "least squares", "identified, limits of Algorithm 4", "identified, limits of the data"
     }  # fmt: skip
     found = analysis.identify(analysis.by_run(analysis.without_outliers(made)))
@@ -247,11 +248,14 @@ def test_shapes_are_those_of_the_regression(tmp_path, drawn):
     assert set(drawn) == {"simulated_shapes", "simulated_matrices"}
     found = analysis.regressed(analysis.without_outliers(s), analysis.recipe("continuous"))
     for panel, state in zip(drawn["simulated_shapes"][0].axes, (*NU, *TAU), strict=True):
-        assert panel.get_xlabel() == f"node of {state}"
+        assert panel.get_xlabel().startswith(f"{state} [")
         places = [k for k, n in enumerate(found.columns) if n.startswith(f"{state}=")]
         for k, line in enumerate(panel.get_lines()):
             assert line.get_label() == AXES[k]
             assert line.get_ydata() == pytest.approx(found.B[k, places])
+            assert line.get_xdata() == pytest.approx(
+                [float(found.columns[j][len(state) + 1 :]) for j in places]
+            )
 
 
 # In the loop
@@ -318,7 +322,7 @@ def test_table_of_the_loops_has_what_is_lost(found, tmp_path, monkeypatch, drawn
     assert row.startswith(f"| PLS2 | {model_loops.eigenvalues(found['PLS2'])} | {check} |")
     assert "| With PLS3 (SYSMV3; SYSMV4 in the caption)" in text
     assert "runs lost: PLS2 1 of 5, PLS3 0 of 5, PLS4 0 of 5. Force in X" in text
-    assert json.loads((tmp_path / "results.json").read_text("utf-8"))["unstable"]["here"].startswith(
+    assert json.loads((tmp_path / "results.json").read_text("utf-8"))["loops"][-1]["here"].startswith(
         "not reproduced; PLS2 does"
     )
     assert set(drawn) == {
@@ -350,8 +354,11 @@ def test_identification_stands_beside_what_is_hidden(tmp_path, monkeypatch):
     monkeypatch.setattr(
         analysis, "explained", lambda runs, phi: np.array([0.5, 0.25, phi[1] / sysid4.PHI[1]])
     )
-    text = told(tmp_path, chapter7.identification, [("true states", "s"), ("eight", "e")])
-    assert asked == [["s"], ["e"]]
+    s, e = linear(), linear(0.01)
+    text = told(tmp_path, chapter7.identification, [("true states", s), ("eight", e)])
+    assert asked == [[s], [e]]
+    assert "| SysID has the main dynamics of the model error (7.2.4) | no |" in text
+    assert "here the eight (7.2.4) | no |" in text
     assert "| coefficient | hidden | true states | eight |" in text
     assert "| N_r | -1.8 | -1.8 | -3.6 |" in text
     assert "| R² of ω Y |  | 0.2500 | 0.2500 |" in text
@@ -431,11 +438,14 @@ def test_the_study_runs_every_scenario_and_reads_what_lies_in_its_folder(tmp_pat
         analysis, "gather_samples", lambda runs, by: read.extend(runs) or analysis.by_run(s)
     )
     monkeypatch.setattr(analysis_tables, "write_shapes", lambda *given: told.append("shapes"))
+    monkeypatch.setattr(chapter7, "write_replay", lambda *given: told.append(given[1].parent.name))
+    monkeypatch.setattr(analysis_tables, "write_eight", lambda *given: told.append("eight"))
     monkeypatch.setattr(chapter7, "simulated", lambda *given: told.append([n for n, _ in given[2]]))
     monkeypatch.setattr(chapter7, "write_loops", lambda *given: told.append(given[2:]))
     monkeypatch.setattr(chapter7, "measured", lambda report, data: told.append(data))
     chapter7.study(tmp_path, 9.0, 2, None)
     assert ran == {where: str(where) for where in read}
-    assert told == ["shapes", ["true states", "smoothed", "mdf", "eight"], (9.0, 2)]
+    quiet = ["true states", "smoothed", "mdf", "eight"]
+    assert told == ["shapes", "controller_cl_win_eps_eight", quiet, "eight", (9.0, 2)]
     chapter7.study(tmp_path, None, 2, tmp_path)
     assert told[-1] == tmp_path

@@ -33,7 +33,7 @@ from thesis.basin_trials.store_contents import StoreContents
 from thesis.error_models import lap_pictures, model_loops
 from thesis.observers import claims, estimates_replayed, pictures
 from thesis.observers.estimates_replayed import OBSERVERS, SIGNALS
-from thesis.tracking.outcome import AXES, LEARNED_FROM, TrackingOutcome, missing
+from thesis.tracking.outcome import AXES, LEARNED_FROM, TrackingOutcome
 from thesis.tracking.verdict import CONTROLLERS, FOUR, PRINTED
 
 
@@ -139,7 +139,7 @@ def test_report_of_chapter_5(tmp_path, monkeypatch, figures, read):
 
     def run_each(todo, seeds, analyse, processes, advance):
         asked.update(seeds)
-        run = TrackingOutcome(True, *[0.1] * 17, phi=(0.1,) * 8)
+        run = TrackingOutcome(True, *[0.1] * 24, phi=(0.1,) * 8)
         return {key: [run for _ in seeds[key]] for key in todo}
 
     monkeypatch.setattr(chapter5, "run_each", run_each)
@@ -152,7 +152,10 @@ def test_report_of_chapter_5(tmp_path, monkeypatch, figures, read):
         3,
         1,
     ]
-    assert len(results["claims"]) == 21
+    assert len(results["claims"]) == 33
+    assert "| thesis | today | as printed | numbers and reason |" in text
+    assert "eight, against, today: model error (seed 0, Fig. 5.13)" in text
+    assert text.index("of 33 statements held") < text.index("Seeds 0-4.")
     assert set(results["outcomes"]) == {"ellipse", "eight"}
     assert set(figures) == {"singular_values_today", "singular_values_printed"}
     assert len(lines(figures["singular_values_today"][0].axes[0])) == 2 * len(FOUR)
@@ -175,7 +178,7 @@ def test_gains_are_those_of_the_table_times_a_factor():
 def found_by(settings, seeds, analyse):
     """What ``run_all`` gives where all runs are alike: one result for each seed."""
     kept = StoreContents(1.0, 0.1, 0.2, 3.0, 0.4)
-    alike = trials.Sailed(*[0.0] * 17)._replace(
+    alike = trials.Sailed(*[0.0] * 21)._replace(
         position=0.2, cross_track=0.1, swing=0.1, iaew=1.0, along=0.1, lag=-0.1, first=-0.1, omega_X=0.4,
         heading=0.1, iae=1.0, iaewwt=1.0, work=1.0, frequency=0.5, inside=0.1, omega_Y=0.1,
     )  # fmt: skip
@@ -185,7 +188,7 @@ def found_by(settings, seeds, analyse):
     }
 
 
-def test_report_of_chapter_6(tmp_path, monkeypatch, read):
+def test_report_of_chapter_6(tmp_path, monkeypatch, figures, read):
     asked, drawn = [], []
 
     def run_all(settings, seeds, analyse, logs, jobs, advance):
@@ -203,14 +206,18 @@ def test_report_of_chapter_6(tmp_path, monkeypatch, read):
     assert stores[2:] == (None, 3)
     assert {len(runs) for each in results["trials"].values() for runs in each.values()} == {5}
     assert [names for _, names in drawn] == [set(trials.LABELS.values())] * 4
-    assert len(shown(text)) == 20
+    assert len(shown(text)) == 24
+    assert {name for name in figures if name.endswith("_z1")} == set(figures)
+    assert set(lines(figures["ellipse_016_1_z1"][0].axes[1])) == set(trials.LABELS.values())
+    captions = [text.index(f"(seed 0, Fig. 6.{n})") for n in ("10", "11b", "15b", "19b", "23b", "25")]
+    assert captions == sorted(captions)
     assert [path.name for path in read] == ["0"] * 16
     assert len(results["lessons"]) == 10
-    assert "model error (seed 0)" in text
+    assert "model error (seed 0, Fig. 6.13)" in text
     assert "Experiments on delay and stores: 3 seeds." in text
 
 
-def test_report_of_chapter_6_without_experiments(tmp_path, monkeypatch, read):
+def test_report_of_chapter_6_without_experiments(tmp_path, monkeypatch, figures, read):
     monkeypatch.setattr(
         chapter6_runs, "run_all", lambda some, seeds, how, *_: found_by(some, seeds, how)
     )
@@ -262,11 +269,13 @@ def test_samples_of_the_true_states_have_the_force_of_the_step_before(monkeypatc
 
 def test_scenarios_of_chapter_7():
     made = chapter7.scenarios(40.0)
-    assert set(made) == {*trials.CONTROLLERS, "true", "eight"}
+    basin = {*trials.CONTROLLERS, *(f"{c}_eight" for c in trials.CONTROLLERS)}
+    assert set(made) == {*basin, "true", "eight"}
     for name, content in made.items():
         assert content["stop"] == 40.0
         assert set(chapter7.FORCE) <= set(content["log"]["signals"])
-        assert bool(content["faults"]) == (name in trials.CONTROLLERS)
+        assert bool(content["faults"]) == (name in basin)
+        assert ("eight" in name) == ("eight" in content["fmus"]["guidance"]["path"])
 
 
 def test_report_of_chapter_7(tmp_path, monkeypatch):
@@ -291,10 +300,13 @@ def test_report_of_chapter_7(tmp_path, monkeypatch):
     monkeypatch.setattr(chapter7, "measured", part("measured"))
     monkeypatch.setattr(chapter7, "write_loops", part("loops"))
     monkeypatch.setattr(chapter7.tables, "write_shapes", part("shapes"))
+    monkeypatch.setattr(chapter7.tables, "write_eight", part("eight"))
+    monkeypatch.setattr(chapter7, "write_replay", part("replay"))
     text, _ = written(chapter7.study(tmp_path, 60.0, 3, None), tmp_path)
     assert asked == [
-        ({*trials.CONTROLLERS, "true", "eight"}, tmp_path / "logs", 3),
+        ({*chapter7.scenarios(60.0)}, tmp_path / "logs", 3),
         ("mdf", [*trials.CONTROLLERS]),
+        ("mdf", [f"{c}_eight" for c in trials.CONTROLLERS]),
         ("smoothed", ["true"]),
         ("mdf", ["true"]),
     ]
@@ -304,7 +316,11 @@ def test_report_of_chapter_7(tmp_path, monkeypatch):
         ("mdf", "mdf"),
         ("eight", "samples of eight"),
     ]
+    (replayed,) = parts.pop("replay")
+    assert replayed[0] == tmp_path / "logs" / "controller_cl_win_eps_eight" / "0"
+    assert replayed[1] == chapter7.scenarios(60.0)["controller_cl_win_eps_eight"]
     assert parts == {
+        "eight": [("mdf+mdf+mdf+mdf", "simulated")],
         "shapes": [("mdf+mdf+mdf+mdf", "log of true")],
         "simulated": [("mdf+mdf+mdf+mdf", own)],
         "loops": [("simulated", 60.0, 3)],
@@ -413,8 +429,14 @@ def test_pictures_of_laps_show_each_run_in_one_width():
         assert (dashed[0].get_ydata() == logs["a"][f"controller.omega_hat_{axis}"]).all()
         low, high = panel.get_ylim()
         assert low < solid[0].get_ydata().min() < solid[0].get_ydata().max() < high
-        late = np.concatenate([missing(log, axis)[log["time"] > 1.99] for log in logs.values()])
-        first, last = np.quantile(late, [0.005, 0.995])
+        ends = [
+            np.quantile(
+                np.concatenate([line.get_ydata()[logs["a"]["time"] > 1.99] for line in kind]),
+                [0.005, 0.995],
+            )
+            for kind in (solid, dashed)
+        ]
+        first, last = min(ends[0][0], ends[1][0]), max(ends[0][1], ends[1][1])
         assert (0.5 * (low + high), high - low) == pytest.approx(
             (0.5 * (first + last), 2.0 * (last - first) + 0.04)
         )
@@ -542,7 +564,7 @@ def test_report_of_the_lost_thrust(tmp_path, monkeypatch, figures):
     assert "The largest distance from it is 0.00 in N_r." in text
     assert len(results["places"]) == len(lost_thrust.ESTIMATES) * len(lost_thrust.PACES)
     assert results["places"]["MDF, 1"][0] == {"delta_N": 0.1, "N_r": -1.2, "r2": 0.9}
-    assert results["failure"]["thesis"].startswith("The bow thruster's failure")
+    assert results["failure"][0]["thesis"].startswith("The bow thruster's failure")
     assert "| MDF, force 0.45 s late | 0.25 | 0.100, -1.20, 0.9000 |" in text
     assert set(figures) == {"failure"}
 
@@ -618,7 +640,7 @@ def test_pictures_of_observers_have_the_truth_on_top():
     log = MadeUp(60.0, 0.05)
     estimates = {o: MadeUp(60.0, 0.05) for o in OBSERVERS}
     for estimate in estimates.values():
-        for name in (*SIGNALS, "psi_hat"):
+        for name in (*SIGNALS, "x_hat", "y_hat", "psi_hat"):
             estimate[name]
     figure = pictures.compared(log, estimates)
     for panel, name in zip(figure.axes, ("u", "v", "r"), strict=True):
@@ -633,9 +655,16 @@ def test_pictures_of_observers_have_the_truth_on_top():
     frozen = pictures.freeze(log, estimates, 300, 340)
     assert [len(panel.patches) for panel in frozen.axes] == [1] * 4
     assert pictures.wrap(log, estimates) is None
+    log["observer.x_m"], log["observer.y_m"]
     log["observer.psi_m"] = np.angle(np.exp(1j * 0.2 * log["time"]))
     wrapped = pictures.wrap(log, estimates)
-    assert wrapped.axes[0].get_ylim() == (-3.5, 3.5)
+    heading = wrapped.axes[2]
+    assert heading.get_ylim() == (-3.5, 3.5)
+    for panel, name in zip(wrapped.axes[:2], ("x", "y"), strict=True):
+        drawn = lines(panel)
+        rows = np.searchsorted(log["time"], drawn["truth"].get_xdata())
+        assert (drawn["truth"].get_ydata() == log[f"observer.{name}_m"][rows]).all()
+        assert (drawn["mdf"].get_ydata() == estimates["mdf"][f"{name}_hat"][rows]).all()
 
 
 def test_largest_error_after_a_freeze_also_where_the_estimate_is_lost():
@@ -674,8 +703,8 @@ def test_verdicts_on_the_gains(tmp_path):
 
     for swift, jumpy in itertools.product((True, False), repeat=2):
         rows = observer_gains.claims(made(swift, jumpy))
-        assert [here.startswith("reproduced with (2.8, 2)") for _, here, _ in rows] == [swift, jumpy]
-        assert [here == "with none of these gains" for _, here, _ in rows] == [not swift, not jumpy]
+        assert [row.here.startswith("reproduced with (2.8, 2)") for row in rows] == [swift, jumpy]
+        assert [row.here == "not reproduced with these gains" for row in rows] == [not swift, not jumpy]
     report = Report(tmp_path, "t")
     observer_gains.table(report, made(swift=True, jumpy=True))
     assert "| nonlinear | 6.0 | 9 |" in report.write().read_text(encoding="utf-8")

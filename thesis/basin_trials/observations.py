@@ -11,6 +11,8 @@ from .found import FAULTY, REGULAR, Runs, TrialRuns, lost, mean, share
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS, path_swing
 
 MUCH = 1.5  # times that count as "substantially"; chosen
+HIDDEN = 0.5  # 1, share of an error below which a signal does not show it; chosen
+LITTLE = 0.5  # 1, share of the model error below which an estimate explains little; chosen
 
 
 def answered(answers: Mapping[str, str | bool | None]) -> str:
@@ -103,6 +105,8 @@ def other_sections(found: TrialRuns) -> dict[str, Sequence[Verdict]]:
             below(found, "RBS and ABS come best out of the metrics", 1, "iaewwt", *both),
             below(found, "ABS is a bit more energy efficient than RBS", 1, "work", (ABS, RBS)),
             below(found, "CLE is the worst", 1, "iaewwt", *((c, CLE) for c in (RBS, ABS, CLZ))),
+            *sway_error(found),
+            struggling(found),
         ),
         "The eight at 0.32 (6.4.5)": (
             follow(found, 3),
@@ -111,6 +115,51 @@ def other_sections(found: TrialRuns) -> dict[str, Sequence[Verdict]]:
             held(found, "The period of the oscillation is near 0.1 s", 3, "frequency", 5.0, 20.0),
         ),
     }
+
+
+def sway_error(found: TrialRuns) -> list[Verdict]:
+    """Whether concurrent learning keeps an error across the slow eight, which z1 does not show."""
+    here, shown, rows = {}, {}, []
+    for name, runs in as_in_the_basin(found, 1).items():
+        size = {
+            c: [r._replace(bias=abs(r.bias), z1_y=abs(r.z1_y)) for r in each] for c, each in runs.items()
+        }
+        pairs = {
+            f"{LABELS[a]}/{LABELS[b]}": share(size[a], size[b], "bias")
+            for a in (RBS, ABS)
+            for b in (CLZ, CLE)
+        }
+        here[name] = surely_below(list(pairs.values()))
+        bias, z1 = ({c: mean(size[c], n).mean for c in (CLZ, CLE)} for n in ("bias", "z1_y"))
+        known = {LABELS[c]: "yes" if z1[c] < HIDDEN * bias[c] else "no" for c in bias if bias[c] > 0.0}
+        shown[name] = by_controller(known) if known else None
+        means = ", ".join(f"{LABELS[c]} {bias[c]:.3g} and {z1[c]:.3g}" for c in bias)
+        rows.append(f"{name}: {listed(pairs)}; e and z1_y [m]: {means}")
+    numbers = f"magnitude of the mean of e, {TRIALS[1].name}, {'; '.join(rows)}"
+    return [
+        Verdict(
+            "CLZ and CLE keep a constant error in sway, more than RBS and ABS", answered(here), numbers
+        ),
+        Verdict("z1 does not show that error", answered(shown), f"z1_y below {HIDDEN:g} of e; as above"),
+    ]
+
+
+def struggling(found: TrialRuns) -> Verdict:
+    """Whether the estimates explain little of the model error of the slow eight."""
+    here, rows = {}, []
+    for name, runs in as_in_the_basin(found, 1).items():
+        known = {LABELS[c]: [mean(runs[c], f"known_{a}").mean for a in "YN"] for c in (ABS, CLZ, CLE)}
+        here[name] = by_controller(
+            {c: "yes" if max(x) < LITTLE else "no" for c, x in known.items() if x[0] == x[0]}
+            or {"": "no run kept up"}
+        )
+        rows.append(f"{name}: " + ", ".join(f"{c} {y:.2f}, {n:.2f}" for c, (y, n) in known.items()))
+    return Verdict(
+        "The adaptive controllers struggle to estimate the model error",
+        answered(here),
+        f"share of the mean square of ω in sway and yaw that ω̂ explains, little below {LITTLE:g}: "
+        f"{'; '.join(rows)}",
+    )
 
 
 def settings(found: TrialRuns) -> dict[str, tuple[Runs, Runs]]:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import signal
-from scipy.spatial import KDTree
 
 from cosim.dispatch import FinishedRun
 from cosim.scenario import Roles
@@ -15,7 +14,7 @@ from fmus.declare import packer, variables
 
 from ..analysis import model_error
 from ..monte_carlo import Content, shipped, vary
-from ..tracking.outcome import AXES, SETTLED, Log, quick, rms
+from ..tracking.outcome import AXES, SETTLED, inside, quick, rms
 from . import sysid4
 
 RBS, ABS = "controller_bs", "controller_abs"
@@ -32,8 +31,10 @@ HARD: dict[str, float] = dict(zip(AXIS_NAMES, (0.2, 0.6, 0.2, 3.0, 6.0, 3.0), st
 POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 SPIKES = {"kind": "spikes", "signals": POSE, "size": [0.1, 0.1, 0.1], "rate": 1.0 / 60.0}
 MOTION = [f"vessel.{name}" for name in ("u", "v", "r", "u_dot", "v_dot", "r_dot")]
-LOGGED = [*dict.fromkeys([*Roles().columns[1:], "controller.z1_x", *MOTION])]
+Z1 = [f"controller.z1_{n}" for n in ("x", "y", "psi")]
+LOGGED = [*dict.fromkeys([*Roles().columns[1:], *Z1, *MOTION])]
 LOST = 2.0  # m; the target is then on the other side of the path
+TINY = 1e-12  # N² and (N m)²; mean square of a model error that is none, far below the noise's
 SLOW = 0.1  # Hz, edge of what counts as swing; harmonics of the path lie above it as well; chosen
 
 
@@ -129,6 +130,10 @@ class Sailed(NamedTuple):
         iae, work, iaew, iaewwt: metrics of 4.4.
         swing: true yaw rate faster than 0.1 Hz, that of the path included, RMS [rad/s].
         frequency: where the spectrum of that is highest [Hz].
+        bias: e of the true pose, mean over the second half [m].
+        z1_y: the same by the observer, in the ship's axes [m].
+        known_Y, known_N: share of the mean square of the model error that its estimate explains,
+            below 0 where it makes the error larger [1].
     """
 
     lost: float
@@ -148,20 +153,13 @@ class Sailed(NamedTuple):
     iaewwt: float
     swing: float
     frequency: float
+    bias: float
+    z1_y: float
+    known_Y: float
+    known_N: float
 
 
-BROKEN = Sailed(1.0, *[float("nan")] * 16)
-
-
-def inside(log: Log, part: np.ndarray) -> float:
-    """Mean distance [m] by which the ship is on the inner side of the curve, from its nearest point."""
-    path = np.column_stack([log["guidance.x_t"], log["guidance.y_t"]])
-    psi = np.unwrap(log["guidance.psi_t"])
-    ship = np.column_stack([log["vessel.x"], log["vessel.y"]])[part]
-    _, nearest = KDTree(path).query(ship)
-    off = ship - path[nearest]
-    aside = -np.sin(psi[nearest]) * off[:, 0] + np.cos(psi[nearest]) * off[:, 1]
-    return float(np.mean(aside * np.sign(np.gradient(psi))[nearest]))
+BROKEN = Sailed(1.0, *[float("nan")] * 20)
 
 
 def sailed(run: FinishedRun) -> Sailed:
@@ -179,6 +177,10 @@ def sailed(run: FinishedRun) -> Sailed:
     motion = np.column_stack([log[name] for name in MOTION])[settled]
     tau = np.column_stack([log[f"thrusters.tau_cmd_{a}"] for a in AXES])[settled]
     omega = model_error(motion[:, :3], motion[:, 3:], tau)
+    estimate = np.column_stack([log[f"controller.omega_hat_{a}"] for a in AXES])[settled]
+    left, all_of_it = (np.square(x).mean(axis=0) for x in (omega - estimate, omega))
+    known = 1.0 - left / np.maximum(all_of_it, TINY)
+    psi_t = log["guidance.psi_t"]
     frequencies, power = signal.periodogram(swing, 1.0 / h)
     return Sailed(
         lost=float(distance[half].max() > LOST),
@@ -198,4 +200,8 @@ def sailed(run: FinishedRun) -> Sailed:
         iaewwt=m["IAEWWT"],
         swing=rms(swing),
         frequency=float(frequencies[power.argmax()]),
+        bias=float((np.cos(psi_t) * east - np.sin(psi_t) * north)[half].mean()),
+        z1_y=float(log["controller.z1_y"][half].mean()),
+        known_Y=float(known[1]),
+        known_N=float(known[2]),
     )

@@ -1,19 +1,21 @@
 """The analysis of chapter 7 of some runs, simulated or measured, as parts of a report."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binom, norm
 
-from studies.study_report import Report
+from studies.study_report import Report, Verdict
 
 from .. import analysis
 from ..analysis import NU, OMEGA, TAU, Regressed, Samples, correlations
 from ..tracking.outcome import AXES, Log
+from .model_statements import explaining, systematic
 
 RECIPES = ("PLS1", "PLS2", "PLS3", "PLS4")
+UNIT = dict(zip([*NU, *TAU], ("m/s", "m/s", "rad/s", "N", "N", "N m"), strict=True))
 POINTS = 2000  # at most in a scatter plot; chosen
 MOST = 8  # factors of the curve of Fig. 7.6a; chosen
 NOTHING = 0.1  # Q² below which an axis has no model that factors could suffice for; chosen
@@ -109,7 +111,7 @@ def unsystematic(q2: np.ndarray) -> str:
     return "yes" if q2[1] < 0.5 * min(q2[0], q2[2]) else "no"
 
 
-def findings(found: Mapping[str, Regressed]) -> list[list[str]]:
+def findings(found: Mapping[str, Regressed]) -> list[Verdict]:
     """Which of the thesis' findings on the regressions hold: finding, here, numbers."""
     wide = found["PLS2"]
     most = analysis.regressed(wide.samples, replace(wide.recipe, factors=MOST))
@@ -121,29 +123,47 @@ def findings(found: Mapping[str, Regressed]) -> list[list[str]]:
     q2 = np.array([found["PLS4"].by_axis("q2")[a] for a in AXES])
     cells = ", ".join
     return [
-        [
+        Verdict(
             "Three factors suffice (7.3, Fig. 7.6a)",
             suffice(three, best),
             f"Q² by 3 factors {cells(f'{x:.3f}' for x in three)}, the best of up to {MOST} "
             f"{cells(f'{x:.3f}' for x in best)}; enough: {100.0 * SUFFICES:g} % of the best, where that "
             f"is {NOTHING:g} or more",
-        ],
-        [
+        ),
+        Verdict(
             "Products with v are insignificant (Fig. 7.7)",
             insignificance(unsure),
             f"{int(unsure.sum())} of {unsure.size} coefficients within two of their standard deviations "
             "over the folds, or of changing sign",
-        ],
-        [
+        ),
+        Verdict(
             "ω in sway is unsystematic, in surge and yaw it is systematic (7.3, Fig. 7.9)",
             unsystematic(q2),
             f"Q² of PLS4 in X, Y, N: {cells(f'{x:.3f}' for x in q2)}",
-        ],
+        ),
     ]
 
 
-def write_findings(report: Report, found: Mapping[str, Regressed]) -> None:
-    report.table(["thesis", "here", "numbers"], findings(found), words=True)
+def write_findings(report: Report, found: Mapping[str, Regressed], name: str) -> None:
+    """The findings as a table, each with the name of the runs."""
+    report.verdicts(f"{name}_regressions", named(findings(found), name))
+
+
+def named(rows: Sequence[Verdict], name: str) -> list[Verdict]:
+    """Verdicts whose statements end with the name of the runs."""
+    return [row._replace(thesis=f"{row.thesis}: {name}") for row in rows]
+
+
+def write_eight(report: Report, s: Samples, ellipse: Mapping[str, Regressed]) -> None:
+    """PCA and PLS of the basin runs on the eight, which the thesis leaves to others (7.4, 8)."""
+    report.heading("The eight (7.4)")
+    write_components(report, s, "eight")
+    found = regressions(s)
+    report.table(
+        ["recipe", *(f"R² / Q² {a}" for a in AXES)], [[n, *shares(r)] for n, r in found.items()]
+    )
+    q2 = [np.array([f["PLS2"].by_axis("q2")[a] for a in AXES]) for f in (found, ellipse)]
+    report.verdicts("eight_regressions", [*named(findings(found), "eight"), systematic(*q2)])
 
 
 def write_table_7_1(report: Report, s: Samples, name: str) -> None:
@@ -174,6 +194,9 @@ def write_table_7_1(report: Report, s: Samples, name: str) -> None:
         f"{', '.join(f'{x:.3g}' for x in first.condition)}. R² of ω about its mean, outliers removed; "
         "below zero where a model is worse than a constant."
     )
+    r2 = {n: analysis.explained(runs, found.phi) for n, found in own.items()}
+    statement = "The identified model has the main dynamics of the model error (7.2.4, Fig. 7.2)"
+    report.verdicts(f"{name}_table_7_1", named([explaining(statement, r2)], name))
     one = runs[0]
     predicted = {n: analysis.regressors(one) @ phi for n, phi in table.items()}
     shown = analysis.model_error_over_time(one.omega, predicted, one.time)
@@ -187,11 +210,14 @@ def write_shapes(report: Report, s: Samples, log: Log) -> None:
     panels = figure.subplots(3, 2)
     for panel, state in zip(panels.ravel(), [*NU, *TAU], strict=True):
         places = [k for k, n in enumerate(found.columns) if n.partition("=")[0] == state]
+        nodes = [float(found.columns[k].partition("=")[2]) for k in places]
         for k, axis in enumerate(AXES):
-            panel.plot(range(len(places)), found.B[k, places], "o-", markersize=3.0, label=axis)
-        panel.set(xlabel=f"node of {state}", ylabel="force")
+            panel.plot(nodes, found.B[k, places], "o-", markersize=3.0, label=axis)
+        panel.set(xlabel=f"{state} [{UNIT[state]}]", ylabel="force [N, N, N m]")
     panels[0, 0].legend()
-    report.figure("simulated_shapes", figure, "Continuous nominal PLS: force over each state.")
+    report.figure(
+        "simulated_shapes", figure, "Continuous nominal PLS: force over each state (Fig. 3.1)."
+    )
     report.figure("simulated_matrices", matrices(log), "A run as in 3.2 (Figs. 3.4, 3.5).")
 
 

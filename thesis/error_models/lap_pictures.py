@@ -1,6 +1,6 @@
 """Pictures of several runs: errors, and model error with its estimate (Figs. 7.12, 7.14, 7.15, 7.18)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -26,6 +26,13 @@ def errors_picture(logs: Mapping[str, Log]) -> Figure:
     return figure
 
 
+def spread(values: Sequence[np.ndarray], logs: Mapping[str, Log]) -> tuple[float, float]:
+    """Between what a line of each log lies after the start, but for a hundredth of the samples."""
+    late = [x[g["time"] > 0.1 * g["time"][-1]] for x, g in zip(values, logs.values(), strict=True)]
+    low, high = np.quantile(np.concatenate(late), [0.005, 0.995])
+    return float(low), float(high)
+
+
 def force_picture(logs: Mapping[str, Log]) -> Figure:
     """Model error with the lost thrust, and dashed its estimate."""
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
@@ -36,8 +43,9 @@ def force_picture(logs: Mapping[str, Log]) -> Figure:
             panel.plot(log["time"], log[f"controller.omega_hat_{a}"], "--", color=colour, linewidth=1.0)
         panel.set_ylabel(f"ω_{a} [{'N m' if a == 'N' else 'N'}]")
         # The start, where ship and estimate are still far off, would flatten the rest.
-        late = [missing(g, a)[g["time"] > 0.1 * g["time"][-1]] for g in logs.values()]
-        low, high = np.quantile(np.concatenate(late), [0.005, 0.995])
+        low, high = spread([missing(g, a) for g in logs.values()], logs)
+        seen = spread([g[f"controller.omega_hat_{a}"] for g in logs.values()], logs)
+        low, high = min(low, seen[0]), max(high, seen[1])
         panel.set_ylim(low - 0.5 * (high - low) - 0.02, high + 0.5 * (high - low) + 0.02)
         panel.grid(alpha=0.3)
     panels[0].legend(fontsize=8, ncols=3)

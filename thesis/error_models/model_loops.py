@@ -1,7 +1,6 @@
 """Models of the model error back in the ship: the runs (a) to (d) of 7.4, and the check before them."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,10 +11,11 @@ from studies.study_report import Report, Verdict
 
 from .. import analysis
 from ..analysis import Regressed
-from ..basin_trials.trials import CLE, CLZ, LOST, RBS, TRIALS, scenario
+from ..basin_trials.trials import CLE, CLZ, RBS, TRIALS, scenario
 from ..monte_carlo import Content, run_all, vary
 from ..tracking.outcome import LEARNED_FROM, Log, rms
 from .lap_pictures import errors_picture, force_picture
+from .model_statements import LoopResult, alike, controlled, reacting
 
 SLOW, EIGHT = TRIALS[0], TRIALS[1]
 TRACK = ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"]
@@ -28,19 +28,6 @@ RUNS = {
     "CLE, ellipse": (SLOW, CLE, False),
     "RBS, eight": (EIGHT, RBS, False),
 }
-
-
-class LoopResult(NamedTuple):
-    """Distance to the target, RMS [m], mean z1_x over the second half [m], and every tenth row."""
-
-    position: float
-    lag: float
-    log: Log
-
-    @property
-    def lost(self) -> bool:
-        """Whether the run broke off or the ship was far from its target."""
-        return not self.position < LOST
 
 
 def loop(run: FinishedRun) -> LoopResult:
@@ -146,9 +133,20 @@ def write_loops(
         {n: analysis.thrust_of(r).holds for n, r in tried.items()},
         why(found),
     )
-    report.table(["thesis", "here", "numbers"], [list(verdict)], words=True)
-    report.result("unstable", verdict)
     hydrodynamic = ("SYSID1", "SYSID4", "PLS4")
+
+    def of(run: str, *names: str) -> dict[str, LoopResult]:
+        return {n: runs[f"{n}|{run}"] for n in names}
+
+    learning = of("CLE, ellipse", *hydrodynamic)
+    others = {n: r for n, r in learning.items() if n != "SYSID4"}
+    verdicts = [
+        alike(*of("RBS, ellipse, fault", "SYSID4", "PLS3").values()),
+        *controlled(of("RBS, ellipse", *hydrodynamic), learning),
+        reacting(learning["SYSID4"], others, "PLS4"),
+        verdict,
+    ]
+    report.verdicts("loops", verdicts)
     for run, names, draw, what in (
         ("RBS, ellipse, fault", ("SYSID4", "PLS3"), tracks, "tracks (Fig. 7.11)"),
         ("RBS, ellipse, fault", ("SYSID4", "PLS3"), errors_picture, "errors (Fig. 7.12a, b)"),

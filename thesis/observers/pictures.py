@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-UNIT_OF: dict[str, str] = {**UNITS, "psi_m": "rad"}
+UNIT_OF: dict[str, str] = {**UNITS, "x_m": "m", "y_m": "m", "psi_m": "rad"}
 COLORS = {
     "df": "tab:red",
     "mdf": "tab:blue",
@@ -93,19 +93,19 @@ def freeze(log: Log, estimates: Mapping[str, Log], first: int, end: int) -> "Fig
 
 
 def wrap(log: Log, estimates: Mapping[str, Log]) -> "Figure | None":
-    """Yaw rate and acceleration through a wrap of the heading; None where there is none."""
+    """Pose, yaw rate and acceleration through a wrap of the heading; None where there is none."""
     rows = wraps(log)
     if not rows:
         return None
     time = log["time"]
     h = float(np.median(np.diff(time)))
     part = slice(max(0, rows[0] - round(1.0 / h)), rows[0] + round(3.0 / h))
-    figure, panels = _window(
-        ("psi_m", "r", "r_dot"),
-        part,
-        time,
-        {**_true(log), "psi_m": log["observer.psi_m"]},
-        {o: {**e, "psi_m": np.angle(np.exp(1j * e["psi_hat"]))} for o, e in estimates.items()},
-    )
-    panels[0].set_ylim(-3.5, 3.5)
+    pose = ("x_m", "y_m", "psi_m")
+    shown = {
+        o: {**e, "x_m": e["x_hat"], "y_m": e["y_hat"], "psi_m": np.angle(np.exp(1j * e["psi_hat"]))}
+        for o, e in estimates.items()
+    }
+    measured = {name: log[f"observer.{name}"] for name in pose}
+    figure, panels = _window((*pose, "r", "r_dot"), part, time, {**_true(log), **measured}, shown)
+    panels[2].set_ylim(-3.5, 3.5)
     return figure

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import signal
+from scipy.spatial import KDTree
 
 from cosim.dispatch import FinishedRun
 from fmus.hull import RotationalDamping
@@ -12,12 +13,14 @@ from fmus.hull import RotationalDamping
 Log = Mapping[str, np.ndarray]
 
 AXES = "XYN"
-# What the model error and its estimate are made of.
+# The model error, its estimate, and what it does to both parts of the requested force (5.1).
 LEARNED_FROM = [
     f"{signal}_{a}"
     for signal in (
         "vessel.omega_star",
         "controller.omega_hat",
+        "controller.tau_lin",
+        "controller.tau_nonlin",
         "thrusters.tau_act",
         "thrusters.tau_cmd",
     )
@@ -46,6 +49,12 @@ class TrackingOutcome(NamedTuple):
         rank: share of the time with the rank condition met [1].
         sway: RMS of v [m/s].
         signs: mean of the sign of v r, -1 to 1; at both ends |r|v and |v|r are one column.
+        bias: mean e over the second half [m]; positive to starboard.
+        inside: how far inside of the path the ship is, mean over the second half [m].
+        end: position over the last tenth [m].
+        linear, nonlinear: norm of both parts of the requested force (5.1) [N, N, N m].
+        agree_Y, agree_N: correlation of the estimated model error with the true one, -1 to 1; NaN
+            without an estimate.
         phi: estimates of (2.30), mean over the second half; empty without adaptation.
     """
 
@@ -67,6 +76,13 @@ class TrackingOutcome(NamedTuple):
     rank: float
     sway: float
     signs: float
+    bias: float
+    inside: float
+    end: float
+    linear: float
+    nonlinear: float
+    agree_Y: float
+    agree_N: float
     phi: tuple[float, ...] = ()
 
     @property
@@ -75,7 +91,7 @@ class TrackingOutcome(NamedTuple):
         return self.omega_Y
 
 
-BROKEN = TrackingOutcome(False, *[float("nan")] * 17, phi=())
+BROKEN = TrackingOutcome(False, *[float("nan")] * 24, phi=())
 TRUE_PHI = tuple(RotationalDamping())
 PHI = [f"controller.phi_hat_{k + 1}" for k in range(len(TRUE_PHI))]
 
@@ -98,6 +114,28 @@ def missing(log: Log, axis: str) -> np.ndarray:
     return log[f"vessel.omega_star_{axis}"] + lost
 
 
+def inside(log: Log, part: np.ndarray) -> float:
+    """Mean distance [m] by which the ship is on the inner side of the curve, from its nearest point."""
+    path = np.column_stack([log["guidance.x_t"], log["guidance.y_t"]])
+    psi = np.unwrap(log["guidance.psi_t"])
+    ship = np.column_stack([log["vessel.x"], log["vessel.y"]])[part]
+    _, nearest = KDTree(path).query(ship)
+    off = ship - path[nearest]
+    aside = -np.sin(psi[nearest]) * off[:, 0] + np.cos(psi[nearest]) * off[:, 1]
+    return float(np.mean(aside * np.sign(np.gradient(psi))[nearest]))
+
+
+def size(log: Log, signals: str, part: np.ndarray) -> float:
+    """RMS of the norm of a force, ``signals`` without the axis [N, N, N m]."""
+    return rms(np.sqrt(sum(np.square(log[f"{signals}_{a}"][part]) for a in AXES)))
+
+
+def agreement(log: Log, axis: str, part: np.ndarray) -> float:
+    """Correlation of the estimated model error with the true one; NaN where one does not change."""
+    pair = [log[f"controller.omega_hat_{axis}"][part], missing(log, axis)[part]]
+    return float(np.corrcoef(pair)[0, 1]) if min(np.ptp(x) for x in pair) > 0.0 else float("nan")
+
+
 def outcome(run: FinishedRun) -> TrackingOutcome:
     """The numbers of a run; those of one that broke off are NaN."""
     if run.status == "failed":
@@ -105,9 +143,11 @@ def outcome(run: FinishedRun) -> TrackingOutcome:
     log = run.log
     m = run.metrics
     settled = log["time"] >= m["from"]
-    half = log["time"] >= 0.5 * log["time"][-1]
+    half, end = (log["time"] >= share * log["time"][-1] for share in (0.5, 0.9))
+    psi_t = log["guidance.psi_t"]
     wrong = {a: rms((log[f"controller.omega_hat_{a}"] - missing(log, a))[settled]) for a in AXES}
-    distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
+    north, east = (log[f"vessel.{a}"] - log[f"guidance.{a}_t"] for a in "xy")
+    distance = np.hypot(north, east)
     learns = "controller.sigma_min" in log
     return TrackingOutcome(
         done=True,
@@ -128,6 +168,13 @@ def outcome(run: FinishedRun) -> TrackingOutcome:
         rank=float(log["controller.rank_met"][settled].mean()) if learns else float("nan"),
         sway=rms(log["vessel.v"][settled]),
         signs=float(np.sign(log["vessel.v"] * log["vessel.r"])[settled].mean()),
+        bias=float((np.cos(psi_t) * east - np.sin(psi_t) * north)[half].mean()),
+        inside=inside(log, half),
+        end=rms(distance[end]),
+        linear=size(log, "controller.tau_lin", settled),
+        nonlinear=size(log, "controller.tau_nonlin", settled),
+        agree_Y=agreement(log, "Y", settled),
+        agree_N=agreement(log, "N", settled),
         phi=tuple(float(log[name][half].mean()) for name in PHI if name in log),
     )
 
