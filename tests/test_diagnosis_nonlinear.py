@@ -13,6 +13,9 @@ from diagnosis.predictors import read_model, weak_windows, write_model
 from diagnosis.search.candidates import SMALL, additions, candidate, covered, model_error
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.nonlinear.multistart import Landscape, best_values
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import RefinedModel, TrainingSet
+from diagnosis.search.shortlist import rank, reweighted
 from fmus.declare import Range, Variable
 from fmus.effects import effect
 
@@ -51,6 +54,21 @@ def test_what_is_tried_of_a_coefficient_is_an_addition_and_of_a_shape_the_value_
         for name, value in tried.items():
             before = start.value(name) if name in e.coefficients else 0.0
             assert found.value(name) - before == pytest.approx(value), (e.id, name)
+
+
+@pytest.mark.slow
+def test_a_dead_band_far_below_those_that_are_tried_is_found_and_beats_the_free_curve():
+    """Of a force over the command, as the least dead band that is tried beyond zero is 0.03."""
+    hidden = {"thrust_curve_ahead": 0.15, "thrust_curve_astern": -0.1, "thrust_curve_deadband": 0.01}
+    w = weak_windows(smoothed(sail(64.0, thrusters=hidden)[0]))
+    prior = NominalPrior.of(Model(), 0.1)
+    t, at = TrainingSet([w], None, prior), RefinedModel.at(Model(), prior)
+    rivals = {"thrust_curve", "curve_vsp_x(c)", "loss_surge"}
+    weighed = reweighted(t, at, rank(t, at, set(EFFECTS) - rivals))
+    assert weighed is not None
+    best = weighed[-1]
+    assert best.ids[best.scored[0].candidate] == "thrust_curve"
+    assert best.starts[best.scored[0].candidate].values == pytest.approx(hidden, rel=0.2)
 
 
 def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure():

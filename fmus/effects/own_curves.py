@@ -155,7 +155,7 @@ def thrust_curve(d: Devices) -> Effect:
         sign="positive: more force than assumed",
         source="(2.10)-(2.12)",
         linear=False,
-        search=Search(tries=[{}, *[{band: x} for x in COMMAND_DEADBANDS]], fitted=ways),
+        search=Search(tries=[{band: x} for x in (0.0, *COMMAND_DEADBANDS)], fitted=ways),
         description=f"surge force of the {d.title} asymmetric and with a dead band over the command",
     )
     def function(f: Thrust, now: Running, ahead: Number, astern: Number, least: Number) -> Thrust:
