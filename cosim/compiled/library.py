@@ -1,4 +1,4 @@
-"""The library of C functions: compiled at its first use on a computer, kept in the cache, loaded.
+"""The library of the step loop in C: compiled at its first use on a computer, kept in the cache, loaded.
 
 An entry of the cache that is not whole is compiled again, and that is said.
 
@@ -28,8 +28,7 @@ from cybership.scratch_folder import environment_with, scratch_folder
 
 from .cache_entry import is_whole, make_folder, refusal, store
 
-FOLDER = Path(__file__).parent
-SOURCES = ("loop.c", "rows.c", "powers.py")
+SOURCE = Path(__file__).parent / "loop.c"
 # No product and sum in one rounding, no operation left out: the bits are to be those of Python.
 OPTIONS = ("-std=c99", "-O3", "-w", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 SYSTEM = ("gcc", "cc", "clang")
@@ -133,8 +132,7 @@ def _cache_folder() -> Path | None:
 @cache
 def _found(with_zig: bool) -> FoundLibrary:
     """The library, or why there is none: asked once in a process."""
-    content = b"".join((FOLDER / name).read_bytes() for name in SOURCES)
-    key = repr((content, OPTIONS, platform.machine(), sysconfig.get_platform()))
+    key = repr((SOURCE.read_bytes(), OPTIONS, platform.machine(), sysconfig.get_platform()))
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     if (folder := _cache_folder()) is None:
         return FoundLibrary(
@@ -160,16 +158,12 @@ def _found(with_zig: bool) -> FoundLibrary:
 
 
 def _compile(path: Path, with_zig: bool) -> None:
-    from .powers import powers_of_ten
-
     command = _compiler(with_zig)
     with scratch_folder() as work:
-        (work / "powers.h").write_text(powers_of_ten())
-        files = [str(FOLDER / source) for source in SOURCES if source.endswith(".c")]
         built = work / "built"
         linked = [] if os.name == "nt" else ["-lm"]
         done = subprocess.run(
-            [*command, *OPTIONS, "-I", str(work), "-o", str(built), *files, *linked],
+            [*command, *OPTIONS, "-o", str(built), str(SOURCE), *linked],
             capture_output=True,
             text=True,
             errors="replace",
