@@ -326,7 +326,7 @@ def test_modules_import_modules_inside_cosim():
 
 
 # What any command shares, whatever it is about.
-SHARED = {"cybership.message_text", "cybership.renamed", "cybership.scratch_folder"}
+SHARED = {f"cybership.{n}" for n in ("message_text", "renamed", "scratch_folder", "user_cache")}
 
 
 @pytest.mark.parametrize("package", ["fmus", "cosim"])

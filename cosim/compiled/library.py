@@ -16,17 +16,14 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from filelock import FileLock, Timeout
-from platformdirs import user_cache_path
 
 from cybership.scratch_folder import environment_with, scratch_folder
-
-from .cache_entry import is_whole, make_folder, refusal, store
+from cybership.user_cache import cache_folder, is_whole, make_folder, refusal, store
 
 SOURCE = Path(__file__).parent / "loop.c"
 # No product and sum in one rounding, no operation left out: the bits are to be those of Python.
@@ -120,29 +117,20 @@ class FoundLibrary(NamedTuple):
     note: str = ""
 
 
-def _cache_folder() -> Path | None:
-    if chosen := os.environ.get("CYBERSHIP_CACHE"):
-        return Path(chosen)
-    with suppress(RuntimeError):  # of newer versions; older ones give a relative path
-        if (folder := user_cache_path("cybership")).is_absolute():
-            return folder
-    return None
-
-
 @cache
 def _found(with_zig: bool) -> FoundLibrary:
     """The library, or why there is none: asked once in a process."""
     key = repr((SOURCE.read_bytes(), OPTIONS, platform.machine(), sysconfig.get_platform()))
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
-    if (folder := _cache_folder()) is None:
+    if (folder := cache_folder()) is None:
         return FoundLibrary(
             None, "this user has no home folder; set CYBERSHIP_CACHE to a folder for the loop"
         )
     path = folder / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
     note = ""
     try:
-        make_folder(folder)
-        if why := refusal(path):
+        make_folder(folder, folder)
+        if why := refusal(folder, path):
             return FoundLibrary(None, why, f"{why}; the plain step loop runs")
         if not is_whole(path):
             with FileLock(folder / "loop.lock", timeout=PATIENCE):

@@ -24,8 +24,7 @@ from ..ship import ship as make_ship
 from ..ships.naming import described_ship
 from ..ships.ship_warning import ship_warnings_to
 from . import ledger
-from .building import build, came_compiled, export
-from .cached_fmu import cache_folder
+from .building import build, came_compiled, export, fmu_cache
 from .finding import BuildError, load, which
 from .platforms import native_targets
 from .start_values_file import read_starts
@@ -157,7 +156,7 @@ def _verify(names: Sequence[str]) -> None:
     """
     for name in names:
         try:
-            wrong = ledger.unknown_binary(Path(name), cache_folder())
+            wrong = ledger.unknown_binary(Path(name), fmu_cache())
         except (OSError, zipfile.BadZipFile, RuntimeError, ValueError) as error:
             raise BuildError(f"'{name}' cannot be read: {error}") from error
         if wrong:
