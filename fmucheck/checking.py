@@ -4,21 +4,19 @@ import argparse
 import difflib
 import json
 import os
-import sys
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-from cybership.message_text import printable
+from cybership.command_arguments import command_parser, complain, positive, whole_number
 from cybership.scratch_folder import sweep
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
-from fmus.interruption import program
 
 from .examine import examine
-from .fmu import Fmu
+from .fmu import FmuArchive
 from .registry import RULES, Rule, in_order
 from .report import Outcomes, as_json, listing, show
 from .source import BadFileError
@@ -51,17 +49,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(error: Exception) -> int:
-    print("error:", printable(str(error)), file=sys.stderr)
+    complain(error)
     return BAD_INPUT
 
 
-def _open(names: Sequence[str]) -> tuple[list[Fmu], int]:
+def _open(names: Sequence[str]) -> tuple[list[FmuArchive], int]:
     """FMUs that can be checked, all of ours without names, and BAD_INPUT if there are others."""
-    fmus: list[Fmu] = []
+    fmus: list[FmuArchive] = []
     code = CLEAN
     for name in names or [None]:
         try:
-            fmus += map(Fmu, build([]) if name is None else [_path(name)])
+            fmus += map(FmuArchive, build([]) if name is None else [_path(name)])
         except (BadFileError, BuildError, DeclarationError, OSError) as error:
             code = _refuse(error)
     return fmus, code
@@ -83,7 +81,7 @@ def _chosen(names: Sequence[str]) -> list[Rule]:
 
 
 def _examine_all(
-    fmus: Sequence[Fmu], chosen: Sequence[Rule], options: argparse.Namespace
+    fmus: Sequence[FmuArchive], chosen: Sequence[Rule], options: argparse.Namespace
 ) -> list[Outcomes]:
     """All FMUs, some at a time, with a bar on a terminal."""
     from rich.console import Console
@@ -97,7 +95,7 @@ def _examine_all(
     ):
         task = bar.add_task("checking", total=len(fmus) * len(chosen))
 
-        def check(fmu: Fmu) -> Outcomes:
+        def check(fmu: FmuArchive) -> Outcomes:
             run, done = not options.no_run, lambda: bar.advance(task)
             return examine(fmu, chosen, options.timeout, run, done, stopped)
 
@@ -108,33 +106,16 @@ def _examine_all(
             pool.shutdown(cancel_futures=True)
 
 
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"needs a positive number, not '{text}'")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"needs a whole number above zero, not '{text}'")
-    return int(text)
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("fmus.check"),
-        description="Check FMI 2.0 co-simulation FMUs, of this project or others, against the standard.",
-        epilog="examples:  %(prog)s\n"
+    parser = command_parser(
+        "fmus.check",
+        "Check FMI 2.0 co-simulation FMUs, of this project or others, against the standard.",
+        "examples:  %(prog)s\n"
         "           %(prog)s mine.fmu other.fmu\n"
         "           %(prog)s vessel --json\n"
         "           %(prog)s mine.fmu --no-run\n"
         "exit codes: 0 no findings, 1 findings, 2 bad input (the rest is checked), 130 interrupted\n"
         "An FMU is a program, and checking it runs it: --no-run only reads it.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "files",
@@ -154,14 +135,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-run", action="store_true", help="only read the FMU, do not run it")
     parser.add_argument(
         "--timeout",
-        type=_positive,
+        type=positive,
         default=60.0,
         metavar="S",
         help="time limit of each rule that runs the FMU [s] (60)",
     )
     parser.add_argument(
         "--jobs",
-        type=_count,
+        type=whole_number(1),
         default=os.cpu_count() or 1,
         metavar="N",
         help="number of FMUs at a time (default: processors)",

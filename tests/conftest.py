@@ -21,8 +21,8 @@ from cosim.dispatch import analyse_runs
 from cosim.fmu import FmuModel, LocalInstance, archive_check
 from cosim.master import loop_surroundings
 from cosim.system import own_fmus
+from cybership.user_cache import cache_folder
 from fmus.build import build
-from fmus.build.cached_fmu import cache_folder
 from fmus.build.platforms import native_targets
 
 # The clock of one example tells what else the machine does, and what traces the test.

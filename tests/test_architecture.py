@@ -326,7 +326,10 @@ def test_modules_import_modules_inside_cosim():
 
 
 # What any command shares, whatever it is about.
-SHARED = {"cybership.message_text", "cybership.renamed", "cybership.scratch_folder"}
+SHARED = {
+    f"cybership.{n}"
+    for n in ("command_arguments", "message_text", "renamed", "scratch_folder", "user_cache")
+}
 
 
 @pytest.mark.parametrize("package", ["fmus", "cosim"])
@@ -429,7 +432,7 @@ OF_COMPONENTS = {"Inputs", "Outputs", "Params", "State"}
 
 def test_a_class_name_has_one_meaning():
     homes: dict[str, list[str]] = {}
-    for package in ("fmus", "cosim", "cybership", "diagnosis", "studies", "thesis"):
+    for package in ("fmus", "fmucheck", "cosim", "cybership", "diagnosis", "studies", "thesis"):
         for module, path in sources(package).items():
             for node in ast.walk(ast.parse(path.read_text())):
                 if isinstance(node, ast.ClassDef):

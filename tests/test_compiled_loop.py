@@ -6,16 +6,13 @@ import sys
 from array import array
 
 import numpy as np
-import orjson
 import pytest
 from support.cases import slow
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
 from cosim.compiled import library
-from cosim.compiled.row_text import Rows, compiled_lines
 from cosim.master.loops.rounding import round_to_places
-from cosim.results.log import format_rows
 from cosim.scenario import faults, operations
 
 pytestmark = needs_compiler
@@ -283,52 +280,3 @@ def test_faults_draw_the_same_for_many_calls_as_call_by_call(kind):
         once(ours, times[k])
         ahead(other, times[k])
         assert ours.tobytes() == other.tobytes()
-
-
-def shown(block):
-    lines = compiled_lines()
-    assert lines is not None
-    text, ends = lines(Rows(block[:, 0], block, np.arange(1, block.shape[1])))
-    assert np.array_equal(np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1, ends)
-    return bytes(text).splitlines()
-
-
-def test_numbers_of_the_log_are_those_of_orjson():
-    """Random bits, whole numbers, times, and numbers beside powers of two and of ten, where digits run out."""
-    rng = np.random.default_rng(4)
-    exact = np.concatenate(
-        [
-            2.0 ** np.arange(-1074, 1024),
-            [float(f"{d}e{k}") for k in range(-323, 309) for d in (1, 5, 9.999)],
-        ]
-    )
-    kinds = [
-        rng.integers(0, 2**64, 60_000, dtype=np.uint64).view(np.float64),
-        rng.integers(0, 2**20, 2_000, dtype=np.uint64).view(np.float64),
-        rng.standard_normal(20_000),
-        np.round(rng.standard_normal(5_000), 3),
-        np.arange(-2_000.0, 2_000.0),
-        np.array([round(k * 0.01, 12) for k in range(5_000)]),
-        rng.integers(0, 2**63, 5_000).astype(float),
-        exact, -exact, np.nextafter(exact, 0.0), np.nextafter(exact, np.inf),
-        np.array([0.0, -0.0, math.nan, math.inf, -math.inf, 1e15, 1e16, 1e17, 1e-4, 1e-5]),
-    ]  # fmt: skip
-    numbers = np.concatenate(kinds)
-    block = np.ascontiguousarray(numbers[: len(numbers) // 7 * 7].reshape(-1, 7))
-    assert shown(block) == format_rows(block)
-
-
-def test_other_orjson_is_followed(monkeypatch):
-    """Where an orjson writes numbers in another way, its way is taken."""
-    compiled_lines.cache_clear()
-    monkeypatch.setattr("cosim.compiled.row_text.orjson", Other)
-    assert compiled_lines() is None
-    compiled_lines.cache_clear()
-
-
-class Other:
-    OPT_SERIALIZE_NUMPY = 0
-
-    @staticmethod
-    def dumps(block, option):
-        return orjson.dumps(block, option=orjson.OPT_SERIALIZE_NUMPY).replace(b"e+", b"e")

@@ -34,7 +34,7 @@ from cosim.command import printable
 from cosim.results.log import LogWriter
 from cybership import scratch_folder
 from cybership.message_text import LONGEST_WORD
-from fmus.build.cached_fmu import make_folder
+from fmus.build.building import prepare_folder
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no binary for this test here")
 
@@ -350,7 +350,7 @@ def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_p
     assert (tmp_path / "a.fmu").read_text() == "whole"
     assert {*tmp_path.iterdir()} == {tmp_path / "a.fmu", other, young, alive}
     monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
-    make_folder(tmp_path / "hash")
+    prepare_folder(tmp_path / "hash")
     assert {*tmp_path.glob(".*")} == {young, alive}
 
 

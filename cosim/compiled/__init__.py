@@ -1,3 +1,3 @@
-"""What runs as machine code where it can: step loop and text of the log, from C in this folder."""
+"""What runs as machine code where it can: the step loop, from C in this folder."""
 
 __all__: list[str] = []

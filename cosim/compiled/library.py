@@ -1,4 +1,4 @@
-"""The library of C functions: compiled at its first use on a computer, kept in the cache, loaded.
+"""The library of the step loop in C: compiled at its first use on a computer, kept in the cache, loaded.
 
 An entry of the cache that is not whole is compiled again, and that is said.
 
@@ -16,20 +16,16 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from filelock import FileLock, Timeout
-from platformdirs import user_cache_path
 
 from cybership.scratch_folder import environment_with, scratch_folder
+from cybership.user_cache import cache_folder, is_whole, make_folder, refusal, store
 
-from .cache_entry import is_whole, make_folder, refusal, store
-
-FOLDER = Path(__file__).parent
-SOURCES = ("loop.c", "rows.c", "powers.py")
+SOURCE = Path(__file__).parent / "loop.c"
 # No product and sum in one rounding, no operation left out: the bits are to be those of Python.
 OPTIONS = ("-std=c99", "-O3", "-w", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 SYSTEM = ("gcc", "cc", "clang")
@@ -121,30 +117,20 @@ class FoundLibrary(NamedTuple):
     note: str = ""
 
 
-def _cache_folder() -> Path | None:
-    if chosen := os.environ.get("CYBERSHIP_CACHE"):
-        return Path(chosen)
-    with suppress(RuntimeError):  # of newer versions; older ones give a relative path
-        if (folder := user_cache_path("cybership")).is_absolute():
-            return folder
-    return None
-
-
 @cache
 def _found(with_zig: bool) -> FoundLibrary:
     """The library, or why there is none: asked once in a process."""
-    content = b"".join((FOLDER / name).read_bytes() for name in SOURCES)
-    key = repr((content, OPTIONS, platform.machine(), sysconfig.get_platform()))
+    key = repr((SOURCE.read_bytes(), OPTIONS, platform.machine(), sysconfig.get_platform()))
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
-    if (folder := _cache_folder()) is None:
+    if (folder := cache_folder()) is None:
         return FoundLibrary(
             None, "this user has no home folder; set CYBERSHIP_CACHE to a folder for the loop"
         )
     path = folder / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
     note = ""
     try:
-        make_folder(folder)
-        if why := refusal(path):
+        make_folder(folder, folder)
+        if why := refusal(folder, path):
             return FoundLibrary(None, why, f"{why}; the plain step loop runs")
         if not is_whole(path):
             with FileLock(folder / "loop.lock", timeout=PATIENCE):
@@ -160,16 +146,12 @@ def _found(with_zig: bool) -> FoundLibrary:
 
 
 def _compile(path: Path, with_zig: bool) -> None:
-    from .powers import powers_of_ten
-
     command = _compiler(with_zig)
     with scratch_folder() as work:
-        (work / "powers.h").write_text(powers_of_ten())
-        files = [str(FOLDER / source) for source in SOURCES if source.endswith(".c")]
         built = work / "built"
         linked = [] if os.name == "nt" else ["-lm"]
         done = subprocess.run(
-            [*command, *OPTIONS, "-I", str(work), "-o", str(built), *files, *linked],
+            [*command, *OPTIONS, "-o", str(built), str(SOURCE), *linked],
             capture_output=True,
             text=True,
             errors="replace",

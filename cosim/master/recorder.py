@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..compiled.library import asks_for_plain_loop
 from ..errors import InputError, SimulationError
 from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
@@ -64,7 +63,7 @@ class Recorder:
     ) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
+        self._writer = memory if folder is None else LogWriter(folder / CSV, self.columns)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = _kept_names(system, self._names, pictures)
@@ -74,11 +73,6 @@ class Recorder:
         logged = self._slots(table, system.logged)
         self.pending = PendingRows(table.row, logged, system.scenario.log.every)
         self.take = self.pending.take
-
-    def _log_writer(self, path: Path, system: System) -> LogWriter:
-        native = system.scenario.native
-        compiled = native is not False and not asks_for_plain_loop()
-        return LogWriter(path, self.columns, compiled=compiled, with_zig=native is True)
 
     @staticmethod
     def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:

@@ -2,17 +2,18 @@
 
 import errno
 import os
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import orjson
 
 from cybership.scratch_folder import atomic_write
 
-from ..compiled.row_text import Lines, Rows, compiled_lines
 from ..errors import InputError, nearest
 from ..files import write_all
 from ..process.run_state import Owner
@@ -28,6 +29,27 @@ SHOWN = 6  # names of columns that a terminal shows; chosen: a line has about so
 
 # Column name, as in the header of ``log.csv``, -> values, shape (rows,).
 Log = Mapping[str, np.ndarray]
+
+
+class Rows(NamedTuple):
+    """Rows of a log.
+
+    Attributes:
+        times: [s], float64, shape (rows,).
+        table: values of all signals, float64, shape (rows, signals).
+        slots: places in it of the logged signals, intp, shape (columns,).
+    """
+
+    times: np.ndarray
+    table: np.ndarray
+    slots: np.ndarray
+
+    def block(self) -> np.ndarray:
+        """Times and logged signals, shape (rows, 1 + columns), C-contiguous."""
+        block = np.empty((len(self.times), 1 + len(self.slots)))
+        block[:, 0] = self.times
+        block[:, 1:] = self.table[:, self.slots]
+        return block
 
 
 class LogColumns(dict[str, np.ndarray]):
@@ -47,8 +69,6 @@ class LogWriter:
     Args:
         path: file to write; an older one is replaced.
         columns: names for the header line, ``time`` first.
-        compiled: whether the text may come from C; it is the same.
-        with_zig: whether zig may compile that; see :func:`cosim.compiled.library.library`.
 
     Attributes:
         rows: number of rows in the file.
@@ -57,11 +77,8 @@ class LogWriter:
         OSError: the file cannot be made; then there is none.
     """
 
-    def __init__(
-        self, path: Path, columns: Sequence[str], compiled: bool = False, with_zig: bool = False
-    ) -> None:
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self.rows = 0
-        self._lines = (compiled_lines(with_zig) if compiled else None) or _lines
         self._owner = Owner()
         self._failure: OSError | None = None
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
@@ -89,31 +106,26 @@ class LogWriter:
             raise self._failure
         if not len(rows.times):
             return
-        lines, ends = self._lines(rows)
+        text = format_rows(rows.block())
         try:
             if self._identify() != self._identity:
                 raise OSError(errno.EBADF, "another part of the program closed its file")
             begun = self._file.tell()
             try:
-                write_all(self._file, lines)
+                write_all(self._file, text)
             except OSError:
-                self._cut(begun, begun + ends)
+                self._cut(begun, text)
                 raise
         except OSError as error:
             self._failure = error
             raise
-        self.rows += len(ends)
+        self.rows += len(rows.times)
 
-    def _cut(self, begun: int, ends: np.ndarray) -> None:
-        """Keep the rows of a block that are whole.
-
-        Args:
-            begun: position at which the block begins [bytes].
-            ends: positions behind its rows [bytes].
-        """
-        whole = int(np.searchsorted(ends, self._file.tell(), side="right"))
-        self._file.truncate(int(ends[whole - 1]) if whole else begun)
-        self.rows += whole
+    def _cut(self, begun: int, text: bytes) -> None:
+        """Keep the rows of a block that are whole, of one that begins at a position [bytes]."""
+        whole = text[: text.rfind(b"\n", 0, self._file.tell() - begun) + 1]
+        self._file.truncate(begun + len(whole))
+        self.rows += whole.count(b"\n")
 
     def close(self) -> None:
         with suppress(OSError):  # closed by something else
@@ -149,28 +161,21 @@ class LogInMemory:
         return {name: table[:, k] for k, name in enumerate(self._names)}
 
 
-def _lines(rows: Rows) -> Lines:
-    """Lines, and the bytes up to the end of each."""
-    found = format_rows(rows.block())
-    return memoryview(b"\n".join(found) + b"\n"), np.cumsum([len(line) + 1 for line in found])
-
-
-def format_rows(block: np.ndarray) -> list[bytes]:
-    """Rows of a log as text, without the ends of lines.
+def format_rows(block: np.ndarray) -> bytes:
+    """Rows of a log as text, a line each.
 
     Args:
         block: (rows, columns), float64, C-contiguous.
     """
-    if not len(block):
-        return []
-    lines = orjson.dumps(block, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2].split(b"],[")
-    # JSON has neither NaN nor infinity; all other numbers must look the same in every row.
-    for k in np.flatnonzero(~np.isfinite(block).all(axis=1)):
-        cells = lines[k].split(b",")
-        for j in np.flatnonzero(~np.isfinite(block[k])):
-            cells[j] = repr(float(block[k, j])).encode()
-        lines[k] = b",".join(cells)
-    return lines
+    # Row by row: to look for the ends of rows in the text of a block would take longer.
+    lines = [orjson.dumps(row, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1] for row in block]
+    text = b"\n".join([*lines, b""])
+    known = np.isfinite(block)
+    if known.all():
+        return text
+    # JSON has neither NaN nor infinity: orjson writes null; all other numbers must look the same.
+    missing = iter(block[~known].tolist())
+    return re.sub(b"null", lambda _: repr(next(missing)).encode(), text)
 
 
 def cut_to_rows(path: Path) -> int:

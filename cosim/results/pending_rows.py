@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..compiled.row_text import Rows
 from ..files import write_all
 from ..process.run_state import LAYOUT, STATE, STEPS, TAKEN
-from .log import cut_to_rows, format_rows
+from .log import Rows, cut_to_rows, format_rows
 
 # Rows that are written together: at least so many, as the cost of a call is then small beside that of
 # the rows, and more of narrow ones, up to so many numbers (256 KiB); chosen: a processor keeps these at
@@ -130,7 +129,7 @@ def rescue(path: Path) -> int:
     block = logged.block()[rows + before // -every :]
     try:
         with open(path, "ab", buffering=0) as file:
-            write_all(file, b"".join(line + b"\n" for line in format_rows(block)))
+            write_all(file, format_rows(block))
     finally:
         rows = cut_to_rows(path)
     return rows

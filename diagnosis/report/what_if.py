@@ -1,7 +1,8 @@
 """What the page of a report needs to predict the windows itself while a reader moves coefficients.
 
 One text holds all of it, compressed: the step of a prediction as WebAssembly, of each run the windows'
-start states and inputs and the measured pose, and the coefficients. ``templates/what_if.js`` reads it.
+start states and inputs and the measured pose, and the coefficients. The program in ``templates/what_if``
+reads it.
 """
 
 import json
@@ -40,7 +41,9 @@ from .report_data import ReportData
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-SCRIPT = Path(__file__).parent / "templates" / "what_if.js"
+SCRIPTS = Path(__file__).parent / "templates" / "what_if"
+# Files of the page's program, in this order.
+PROGRAM = ("data", "predictions", "residual_force", "fit", "own_run", "pictures", "results", "controls")
 CANDIDATES = 12  # effects of the ranking that a reader may try; chosen: of more the list is not read
 MOST_VALUES = 6  # of an effect that was not found: a shape of more has no use as sliders; chosen
 REACH = 3.0  # a slider ends so many standard deviations, or changes, from the first value; chosen
@@ -106,7 +109,8 @@ class WhatIf(NamedTuple):
         """The program of the page, which is no text of a user."""
         from markupsafe import Markup
 
-        return Markup(SCRIPT.read_text(encoding="utf-8"))
+        files = ((SCRIPTS / f"{name}.js").read_text(encoding="utf-8") for name in PROGRAM)
+        return Markup("\n".join(files))
 
     @property
     def policy(self) -> "Markup":
@@ -123,22 +127,22 @@ def what_if(r: ReportData) -> WhatIf:
         return WhatIf()
     if not r.comparison.predictor.parametric:
         return WhatIf(missing="the model is not a described ship, so the page cannot compute it")
-    bench = Bench(r)
-    if bench.learned.filters:
+    movable = MovableModel(r)
+    if movable.learned.filters:
         return WhatIf(missing="the pose was measured behind a filter, which the page does not have")
-    if len({(e.smoothed.track.run.signals, _settings(e)) for e in bench.runs}) > 1:
+    if len({(e.smoothed.track.run.signals, _settings(e)) for e in movable.runs}) > 1:
         return WhatIf(missing="the runs have commands of different kinds")
-    module = webassembly_of(bench)
+    module = webassembly_of(movable)
     if module is None:
         return WhatIf(missing="an effect cannot be translated to WebAssembly")
-    return WhatIf(bench.content(module))
+    return WhatIf(movable.content(module))
 
 
-def webassembly_of(bench: "Bench") -> bytes | None:
+def webassembly_of(movable: "MovableModel") -> bytes | None:
     """A step of the prediction with the parameters that can be moved; None: it cannot be translated."""
-    run = bench.runs[0].smoothed.track.run
+    run = movable.runs[0].smoothed.track.run
     try:
-        made = prediction_component(bench.learned, bench.names, run, bench.windy)
+        made = prediction_component(movable.learned, movable.names, run, movable.windy)
         return component_module(program(made))
     except TraceError:
         return None
@@ -151,7 +155,7 @@ def _settings(e: Evaluation) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class MovableModel:
     """The runs, models and coefficients of a report.
 
     Attributes:

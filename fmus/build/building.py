@@ -9,7 +9,8 @@ from pathlib import Path
 from threading import Timer
 from typing import Any
 
-from cybership.scratch_folder import scratch_folder
+from cybership.scratch_folder import scratch_folder, sweep_parts
+from cybership.user_cache import cache_folder, is_whole, make_folder, place, refusal, store
 
 from ..declare import Component
 from ..effects import STANDARD, EffectSet
@@ -18,7 +19,6 @@ from ..ship import ship as make_ship
 from ..ship_description import Description
 from ..ships.naming import described_ship
 from . import ledger
-from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
 from .packing import changes, hash_of, pack, sources
 from .platforms import Native, native_targets
@@ -171,21 +171,21 @@ def _cached(
 ) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
     stem, own_file = which(name)
-    folder = cache_folder() / _source_hash(own_file, of, {}, native)
+    folder = fmu_cache() / _source_hash(own_file, of, {}, native)
     fmu = folder / f"{stem}.fmu"
-    if starts is None and is_whole(fmu):
+    if starts is None and _is_usable(fmu):
         return fmu
     from filelock import FileLock  # only now: most calls find what they need, and this takes a while
 
     module, component = load(stem, own_file, of)
     if starts is not None:
         component = starts.baked(component)
-        folder = cache_folder() / _source_hash(own_file, of, component.starts, native)
-    make_folder(folder)
+        folder = fmu_cache() / _source_hash(own_file, of, component.starts, native)
+    prepare_folder(folder)
     fmu = folder / f"{component.name}.fmu"
     python = _cached(name, of, starts, note=note) if native is not None and native.python else None
     with FileLock(folder / "lock"):
-        if not is_whole(fmu):
+        if not _is_usable(fmu):
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
             with scratch_folder() as work, _told_if_long(component.name, note):
@@ -197,10 +197,39 @@ def _cached(
                 else:
                     code_hash = hash_of(sources(module, own_file, of), component.starts, of)
                     built = _compiled(component, code_hash, native, work, python)
-                with FileLock(cache_folder() / "ledger.lock"):
-                    ledger.record(built, cache_folder())
+                with FileLock(fmu_cache() / "ledger.lock"):
+                    ledger.record(built, fmu_cache())
                 store(built, fmu)
     return fmu
+
+
+def fmu_cache() -> Path:
+    """Where built FMUs are kept.
+
+    Raises:
+        BuildError: the user has no folder of that kind.
+    """
+    if (folder := cache_folder()) is None:
+        raise BuildError("this user has no home folder: set CYBERSHIP_CACHE to a folder for built FMUs")
+    return folder
+
+
+def _is_usable(fmu: Path) -> bool:
+    """Whether an FMU in the cache is there and whole."""
+    if why := refusal(fmu_cache(), fmu):
+        raise BuildError(why)
+    return is_whole(fmu)
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a folder of the cache; what killed processes have left in the cache is removed."""
+    try:
+        make_folder(fmu_cache(), folder)
+        sweep_parts(fmu_cache().glob("**/.*.part"))
+    except OSError as error:
+        raise BuildError(
+            f"cannot keep FMUs in '{folder}' ({error.strerror}); set CYBERSHIP_CACHE to another folder"
+        ) from None
 
 
 @contextmanager
