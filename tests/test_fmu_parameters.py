@@ -32,7 +32,7 @@ from diagnosis.fmu_parameters.parameter_file import (
 from diagnosis.fmu_parameters.residuals import Whitening, laid
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 from diagnosis.fmu_parameters.system_remainder import change_of_squares
-from diagnosis.predictors.fmu.playback import Playback, Prediction, Processes
+from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes
 
 pytestmark = needs_compiler
 
@@ -69,7 +69,7 @@ def measured(fmu, folder, name, values, forces=(), seed=1, seconds=30.0):
     rng = np.random.default_rng(seed)
     t = H * np.arange(round(seconds / H) + 1)
     force = 2.0 * np.sin(0.7 * t + seed) + 1.5 * rng.uniform(-1.0, 1.0, t.size)[(t / 3.0).astype(int)]
-    (x,) = played_back(fmu, "f", ["x"], Prediction(H, values, force[:-1, None]), forces).T
+    (x,) = played_back(fmu, "f", ["x"], PlaybackRequest(H, values, force[:-1, None]), forces).T
     table = {"time": t, "force": force, "position": x + NOISE * rng.standard_normal(t.size)}
     path = folder / f"{name}.csv"
     pd.DataFrame(table).to_csv(path, index=False)
@@ -211,11 +211,11 @@ def test_playback_adds_a_force_as_the_fmu_has_it(fmu):
     """A spring beside the FMU is its own spring, but for what a step is late."""
     force = np.sin(0.5 * np.arange(2000) * 0.01)[:, None]
     plain, own = (
-        played_back(fmu, "f", ["x", "v"], Prediction(0.01, values, force))
+        played_back(fmu, "f", ["x", "v"], PlaybackRequest(0.01, values, force))
         for values in ({}, {"c": 11.0})
     )
     spring = AdditionalForce("f", "x", 1, False, -1.0)
-    beside = played_back(fmu, "f", ["x", "v"], Prediction(0.01, {}, force), [spring])
+    beside = played_back(fmu, "f", ["x", "v"], PlaybackRequest(0.01, {}, force), [spring])
     assert np.abs(own - beside).max() < 0.05 * np.abs(own - plain).max()
 
 
@@ -322,9 +322,9 @@ def test_found_fmu_moves_as_the_fit_has_it(fmu, work, force):
     assert sentence.startswith("found.fmu is oscillator.fmu with")
     new = json.loads((work / "map.json").read_text())
     assert new["start"] == {"position": "model.x0", "der(position)": "model.v0"}
-    fitted = played_back(fmu, "f", ["x", "v"], Prediction(H, values, inputs), [force])
+    fitted = played_back(fmu, "f", ["x", "v"], PlaybackRequest(H, values, inputs), [force])
     name = new["inputs"]["force"]
-    made = played_back(work / "found.fmu", name, ["model.x", "model.v"], Prediction(H, {}, inputs))
+    made = played_back(work / "found.fmu", name, ["model.x", "model.v"], PlaybackRequest(H, {}, inputs))
     assert np.abs(fitted).max() > 0.1
     assert made == pytest.approx(fitted, abs=1e-12)
 
@@ -486,7 +486,7 @@ def test_fmu_cannot_read_the_run_unless_it_may(work, capsys, unconfined):
 def test_fmu_that_ends_its_process_is_said(work, capsys):
     fmu = build_oscillator(work, "fatal", habit="if (t > 1.0) abort();")
     processes = Processes(ConfinedFmu(FmuModel(fmu)), ["f"], ["x"])
-    first, second = processes.run([Prediction(H, {}, np.zeros((n, 1))) for n in (40, 10)])
+    first, second = processes.run([PlaybackRequest(H, {}, np.zeros((n, 1))) for n in (40, 10)])
     processes.close()
     assert "SIGABRT" in first.fault
     assert np.isnan(first.outputs).all()

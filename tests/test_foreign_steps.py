@@ -12,7 +12,7 @@ from support.measured import sail
 import diagnosis
 from cosim import InputError
 from diagnosis import Fmu, Run
-from diagnosis.predictors.fmu.playback import Playback
+from diagnosis.predictors.fmu.fmu_playback import Playback
 from diagnosis.predictors.predictor import Execution
 from fmus.build import build, native_targets
 

@@ -11,7 +11,7 @@ from cosim.errors import nearest
 from cosim.fmu import FmuModel
 from cybership.message_text import quoted
 
-from ..predictors.fmu.playback import Prediction
+from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.tables import column_names, numbers, table_of_file
 from ..runs.sensors.evidence import FEWEST
@@ -58,7 +58,7 @@ class Window:
 
     run: str
     begin: float
-    course: Prediction
+    course: PlaybackRequest
     time: np.ndarray
     measured: np.ndarray
     start_std: Mapping[str, float]
@@ -229,7 +229,7 @@ def _window(
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])
-    return Window(run.name, begin, Prediction(h, start, inputs), t[counts], measured[counts], std)
+    return Window(run.name, begin, PlaybackRequest(h, start, inputs), t[counts], measured[counts], std)
 
 
 def _at_start(t: np.ndarray, y: np.ndarray, noise: float, rate: bool) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_earth
 from fmus.ops import wrap
 
-from ..predictors.fmu.playback import PlayedBack, Prediction, Processes
+from ..predictors.fmu.fmu_playback import PlaybackRequest, PlayedBack, Processes
 from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
@@ -144,7 +144,7 @@ class WindowResiduals:
 
     def _prediction(
         self, w: Window, setting: Setting, begin: Mapping[str, float] = MappingProxyType({})
-    ) -> Prediction:
+    ) -> PlaybackRequest:
         """That of a window with a setting and other start values."""
         start = {**w.course.start, **self.values(setting), **begin}
         of = self.processes

@@ -13,17 +13,17 @@ from cosim.fmu import ConfinedFmu
 from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples, commands_at
+from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.playback import Prediction
 from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER, SI_UNIT
 from ..predictors.windows import step_of, usable_windows
 from ..runs import QUANTITY, Smoothed
 from ..runs.sensors.evidence import FEWEST
 from .additional_force import AdditionalForce, EarthDirection
+from .calibration_task import CalibrationTask
 from .force_search import candidates
 from .measured_system import Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
-from .task import CalibrationTask
 
 # Of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
 MOST_SAMPLES = 60
@@ -36,7 +36,7 @@ class ShipTask(CalibrationTask):
 
     Args:
         predictor: how the FMU and its map are read for these runs.
-        parameters, notes: see :class:`.task.CalibrationTask`.
+        parameters, notes: see :class:`.calibration_task.CalibrationTask`.
         runs: use -> runs.
     """
 
@@ -147,7 +147,7 @@ class ShipTask(CalibrationTask):
             for signal, c in p.map.told("start").items()
             if signal in sure and not p.whole
         }
-        course = Prediction(h, start, np.column_stack([*inputs.values()]))
+        course = PlaybackRequest(h, start, np.column_stack([*inputs.values()]))
         onto = s.eta[rows[0]] if p.placed else None
         return Window(run.name, float(begin), course, since[rows], s.track.pose[rows], std, onto)
 

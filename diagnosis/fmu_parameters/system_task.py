@@ -14,14 +14,14 @@ from cybership.message_text import quoted
 from ..execution.user_files import json_content
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, POSE
-from ..predictors.fmu.playback import confined
+from ..predictors.fmu.fmu_playback import confined
 from ..runs import stated_layout
 from .additional_force import AdditionalForce
+from .calibration_task import CalibrationTask
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
-from .task import CalibrationTask
 
 # Outputs that are no measured ones, of which an additional force may be a function; chosen: the more
 # are tried, the more alike they are.
@@ -52,7 +52,7 @@ class SystemTask(CalibrationTask):
     Args:
         model: the FMU.
         map: which column is which variable.
-        parameters, notes: see :class:`.task.CalibrationTask`.
+        parameters, notes: see :class:`.calibration_task.CalibrationTask`.
         runs: of each use.
         window: length of the windows [s]; None: as the map says.
         execution: how the FMU is run.

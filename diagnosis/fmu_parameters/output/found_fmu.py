@@ -8,7 +8,7 @@ import cosim
 from cosim.fmu import FmuModel
 from fmus.build import BuildError
 
-from ...predictors.fmu.container import ADDED, FOREIGN, write_container
+from ...predictors.fmu.fmu_container import ADDED, FOREIGN, write_container
 from ...predictors.fmu.variable_map import write_map
 from ...predictors.predictor import FOUND, MAP
 from ..additional_force import AdditionalForce

@@ -8,12 +8,12 @@ from ...execution.progress import Advance
 from ...execution.result_folder import together
 from ...predictors import WRITTEN, Execution
 from ...predictors.predictor import FOUND, MAP
+from ..calibration_task import CalibrationTask
 from ..residuals import WindowResiduals
 from ..sensitivity import refuse_unknown, sensitivities
 from ..ship_task import ship_task
 from ..system_calibration import calibrate
 from ..system_task import is_system, system_task
-from ..task import CalibrationTask
 from .system_content import FILES, CalibrationReport
 from .system_plots import plots_of
 

@@ -17,9 +17,9 @@ from ...predictors.prediction import FAR_OFF
 from ...report.document import Document, Plot, ReportSection, numbers, write_document, write_json
 from ...report.document import Table as PageTable
 from ...runs.cleaning import Z95
+from ..calibration_task import CalibrationTask
 from ..force_search import Accepted
 from ..system_calibration import CalibratedValue, SystemCalibration
-from ..task import CalibrationTask
 
 FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
 SENTENCES = {

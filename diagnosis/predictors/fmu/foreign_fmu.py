@@ -48,8 +48,8 @@ from ..ship_model import Model
 from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
 from ..windows import FREE_STEP, Windows, step_of
+from .fmu_playback import PlaybackRequest, Processes, confined
 from .lineage import learned_from, parts_of, remember
-from .playback import Prediction, Processes, confined
 from .ship_of_fmu import SYSTEMS
 from .short_steps import ShortSteps
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
@@ -275,7 +275,7 @@ class FmuPredictor(BlackBox):
         for row in rows:
             inputs = self.of_variables("inputs", commands_at(run, smoothed.time[row] + middle))
             driven = np.column_stack([inputs[name] for name in self.processes.inputs])
-            predictions.append(Prediction(h, _row(at, row), driven))
+            predictions.append(PlaybackRequest(h, _row(at, row), driven))
         found = self.processes.run(predictions)
         if fault := next((p.fault for p in found if p.fault), ""):
             raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {fault}")

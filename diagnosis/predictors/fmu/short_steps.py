@@ -7,7 +7,7 @@ import numpy as np
 from cosim import InputError
 from cosim.fmu import ConfinedFmu
 
-from .playback import Playback, Prediction
+from .fmu_playback import Playback, PlaybackRequest
 
 STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
 
@@ -36,7 +36,7 @@ class ShortSteps:
         """
         playback = self._playback
         held = np.tile([inputs[name] for name in playback.inputs], (STEPS + self._late, 1))
-        found = playback.run(Prediction(self.h, start, held))
+        found = playback.run(PlaybackRequest(self.h, start, held))
         if found.fault:
             raise InputError(f"'{self._name}' cannot be set to a measured state: {found.fault}")
         return dict(zip(playback.outputs, found.outputs[int(self._late) :].T, strict=True))

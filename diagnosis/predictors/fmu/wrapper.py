@@ -15,7 +15,7 @@ from ...runs import Column
 from ..ship_model import Model
 from ..weak_form import WeakWindows, omega
 from ..windows import step_of
-from .container import ADDED, FOREIGN, write_container
+from .fmu_container import ADDED, FOREIGN, write_container
 from .variable_map import DISTURBANCES, VariableMap
 
 NONE = "No FMU with the findings is written"

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.fmu import ConfinedFmu
 
-from ..predictors.fmu.playback import Processes
+from ..predictors.fmu.fmu_playback import Processes
 from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter

@@ -44,7 +44,7 @@ def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
         raise InputError(str(error)) from None
 
 
-class Prediction(NamedTuple):
+class PlaybackRequest(NamedTuple):
     """What an FMU gets in one prediction.
 
     Attributes:
@@ -95,7 +95,7 @@ class Playback:
         # To save the state before each step, for one that is discarded, takes a multiple of the time.
         self._redoes = False
 
-    def run(self, prediction: Prediction) -> PlayedBack:
+    def run(self, prediction: PlaybackRequest) -> PlayedBack:
         """One prediction."""
         try:
             if self._resets is None:
@@ -108,10 +108,10 @@ class Playback:
                 return self.run(prediction)
             return PlayedBack(self._nothing(prediction), self._fmu.told(error))
 
-    def _nothing(self, prediction: Prediction) -> np.ndarray:
+    def _nothing(self, prediction: PlaybackRequest) -> np.ndarray:
         return np.full((len(prediction.inputs) + 1, len(self.outputs)), np.nan)
 
-    def _returns_by_reset(self, prediction: Prediction) -> bool:
+    def _returns_by_reset(self, prediction: PlaybackRequest) -> bool:
         """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
         new = self._run(prediction)
         with suppress(SimulationError):
@@ -137,7 +137,7 @@ class Playback:
         if instance is not None:
             instance.free()
 
-    def _run(self, prediction: Prediction) -> PlayedBack:
+    def _run(self, prediction: PlaybackRequest) -> PlayedBack:
         h, start, (steps, driven) = prediction.h, dict(prediction.start), prediction.inputs.shape
         rows = np.tile(self._starts, (steps, 1))
         rows[:, :driven] = prediction.inputs
@@ -166,7 +166,7 @@ class Processes:
         for playback in self._playbacks:
             self._free.put(playback)
 
-    def run(self, predictions: Sequence[Prediction]) -> list[PlayedBack]:
+    def run(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
         """Some predictions, in their order."""
         with ThreadPoolExecutor(PROCESSES, "playback") as threads:
             try:
@@ -176,7 +176,7 @@ class Processes:
                 self._fmu.close()
                 raise
 
-    def _one(self, prediction: Prediction) -> PlayedBack:
+    def _one(self, prediction: PlaybackRequest) -> PlayedBack:
         playback = self._free.get()
         try:
             return playback.run(prediction)
