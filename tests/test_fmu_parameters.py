@@ -29,9 +29,10 @@ from diagnosis.fmu_parameters.parameter_file import (
     proposed,
     read_parameters,
 )
-from diagnosis.fmu_parameters.residuals import Whitening, laid
+from diagnosis.fmu_parameters.residuals import Whitening
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 from diagnosis.fmu_parameters.system_remainder import change_of_squares
+from diagnosis.predictors.black_box import laid
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes
 
 pytestmark = needs_compiler
@@ -184,7 +185,8 @@ def test_whitening_is_the_inverse_root_of_the_covariance():
 
 def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():
     track = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
-    moved = laid(track, np.array([2.0, 3.0, np.pi / 2]))
+    onto = np.array([[2.0], [3.0], [np.pi / 2]])
+    moved = laid(track[..., None], np.zeros(1), onto)[..., 0]
     assert moved[0] == pytest.approx([2.0, 3.0, np.pi / 2])
     assert moved[4] == pytest.approx([2.0, 7.0, np.pi / 2])
 

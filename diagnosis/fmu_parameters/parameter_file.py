@@ -243,7 +243,7 @@ def _with_prior(v: FmuVariable) -> CalibratedParameter:
     Raises:
         ValueError: its value is no scale and it has no range.
     """
-    value, unit = float(v.start or 0.0), "1" if v.unit is None else v.unit.name
+    value, unit = float(v.start or 0.0), unit_of(v)
     kind = kind_of(v.unit)
     positive = value > 0.0 and (kind.positive or (v.min is not None and v.min >= 0.0))
     if value:
@@ -256,6 +256,11 @@ def _with_prior(v: FmuVariable) -> CalibratedParameter:
     return CalibratedParameter(
         name=v.name, unit=unit, value=value, min=v.min, max=v.max, log=positive, prior=prior
     )
+
+
+def unit_of(v: FmuVariable) -> str:
+    """Name of a variable's unit; 1 where the FMU states none."""
+    return "1" if v.unit is None else v.unit.name
 
 
 def kind_of(unit: Unit | None) -> Kind:

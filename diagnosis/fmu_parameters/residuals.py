@@ -16,9 +16,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from cosim import InputError
-from fmus.frames import rotate_to_earth
 from fmus.ops import wrap
 
+from ..predictors.black_box import laid
 from ..predictors.fmu.fmu_playback import PlaybackRequest, PlayedBack, Processes
 from .additional_force import AdditionalForce
 from .measured_system import Window
@@ -186,7 +186,9 @@ class WindowResiduals:
             for k in self.angles:
                 outputs[:, k] = np.unwrap(outputs[:, k])
             predicted = np.column_stack([np.interp(w.time, at, y) for y in outputs.T])
-            off = w.measured - (predicted if w.onto is None else laid(predicted, w.onto))
+            if w.onto is not None:
+                predicted = laid(predicted[..., None], np.zeros(1), w.onto[:, None])[..., 0]
+            off = w.measured - predicted
             off[:, self.angles] = wrap(off[:, self.angles])
             off /= self.noise
             off[~(np.abs(off) < LARGEST)] = np.nan
@@ -312,13 +314,6 @@ class WindowResiduals:
     def at(setting: Setting, k: int, z: float) -> Setting:
         """A setting with another value of a parameter."""
         return Setting((*setting.z[:k], z, *setting.z[k + 1 :]), setting.forces)
-
-
-def laid(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
-    """A track (T, 3), moved and turned so that it begins in another pose (3,)."""
-    x, y, psi = (pose - pose[0]).T
-    north, east = rotate_to_earth(onto[2] - pose[0, 2], x, y)
-    return np.column_stack([onto[0] + north, onto[1] + east, onto[2] + psi])
 
 
 def rms_of(

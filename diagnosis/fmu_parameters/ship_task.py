@@ -12,8 +12,7 @@ from cosim.fmu import ConfinedFmu
 
 from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
-from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples, commands_at
-from ..predictors.fmu.fmu_playback import PlaybackRequest
+from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
 from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER, SI_UNIT
 from ..predictors.windows import step_of, usable_windows
@@ -52,7 +51,7 @@ class ShipTask(CalibrationTask):
     ) -> None:
         super().__init__(parameters, notes)
         self.predictor, self.runs, told = predictor, runs, predictor.map.told
-        self.driven = [c.name for c in told("inputs").values()]
+        self.driven = predictor.processes.inputs
         given = {**told("inputs"), **told(DISTURBANCES)}
         self.forces_on = [c.name for s, c in given.items() if s in BESIDE]
         self.outputs = [told("outputs")[s].name for s in MOTION if s in told("outputs")]
@@ -137,17 +136,13 @@ class ShipTask(CalibrationTask):
         if not p.whole:
             rows = rows[:: max(1, rows.size // MOST_SAMPLES)]
         steps = int(np.ceil(since[rows[-1]] / h - 1e-6))
-        middle = begin + (np.arange(steps) + 0.5) * h
-        at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
-        start = {n: float(x[0]) for n, x in p.of_variables("start", at).items()}
-        inputs = p.of_variables("inputs", commands_at(run, middle))
+        (course,) = p.requests(s, np.array([row]), h, steps)
         sure = dict(zip(MOTION, [*s.eta_std[row], *s.nu_std[row]], strict=True))
         std = {
             c.name: float(sure[signal]) / abs(p.lines["start"][signal].gain)
             for signal, c in p.map.told("start").items()
             if signal in sure and not p.whole
         }
-        course = PlaybackRequest(h, start, np.column_stack([*inputs.values()]))
         onto = s.eta[rows[0]] if p.placed else None
         return Window(run.name, float(begin), course, since[rows], s.track.pose[rows], std, onto)
 

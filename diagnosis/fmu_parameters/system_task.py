@@ -20,7 +20,7 @@ from .additional_force import AdditionalForce
 from .calibration_task import CalibrationTask
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
-from .parameter_file import CalibratedParameter, proposed, read_parameters
+from .parameter_file import CalibratedParameter, proposed, read_parameters, unit_of
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
 # Outputs that are no measured ones, of which an additional force may be a function; chosen: the more
@@ -73,9 +73,7 @@ class SystemTask(CalibrationTask):
         self._length = window or map.window
         self.driven = [c.name for c in map.inputs.values()]
         self.names = [c.name for c in map.outputs.values()]
-        self.units = [
-            "1" if (unit := model.variables[n].unit) is None else unit.name for n in self.names
-        ]
+        self.units = [unit_of(model.variables[n]) for n in self.names]
         self.forces_on = force_inputs(map, model)
         others = [
             v.name

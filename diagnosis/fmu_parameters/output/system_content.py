@@ -17,8 +17,10 @@ from ...predictors.prediction import FAR_OFF
 from ...report.document import Document, Plot, ReportSection, numbers, write_document, write_json
 from ...report.document import Table as PageTable
 from ...runs.cleaning import Z95
+from ..additional_force import AdditionalForce
 from ..calibration_task import CalibrationTask
 from ..force_search import Accepted
+from ..parameter_file import unit_of
 from ..system_calibration import CalibratedValue, SystemCalibration
 
 FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
@@ -56,15 +58,10 @@ class CalibrationReport:
     def _notes(self) -> list[str]:
         return [*self.result.faults, *self.task.notes, *self.task.confined.sentences()]
 
-    def unit(self, variable: str) -> str:
-        """Unit of a variable of the FMU, 1 where it states none."""
-        unit = self.model.variables[variable].unit
-        return "1" if unit is None else unit.name
-
-    def force_unit(self, f: Accepted) -> str:
+    def force_unit(self, f: AdditionalForce) -> str:
         """Unit of a force's coefficient."""
-        y = self.unit(f.force.output) if f.force.output else "1"
-        return f.force.unit(self.unit(f.force.input), y)
+        every = self.model.variables
+        return f.unit(unit_of(every[f.input]), unit_of(every[f.output]) if f.output else "1")
 
     def force_interval(self, k: int) -> tuple[float, float]:
         """95 % interval of a force's coefficient."""
@@ -162,7 +159,7 @@ class CalibrationReport:
     def _effect(self, k: int, f: Accepted) -> dict[str, Any]:
         value = {
             "value": f.force.coefficient,
-            "unit": self.force_unit(f),
+            "unit": self.force_unit(f.force),
             "ci95": [*self.force_interval(k)],
         }
         return {
@@ -217,7 +214,7 @@ class CalibrationReport:
             "names": [*(f"{self.model.name}.{n}" for n in names), *(f.id for f in forces)],
             "units": [
                 *(v.parameter.unit for v in r.values),
-                *(f.unit(self.unit(f.input), self.unit(f.output) if f.output else "1") for f in forces),
+                *map(self.force_unit, forces),
             ],
             "mean": [
                 *(v.parameter.at(x) for v, x in zip(r.values, z, strict=True)),
@@ -242,7 +239,7 @@ class CalibrationReport:
                 f.force.id,
                 value,
                 f"{low} to {high}",
-                self.force_unit(f),
+                self.force_unit(f.force),
                 f"{f.probability:.0%}",
                 alike,
             ]

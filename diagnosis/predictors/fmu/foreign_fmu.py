@@ -269,18 +269,23 @@ class FmuPredictor(BlackBox):
 
     def _told(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> dict[str, np.ndarray]:
         """Signal -> its values (steps + 1, w) [SI], in steps of h [s] from some rows on."""
-        run, middle = smoothed.track.run, (np.arange(steps) + 0.5) * h
-        at = self.of_variables("start", at_samples(smoothed))
-        predictions = []
-        for row in rows:
-            inputs = self.of_variables("inputs", commands_at(run, smoothed.time[row] + middle))
-            driven = np.column_stack([inputs[name] for name in self.processes.inputs])
-            predictions.append(PlaybackRequest(h, _row(at, row), driven))
-        found = self.processes.run(predictions)
+        found = self.processes.run([*self.requests(smoothed, rows, h, steps)])
         if fault := next((p.fault for p in found if p.fault), ""):
-            raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {fault}")
+            where = f"'{self.name}' failed on run '{smoothed.track.run.name}'"
+            raise cosim.InputError(f"{where}: {fault}")
         told = np.stack([p.outputs for p in found], axis=2)
         return self._outputs(dict(zip(self.processes.outputs, told.transpose(1, 0, 2), strict=True)))
+
+    def requests(
+        self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int
+    ) -> Iterator[PlaybackRequest]:
+        """What the FMU gets from the states in some rows of a run on, in steps of h [s]."""
+        at, middle = self.of_variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
+        for row in rows:
+            commands = commands_at(smoothed.track.run, smoothed.time[row] + middle)
+            inputs = self.of_variables("inputs", commands)
+            driven = np.column_stack([inputs[name] for name in self.processes.inputs])
+            yield PlaybackRequest(h, _row(at, row), driven)
 
     def accelerations(self, signals: Signals) -> np.ndarray:
         start, inputs = (self.of_variables(group, signals) for group in ("start", "inputs"))
