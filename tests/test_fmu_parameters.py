@@ -485,6 +485,19 @@ def test_fmu_cannot_read_the_run_unless_it_may(work, capsys, unconfined):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_fresh_prediction_knows_nothing_of_others(work, fresh):
+    """An FMU that behaves until it has run five times in a process, and then tells so."""
+    habit = "static int runs; if (t == 0.0) runs++; if (runs > 5) { p[V_x] = 7.0; return 0; }"
+    fmu = build_oscillator(work, "remembering", habit=habit)
+    processes = Processes(ConfinedFmu(FmuModel(fmu)), ["f"], ["x"], fresh)
+    found = processes.run([PlaybackRequest(H, {}, np.zeros((3, 1)))] * 16)
+    processes.close()
+    assert not any(f.fault for f in found)
+    assert any((f.outputs == 7.0).any() for f in found) != fresh
+
+
+@pytest.mark.slow
 def test_fmu_that_ends_its_process_is_said(work, capsys):
     fmu = build_oscillator(work, "fatal", habit="if (t > 1.0) abort();")
     processes = Processes(ConfinedFmu(FmuModel(fmu)), ["f"], ["x"])

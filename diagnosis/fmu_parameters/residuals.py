@@ -27,7 +27,6 @@ from .parameter_file import CalibratedParameter
 # Of a difference, in standard deviations of a prior or of a start value; chosen: solvers keep some
 # digits.
 STEP = 0.05
-REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
 MOST_STEPS = 30  # of a fit; chosen: a dozen suffices from a start value
 LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
@@ -174,10 +173,9 @@ class WindowResiduals:
                 self.failed.append((self.values(s), why))
             off = [self._off(w, p) for w, p in zip(self.windows, each, strict=True)]
             self._known[s, moved] = np.concatenate(off)
-        found = [self._known[s, moved] for s in settings]
-        while len(self._known) > REMEMBERED:
-            del self._known[next(iter(self._known))]
-        return found
+        # A fit asks for the same again at once, with its slopes.
+        self._known = {(s, moved): self._known[s, moved] for s in settings}
+        return [self._known[s, moved] for s in settings]
 
     def _off(self, w: Window, p: PlayedBack) -> np.ndarray:
         at = w.course.h * np.arange(len(p.outputs))
@@ -221,7 +219,7 @@ class WindowResiduals:
         Raises:
             InputError: the FMU fails there.
         """
-        self._known = {key: r for key, r in self._known.items() if not key[1]}
+        self._known.clear()
         self._whitening = [self._whitening_of(w, setting) for w in self.windows]
 
     def _whitening_of(self, w: Window, setting: Setting) -> Whitening:

@@ -9,6 +9,7 @@ from cosim import InputError
 
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
+from ..search.most_likely import STEPS
 from ..search.prediction_fit.joint_posterior import together
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
@@ -16,7 +17,6 @@ from .residuals import Setting, WindowResiduals
 # Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
 # it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
-HALVINGS = 5  # of a range that the FMU fails in, to find where it works; chosen: to a thirtieth
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedPara
         if not fault or z == 0.0:
             continue
         works, fails = 0.0, z
-        for _ in range(HALVINGS):
+        for _ in range(STEPS):
             middle = 0.5 * (works + fails)
             works, fails = (works, middle) if _fault(r, start, k, middle) else (middle, fails)
         ends[side] = p.at(works)

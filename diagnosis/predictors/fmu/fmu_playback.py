@@ -1,7 +1,8 @@
 """An FMU along given inputs from a given start, many times, in confined processes.
 
 An instance is reset between two predictions, if a reset is seen to leave it as its instantiation does;
-else each prediction has an instance of its own. A request that fails says why; the others go on.
+else, and where it must know nothing of other predictions, each has an instance, and so a process, of its
+own. A request that fails says why; the others go on.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,16 +75,19 @@ class PlayedBack:
 
 
 class Playback:
-    """An FMU in one process.
+    """An FMU in one process at a time.
 
     Args:
         fmu: the FMU.
         inputs, outputs: variables that are put and got in each step.
+        fresh: whether each prediction has an instance of its own.
     """
 
     _begins = Lock()  # processes are begun one after the other
 
-    def __init__(self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], fresh: bool = False
+    ) -> None:
         self._fmu, self.inputs, self.outputs = fmu, inputs, outputs
         every = fmu.model.variables
         self._starts = [float(every[name].start or 0.0) for name in inputs]
@@ -91,7 +95,7 @@ class Playback:
         self._ports = ports[: len(inputs)], ports[len(inputs) :]
         self._instance: IsolatedInstance | None = None
         self._h = 0.0  # of its steps
-        self._resets: bool | None = None
+        self._resets: bool | None = False if fresh else None
         # To save the state before each step, for one that is discarded, takes a multiple of the time.
         self._redoes = False
 
@@ -159,9 +163,11 @@ class Playback:
 class Processes:
     """An FMU in processes of its own, in which it may fail; arguments as of :class:`Playback`."""
 
-    def __init__(self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], fresh: bool = False
+    ) -> None:
         self._fmu, self.name, self.inputs, self.outputs = fmu, fmu.model.path.name, inputs, outputs
-        self._playbacks = [Playback(fmu, inputs, outputs) for _ in range(PROCESSES)]
+        self._playbacks = [Playback(fmu, inputs, outputs, fresh) for _ in range(PROCESSES)]
         self._free = SimpleQueue[Playback]()
         for playback in self._playbacks:
             self._free.put(playback)

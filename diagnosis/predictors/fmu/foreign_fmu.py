@@ -208,7 +208,7 @@ class FmuPredictor(BlackBox):
             tuple(dict.fromkeys(c.name for c in self.map.told(g).values()))
             for g in ("inputs", "outputs")
         )
-        self.processes = Processes(process, inputs, outputs)
+        self.processes = Processes(process, inputs, outputs, fresh=True)
         self.learned_from = fmu.learned_from
         self.files = [(role, path, sha256(path)) for role, path in fmu.files]
         self.lines = signal_lines(self.map, commands_of([w.run for w in runs]))
