@@ -89,12 +89,10 @@ def _calibrates_fmu(options: argparse.Namespace) -> bool:
 
 def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
     """The one answer where the parameters of an FMU are calibrated."""
-    from .fmu_parameters.output.learn_fmu import learn_ship, learn_system
-    from .fmu_parameters.system_task import is_system
+    from .fmu_parameters.output.learn_fmu import learn_fmu
 
     origin = {name: str(value) for name, value in _origin(options).items()}
-    work = learn_system if is_system(options.train, options.map) else learn_ship
-    return Done(0, work(options, advance, origin, execution_of(options)).shown(str(options.out)))
+    return Done(0, learn_fmu(options, advance, origin, execution_of(options)).shown(str(options.out)))
 
 
 def _begun(options: argparse.Namespace, advance: Advance) -> "Session":

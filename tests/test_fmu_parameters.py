@@ -18,7 +18,6 @@ from cosim import InputError, Unit
 from cosim.fmu import ConfinedFmu, FmuModel
 from diagnosis import learn, linearise, parameters
 from diagnosis.fmu_parameters.additional_force import AdditionalForce
-from diagnosis.fmu_parameters.fmu_playback import InputCourse, Playback, PlaybackRequest, Processes
 from diagnosis.fmu_parameters.force_search import candidates
 from diagnosis.fmu_parameters.linear_model import linearised, states_of
 from diagnosis.fmu_parameters.measured_system import MeasuredRun, noise_of, noises, windows_of
@@ -30,16 +29,18 @@ from diagnosis.fmu_parameters.parameter_file import (
     proposed,
     read_parameters,
 )
-from diagnosis.fmu_parameters.residuals import Whitening, laid
+from diagnosis.fmu_parameters.residuals import Whitening
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 from diagnosis.fmu_parameters.system_remainder import change_of_squares
+from diagnosis.predictors.black_box import laid
+from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes
 
 pytestmark = needs_compiler
 
 H, NOISE = 0.05, 1e-3
 MAP = {"inputs": {"force": "f"}, "outputs": {"position": "x"}}
 START = {"position": "x0", "der(position)": "v0"}
-DRAG = AdditionalForce("f", "v", 1, False, -3.0)
+DRAG = AdditionalForce("f", "v", 2, False, -3.0)
 
 
 @pytest.fixture(scope="module")
@@ -53,16 +54,23 @@ def work(tmp_path, monkeypatch):
     return tmp_path
 
 
+def played_back(fmu, driven, seen, prediction, forces=()):
+    """Outputs (steps + 1, m) of an FMU; forces may be functions of its speed and place."""
+    known = ["x", "v"] if forces else seen
+    terms = [t for f in forces for t in f.terms([driven], known)]
+    playback = Playback(ConfinedFmu(FmuModel(fmu)), [driven], known)
+    found = playback.run(prediction._replace(terms=terms))
+    playback._fmu.close()
+    assert not found.fault
+    return found.outputs[:, : len(seen)]
+
+
 def measured(fmu, folder, name, values, forces=(), seed=1, seconds=30.0):
     """A run of the FMU with other values and a force beside it, and noise, as a CSV file."""
     rng = np.random.default_rng(seed)
     t = H * np.arange(round(seconds / H) + 1)
     force = 2.0 * np.sin(0.7 * t + seed) + 1.5 * rng.uniform(-1.0, 1.0, t.size)[(t / 3.0).astype(int)]
-    playback = Playback(
-        ConfinedFmu(FmuModel(fmu)), ["f"], ["x", "v"], [InputCourse(H, {}, force[:-1, None])]
-    )
-    x = playback.run(PlaybackRequest(0, values, forces)).outputs[:, 0]
-    playback._fmu.close()
+    (x,) = played_back(fmu, "f", ["x"], PlaybackRequest(H, values, force[:-1, None]), forces).T
     table = {"time": t, "force": force, "position": x + NOISE * rng.standard_normal(t.size)}
     path = folder / f"{name}.csv"
     pd.DataFrame(table).to_csv(path, index=False)
@@ -177,7 +185,8 @@ def test_whitening_is_the_inverse_root_of_the_covariance():
 
 def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():
     track = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
-    moved = laid(track, np.array([2.0, 3.0, np.pi / 2]))
+    onto = np.array([[2.0], [3.0], [np.pi / 2]])
+    moved = laid(track[..., None], np.zeros(1), onto)[..., 0]
     assert moved[0] == pytest.approx([2.0, 3.0, np.pi / 2])
     assert moved[4] == pytest.approx([2.0, 7.0, np.pi / 2])
 
@@ -203,11 +212,12 @@ def test_start_values_are_those_of_the_motion(fmu):
 def test_playback_adds_a_force_as_the_fmu_has_it(fmu):
     """A spring beside the FMU is its own spring, but for what a step is late."""
     force = np.sin(0.5 * np.arange(2000) * 0.01)[:, None]
-    playback = Playback(ConfinedFmu(FmuModel(fmu)), ["f"], ["x", "v"], [InputCourse(0.01, {}, force)])
-    own = playback.run(PlaybackRequest(0, {"c": 11.0})).outputs
-    beside = playback.run(PlaybackRequest(0, {}, [AdditionalForce("f", "x", 0, False, -1.0)])).outputs
-    plain = playback.run(PlaybackRequest(0, {})).outputs
-    playback._fmu.close()
+    plain, own = (
+        played_back(fmu, "f", ["x", "v"], PlaybackRequest(0.01, values, force))
+        for values in ({}, {"c": 11.0})
+    )
+    spring = AdditionalForce("f", "x", 1, False, -1.0)
+    beside = played_back(fmu, "f", ["x", "v"], PlaybackRequest(0.01, {}, force), [spring])
     assert np.abs(own - beside).max() < 0.05 * np.abs(own - plain).max()
 
 
@@ -306,7 +316,7 @@ def test_fmu_whose_states_cannot_be_set_is_refused(work, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("force", [DRAG, AdditionalForce("f", "x", 0, True, -1.0), AdditionalForce("f")])
+@pytest.mark.parametrize("force", [DRAG, AdditionalForce("f", "x", 1, True, -1.0), AdditionalForce("f")])
 def test_found_fmu_moves_as_the_fit_has_it(fmu, work, force):
     inputs, values = np.repeat([2.0, -1.0, 0.5], 20)[:, None], {"c": 12.0, "m": 2.1}
     given = {"inputs": {"force": "f"}, "outputs": {"position": "x"}, "start": START}
@@ -314,16 +324,11 @@ def test_found_fmu_moves_as_the_fit_has_it(fmu, work, force):
     assert sentence.startswith("found.fmu is oscillator.fmu with")
     new = json.loads((work / "map.json").read_text())
     assert new["start"] == {"position": "model.x0", "der(position)": "model.v0"}
-    found = []
-    for path, driven, seen, set_to in (
-        (fmu, "f", ["x", "v"], values),
-        (work / "found.fmu", new["inputs"]["force"], ["model.x", "model.v"], {}),
-    ):
-        forces = [force] if set_to else []
-        with Processes(ConfinedFmu(FmuModel(path)), [driven], seen, [InputCourse(H, {}, inputs)]) as p:
-            found += p.run([PlaybackRequest(0, set_to, forces)])
-    assert np.abs(found[0].outputs).max() > 0.1
-    assert found[1].outputs == pytest.approx(found[0].outputs, abs=1e-12)
+    fitted = played_back(fmu, "f", ["x", "v"], PlaybackRequest(H, values, inputs), [force])
+    name = new["inputs"]["force"]
+    made = played_back(work / "found.fmu", name, ["model.x", "model.v"], PlaybackRequest(H, {}, inputs))
+    assert np.abs(fitted).max() > 0.1
+    assert made == pytest.approx(fitted, abs=1e-12)
 
 
 # Commands
@@ -480,15 +485,24 @@ def test_fmu_cannot_read_the_run_unless_it_may(work, capsys, unconfined):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_fresh_prediction_knows_nothing_of_others(work, fresh):
+    """An FMU that behaves until it has run five times in a process, and then tells so."""
+    habit = "static int runs; if (t == 0.0) runs++; if (runs > 5) { p[V_x] = 7.0; return 0; }"
+    fmu = build_oscillator(work, "remembering", habit=habit)
+    processes = Processes(ConfinedFmu(FmuModel(fmu)), ["f"], ["x"], fresh)
+    found = processes.run([PlaybackRequest(H, {}, np.zeros((3, 1)))] * 16)
+    processes.close()
+    assert not any(f.fault for f in found)
+    assert any((f.outputs == 7.0).any() for f in found) != fresh
+
+
+@pytest.mark.slow
 def test_fmu_that_ends_its_process_is_said(work, capsys):
     fmu = build_oscillator(work, "fatal", habit="if (t > 1.0) abort();")
-    with Processes(
-        ConfinedFmu(FmuModel(fmu)),
-        ["f"],
-        ["x"],
-        [InputCourse(H, {}, np.zeros((40, 1))), InputCourse(H, {}, np.zeros((10, 1)))],
-    ) as p:
-        first, second = p.run([PlaybackRequest(0, {}), PlaybackRequest(1, {})])
+    processes = Processes(ConfinedFmu(FmuModel(fmu)), ["f"], ["x"])
+    first, second = processes.run([PlaybackRequest(H, {}, np.zeros((n, 1))) for n in (40, 10)])
+    processes.close()
     assert "SIGABRT" in first.fault
     assert np.isnan(first.outputs).all()
     assert not second.fault

@@ -12,6 +12,7 @@ from support.measured import sail
 import diagnosis
 from cosim import InputError
 from diagnosis import Fmu, Run
+from diagnosis.predictors.fmu.fmu_playback import Playback
 from diagnosis.predictors.predictor import Execution
 from fmus.build import build, native_targets
 
@@ -168,16 +169,14 @@ FIXED_STEP = [
 def steps_of(fmu, tmp_path, **options):
     """The lengths of the steps that an FMU is asked for while it is evaluated, and the result."""
     asked = set()
-    from diagnosis.predictors.fmu import instances
+    run = Playback._run
 
-    class Counted(instances.FmuRun):
-        def __init__(self, fmu, inputs, outputs, h):
-            asked.add(h)
-            super().__init__(fmu, inputs, outputs, h)
+    def counted(self, prediction):
+        asked.add(prediction.h)
+        return run(self, prediction)
 
     patch = pytest.MonkeyPatch()
-    patch.setattr("diagnosis.predictors.fmu.instances.FmuRun", Counted)
-    patch.setattr("diagnosis.predictors.fmu.short_steps.FmuRun", Counted)
+    patch.setattr(Playback, "_run", counted)
     try:
         model = Fmu(fmu, execution=Execution(**options))
         return asked, diagnosis.evaluate(loaded(turned(0.1, 60.0)), model)
@@ -233,17 +232,14 @@ def test_a_first_sample_that_is_an_outlier_leaves_its_window(made, tmp_path):
 @pytest.mark.slow
 def test_outputs_that_are_zero_until_the_first_step_are_told_and_left_out(made, tmp_path, monkeypatch):
     """As of an FMU that computes its outputs in its steps only; the right model is not condemned."""
-    from diagnosis.predictors.fmu import instances
+    run_of = Playback._run
 
-    whole, short = instances.FmuRun.initialise, instances.FmuRun.whole_run
-    monkeypatch.setattr(instances.FmuRun, "initialise", lambda *a: 0.0 * whole(*a))
+    def late(self, prediction):
+        found = run_of(self, prediction)
+        found.outputs[0] = 0.0
+        return found
 
-    def late(*arguments):
-        told = short(*arguments)
-        told[0] = 0.0
-        return told
-
-    monkeypatch.setattr(instances.FmuRun, "whole_run", late)
+    monkeypatch.setattr(Playback, "_run", late)
     run = turned(0.1, 60.0, offset=200.0)
     found = diagnosis.evaluate(loaded(run), made)
     (e,) = found.evaluations

@@ -100,7 +100,8 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
             )
         inertia = inertial(w, model)[:, k]
         parts = inertia**2 + (z[:, k] - inertia) ** 2
-        if name in run.absent and size[k] > SETTINGS.unbalanced * np.sqrt(parts.mean()):
+        # Both inertia and hull may be inexact.
+        if name in run.absent and size[k] > 2.0 * SETTINGS.inexact * np.sqrt(parts.mean()):
             return (
                 f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
                 "if nothing was commanded there, give it a column of zeros"
@@ -135,7 +136,7 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
     still = lasting(needed_force(every, model)[idle], every.block[idle])
-    if np.median(still / size) < SETTINGS.explained:  # on two axes of three: one may be so by chance
+    if 2.0 * np.median(still / size) < 1.0:  # on two axes of three: one may be so by chance
         return None
     return (
         f"all commands are zero for {w.every * idle.sum():.0f} s, and the motion needs "

@@ -90,8 +90,8 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         free = max(len(a) - len(beta), 1)
         variance = left[:, j] @ left[:, j] / free * (inverse[0] @ inverse[0])
         value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
-        # With less explained of what all else leaves, it is not T that moves the ship.
-        told[j] = beta[0] ** 2 > SETTINGS.explained * (beta[0] ** 2 + free * variance)
+        # With less explained than all else leaves, it is not T that moves the ship.
+        told[j] = beta[0] ** 2 > free * variance
     return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), told)
 
 

@@ -58,7 +58,7 @@ def of_commands(mistake: str, factors: Sequence[float], signals: Sequence[str] =
 
 def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, ColumnChange]:
     pairs = zip(signals, factors, strict=True)
-    return {s: ColumnChange(s, np.sign(f), abs(f)) for s, f in pairs if f != 1.0}
+    return {s: ColumnChange(s, f) for s, f in pairs if f != 1.0}
 
 
 def swapped(signals: Sequence[str], i: int, k: int) -> Reading:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..predictors.uncertainty import NEGLIGIBLE
+from ..predictors.uncertainty import MEASURED, NEGLIGIBLE
 from ..runs.cleaning import CHANCE
 
 
@@ -15,7 +15,6 @@ class AssessmentSettings:
 
     chance: float = CHANCE  # 1, of an error of the first kind, all tests of a question together
     negligible: float = NEGLIGIBLE  # 1, share of commands or windows that may be false or unexplained
-    explained: float = 0.5  # 1, share from which on most is explained, so that it has this cause
     # 1, of accelerations over commands, of commands over full thrust. Derived: half of the way, in
     # logarithms, between one thruster of two and the foot, the smallest of the units: sqrt(2 * 3.28).
     most_gain: float = 2.5
@@ -23,14 +22,13 @@ class AssessmentSettings:
     # gives a tenth, or none, is a matter of the diagnosis.
     least_gain: float = 0.1
     windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
-    inexact: float = 0.1  # 1, of the inertial force, that a model lacks at the least; chosen
+    inexact: float = MEASURED  # 1, of the inertial force, that a model lacks at the least
     lost: float = 0.5  # 1, deviation of the share of a thruster's force that is lost; chosen
     drift: float = 0.5  # 1, of the full thrust, that nothing but an actuator gives all the time; chosen
     steady: float = 0.1  # 1, of the full thrust, deviation of a force that is steady; chosen
     # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no
     # coefficient is known to 1 %.
     hardly: float = 0.01
-    unbalanced: float = 0.2  # 1, of what inertia and hull need. Derived: twice 10 % of a coefficient
     neighbours: int = 5  # windows by which that of a model error is predicted; chosen
     repeats: float = 0.25  # 1, share from which on an error is said to repeat; chosen
     # 1. Calibrated by tests/test_diagnosis_where.py: with one block three times as many regions were

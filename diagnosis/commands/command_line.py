@@ -148,7 +148,7 @@ def confinement_options(made: argparse.ArgumentParser) -> None:
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of a call to the FMU [s] (default: 100 times its usual step, at least 30 s)",
+        help="longest time of one prediction by the FMU [s] (default: 120)",
     )
     made.add_argument(
         "--unconfined",

@@ -6,20 +6,8 @@ from typing import NamedTuple
 
 from cosim.fmu import FeedbackTerm
 
-
-class Shape(NamedTuple):
-    """A function of one output; ``power`` of it is in the unit of its coefficient."""
-
-    symbol: str
-    power: int
-
-
-SHAPES = (
-    Shape("{y}", 1),
-    Shape("|{y}|{y}", 2),
-    Shape("{y}³", 3),
-)
-CONSTANT = Shape("1", 0)
+# Function of an output y that a force goes with; its number is the power of y in the coefficient's unit.
+SYMBOLS = ("1", "{y}", "|{y}|{y}", "{y}³")
 
 
 class EarthDirection(NamedTuple):
@@ -45,7 +33,7 @@ class AdditionalForce:
     Attributes:
         input: the variable that it acts on.
         output: that it is a function of; empty: constant.
-        shape: number of the function in :data:`SHAPES`; -1: constant.
+        power: number of the function in :data:`SYMBOLS`.
         rate: whether it is a function of the output's derivative by time.
         coefficient: what the function is multiplied with [N in the earth frame].
         earth: direction of a force in the earth frame, which has parts on several inputs.
@@ -53,7 +41,7 @@ class AdditionalForce:
 
     input: str
     output: str = ""
-    shape: int = -1
+    power: int = 0
     rate: bool = False
     coefficient: float = 1.0
     earth: EarthDirection | None = None
@@ -69,32 +57,28 @@ class AdditionalForce:
         return self.output if self.earth is None else self.earth.heading
 
     @property
-    def _shape(self) -> Shape:
-        return CONSTANT if self.shape < 0 else SHAPES[self.shape]
-
-    @property
     def id(self) -> str:
         """As ``f:|v|v``: the input, and what the force goes with."""
         if self.earth is not None:
             return f"earth_force:{self.earth.name}"
         y = f"der({self.output})" if self.rate else self.output
-        return f"{self.input}:{self._shape.symbol.format(y=y)}"
+        return f"{self.input}:{SYMBOLS[self.power].format(y=y)}"
 
     def unit(self, of_input: str, of_output: str) -> str:
         """Unit of the coefficient."""
         if self.earth is not None:
             return "N"
-        if not self._shape.power:
+        if not self.power:
             return of_input
         y = f"{of_output}/s" if self.rate else of_output
-        return f"{of_input}/({y})" + (f"^{self._shape.power}" if self._shape.power > 1 else "")
+        return f"{of_input}/({y})" + (f"^{self.power}" if self.power > 1 else "")
 
     def terms(self, inputs: Sequence[str], outputs: Sequence[str]) -> list[FeedbackTerm]:
         """The force by the numbers of its variables."""
         place = outputs.index(self.signal) if self.signal else 0
         if self.earth is None:
             slot = inputs.index(self.input)
-            return [FeedbackTerm(slot, place, self._shape.power, self.rate, self.coefficient)]
+            return [FeedbackTerm(slot, place, self.power, self.rate, self.coefficient)]
         turn = self.earth.turn
         return [
             FeedbackTerm(inputs.index(name), place, 1, False, self.coefficient * gain, turn, phase)

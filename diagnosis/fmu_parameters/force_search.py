@@ -1,20 +1,20 @@
 """Which additional force explains what parameters do not."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..execution.progress import Advance
-from .additional_force import SHAPES, AdditionalForce
+from ..search.most_likely import LEVEL
+from .additional_force import SYMBOLS, AdditionalForce
 from .parameter_fit import ParameterFit, added, fit
-from .residuals import Setting, WindowResiduals, replaced
+from .residuals import Setting, WindowResiduals
 
 TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
 # Correlation of two signals that are one, and of what two forces change beyond parameters, which no such
 # run discriminates.
 SAME = 0.999  # chosen
-PROBABLE = 0.05  # of a candidate that belongs to the set of those that cannot be told apart; chosen
 ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
 # Central, forward, backward: how an FMU integrates decides which difference its own rate is.
 RATES = (np.gradient, lambda y: np.diff(y, append=y[-1]), lambda y: np.diff(y, prepend=y[0]))
@@ -55,7 +55,7 @@ def candidates(
         found.append(AdditionalForce(i))
         for y in outputs:
             rates = (False, True) if y in measured else (False,)
-            found += [AdditionalForce(i, y, k, rate) for rate in rates for k in range(len(SHAPES))]
+            found += [AdditionalForce(i, y, k, rate) for rate in rates for k in range(1, len(SYMBOLS))]
     return found
 
 
@@ -106,12 +106,12 @@ def search(
     log = 0.5 * np.array([0.0, *(score for score, *_ in fits)])
     weight = np.exp(log - log.max())
     weight /= weight.sum()
-    own = weight[1:]
+    own, unlikely = weight[1:], 1.0 - LEVEL
     best, (_, one, force) = float(own[0]), fits[0]
-    near = [f.id for w, (_, _, f) in zip(own, fits, strict=True) if f.id != force.id and w > PROBABLE]
+    near = [f.id for w, (_, _, f) in zip(own, fits, strict=True) if f.id != force.id and w > unlikely]
     alike = (*same.get(force.id, ()), *near)
     end = one.setting.forces[-1]
-    gained = Accepted(end, best, float(own[own > PROBABLE].sum()), alike, at.cost - one.cost)
+    gained = Accepted(end, best, float(own[own > unlikely].sum()), alike, at.cost - one.cost)
     return one, gained
 
 
@@ -147,7 +147,7 @@ def _promising(
 def _same(gain: float, correlation: float) -> bool:
     """Whether the runs do not discriminate two forces: the second would gain hardly less."""
     lost = gain * (1.0 - correlation**2)
-    return abs(correlation) > SAME and lost < -2.0 * float(np.log(PROBABLE))
+    return abs(correlation) > SAME and lost < -2.0 * float(np.log(1.0 - LEVEL))
 
 
 def _with_prior(at: ParameterFit) -> np.ndarray:
@@ -190,15 +190,16 @@ def _scaled(
     sizes = {o: _size(r, k) for k, o in enumerate(r.processes.outputs)}
 
     def by(pairs: Sequence[tuple[AdditionalForce, float]]) -> list[np.ndarray]:
-        settings = [Setting(at.setting.z, (*at.setting.forces, replaced(f, c))) for f, c in pairs]
+        settings = [
+            Setting(at.setting.z, (*at.setting.forces, replace(f, coefficient=c))) for f, c in pairs
+        ]
         return [x - base for x in r.whitened(settings)]
 
     def first(f: AdditionalForce) -> float:
         y = sizes.get(f.output, 1.0) if f.output else 1.0
         if f.rate:
             y /= max(float(np.median([w.time[-1] for w in r.windows])) / 10.0, 1e-9)
-        power = f.shape + 1
-        return SMALL * usual[f.input] / max(y, 1e-12) ** power
+        return SMALL * usual[f.input] / max(y, 1e-12) ** f.power
 
     guess = [(f, first(f)) for f in forces]
     found = []

@@ -15,14 +15,14 @@ from cybership.message_text import quoted
 
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, TAU
-from ..predictors.fmu.instances import FmuRun, confined
+from ..predictors.fmu.fmu_playback import confined
 from ..predictors.fmu.short_steps import ShortSteps
 from ..predictors.fmu.variable_map import VariableMap, propose
+from ..predictors.weak_form import SMALL
 from ..report.document import write_json
 from ..runs import QUANTITY
 from .system_map import SystemMap, column_of_start
 
-SMALL = 1e-3  # of a value, or of one unit where that is less, the step of a difference; chosen
 STEP = 1e-3  # s, of the short steps where the FMU suggests none; chosen
 
 
@@ -192,7 +192,7 @@ def linearised(
             columns = []
             for name in (*(s.name for s in states), *inputs):
                 value = {**start, **driven}[name]
-                d = SMALL * max(abs(value), 1.0)
+                d = SMALL * max(abs(value), 1.0)  # of one unit where the value is less
                 sides = []
                 for moved in (value - d, value + d):
                     changed = {name: moved}
@@ -227,11 +227,18 @@ def _exact(
     told = fmu.model.description.coSimulation
     if told is None or not told.providesDirectionalDerivative or any(s.order for s in states):
         return None
-    run = FmuRun(fmu, [*driven], outputs, h)
+    variables, instance = fmu.model.variables, fmu.instance()
     try:
-        run.initialise(start, [*driven.values()], h)
-        return run.slopes([*(s.seen for s in states), *outputs], [*(s.name for s in states), *driven])
+        instance.set_up(h)
+        for name, value in {**start, **driven}.items():
+            instance.set_value(variables[name], value)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        unknown = [variables[n] for n in (*(s.seen for s in states), *outputs)]
+        known = [variables[n] for n in (*(s.name for s in states), *driven)]
+        columns = [instance.directional_derivative(unknown, v) for v in known]
+        return np.array(columns).reshape(len(known), len(unknown)).T
     except SimulationError:
         return None
     finally:
-        run.instance.free()
+        instance.free()

@@ -11,13 +11,13 @@ from cosim.errors import nearest
 from cosim.fmu import FmuModel
 from cybership.message_text import quoted
 
+from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.tables import column_names, numbers, table_of_file
-from .fmu_playback import InputCourse
+from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
 LOGS = ("log.csv", "log.parquet")
-FEWEST = 20  # samples of a window; chosen: less tells hardly more than its own start
 MOST_STEPS = 20  # between two samples; chosen, an FMU that wants more of them takes them itself
 DIGITS = 1e-5  # of an output's spread: noise below that is rounding; chosen
 # By which the standard deviation of a start value is larger than that of its parabola, which also bends
@@ -58,7 +58,7 @@ class Window:
 
     run: str
     begin: float
-    course: InputCourse
+    course: PlaybackRequest
     time: np.ndarray
     measured: np.ndarray
     start_std: Mapping[str, float]
@@ -229,7 +229,7 @@ def _window(
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])
-    return Window(run.name, begin, InputCourse(h, start, inputs), t[counts], measured[counts], std)
+    return Window(run.name, begin, PlaybackRequest(h, start, inputs), t[counts], measured[counts], std)
 
 
 def _at_start(t: np.ndarray, y: np.ndarray, noise: float, rate: bool) -> tuple[float, float]:

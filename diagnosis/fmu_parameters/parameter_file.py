@@ -10,7 +10,7 @@
 
 import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -42,6 +42,7 @@ class Kind(NamedTuple):
 
     Attributes:
         name: of the kind.
+        unit: name of its unit, where a file leaves out the definition; empty: no other one.
         exponents: of kg, m, s, A, K, mol, cd.
         rel_std: relative standard deviation of the prior. Chosen: a weighed or measured quantity to a
             tenth, one that data sheets state to three tenths, one that is mostly guessed to a half.
@@ -49,31 +50,32 @@ class Kind(NamedTuple):
     """
 
     name: str
+    unit: str
     exponents: tuple[int, ...]
     rel_std: float
     positive: bool
 
 
 KINDS = (
-    Kind("mass", (1, 0, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("moment of inertia", (1, 2, 0, 0, 0, 0, 0), 0.3, True),
-    Kind("length", (0, 1, 0, 0, 0, 0, 0), 0.1, False),
-    Kind("area", (0, 2, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("volume", (0, 3, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("density", (1, -3, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("time constant", (0, 0, 1, 0, 0, 0, 0), 0.3, True),
-    Kind("frequency", (0, 0, -1, 0, 0, 0, 0), 0.3, True),
-    Kind("stiffness", (1, 0, -2, 0, 0, 0, 0), 0.3, True),
-    Kind("damping", (1, 0, -1, 0, 0, 0, 0), 0.5, True),
-    Kind("temperature", (0, 0, 0, 0, 1, 0, 0), 0.02, False),
-    Kind("heat capacity", (1, 2, -2, 0, -1, 0, 0), 0.3, True),
-    Kind("thermal conductance", (1, 2, -3, 0, -1, 0, 0), 0.5, True),
-    Kind("electric resistance", (1, 2, -3, -2, 0, 0, 0), 0.1, True),
-    Kind("inductance", (1, 2, -2, -2, 0, 0, 0), 0.3, True),
-    Kind("capacitance", (-1, -2, 4, 2, 0, 0, 0), 0.3, True),
+    Kind("mass", "kg", (1, 0, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("moment of inertia", "kg.m2", (1, 2, 0, 0, 0, 0, 0), 0.3, True),
+    Kind("length", "m", (0, 1, 0, 0, 0, 0, 0), 0.1, False),
+    Kind("area", "m2", (0, 2, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("volume", "m3", (0, 3, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("density", "", (1, -3, 0, 0, 0, 0, 0), 0.1, True),
+    Kind("time constant", "s", (0, 0, 1, 0, 0, 0, 0), 0.3, True),
+    Kind("frequency", "Hz", (0, 0, -1, 0, 0, 0, 0), 0.3, True),
+    Kind("stiffness", "N/m", (1, 0, -2, 0, 0, 0, 0), 0.3, True),
+    Kind("damping", "N.s/m", (1, 0, -1, 0, 0, 0, 0), 0.5, True),
+    Kind("temperature", "K", (0, 0, 0, 0, 1, 0, 0), 0.02, False),
+    Kind("heat capacity", "J/K", (1, 2, -2, 0, -1, 0, 0), 0.3, True),
+    Kind("thermal conductance", "W/K", (1, 2, -3, 0, -1, 0, 0), 0.5, True),
+    Kind("electric resistance", "Ohm", (1, 2, -3, -2, 0, 0, 0), 0.1, True),
+    Kind("inductance", "H", (1, 2, -2, -2, 0, 0, 0), 0.3, True),
+    Kind("capacitance", "F", (-1, -2, 4, 2, 0, 0, 0), 0.3, True),
 )
-QUADRATIC = Kind("quadratic damping", (), 0.5, False)
-OTHER = Kind("other", (), 0.3, False)
+QUADRATIC = Kind("quadratic damping", "", (), 0.5, False)
+OTHER = Kind("other", "", (), 0.3, False)
 
 
 class Prior(BaseModel):
@@ -241,7 +243,7 @@ def _with_prior(v: FmuVariable) -> CalibratedParameter:
     Raises:
         ValueError: its value is no scale and it has no range.
     """
-    value, unit = float(v.start or 0.0), "1" if v.unit is None else v.unit.name
+    value, unit = float(v.start or 0.0), unit_of(v)
     kind = kind_of(v.unit)
     positive = value > 0.0 and (kind.positive or (v.min is not None and v.min >= 0.0))
     if value:
@@ -256,22 +258,18 @@ def _with_prior(v: FmuVariable) -> CalibratedParameter:
     )
 
 
+def unit_of(v: FmuVariable) -> str:
+    """Name of a variable's unit; 1 where the FMU states none."""
+    return "1" if v.unit is None else v.unit.name
+
+
 def kind_of(unit: Unit | None) -> Kind:
     """The kind of a quantity by its unit; :data:`OTHER` where that says nothing."""
-    exponents = None if unit is None else unit.exponents or _BY_NAME.get(unit.name)
-    # N.s2/m has the dimension of a mass.
-    if unit is not None and re.match(r"N\.(m\.)?s2", unit.name):
+    if unit is None:
+        return OTHER
+    if re.match(r"N\.(m\.)?s2", unit.name):  # N.s2/m has the dimension of a mass
         return QUADRATIC
-    return next((k for k in KINDS if k.exponents == exponents), OTHER)
-
-
-# Exponents of units whose definition a file leaves out.
-_BY_NAME: Mapping[str, tuple[int, ...]] = {
-    name: next(k.exponents for k in KINDS if k.name == kind)
-    for name, kind in (
-        ("kg", "mass"), ("m", "length"), ("m2", "area"), ("m3", "volume"), ("s", "time constant"),
-        ("Hz", "frequency"), ("N/m", "stiffness"), ("N.s/m", "damping"), ("kg.m2", "moment of inertia"),
-        ("K", "temperature"), ("J/K", "heat capacity"), ("W/K", "thermal conductance"),
-        ("Ohm", "electric resistance"), ("H", "inductance"), ("F", "capacitance"),
+    known = (
+        k for k in KINDS if unit.exponents == k.exponents or (not unit.exponents and unit.name == k.unit)
     )
-}  # fmt: skip
+    return next(known, OTHER)

@@ -1,21 +1,18 @@
 """The most likely parameters and additional forces by least squares, and how well they are known."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import norm
 
+from ..runs.cleaning import Z95
+from ..search.most_likely import ENOUGH, STEPS
 from .additional_force import AdditionalForce
-from .residuals import Setting, WindowResiduals, replaced
+from .residuals import MOST_STEPS, Setting, WindowResiduals
 
-MOST_ROUNDS = 6  # of fits, each with the slopes by start values about the last one; chosen
-SETTLED = 0.1  # posterior standard deviations by which a value moves in the last round; chosen
-MOST_STEPS = 30  # of a fit; chosen: a dozen suffices from a start value
-Z95 = float(norm.ppf(0.975))
 # Cost at the ends of a normal 95 % interval is 3.84 higher. Where it differs by more than a fifth of
 # that, the interval is that of the profile (chosen).
 NOT_NORMAL = 0.2
@@ -99,7 +96,7 @@ def fit(
         y = whole.copy()
         y[free] = x
         forces = zip(begin.forces, (y[p:] * size).tolist(), strict=True)
-        return Setting(tuple(y[:p].tolist()), tuple(replaced(f, c) for f, c in forces))
+        return Setting(tuple(y[:p].tolist()), tuple(replace(f, coefficient=c) for f, c in forces))
 
     def residuals(x: np.ndarray) -> np.ndarray:
         s = setting(x)
@@ -137,11 +134,11 @@ def fitted(r: WindowResiduals, begin: Setting, sizes: Sequence[float] = ()) -> P
     last = fit(r, begin, sizes)
     if not any(w.start_std for w in r.windows):
         return last
-    for _ in range(MOST_ROUNDS):
+    for _ in range(STEPS):
         r.whiten_about(last.setting)
         new = fit(r, last.setting, sizes)
         change = np.subtract(new.setting.z, last.setting.z)
-        still = np.abs(change) < SETTLED * np.sqrt(np.diag(new.covariance)[: change.size])
+        still = change**2 < ENOUGH * np.diag(new.covariance)[: change.size]
         last = new
         if still.all():
             break
@@ -183,7 +180,7 @@ def _reach(
         z[k] = f.setting.z[k] + sign * d
         change = sign * d * line[len(z) :] * np.array(f.sizes)
         forces = zip(f.setting.forces, f.coefficients, change, strict=True)
-        s = Setting(tuple(z.tolist()), tuple(replaced(g, c + float(x)) for g, c, x in forces))
+        s = Setting(tuple(z.tolist()), tuple(replace(g, coefficient=c + float(x)) for g, c, x in forces))
         (found,) = r.whitened([s])
         total = float(found @ found + z @ z) - f.cost
         return total / inflation if np.isfinite(total) else np.inf
@@ -215,4 +212,4 @@ def _profile(r: WindowResiduals, f: ParameterFit, k: int, change: float) -> floa
 
 def added(f: ParameterFit, force: AdditionalForce, size: float) -> tuple[Setting, tuple[float, ...]]:
     """Where to begin with one more force, as yet zero, and the units of all."""
-    return Setting(f.setting.z, (*f.setting.forces, replaced(force, 0.0))), (*f.sizes, size)
+    return Setting(f.setting.z, (*f.setting.forces, replace(force, coefficient=0.0))), (*f.sizes, size)

@@ -9,25 +9,26 @@ the slopes are those about the most likely start (Laplace's method).
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from cosim import InputError
-from fmus.frames import rotate_to_earth
 from fmus.ops import wrap
 
+from ..predictors.black_box import laid
+from ..predictors.fmu.fmu_playback import PlaybackRequest, PlayedBack, Processes
 from .additional_force import AdditionalForce
-from .fmu_playback import PlaybackRequest, PlayedBack, Processes
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-STEP = 0.02  # of a central difference, in prior standard deviations; chosen: solvers keep some digits
-REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit
-LARGEST = 1e50  # of a residual: more is not finite, and its square is; chosen
-START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
-MOST_STARTS = 30  # tried in a window; chosen: a dozen suffices
+# Of a difference, in standard deviations of a prior or of a start value; chosen: solvers keep some
+# digits.
+STEP = 0.05
+LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
+MOST_STEPS = 30  # of a fit; chosen: a dozen suffices from a start value
 LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
 
@@ -72,7 +73,6 @@ class WindowResiduals:
     Args:
         processes: that run the FMU.
         windows: of the runs.
-        first: number of the course of the first window; the others follow.
         noise: (m,), of each output.
         parameters: that are calibrated.
         lines: (2, m), gain and offset that make of an output what is measured; None: it is that.
@@ -86,13 +86,12 @@ class WindowResiduals:
         self,
         processes: Processes,
         windows: Sequence[Window],
-        first: int,
         noise: np.ndarray,
         parameters: Sequence[CalibratedParameter],
         lines: np.ndarray | None = None,
         angles: Sequence[int] = (),
     ) -> None:
-        self.processes, self.windows, self._first = processes, windows, first
+        self.processes, self.windows = processes, windows
         self.noise, self.parameters, self.angles = noise, parameters, [*angles]
         m = noise.size
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
@@ -138,12 +137,18 @@ class WindowResiduals:
         self, settings: Sequence[Setting], windows: Sequence[int] | None = None
     ) -> list[list[PlayedBack]]:
         """Of each setting the prediction in each window."""
-        which = range(len(self.windows)) if windows is None else windows
-        requests = [
-            PlaybackRequest(self._first + k, self.values(s), s.forces) for s in settings for k in which
-        ]
-        found = self.processes.run(requests)
+        which = self.windows if windows is None else [self.windows[k] for k in windows]
+        found = self.processes.run([self._prediction(w, s) for s in settings for w in which])
         return [found[j : j + len(which)] for j in range(0, len(found), len(which))]
+
+    def _prediction(
+        self, w: Window, setting: Setting, begin: Mapping[str, float] = MappingProxyType({})
+    ) -> PlaybackRequest:
+        """That of a window with a setting and other start values."""
+        start = {**w.course.start, **self.values(setting), **begin}
+        of = self.processes
+        terms = [t for f in setting.forces for t in f.terms(of.inputs, of.outputs)]
+        return w.course._replace(start=start, terms=terms)
 
     def raw(self, settings: Sequence[Setting]) -> list[np.ndarray]:
         """Of each setting the residuals (size,) in units of the noise; NaN where the FMU fails."""
@@ -155,12 +160,12 @@ class WindowResiduals:
         """The same where the windows begin with other start values."""
         moved = any(begins)
         new = [s for s in dict.fromkeys(settings) if (s, moved) not in self._known]
-        requests = [
-            PlaybackRequest(k, {**self.values(s), **begin}, s.forces)
+        asked = [
+            self._prediction(w, s, begin)
             for s in new
-            for k, begin in enumerate(begins, self._first)
+            for w, begin in zip(self.windows, begins, strict=True)
         ]
-        predicted = iter(self.processes.run(requests))
+        predicted = iter(self.processes.run(asked))
         for s in new:
             each = [next(predicted) for _ in self.windows]
             why = next((p.fault for p in each if p.fault), "")
@@ -168,10 +173,9 @@ class WindowResiduals:
                 self.failed.append((self.values(s), why))
             off = [self._off(w, p) for w, p in zip(self.windows, each, strict=True)]
             self._known[s, moved] = np.concatenate(off)
-        found = [self._known[s, moved] for s in settings]
-        while len(self._known) > REMEMBERED:
-            del self._known[next(iter(self._known))]
-        return found
+        # A fit asks for the same again at once, with its slopes.
+        self._known = {(s, moved): self._known[s, moved] for s in settings}
+        return [self._known[s, moved] for s in settings]
 
     def _off(self, w: Window, p: PlayedBack) -> np.ndarray:
         at = w.course.h * np.arange(len(p.outputs))
@@ -180,7 +184,9 @@ class WindowResiduals:
             for k in self.angles:
                 outputs[:, k] = np.unwrap(outputs[:, k])
             predicted = np.column_stack([np.interp(w.time, at, y) for y in outputs.T])
-            off = w.measured - (predicted if w.onto is None else laid(predicted, w.onto))
+            if w.onto is not None:
+                predicted = laid(predicted[..., None], np.zeros(1), w.onto[:, None])[..., 0]
+            off = w.measured - predicted
             off[:, self.angles] = wrap(off[:, self.angles])
             off /= self.noise
             off[~(np.abs(off) < LARGEST)] = np.nan
@@ -213,12 +219,10 @@ class WindowResiduals:
         Raises:
             InputError: the FMU fails there.
         """
-        self._known = {key: r for key, r in self._known.items() if not key[1]}
-        self._whitening = [
-            self._whitening_of(w, k, setting) for k, w in enumerate(self.windows, self._first)
-        ]
+        self._known.clear()
+        self._whitening = [self._whitening_of(w, setting) for w in self.windows]
 
-    def _whitening_of(self, w: Window, course: int, setting: Setting) -> Whitening:
+    def _whitening_of(self, w: Window, setting: Setting) -> Whitening:
         """Of one window, about the most likely start where its prediction is not linear in that."""
         names, std = [*w.start_std], np.array([*w.start_std.values()])
         middle, z = np.array([w.course.start[n] for n in names]), np.zeros(len(names))
@@ -227,17 +231,15 @@ class WindowResiduals:
             return dict(zip(names, (middle + z * std).tolist(), strict=True)) if z.any() else {}
 
         def at(starts: Sequence[np.ndarray]) -> list[PlayedBack]:
-            values = self.values(setting)
-            each = [PlaybackRequest(course, {**values, **begin(x)}, setting.forces) for x in starts]
-            return self.processes.run(each)
+            return self.processes.run([self._prediction(w, setting, begin(x)) for x in starts])
 
         def off(z: np.ndarray) -> np.ndarray:
             (there,) = at([z])
             return np.concatenate([np.nan_to_num(self._off(w, there), nan=LARGEST), z])
 
         def slopes(z: np.ndarray) -> np.ndarray:
-            base, *moved = (self._off(w, p) for p in at([z, *(z + START_STEP * np.eye(z.size))]))
-            S = np.column_stack([(r - base) / START_STEP for r in moved])
+            base, *moved = (self._off(w, p) for p in at([z, *(z + STEP * np.eye(z.size))]))
+            S = np.column_stack([(r - base) / STEP for r in moved])
             return np.where(np.isfinite(S).all(axis=0), S, 0.0)
 
         (here,) = at([z])
@@ -251,7 +253,7 @@ class WindowResiduals:
         bend = off(best)[: base.size] - base - S @ best
         if np.sqrt(np.mean(bend**2)) > LINEAR:
             jacobian: Any = lambda z: np.concatenate([slopes(z), np.eye(z.size)])  # noqa: E731
-            z = least_squares(off, z, jacobian, max_nfev=MOST_STARTS).x
+            z = least_squares(off, z, jacobian, max_nfev=MOST_STEPS).x
             S = slopes(z)
         U, size, _ = np.linalg.svd(S, full_matrices=False)
         return Whitening(U, 1.0 / np.sqrt(1.0 + size**2), begin(z), S @ z)
@@ -303,25 +305,13 @@ class WindowResiduals:
     def _forced(setting: Setting, k: int, change: float) -> Setting:
         """A setting with another coefficient of a force."""
         forces = list(setting.forces)
-        forces[k] = replaced(forces[k], forces[k].coefficient + change)
+        forces[k] = replace(forces[k], coefficient=forces[k].coefficient + change)
         return Setting(setting.z, tuple(forces))
 
     @staticmethod
     def at(setting: Setting, k: int, z: float) -> Setting:
         """A setting with another value of a parameter."""
         return Setting((*setting.z[:k], z, *setting.z[k + 1 :]), setting.forces)
-
-
-def laid(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
-    """A track (T, 3), moved and turned so that it begins in another pose (3,)."""
-    x, y, psi = (pose - pose[0]).T
-    north, east = rotate_to_earth(onto[2] - pose[0, 2], x, y)
-    return np.column_stack([onto[0] + north, onto[1] + east, onto[2] + psi])
-
-
-def replaced(f: AdditionalForce, coefficient: float) -> AdditionalForce:
-    """A force with another coefficient."""
-    return replace(f, coefficient=coefficient)
 
 
 def rms_of(

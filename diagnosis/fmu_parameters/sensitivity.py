@@ -8,15 +8,15 @@ import numpy as np
 from cosim import InputError
 
 from ..execution.progress import Advance
+from ..predictors.prediction import FAR_OFF
+from ..search.most_likely import STEPS
+from ..search.prediction_fit.joint_posterior import together
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
-from .system_calibration import together
 
 # Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
 # it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
-HALVINGS = 5  # of a range that the FMU fails in, to find where it works; chosen: to a thirtieth
-EXTREME = 3.0  # prior standard deviations, at which a range without an end is tried; chosen
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,7 @@ def sensitivities(r: WindowResiduals, advance: Advance) -> Sensitivities:
     names = [found[k].parameter.name for k in seen]
     scale = np.sqrt(np.diag(data))
     weak = np.linalg.pinv(data / np.outer(scale, scale), rcond=1e-9) if seen else np.zeros((0, 0))
-    groups = together(weak, names) if seen else []
-    return Sensitivities(found, groups)
+    return Sensitivities(found, together(names, weak))
 
 
 def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedParameter, str]:
@@ -88,12 +87,12 @@ def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedPara
     low, high = p.bounds
     faults, ends = [], {}
     for side, bound in (("min", low), ("max", high)):
-        z = float(np.clip(bound, -EXTREME, EXTREME))
+        z = float(np.clip(bound, -FAR_OFF, FAR_OFF))  # a range may have no end
         fault = _fault(r, start, k, z)
         if not fault or z == 0.0:
             continue
         works, fails = 0.0, z
-        for _ in range(HALVINGS):
+        for _ in range(STEPS):
             middle = 0.5 * (works + fails)
             works, fails = (works, middle) if _fault(r, start, k, middle) else (middle, fails)
         ends[side] = p.at(works)

@@ -2,10 +2,8 @@
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,65 +12,63 @@ from cosim.fmu import ConfinedFmu
 
 from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
-from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, Signals, at_samples, commands_at
+from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.variable_map import DISTURBANCES, QUARTER
+from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER, SI_UNIT
 from ..predictors.windows import step_of, usable_windows
-from ..runs import Smoothed
+from ..runs import QUANTITY, Smoothed
+from ..runs.sensors.evidence import FEWEST
 from .additional_force import AdditionalForce, EarthDirection
-from .fmu_playback import InputCourse, of_predictions
+from .calibration_task import CalibrationTask
 from .force_search import candidates
-from .measured_system import FEWEST, Window
+from .measured_system import Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
-from .residuals import WindowResiduals
-from .system_task import numbered, processes_of
 
-MOST_SAMPLES = (
-    60  # of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion
-)
+# Of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
+MOST_SAMPLES = 60
 # Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
 EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": QUARTER}, "F_e": {"tau_X": -QUARTER, "tau_Y": 0.0}}
-UNITS = {"x": "m", "y": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
 
 
-@dataclass
-class ShipTask:
-    """An FMU of a ship, measured runs, and its parameters.
+class ShipTask(CalibrationTask):
+    """An FMU of a ship, and measured runs.
 
-    Attributes:
-        fmu: the FMU and its map.
-        predictor: how the map is read for these runs.
-        parameters: that are calibrated.
-        notes: what a reader should know of the choice of these.
+    Args:
+        predictor: how the FMU and its map are read for these runs.
+        parameters, notes: see :class:`.calibration_task.CalibrationTask`.
         runs: use -> runs.
-        horizon: length of the windows [s].
     """
 
-    fmu: Fmu
-    predictor: FmuPredictor
-    parameters: list[CalibratedParameter]
-    notes: list[str]
-    runs: Mapping[str, Sequence[WeakWindows]]
-    _open: ExitStack = field(default_factory=ExitStack)
+    names, angles = POSE, (POSE.index("psi"),)
+    units = tuple(SI_UNIT[QUANTITY[s]] for s in POSE)
 
-    names = POSE
+    def __init__(
+        self,
+        predictor: FmuPredictor,
+        parameters: list[CalibratedParameter],
+        notes: list[str],
+        runs: Mapping[str, Sequence[WeakWindows]],
+    ) -> None:
+        super().__init__(parameters, notes)
+        self.predictor, self.runs, told = predictor, runs, predictor.map.told
+        self.driven = predictor.processes.inputs
+        given = {**told("inputs"), **told(DISTURBANCES)}
+        self.forces_on = [c.name for s, c in given.items() if s in BESIDE]
+        self.outputs = [told("outputs")[s].name for s in MOTION if s in told("outputs")]
+        lines = [predictor.lines["outputs"][s] for s in POSE]
+        self.lines = np.array([[line.gain for line in lines], [line.offset for line in lines]])
 
     @property
     def confined(self) -> ConfinedFmu:
-        """The FMU in its processes."""
         return self.predictor.confined
 
     @property
-    def units(self) -> list[str]:
-        """Of the pose."""
-        return [UNITS[s] for s in POSE]
+    def content(self) -> Mapping[str, Any]:
+        return self.predictor.given.content()
 
     @property
-    def forces_on(self) -> list[str]:
-        """Inputs for the force or acceleration that may act in addition."""
-        told = self.predictor.map
-        given = {**told.told("inputs"), **told.told(DISTURBANCES)}
-        return [c.name for s, c in given.items() if s in (*TAU, "u_dot", "v_dot", "r_dot")]
+    def use(self) -> dict[str, str]:
+        return {w.run.name: use for use, every in self.runs.items() for w in every}
 
     @property
     def usual(self) -> dict[str, float]:
@@ -87,12 +83,6 @@ class ShipTask:
                     size = size or float(self.predictor.ship.ship.scale.forces[k])
                     found[c.name] = size / abs(self.predictor.lines[group][s].gain)
         return dict.fromkeys(self.forces_on, 1.0) | found
-
-    @property
-    def outputs(self) -> list[str]:
-        """Variables of the pose, then of the velocity as far as the map has it."""
-        told = self.predictor.map.told("outputs")
-        return [told[s].name for s in MOTION if s in told]
 
     @property
     def possible(self) -> list[AdditionalForce]:
@@ -118,26 +108,12 @@ class ShipTask:
             direction = EarthDirection(name, heading, line.gain, parts)
             yield AdditionalForce(parts[0][0], earth=direction)
 
-    def residuals(self) -> dict[str, WindowResiduals]:
-        """Use -> the residuals of its runs, of those that there are.
-
-        Raises:
-            InputError: no window has enough samples.
-        """
+    def windows(self) -> tuple[dict[str, list[Window]], np.ndarray]:
         windows = {use: [x for w in runs for x in self._windows(w)] for use, runs in self.runs.items()}
         if not windows["train"]:
             names = ", ".join(w.run.name for w in self.runs["train"])
             raise InputError(f"no window of {names} has enough samples")
-        driven = [c.name for c in self.predictor.map.told("inputs").values()]
-        processes = processes_of(self, [*chain(*windows.values())], self.confined, driven)
-        self._open.enter_context(processes)
-        lines = [self.predictor.lines["outputs"][s] for s in POSE]
-        gains = np.array([[line.gain for line in lines], [line.offset for line in lines]])
-        noise = np.median([w.smoothed.noise for w in self.runs["train"]], axis=0)
-        return {
-            use: WindowResiduals(processes, own, first, noise, self.parameters, gains, [2])
-            for use, own, first in numbered(windows)
-        }
+        return windows, np.median([w.smoothed.noise for w in self.runs["train"]], axis=0)
 
     def _windows(self, w: WeakWindows) -> list[Window]:
         """Those of a run: of the ship's length from smoothed states, or the whole run."""
@@ -160,25 +136,15 @@ class ShipTask:
         if not p.whole:
             rows = rows[:: max(1, rows.size // MOST_SAMPLES)]
         steps = int(np.ceil(since[rows[-1]] / h - 1e-6))
-        middle = begin + (np.arange(steps) + 0.5) * h
-        at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
-        start = {n: float(x[0]) for n, x in self._of_variables("start", at).items()}
-        inputs = self._of_variables("inputs", commands_at(run, middle))
+        (course,) = p.requests(s, np.array([row]), h, steps)
         sure = dict(zip(MOTION, [*s.eta_std[row], *s.nu_std[row]], strict=True))
         std = {
             c.name: float(sure[signal]) / abs(p.lines["start"][signal].gain)
             for signal, c in p.map.told("start").items()
             if signal in sure and not p.whole
         }
-        course = InputCourse(h, start, np.column_stack([*inputs.values()]))
         onto = s.eta[rows[0]] if p.placed else None
         return Window(run.name, float(begin), course, since[rows], s.track.pose[rows], std, onto)
-
-    def _of_variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
-        """Variable -> its values, for the signals [SI] that a group of the map has."""
-        lines, told = self.predictor.lines[group], self.predictor.map.told(group)
-        known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
-        return {name: (x - line.offset) / line.gain for x, line, name in known}
 
     def state_at(self, time: float) -> dict[str, float]:
         """Start values and inputs of the FMU in the smoothed state of the first run at a time [s].
@@ -192,12 +158,8 @@ class ShipTask:
         if abs(float(s.time[row]) - time) > s.track.period:
             raise InputError(f"run '{s.track.run.name}' has no state at {time:g} s")
         at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
-        both = {**self._of_variables("start", at), **self._of_variables("inputs", at)}
+        both = {**self.predictor.of_variables("start", at), **self.predictor.of_variables("inputs", at)}
         return {n: float(x[0]) for n, x in both.items()}
-
-    def close(self) -> None:
-        """End the processes in which the FMU runs."""
-        self._open.close()
 
 
 def ship_task(
@@ -222,7 +184,7 @@ def ship_task(
 
     craft = ship_with(options.effects, options.ship)
     path = getattr(options, "model", None) or options.fmu
-    fmu = Fmu(path, options.map, craft, of_predictions(execution))
+    fmu = Fmu(path, options.map, craft, execution)
     every = [p for each in paths.values() for p in each]
     gathered = gather(every, advance, options.anyway, fmu.start, options.horizon)
     ends = np.cumsum([0, *(len(each) for each in paths.values())])
@@ -240,4 +202,4 @@ def ship_task(
         chosen, notes = proposed(fmu.model, mapped)
     if not chosen:
         raise InputError(f"'{fmu.name}' has no parameter that can be calibrated")
-    return ShipTask(fmu, predictor, chosen, notes, runs)
+    return ShipTask(predictor, chosen, notes, runs)

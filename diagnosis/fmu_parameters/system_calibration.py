@@ -8,18 +8,19 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from ..execution.progress import Advance, silent
+from ..predictors.prediction import FAR_OFF
+from ..runs.cleaning import CHANCE
+from ..search.prediction_fit.joint_posterior import together
+from ..search.shortlist import TIE
+from ..verdict.confidence import EVEN_ODDS, FOUND
 from .additional_force import AdditionalForce
 from .force_search import Accepted, search
 from .parameter_file import CalibratedParameter
 from .parameter_fit import ParameterFit, fit, fitted, intervals
-from .residuals import Setting, WindowResiduals, replaced, rms_of
-from .system_remainder import CHANCE, SystemRemainder, change_of_squares, inflation, remainder
+from .residuals import Setting, WindowResiduals, rms_of
+from .system_remainder import SystemRemainder, change_of_squares, inflation, remainder
 
-FOUND, EVEN_ODDS = 0.8, 0.5  # contract
-MOST_MOVED = 3.0  # prior standard deviations; contract
 MOST_FORCES = 3  # in one model; chosen
-WORSE = 2.0  # paired standard errors; contract
-TOGETHER = 0.97  # of a correlation, from which on two values are known only together; chosen
 Verdict = Literal["found", "ambiguous", "parameters", "unexplained", "none"]
 
 
@@ -155,7 +156,7 @@ def calibrate(
         rest if kept else first,
         first,
         rejected,
-        together(covariance, every),
+        together(every, covariance),
         best,
         covariance,
         errors,
@@ -177,7 +178,7 @@ def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
     p = len(best.setting.z)
     held = Setting((0.0,) * p, best.setting.forces)
     if not np.isfinite(r.whitened([held])[0]).all():  # forces of other parameters make the FMU diverge
-        held = Setting(held.z, tuple(replaced(f, 0.0) for f in held.forces))
+        held = Setting(held.z, tuple(replace(f, coefficient=0.0) for f in held.forces))
     other = fit(r, held, best.sizes, range(p))
     ratio = (other.data_cost - best.data_cost) / grown
     some = ratio > float(chi2.ppf(1.0 - CHANCE, p))
@@ -210,7 +211,7 @@ def verdict_of(
 
 def _far(best: ParameterFit) -> bool:
     """Whether a parameter is further from its prior mean than that allows."""
-    return bool(np.abs(best.setting.z).max() > MOST_MOVED)
+    return bool(np.abs(best.setting.z).max() > FAR_OFF)
 
 
 def rest_is_large(rest: SystemRemainder) -> bool:
@@ -227,7 +228,7 @@ def _rejected(validate: WindowResiduals | None, best: ParameterFit, start: Setti
     if not np.isfinite(after).all():
         return "with it the FMU fails on the validation runs"
     change, error = change_of_squares(validate, before, after, {w.run for w in validate.windows})
-    worse = change > WORSE * error and change > 0.0
+    worse = change > TIE * error and change > 0.0
     return "with it the prediction error of the validation runs is larger" if worse else ""
 
 
@@ -236,16 +237,3 @@ def _errors(
 ) -> dict[str, dict[str, tuple[float, float]]]:
     before, after = (rms_of(r, raw, names) for raw in r.raw([start, learned]))
     return {run: {n: (x, after[run][n]) for n, x in each.items()} for run, each in before.items()}
-
-
-def together(covariance: np.ndarray, names: Sequence[str]) -> list[list[str]]:
-    """Groups of values that are known only together: chains of correlations above TOGETHER."""
-    from scipy.sparse.csgraph import connected_components
-
-    std = np.sqrt(np.diag(covariance))
-    if not std.size:
-        return []
-    correlation = covariance / np.outer(std, std)
-    count, group = connected_components(np.abs(correlation) > TOGETHER, directed=False)
-    groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
-    return [members for members in groups if len(members) > 1]

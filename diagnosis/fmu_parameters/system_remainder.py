@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from ..predictors.uncertainty import NEGLIGIBLE, SHARE_OF_COMMAND
+from ..runs.cleaning import CHANCE
 from .measured_system import Window
 from .residuals import WindowResiduals
 
-CHANCE = 0.01  # contract: by more than chance
-# Contract: what matters, of the first error and of what makes the motion: here the motion itself.
-OF_FIRST, OF_SPREAD = 0.05, 0.02
 BINS = (4, 16, 64)  # samples whose mean is compared with that of white noise; chosen
 BLOCKS = 8  # of a run, by which the correlation of residuals is judged; chosen
 
@@ -87,7 +86,8 @@ def remainder(
         known = [np.isfinite(w.measured[:, k]) for w in r.windows]
         left, at_first = _beyond(own, known), _beyond(before, known)
         spread = _spread(r, k) / r.noise[k]
-        least = max(OF_SPREAD * spread, OF_FIRST * at_first if white is not first else 0.0)
+        # What makes the motion, of which a command is a part, is here the motion itself.
+        least = max(SHARE_OF_COMMAND * spread, NEGLIGIBLE * at_first if white is not first else 0.0)
         share = min(1.0, (left / at_first) ** 2) if at_first > 0.0 else 0.0
         p = _chance(own, known, fitted / len(names))
         found.append(OutputRemainder(name, unit, left * r.noise[k], share, p, bool(left > least)))

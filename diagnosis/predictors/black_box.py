@@ -211,14 +211,14 @@ class BlackBox(ABC):
 
     def _placed_at(self, motion: np.ndarray, h: float, since: np.ndarray, eta: np.ndarray) -> np.ndarray:
         """Pose (steps + 1, 3, w), laid onto others (w, 3) at times (w,) [s] if it cannot be set."""
-        return _laid(_pose(motion, h), since / h, eta.T) if self.placed else _pose(motion, h)
+        return laid(_pose(motion, h), since / h, eta.T) if self.placed else _pose(motion, h)
 
     def _whole_run(self, smoothed: Smoothed) -> np.ndarray:
         """Pose and velocity (n, 6) along a run from its start."""
         h = step_of(smoothed)
         steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
         motion = self.motion(smoothed, np.array([0]), h, steps)
-        pose = _laid(_pose(motion, h), np.zeros(1), smoothed.eta[:1].T)[:, :, 0]
+        pose = laid(_pose(motion, h), np.zeros(1), smoothed.eta[:1].T)[:, :, 0]
         nu = motion[:, 3:, 0]
         if np.isnan(nu).any():
             rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
@@ -331,8 +331,14 @@ def _pose(motion: np.ndarray, h: float) -> np.ndarray:
     return np.stack([sums(north), sums(east), psi], axis=1)
 
 
-def _laid(pose: np.ndarray, place: np.ndarray, onto: np.ndarray) -> np.ndarray:
-    """Tracks (steps + 1, 3, w), moved and turned onto poses (3, w) after steps (w,), or parts."""
+def laid(pose: np.ndarray, place: np.ndarray, onto: np.ndarray) -> np.ndarray:
+    """Tracks laid onto other poses.
+
+    Args:
+        pose: (steps + 1, 3, w), the tracks [m, m, rad].
+        place: (w,), after how many steps, or parts of one, each is in its other pose.
+        onto: (3, w), these poses.
+    """
     at = between_steps(pose[:, :, None], np.arange(place.size), place)[0].T
     x, y, psi = (pose - at).transpose(1, 0, 2)
     north, east = rotate_to_earth(onto[2] - at[2], x, y)

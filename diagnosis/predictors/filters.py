@@ -63,7 +63,7 @@ class Filters(NamedTuple):
         return found
 
 
-@lru_cache(maxsize=64)  # runs; a fit asks for the same several times
+@lru_cache  # a fit asks for the same runs several times
 def _undone(f: Filters, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """See :meth:`Filters.undone`: y + T dy/dt of a low-pass, and y + b of a tracker.
 

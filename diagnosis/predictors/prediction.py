@@ -80,15 +80,13 @@ class WindowStarts:
         """
         if not model.given:
             return None
-        found = []
-        for smoothed, rows in self.runs:
-            t, given = smoothed.time, model.given[smoothed.track.run.name]
-            table = np.concatenate([given.still[..., None], given.slope], axis=2)
-            edges = np.concatenate([t[:1], 0.5 * (t[1:] + t[:-1]), t[-1:]])
-            time = t[rows] + self.h * np.arange(self.steps + 1)[:, None]
-            found.append(np.diff(Integral(edges, table, table[0])(time), axis=0) / self.h)
-        together = np.moveaxis(np.concatenate(found, axis=1), 1, -1)[..., None, :]
-        return together[:, :, 0], together[:, :, 1:]
+
+        def table(smoothed: Smoothed) -> np.ndarray:
+            given = model.given[smoothed.track.run.name]
+            return np.concatenate([given.still[..., None], given.slope], axis=2)
+
+        means = self._means(table)
+        return means[:, :, 0], means[:, :, 1:]
 
     def air(self, model: Model) -> np.ndarray | None:
         """(steps, 2, 1, w): velocity of the air to north and east [m/s], mean over each step.
@@ -97,14 +95,17 @@ class WindowStarts:
         """
         if model.hull.effects.wind < 0 or all(s.air is None for s, _ in self.runs):
             return None
-        found, steps = [], np.arange(self.steps + 1)[:, None]
+        return self._means(lambda s: np.zeros((s.time.size, 2)) if s.air is None else s.air)
+
+    def _means(self, values: Callable[[Smoothed], np.ndarray]) -> np.ndarray:
+        """(steps, ..., 1, w): means over each step of what an array (n, ...) of each run holds."""
+        found = []
         for smoothed, rows in self.runs:
-            t = smoothed.time
-            air = np.zeros((t.size, 2)) if smoothed.air is None else smoothed.air
+            t, table = smoothed.time, values(smoothed)
             edges = np.concatenate([t[:1], 0.5 * (t[1:] + t[:-1]), t[-1:]])
-            at = Integral(edges, air, air[0])(t[rows] + self.h * steps)
-            found.append(np.diff(at, axis=0) / self.h)
-        return np.moveaxis(np.concatenate(found, axis=1), 1, -1)[:, :, None]
+            time = t[rows] + self.h * np.arange(self.steps + 1)[:, None]
+            found.append(np.diff(Integral(edges, table, table[0])(time), axis=0) / self.h)
+        return np.moveaxis(np.concatenate(found, axis=1), 1, -1)[..., None, :]
 
     def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""

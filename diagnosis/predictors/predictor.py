@@ -65,7 +65,7 @@ class Execution(NamedTuple):
     """How a model that is a program is run.
 
     Attributes:
-        timeout: longest wall time of a call [s]; None: by what a step usually takes.
+        timeout: longest wall time of a prediction [s]; None: as usual.
         step: length of its steps [s]; None: as it declares.
         confined: whether it is kept from files, network and other processes, where the system can.
     """

@@ -33,7 +33,7 @@ MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spike
 # s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
-PLACE, HEADING = slice(0, 2), slice(2, 3)  # channels of the pose, each of one receiver
+PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 FEWEST = 4  # samples, without which there is no third difference
 SHOWN = 3  # items of a list that a message states one by one; chosen

@@ -48,9 +48,9 @@ class MeasuredChannel:
     noise_rel_std: float
     unit: str
     noise_from: str
-    correlation: float = 0.0
-    latency: float = 0.0
-    outliers: int = 0
+    correlation: float
+    latency: float
+    outliers: int
     outlier_times: tuple[float, ...] = ()
     why: str = ""
 
@@ -103,7 +103,8 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
             float(s.noise_rel_std[k]),
             _unit(name),
             GIVEN if name in given else ESTIMATED,
-            _correlation(s.time[right], off[right, k]),
+            correlation=_correlation(s.time[right], off[right, k]),
+            latency=0.0,  # all others are late against the pose
             outliers=wrong.size,
             outlier_times=tuple(s.time[wrong[:SHOWN]].tolist()),
         )
@@ -124,7 +125,9 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
                 0.0 if name in given else _of_differences(int(new.sum())),
                 _unit(name),
                 GIVEN if name in given else ESTIMATED,
+                correlation=0.0,
                 latency=delays.get(name, 0.0),
+                outliers=0,
                 why="" if name in s.sensors.agreeing else reasons.get(name, UNUSED),
             )
 

@@ -20,13 +20,10 @@ from cosim.errors import nearest
 from fmus.ship import Ship
 
 from ..predictors import Model
+from ..predictors.uncertainty import MEASURED
 
 # One relative standard deviation of all, or of those named, by coefficient or group; None: the ship's.
 Prior = float | Mapping[str, float] | None
-
-# Relative standard deviation, at the most, where one is given for all, of what no other ship had to lend
-# (masses, thrusters' forces and places), and of every coefficient in the search.
-MEASURED = 0.1
 
 
 def shares(ship: Ship, prior: Prior) -> dict[str, float]:

@@ -12,10 +12,10 @@ from typing import NamedTuple
 from scipy.special import expit
 
 from ..predictors import Model, WeakWindows
+from ..predictors.uncertainty import MEASURED
 from ..runs.cleaning import DIGITS, EVERY
 from ..search.effect_evidence import EffectEvidence
 from ..search.findings import Finding
-from ..search.prior import MEASURED
 from ..search.refinement import at_limit
 
 # Constants of the logistic map, to be fitted by benchmarks.hidden_effects on other seeds and effects

@@ -1,22 +1,18 @@
 """An FMU with its calibrated parameters and the forces that were found in addition, as one FMU."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import cosim
-from cosim.export import export_fmu
 from cosim.fmu import FmuModel
-from cosim.process import scratch_folder
-from cosim.system import prepare
-from fmus.build import BuildError, build, native_targets
+from fmus.build import BuildError
 
+from ...predictors.fmu.fmu_container import ADDED, FOREIGN, write_container
 from ...predictors.fmu.variable_map import write_map
 from ...predictors.predictor import FOUND, MAP
 from ..additional_force import AdditionalForce
 
-FOREIGN, ADDED = "model", "found"  # instances of the container, as in that of a ship
 SOURCE = """from fmus.addition import AddedTerm, added_terms
 
 COMPONENT = added_terms({starts!r}, {count}, [{terms}])
@@ -64,23 +60,9 @@ def write_found(
         if model.variables[_name(c)].causality == "parameter"
     }
     exposed = [f"{FOREIGN}.{_name(c)}" for c in start.values()]
+    source = SOURCE.format(starts=starts, count=len(seen), terms=terms)
     try:
-        with scratch_folder() as scratch:
-            source = scratch / f"{ADDED}.py"
-            source.write_text(SOURCE.format(starts=starts, count=len(seen), terms=terms))
-            content: dict[str, Any] = {
-                "name": "wrapper",
-                "step": h,
-                "stop": 1000 * h,
-                "fmus": {
-                    ADDED: {"path": str(_built(source, scratch))},
-                    FOREIGN: {"path": str(model.path), "parameters": dict(values)},
-                },
-                "connections": wires,
-                "transformations": {target: {"factor": 1.0} for _, target in wires},
-            }
-            with closing(prepare(cosim.load_scenario(content))) as system:
-                export_fmu(system, folder / FOUND, overwrite=True, expose=exposed)
+        write_container(folder / FOUND, model.path, source, wires, (h, 1000 * h), exposed, values)
     except (cosim.InputError, BuildError) as error:
         return f"No {FOUND} is written: {error}."
     inside = {n: f"{FOREIGN}.{n}" for n in model.variables}
@@ -107,12 +89,3 @@ def _renamed(channels: Mapping[str, Any], names: Mapping[str, str]) -> dict[str,
         else:
             found[key] = names[c] if isinstance(c, str) else c
     return found
-
-
-def _built(source: Path, folder: Path) -> Path:
-    """The component as an FMU: compiled where there is a compiler."""
-    try:
-        (made,) = build(source, folder, native=native_targets())
-    except BuildError:
-        (made,) = build(source, folder)
-    return made

@@ -1,28 +1,31 @@
 """``learn`` with an FMU whose own parameters are calibrated."""
 
 import argparse
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
+from contextlib import closing
 
 from ...execution.progress import Advance
 from ...execution.result_folder import together
 from ...predictors import WRITTEN, Execution
 from ...predictors.predictor import FOUND, MAP
+from ..calibration_task import CalibrationTask
 from ..residuals import WindowResiduals
 from ..sensitivity import refuse_unknown, sensitivities
 from ..ship_task import ship_task
 from ..system_calibration import calibrate
-from ..system_task import SystemTask, system_task
+from ..system_task import is_system, system_task
 from .system_content import FILES, CalibrationReport
 from .system_plots import plots_of
 
 OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.csv", "coefficients.tex")
 
 
-def learn_system(
+def learn_fmu(
     options: argparse.Namespace, advance: Advance, origin: dict[str, str], execution: Execution
 ) -> CalibrationReport:
-    """Calibrate the FMU of any system, and write the result.
+    """Calibrate the FMU of a ship or of any other system, and write the result.
+
+    Files of an older result go away.
 
     Args:
         options: of the command.
@@ -34,46 +37,34 @@ def learn_system(
         InputError: FMU, map, parameters or runs are not as they should be.
     """
     runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
-    task = system_task(options.model, options.map, runs, options.parameters, options.horizon, execution)
-    try:
+    task: CalibrationTask
+    if is_system(options.train, options.map):
+        task = system_task(
+            options.model, options.map, runs, options.parameters, options.horizon, execution
+        )
+    else:
+        task = ship_task(options, runs, advance, execution)
+    with closing(task):
         parts = task.residuals()
-        train = parts["train"]
         if options.parameters is None:
             _only_known(task, parts, advance)
         result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
-        use = {r.name: u for u, every in task.runs.items() for r in every}
-        content = task.map.model_dump(exclude_none=True)
-        units = dict(zip(task.names, task.units, strict=True))
-        report = CalibrationReport(result, task.confined, content, use, train.samples, units, task.notes)
-        return written(report, options.out, origin, parts, task.names, advance)
-    finally:
-        task.close()
+        report = CalibrationReport(result, task, parts["train"].samples)
+        advance("report")
+        with together(options.out, [*dict.fromkeys((*FILES, *OTHERS, *WRITTEN))]) as new:
+            if result.changed and result.forces:
+                from .found_fmu import write_found  # only now: it takes a while to import
+
+                values = {v.parameter.name: v.value for v in result.values}
+                forces, h = [a.force for a in result.forces], parts["train"].windows[0].course.h
+                model = task.confined.model
+                task.notes.append(write_found(new, model, task.content, values, forces, h))
+                report.files.extend(name for name in (FOUND, MAP) if (new / name).exists())
+            report.write(new, origin, plots_of(parts, result, task.names))
+        return report
 
 
-def written(
-    report: CalibrationReport,
-    out: Path,
-    origin: dict[str, str],
-    parts: Mapping[str, WindowResiduals],
-    names: Sequence[str],
-    advance: Advance,
-) -> CalibrationReport:
-    """Write a report; files of an older result go away."""
-    advance("report")
-    found = report.result
-    with together(out, [*dict.fromkeys((*FILES, *OTHERS, *WRITTEN))]) as new:
-        if found.changed and found.forces:
-            from .found_fmu import write_found  # only now: it takes a while to import
-
-            values = {v.parameter.name: v.value for v in found.values}
-            forces, h = [a.force for a in found.forces], parts["train"].windows[0].course.h
-            report.notes.append(write_found(new, report.model, report.map, values, forces, h))
-            report.files.extend(name for name in (FOUND, MAP) if (new / name).exists())
-        report.write(new, origin, plots_of(parts, report.result, names))
-    return report
-
-
-def _only_known(task: SystemTask, parts: Mapping[str, WindowResiduals], advance: Advance) -> None:
+def _only_known(task: CalibrationTask, parts: Mapping[str, WindowResiduals], advance: Advance) -> None:
     """Leave to be calibrated what the runs can tell, within the range in which the FMU works.
 
     Raises:
@@ -89,22 +80,3 @@ def _only_known(task: SystemTask, parts: Mapping[str, WindowResiduals], advance:
     task.parameters = [s.parameter for s in found.each if s.known]
     for part in parts.values():
         part.choose(task.parameters)
-
-
-def learn_ship(
-    options: argparse.Namespace, advance: Advance, origin: dict[str, str], execution: Execution
-) -> CalibrationReport:
-    """Calibrate the FMU of a ship, and write the result; arguments as of :func:`learn_system`."""
-    runs = {use: getattr(options, use) for use in ("train", "validate", "test")}
-    task = ship_task(options, runs, advance, execution)
-    try:
-        parts = task.residuals()
-        train = parts["train"]
-        result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
-        use = {w.run.name: u for u, every in task.runs.items() for w in every}
-        content, units = task.predictor.given.content(), dict(zip(task.names, task.units, strict=True))
-        confined, notes = task.confined, task.notes
-        report = CalibrationReport(result, confined, content, use, train.samples, units, notes)
-        return written(report, options.out, origin, parts, task.names, advance)
-    finally:
-        task.close()

@@ -9,18 +9,21 @@ import numpy as np
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
-from scipy.stats import norm
 
 import cosim
-from cosim.fmu import ConfinedFmu, FmuModel
+from cosim.fmu import FmuModel
 
+from ...predictors.prediction import FAR_OFF
 from ...report.document import Document, Plot, ReportSection, numbers, write_document, write_json
 from ...report.document import Table as PageTable
+from ...runs.cleaning import Z95
+from ..additional_force import AdditionalForce
+from ..calibration_task import CalibrationTask
 from ..force_search import Accepted
-from ..system_calibration import MOST_MOVED, CalibratedValue, SystemCalibration
+from ..parameter_file import unit_of
+from ..system_calibration import CalibratedValue, SystemCalibration
 
 FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
-Z95 = float(norm.ppf(0.975))
 SENTENCES = {
     "parameters": "Parameters of the FMU differ from their values, and no other error is detected.",
     "found": "The FMU lacks an additional force.",
@@ -36,42 +39,29 @@ class CalibrationReport:
 
     Attributes:
         result: the calibration.
-        fmu: the FMU, as it was run.
-        map: which variable is what, as JSON has it.
-        use: run -> train, validate or test.
+        task: what was calibrated.
         samples: number of measured values that were learned from.
-        units: output -> unit.
-        notes: what a reader should know of how it was done.
         files: that are written.
     """
 
     result: SystemCalibration
-    fmu: ConfinedFmu
-    map: Mapping[str, Any]
-    use: Mapping[str, str]
+    task: CalibrationTask
     samples: int
-    units: Mapping[str, str]
-    notes: list[str]
     files: list[str] = field(default_factory=lambda: [*FILES])
 
     @property
     def model(self) -> FmuModel:
         """The FMU."""
-        return self.fmu.model
+        return self.task.confined.model
 
     @property
     def _notes(self) -> list[str]:
-        return [*self.result.faults, *self.notes, *self.fmu.sentences()]
+        return [*self.result.faults, *self.task.notes, *self.task.confined.sentences()]
 
-    def unit(self, variable: str) -> str:
-        """Unit of a variable of the FMU, 1 where it states none."""
-        unit = self.model.variables[variable].unit
-        return "1" if unit is None else unit.name
-
-    def force_unit(self, f: Accepted) -> str:
+    def force_unit(self, f: AdditionalForce) -> str:
         """Unit of a force's coefficient."""
-        y = self.unit(f.force.output) if f.force.output else "1"
-        return f.force.unit(self.unit(f.force.input), y)
+        every = self.model.variables
+        return f.unit(unit_of(every[f.input]), unit_of(every[f.output]) if f.output else "1")
 
     def force_interval(self, k: int) -> tuple[float, float]:
         """95 % interval of a force's coefficient."""
@@ -88,7 +78,7 @@ class CalibrationReport:
         off = [v.parameter.name for v in r.values if v.moved]
         if r.verdict in ("found", "ambiguous") and off and r.forces:
             text += f" Parameters differ as well: {', '.join(off)}."
-        if far := [v.parameter.name for v in r.values if abs(v.z) > MOST_MOVED and v.moved]:
+        if far := [v.parameter.name for v in r.values if abs(v.z) > FAR_OFF and v.moved]:
             text += (
                 f" Beyond three prior standard deviations: {', '.join(far)}; check the value or "
                 "the prior."
@@ -105,7 +95,8 @@ class CalibrationReport:
 
     def content(self) -> dict[str, Any]:
         """``diagnosis.json``."""
-        r = self.result
+        r, task, fmu = self.result, self.task, self.task.confined
+        units = dict(zip(task.names, task.units, strict=True))
         return {
             "verdict": r.verdict,
             "sentence": self.sentence,
@@ -125,17 +116,17 @@ class CalibrationReport:
             "suspect_coefficients": [
                 {"name": v.parameter.name, "z": v.z, "value": v.value}
                 for v in r.values
-                if abs(v.z) > MOST_MOVED
+                if abs(v.z) > FAR_OFF
             ],
             "ranking": [],
             "data": {"samples": self.samples, "used": self.samples},
             "errors": [
                 {
                     "run": run,
-                    "use": self.use[run],
-                    "held_out": self.use[run] == "test",
+                    "use": task.use[run],
+                    "held_out": task.use[run] == "test",
                     "outputs": {
-                        n: {"before": before, "after": after, "unit": self.units[n]}
+                        n: {"before": before, "after": after, "unit": units[n]}
                         for n, (before, after) in each.items()
                     },
                     **self._change(run),
@@ -145,11 +136,11 @@ class CalibrationReport:
             "fmu": {
                 "name": self.model.path.name,
                 "sha256": self.model.sha256,
-                "map": self.map,
+                "map": task.content,
                 "faults": list(r.faults),
-                "notes": list(self.notes),
-                "confinement": self.fmu.confinement,
-                "outside": list(self.fmu.outside),
+                "notes": list(task.notes),
+                "confinement": fmu.confinement,
+                "outside": list(fmu.outside),
             },
         }
 
@@ -168,7 +159,7 @@ class CalibrationReport:
     def _effect(self, k: int, f: Accepted) -> dict[str, Any]:
         value = {
             "value": f.force.coefficient,
-            "unit": self.force_unit(f),
+            "unit": self.force_unit(f.force),
             "ci95": [*self.force_interval(k)],
         }
         return {
@@ -223,7 +214,7 @@ class CalibrationReport:
             "names": [*(f"{self.model.name}.{n}" for n in names), *(f.id for f in forces)],
             "units": [
                 *(v.parameter.unit for v in r.values),
-                *(f.unit(self.unit(f.input), self.unit(f.output) if f.output else "1") for f in forces),
+                *map(self.force_unit, forces),
             ],
             "mean": [
                 *(v.parameter.at(x) for v, x in zip(r.values, z, strict=True)),
@@ -248,16 +239,17 @@ class CalibrationReport:
                 f.force.id,
                 value,
                 f"{low} to {high}",
-                self.force_unit(f),
+                self.force_unit(f.force),
                 f"{f.probability:.0%}",
                 alike,
             ]
 
     def error_rows(self) -> Iterator[list[str]]:
         """Rows of the table of errors."""
+        units = dict(zip(self.task.names, self.task.units, strict=True))
         for run, each in self.result.errors.items():
             for n, (before, after) in each.items():
-                yield [f"{run} ({USES[self.use[run]]})", n, *numbers([before, after]), self.units[n]]
+                yield [f"{run} ({USES[self.task.use[run]]})", n, *numbers([before, after]), units[n]]
 
     def shown(self, out: str) -> Iterator[RenderableType]:
         """The answer on the terminal."""

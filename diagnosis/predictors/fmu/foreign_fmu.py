@@ -10,7 +10,6 @@ from weakref import finalize
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from typing_extensions import deprecated
 
 import cosim
 from cosim.export import export_fmu
@@ -49,7 +48,7 @@ from ..ship_model import Model
 from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
 from ..windows import FREE_STEP, Windows, step_of
-from .instances import Begun, confined, simulate
+from .fmu_playback import PlaybackRequest, Processes, confined
 from .lineage import learned_from, parts_of, remember
 from .ship_of_fmu import SYSTEMS
 from .short_steps import ShortSteps
@@ -127,12 +126,6 @@ class Fmu:
         return self.execution.step or told
 
     @property
-    @deprecated("Each instance has a process of its own.")
-    def isolated(self) -> bool:
-        """Whether each instance has a process of its own."""
-        return True
-
-    @property
     def fixed_step(self) -> float | None:
         """The only step that it takes, or that is asked for [s]; None: it takes steps of any length."""
         told = self.model.description.coSimulation
@@ -184,7 +177,7 @@ class Fmu:
         maps = self.given(measured), self.variables(measured)  # before a process is started
         process = confined(self.model, self.execution)
         predictor = FmuPredictor(self, process, maps, runs)
-        finalize(predictor, process.close)
+        finalize(predictor, predictor.processes.close)
         return predictor
 
 
@@ -196,6 +189,7 @@ class FmuPredictor(BlackBox):
         map: the same with the units that the FMU declares.
         lines: see :func:`.variable_map.signal_lines`.
         confinement: what confines its processes, in words; "unconfined" where nothing does.
+        processes: that predict.
     """
 
     kind = "FMU"
@@ -210,6 +204,11 @@ class FmuPredictor(BlackBox):
         super().__init__(fmu.name, runs, fmu.start or nominal(runs))
         self.fmu, self.confined, self.confinement = fmu, process, process.confinement
         self.given, self.map = maps
+        inputs, outputs = (
+            tuple(dict.fromkeys(c.name for c in self.map.told(g).values()))
+            for g in ("inputs", "outputs")
+        )
+        self.processes = Processes(process, inputs, outputs, fresh=True)
         self.learned_from = fmu.learned_from
         self.files = [(role, path, sha256(path)) for role, path in fmu.files]
         self.lines = signal_lines(self.map, commands_of([w.run for w in runs]))
@@ -243,8 +242,7 @@ class FmuPredictor(BlackBox):
 
     @cached_property
     def _along_runs(self) -> Model:
-        inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
-        time = self.runs[0].scale.time
+        inputs, outputs, time = self.processes.inputs, self.processes.outputs, self.runs[0].scale.time
         h = self.fmu.fixed_step or min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
         late = bool(self.late)
         with closing(ShortSteps(self.confined, inputs, outputs, h, late)) as self._steps:
@@ -271,21 +269,26 @@ class FmuPredictor(BlackBox):
 
     def _told(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> dict[str, np.ndarray]:
         """Signal -> its values (steps + 1, w) [SI], in steps of h [s] from some rows on."""
-        run, columns = smoothed.track.run, self.map.told("outputs")
-        at, middle = self._variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
-        given = [commands_at(run, time + middle) for time in smoothed.time[rows]]
-        begun = [
-            Begun(_row(at, row), self._variables("inputs", commands))
-            for row, commands in zip(rows, given, strict=True)
-        ]
-        try:
-            told = simulate(self.confined, begun, [c.name for c in columns.values()], h, steps)
-        except cosim.InputError as error:
-            raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {error}") from None
-        return self._outputs(told)
+        found = self.processes.run([*self.requests(smoothed, rows, h, steps)])
+        if fault := next((p.fault for p in found if p.fault), ""):
+            where = f"'{self.name}' failed on run '{smoothed.track.run.name}'"
+            raise cosim.InputError(f"{where}: {fault}")
+        told = np.stack([p.outputs for p in found], axis=2)
+        return self._outputs(dict(zip(self.processes.outputs, told.transpose(1, 0, 2), strict=True)))
+
+    def requests(
+        self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int
+    ) -> Iterator[PlaybackRequest]:
+        """What the FMU gets from the states in some rows of a run on, in steps of h [s]."""
+        at, middle = self.of_variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
+        for row in rows:
+            commands = commands_at(smoothed.track.run, smoothed.time[row] + middle)
+            inputs = self.of_variables("inputs", commands)
+            driven = np.column_stack([inputs[name] for name in self.processes.inputs])
+            yield PlaybackRequest(h, _row(at, row), driven)
 
     def accelerations(self, signals: Signals) -> np.ndarray:
-        start, inputs = (self._variables(group, signals) for group in ("start", "inputs"))
+        start, inputs = (self.of_variables(group, signals) for group in ("start", "inputs"))
         size = next(iter(signals.values())).size
         return np.array([self._accelerated(_row(start, k), _row(inputs, k)) for k in range(size)])
 
@@ -339,7 +342,7 @@ class FmuPredictor(BlackBox):
         write_map(folder / MAP, (of_both or self.given).content())
         return [told]
 
-    def _variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
+    def of_variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
         """Variable -> its values, for those of some signals [SI] that a group of the map has."""
         lines, told = self.lines[group], self.map.told(group)
         known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)

@@ -1,41 +1,15 @@
-"""Inverse use of an FMU: its acceleration in a state that is set, by a few short steps from there.
+"""Inverse use of an FMU: its acceleration in a state that is set, by a few short steps from there."""
 
-The FMU is begun anew for each state. It is reset in between, if a reset is seen to leave it as its
-instantiation does; else each state has an instance of its own.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from typing import TypeVar
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cosim import InputError, SimulationError
+from cosim import InputError
 from cosim.fmu import ConfinedFmu
 
-from .instances import FmuRun
+from .fmu_playback import Playback, PlaybackRequest
 
 STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
-
-Values = Mapping[str, float]
-Found = TypeVar("Found")
-
-
-def returns_by_reset(
-    run: Callable[[], Found], same: Callable[[Found, Found], bool], close: Callable[[], None]
-) -> bool:
-    """Whether a reset leaves an FMU as its instantiation does, as far as can be seen.
-
-    Args:
-        run: runs the FMU, after a reset if it has run before.
-        same: whether two results are the same.
-        close: frees the FMU, which a failed reset has left in an unknown state.
-    """
-    new = run()
-    with suppress(SimulationError):
-        return same(new, run())
-    close()
-    return False
 
 
 class ShortSteps:
@@ -51,25 +25,21 @@ class ShortSteps:
     def __init__(
         self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], h: float, late: bool
     ) -> None:
-        self._fmu, self.h, self._late = fmu, h, late
-        self._inputs, self._outputs = tuple(inputs), tuple(dict.fromkeys(outputs))
-        self._resets: bool | None = None
-        self._begun: FmuRun | None = None
+        self._name, self.h, self._late = fmu.model.path.name, h, late
+        self._playback = Playback(fmu, tuple(inputs), tuple(dict.fromkeys(outputs)))
 
-    def run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
+    def run(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> dict[str, np.ndarray]:
         """Each output (STEPS + 1,) from a start on; from the first step on where outputs are late.
 
         Raises:
             InputError: the FMU refuses it, or fails.
         """
-        try:
-            if self._resets is None:
-                self._resets = self._tried(start, inputs)
-            return self._run(start, inputs)
-        except (InputError, SimulationError) as error:
-            self.close()
-            told, name = self._fmu.told(error), self._fmu.model.path.name
-            raise InputError(f"'{name}' cannot be set to a measured state: {told}") from None
+        playback = self._playback
+        held = np.tile([inputs[name] for name in playback.inputs], (STEPS + self._late, 1))
+        found = playback.run(PlaybackRequest(self.h, start, held))
+        if found.fault:
+            raise InputError(f"'{self._name}' cannot be set to a measured state: {found.fault}")
+        return dict(zip(playback.outputs, found.outputs[int(self._late) :].T, strict=True))
 
     def derivatives(self, x: np.ndarray) -> tuple[float, float]:
         """First and second derivative at the start of an output (STEPS + 1,), of a polynomial."""
@@ -79,24 +49,4 @@ class ShortSteps:
 
     def close(self) -> None:
         """Free the FMU."""
-        begun, self._begun = self._begun, None
-        if begun is not None:
-            begun.instance.free()
-
-    def _tried(self, start: Values, inputs: Values) -> bool:
-        """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
-        return returns_by_reset(
-            lambda: self._run(start, inputs),
-            lambda new, again: all(np.array_equal(new[name], again[name]) for name in new),
-            self.close,
-        )
-
-    def _run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
-        if self._begun is not None and self._resets is not False:
-            self._begun.instance.reset()
-        else:
-            self.close()
-            self._begun = FmuRun(self._fmu, self._inputs, self._outputs, self.h)
-        given, steps = [inputs[name] for name in self._inputs], STEPS + self._late
-        told = self._begun.whole_run(start, given, steps)
-        return dict(zip(self._outputs, told[int(self._late) :].T, strict=True))
+        self._playback.close()

@@ -17,24 +17,10 @@ from ...runs.columns.likely_columns import words_of
 
 # Words that say which frame or whose variable it is, and nothing of which signal.
 NOTHING = frozenset(
-    [
-        "ned",
-        "enu",
-        "body",
-        "ship",
-        "vessel",
-        "own",
-        "in",
-        "out",
-        "input",
-        "output",
-        "state",
-        "measured",
-        "meas",
-        "actual",
-        "linear",
-        "cg",
-    ]
+    (
+        *("ned", "enu", "body", "ship", "vessel", "own", "cg"),
+        *("in", "out", "input", "output", "state", "measured", "meas", "actual", "linear"),
+    )
 )
 # Word -> quantity.
 KINDS = {

@@ -1,27 +1,22 @@
 """A foreign FMU with what was found beside it, as one FMU."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import cosim
-from cosim.export import export_fmu
 from cosim.fmu import FmuModel as FmuModel
-from cosim.process import scratch_folder
-from cosim.system import prepare
 from fmus.addition import ACCELERATION, FORCE, Line
-from fmus.build import BuildError, build, native_targets
+from fmus.build import BuildError
 
 from ...runs import Column
 from ..ship_model import Model
 from ..weak_form import WeakWindows, omega
 from ..windows import step_of
+from .fmu_container import ADDED, FOREIGN, write_container
 from .variable_map import DISTURBANCES, VariableMap
-
-FOREIGN, ADDED = "model", "found"  # instances of the container
 
 NONE = "No FMU with the findings is written"
 SOURCE = """# What was found beside {name!r}.
@@ -73,19 +68,14 @@ def write_wrapper(
     if start.ship.effects.files:
         return f"{NONE}: the ship has effects of your own.", None
     try:
-        with scratch_folder() as folder:
-            scenario = cosim.load_scenario(_scenario(fmu, start, learned, folder, runs))
-            with closing(prepare(scenario)) as system:
-                export_fmu(system, path, overwrite=True, expose=_start_values(fmu))
+        _write(path, fmu, start, learned, runs)
     except (cosim.InputError, BuildError) as error:
         return f"{NONE}: {error}.", None
     return f"{path.name} is {fmu.name} with the findings.", _map(fmu)
 
 
-def _scenario(
-    fmu: Wrapped, start: Model, learned: Model, folder: Path, runs: Sequence[WeakWindows]
-) -> dict[str, Any]:
-    """The two FMUs, wired; values pass as they are, for the addition converts them."""
+def _write(path: Path, fmu: Wrapped, start: Model, learned: Model, runs: Sequence[WeakWindows]) -> None:
+    """Write the two, wired; values pass as they are, for the addition converts them."""
     groups = {group: fmu.map.told(group) for group in ("outputs", "inputs", DISTURBANCES)}
     lines = {g: {_plain(s): line for s, line in fmu.lines[g].items()} for g in groups}
     told: dict[str, Line | float] = {**lines["outputs"], **fmu.map.fixed}
@@ -94,28 +84,16 @@ def _scenario(
         for m in (start, learned)
     ]
     arguments = (*parts, told, lines["inputs"], lines[DISTURBANCES])
-    source = folder / f"{ADDED}.py"
-    description = start.ship.description
     text = ", ".join(map(repr, arguments))
-    source.write_text(SOURCE.format(name=fmu.name, description=description, arguments=text))
-    try:
-        (made,) = build(source, folder, native=native_targets())
-    except BuildError:  # no compiler
-        (made,) = build(source, folder)
+    source = SOURCE.format(name=fmu.name, description=start.ship.description, arguments=text)
     wires = [(f"{FOREIGN}.{c.name}", f"{ADDED}.from_{s}") for s, c in groups["outputs"].items()]
     for group, mark in (("inputs", "to"), (DISTURBANCES, "add")):
         wires += [
             (f"{ADDED}.{mark}_{_plain(s)}", f"{FOREIGN}.{c.name}") for s, c in groups[group].items()
         ]
     h = step_of(runs[0].smoothed)
-    return {
-        "name": "wrapper",
-        "step": h,
-        "stop": round(max(float(w.run.time[-1] - w.run.time[0]) for w in runs) / h) * h,
-        "fmus": {ADDED: {"path": str(made)}, FOREIGN: {"path": str(fmu.model.path)}},
-        "connections": wires,
-        "transformations": {target: {"factor": 1.0} for _, target in wires},
-    }
+    stop = round(max(float(w.run.time[-1] - w.run.time[0]) for w in runs) / h) * h
+    write_container(path, fmu.model.path, source, wires, (h, stop), _start_values(fmu))
 
 
 def _plain(signal: str) -> str:

@@ -23,13 +23,11 @@ class ColumnChange(NamedTuple):
 
     Attributes:
         source: the signal whose column it should have.
-        sign: of its axis.
-        factor: of its unit.
+        factor: of its unit, negative where its axis points the other way.
         offset: what is added then [SI].
     """
 
     source: str
-    sign: float = 1.0
     factor: float = 1.0
     offset: float = 0.0
 
@@ -49,8 +47,8 @@ def line_beside(path: Path | None, changes: Mapping[str, ColumnChange], name: st
         return ""
     layout = read_layout(path) or Layout()
     columns = {}
-    for signal, (source, sign, factor, offset) in changes.items():
-        column = layout.column(source)
+    for signal, (source, signed, offset) in changes.items():
+        column, sign, factor = layout.column(source), math.copysign(1.0, signed), abs(signed)
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if math.isclose(size, wanted)), None)

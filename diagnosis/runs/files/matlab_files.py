@@ -13,8 +13,8 @@ MATLAB = "cse1_data"
 # Its first rows, and those of the five commands. Of the two power settings the first is that forward by
 # hand, and that aft in dynamic positioning.
 ROWS = ("time", "x", "y", "z", "roll", "pitch", "psi")
-COMMANDS = slice(7, 12)
-POWER = slice(12, 14)
+COMMANDS = np.s_[7:12]
+POWER = np.s_[12:14]
 # The settings in dynamic positioning, at which the thrusters give their nominal force.
 FULL = (0.4, 0.5)
 

@@ -60,19 +60,13 @@ class JointPosterior(ShortRepr):
 
     @property
     def correlation(self) -> np.ndarray:
-        """(q, q), 1 on the diagonal; 0 beside a value that is known exactly."""
-        std = np.sqrt(np.diag(self.covariance))
-        scale = np.divide(1.0, std, out=np.zeros_like(std), where=std > 0.0)
-        found = self.covariance * scale * scale[:, None]
-        np.fill_diagonal(found, 1.0)
-        return found
+        """(q, q), see :func:`correlation`."""
+        return correlation(self.covariance)
 
     @property
     def together(self) -> list[list[str]]:
-        """Groups of values that are known only together: chains of correlations above TOGETHER."""
-        count, group = connected_components(np.abs(self.correlation) > TOGETHER, directed=False)
-        groups = [[n for n, g in zip(self.names, group, strict=True) if g == k] for k in range(count)]
-        return [members for members in groups if len(members) > 1]
+        """Groups of values that are known only together, see :func:`together`."""
+        return together(self.names, self.covariance)
 
     def write(
         self,
@@ -95,3 +89,25 @@ class JointPosterior(ShortRepr):
             "learned_from": [f.content() for f in learned_from],
         } | ({} if task is None else {"task": task})
         path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def correlation(covariance: np.ndarray) -> np.ndarray:
+    """(q, q), 1 on the diagonal; 0 beside a value that is known exactly."""
+    std = np.sqrt(np.diag(covariance))
+    scale = np.divide(1.0, std, out=np.zeros_like(std), where=std > 0.0)
+    found = covariance * scale * scale[:, None]
+    np.fill_diagonal(found, 1.0)
+    return found
+
+
+def together(names: Sequence[str], covariance: np.ndarray) -> list[list[str]]:
+    """Groups of values that are known only together: chains of correlations above TOGETHER.
+
+    Args:
+        names: of the values.
+        covariance: (q, q), of these.
+    """
+    chained = np.abs(correlation(covariance)) > TOGETHER
+    count, group = connected_components(chained, directed=False)
+    groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
+    return [members for members in groups if len(members) > 1]

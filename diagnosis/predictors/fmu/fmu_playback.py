@@ -1,0 +1,196 @@
+"""An FMU along given inputs from a given start, many times, in confined processes.
+
+An instance is reset between two predictions, if a reset is seen to leave it as its instantiation does;
+else, and where it must know nothing of other predictions, each has an instance, and so a process, of its
+own. A request that fails says why; the others go on.
+"""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from queue import SimpleQueue
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim import InputError, SimulationError
+from cosim.fmu import (
+    MEANS,
+    ConfinedFmu,
+    DoubleMemory,
+    FeedbackTerm,
+    FmuModel,
+    IsolatedInstance,
+    Port,
+)
+
+from ..predictor import Execution
+
+PROCESSES = 2  # chosen: as everywhere in the diagnosis
+LONGEST = 120.0  # s that one prediction may take; chosen: a window is some thousand steps
+
+
+def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
+    """An FMU, and the process that makes those of its instances, whose calls are whole predictions.
+
+    Raises:
+        InputError: there is no process for it.
+    """
+    try:
+        means = MEANS if execution.confined else ()
+        return ConfinedFmu(model, means, execution.timeout or LONGEST)
+    except SimulationError as error:
+        raise InputError(str(error)) from None
+
+
+class PlaybackRequest(NamedTuple):
+    """What an FMU gets in one prediction.
+
+    Attributes:
+        h: length of a step [s].
+        start: variable -> value that it begins with; an input keeps this value.
+        inputs: (steps, n), values of the first inputs in each step; all others keep their start value.
+        terms: what is added to inputs.
+    """
+
+    h: float
+    start: Mapping[str, float]
+    inputs: np.ndarray
+    terms: Sequence[FeedbackTerm] = ()
+
+
+@dataclass(frozen=True)
+class PlayedBack:
+    """A prediction.
+
+    Attributes:
+        outputs: (steps + 1, m); NaN from where the FMU failed.
+        fault: why it failed; empty: it did not.
+    """
+
+    outputs: np.ndarray
+    fault: str = ""
+
+
+class Playback:
+    """An FMU in one process at a time.
+
+    Args:
+        fmu: the FMU.
+        inputs, outputs: variables that are put and got in each step.
+        fresh: whether each prediction has an instance of its own.
+    """
+
+    _begins = Lock()  # processes are begun one after the other
+
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], fresh: bool = False
+    ) -> None:
+        self._fmu, self.inputs, self.outputs = fmu, inputs, outputs
+        every = fmu.model.variables
+        self._starts = [float(every[name].start or 0.0) for name in inputs]
+        ports = [Port(every[n], k) for k, n in enumerate((*inputs, *outputs))]
+        self._ports = ports[: len(inputs)], ports[len(inputs) :]
+        self._instance: IsolatedInstance | None = None
+        self._h = 0.0  # of its steps
+        self._resets: bool | None = False if fresh else None
+        # To save the state before each step, for one that is discarded, takes a multiple of the time.
+        self._redoes = False
+
+    def run(self, prediction: PlaybackRequest) -> PlayedBack:
+        """One prediction."""
+        try:
+            if self._resets is None:
+                self._resets = self._returns_by_reset(prediction)
+            return self._run(prediction)
+        except (SimulationError, InputError) as error:
+            self.close()
+            if not self._redoes:
+                self._redoes = True
+                return self.run(prediction)
+            return PlayedBack(self._nothing(prediction), self._fmu.told(error))
+
+    def _nothing(self, prediction: PlaybackRequest) -> np.ndarray:
+        return np.full((len(prediction.inputs) + 1, len(self.outputs)), np.nan)
+
+    def _returns_by_reset(self, prediction: PlaybackRequest) -> bool:
+        """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
+        new = self._run(prediction)
+        with suppress(SimulationError):
+            again = self._run(prediction)
+            return np.array_equal(new.outputs, again.outputs, equal_nan=True)
+        self.close()  # a failed reset has left it in an unknown state
+        return False
+
+    def _ready(self, h: float) -> IsolatedInstance:
+        if self._instance is not None and self._resets is not False and h == self._h:
+            self._instance.reset()
+            return self._instance
+        self.close()
+        with self._begins:
+            self._instance, self._h = self._fmu.instance(), h
+        count = sum(map(len, self._ports))
+        self._instance.bind(*self._ports, DoubleMemory(count), h, self._redoes)
+        return self._instance
+
+    def close(self) -> None:
+        """End its process."""
+        instance, self._instance = self._instance, None
+        if instance is not None:
+            instance.free()
+
+    def _run(self, prediction: PlaybackRequest) -> PlayedBack:
+        h, start, (steps, driven) = prediction.h, dict(prediction.start), prediction.inputs.shape
+        rows = np.tile(self._starts, (steps, 1))
+        rows[:, :driven] = prediction.inputs
+        for k, name in enumerate(self.inputs):
+            rows[:, k] = start.pop(name, rows[:, k])
+        outputs, instance = self._nothing(prediction), self._ready(h)
+        told = np.frombuffer(instance.whole_run(start, rows.tobytes(), steps, h, prediction.terms))
+        known = told.reshape(-1, len(self.outputs))
+        outputs[: len(known)] = known
+        if np.isfinite(outputs).all():
+            return PlayedBack(outputs)
+        self.close()  # a reset may not cure it
+        k = len(known) - 1
+        place = int(np.argmax(np.nan_to_num(np.abs(outputs[k]), nan=np.inf)))
+        how = "diverges" if np.isfinite(outputs[k, place]) else "is not finite"
+        return PlayedBack(outputs, f"{self.outputs[place]} {how} at t = {k * h:.6g} s")
+
+
+class Processes:
+    """An FMU in processes of its own, in which it may fail; arguments as of :class:`Playback`."""
+
+    def __init__(
+        self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], fresh: bool = False
+    ) -> None:
+        self._fmu, self.name, self.inputs, self.outputs = fmu, fmu.model.path.name, inputs, outputs
+        self._playbacks = [Playback(fmu, inputs, outputs, fresh) for _ in range(PROCESSES)]
+        self._free = SimpleQueue[Playback]()
+        for playback in self._playbacks:
+            self._free.put(playback)
+
+    def run(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
+        """Some predictions, in their order."""
+        with ThreadPoolExecutor(PROCESSES, "playback") as threads:
+            try:
+                return [*threads.map(self._one, predictions)]
+            except BaseException:  # such as Ctrl-C: predictions that are under way end with the FMU
+                threads.shutdown(wait=False, cancel_futures=True)
+                self._fmu.close()
+                raise
+
+    def _one(self, prediction: PlaybackRequest) -> PlayedBack:
+        playback = self._free.get()
+        try:
+            return playback.run(prediction)
+        finally:
+            self._free.put(playback)
+
+    def close(self) -> None:
+        """End the processes."""
+        self._fmu.close()
+        for playback in self._playbacks:
+            playback.close()
