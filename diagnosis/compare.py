@@ -8,7 +8,6 @@ if __name__ == "__main__":
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -68,7 +67,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         maps = [name for name in (MAP,) if (new / name).exists()]
         report = ReportData.of(comparison, options.model, [*FILES, *maps])
         write_json(new / COMPARISON, file_content(report))
-    written = replace(report, files=[COMPARISON, *maps])
+    written = ReportData.of(comparison, options.model, [COMPARISON, *maps])
     yield Done(0, show_comparison(written, str(options.out)), more=True)
     with together(options.out, (REPORT, *RECORD)) as new:
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
