@@ -45,8 +45,12 @@ PARTS = {
     "report": "report",
 }
 
-ANSWERS = ["compare", "compare, wall", *(f"until answer {k}" for k in (1, 2, 3))]
-REMAINING = ["first remaining time", "least", "most"]  # over the true one
+ANSWERS = ["compare", "compare, wall", "compare, report", *(f"until answer {k}" for k in (1, 2, 3))]
+# Remaining time over the true one.
+REMAINING = [
+    "first remaining time",
+    *(f"{which}{half}" for half in ("", ", second half") for which in ("least", "most")),
+]
 
 
 def seconds() -> float:
@@ -93,21 +97,32 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
         for k, _ in enumerate(answers if isinstance(answers, Iterator) else [answers]):
             found[f"until answer {k + 1}"] = seconds()
     close()
-    ratios = [left / (since - at) for at, left in stated if since - at > 1.0]
-    if ratios:
-        found |= {"first remaining time": ratios[0], "least": min(ratios), "most": max(ratios)}
+    found |= ratios(stated, since)
     return found | {"all": seconds() - begun, "wall": time.perf_counter() - wall}
 
 
+def ratios(stated: Sequence[tuple[float, float]], end: float) -> dict[str, float]:
+    """Remaining times over the true ones, of times at which they were stated [s] until an end [s]."""
+    each = [(at, left / (end - at)) for at, left in stated if end - at > 1.0]
+    found = {"first remaining time": each[0][1]} if each else {}
+    for half, begin in (("", 0.0), (", second half", 0.5 * end)):
+        if of_part := [ratio for at, ratio in each if at >= begin]:
+            found |= {f"least{half}": min(of_part), f"most{half}": max(of_part)}
+    return found
+
+
 def compare(runs: Sequence[str], ship: str | None) -> dict[str, float]:
-    """Seconds of one ``compare``, and of it by the wall."""
+    """Seconds until one ``compare`` shows the errors, the same by the wall, and until its report."""
     wall = time.perf_counter()
     from diagnosis import compare as command
 
     with TemporaryDirectory() as folder:
         of = ["--ship", ship] if ship else []
-        command.compare(command._parser().parse_args([*runs, *of, "--out", folder]), lambda step: None)
-    return {"compare": seconds(), "compare, wall": time.perf_counter() - wall}
+        options = command._parser().parse_args([*runs, *of, "--out", folder])
+        answers, found = command.compare(options, lambda step: None), {}
+        for _ in answers if isinstance(answers, Iterator) else [answers]:
+            found = found or {"compare": seconds(), "compare, wall": time.perf_counter() - wall}
+    return found | {"compare, report": seconds()}
 
 
 def simulated(folder: Path, thinned: bool = False) -> list[str]:

@@ -7,7 +7,7 @@ if __name__ == "__main__":
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -30,7 +30,7 @@ from .commands.command_line import (
 from .execution.progress import Advance
 from .execution.result_folder import together
 
-FILES = ("comparison.json", "report.html")
+COMPARISON, REPORT = FILES = ("comparison.json", "report.html")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,10 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run(compare, _parser().parse_args(arguments))
 
 
-def compare(options: argparse.Namespace, advance: Advance) -> Done:
-    """Run the command with parsed options."""
-    from .acceptance import FILES as RECORD
-    from .acceptance import lines, read_criteria, validate
+def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
+    """Run the command with parsed options: the errors, then the report and the validation record."""
+    from .acceptance.record.file_names import FILES as RECORD
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .predictors import MAP, open_model, ship_of_model, ship_with
     from .report import ReportData, file_content, show_comparison, write_report
@@ -49,7 +48,11 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
 
     if options.criteria is None and (options.sign or options.learned):
         raise InputError("--sign and --learned belong to a record: --criteria FILE.json is missing")
-    criteria = None if options.criteria is None else read_criteria(options.criteria)
+    criteria = None
+    if options.criteria is not None:
+        from .acceptance import read_criteria
+
+        criteria = read_criteria(options.criteria)
     with together(options.out, (*FILES, MAP, *RECORD)) as new:
         craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
         model = open_model(options.model, options.map, craft, execution_of(options))
@@ -61,22 +64,27 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
             comparison = session.evaluate(runs, model, advance=advance)
         advance("where it fails")
         comparison.predictor.write(new)
-        files = [*FILES, *(name for name in (MAP,) if (new / name).exists())]
-        report = ReportData.of(comparison, options.model, files)
-        write_json(new / "comparison.json", file_content(report))
+        maps = [name for name in (MAP,) if (new / name).exists()]
+        report = ReportData.of(comparison, options.model, [*FILES, *maps])
+        write_json(new / COMPARISON, file_content(report))
+    written = ReportData.of(comparison, options.model, [COMPARISON, *maps])
+    yield Done(0, show_comparison(written, str(options.out)), more=True)
+    with together(options.out, (REPORT, *RECORD)) as new:
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
-        write_report(new / "report.html", report, advance, origin)
+        write_report(new / REPORT, report, advance, origin)
         judged: list[str] = []
         if criteria is not None:
+            from .acceptance import lines, validate
+
             advance("criteria")
             files = {name: getattr(options, name) for name in ("model", "map", "effects")}
             files["ship"] = options.ship if Path(options.ship or "").is_file() else None
             command = origin["command"]
             record = validate(comparison, criteria, options.learned, files, command)
-            written = record.write_into(new, options.sign)
+            names = record.write_into(new, options.sign)
             judged = ["Criteria", *(f"  {line}" for line in lines(record.content))]
-            judged.append(f"  {', '.join(written)} in {options.out}")
-    return Done(0, [*show_comparison(report, str(options.out)), *map(printable, judged)])
+            judged.append(f"  {', '.join(names)} in {options.out}")
+    yield Done(0, [f"{REPORT} in {options.out}", *map(printable, judged)])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -86,8 +94,8 @@ def _parser() -> argparse.ArgumentParser:
         "examples:  %(prog)s run1.csv run2.csv\n"
         "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
         "           %(prog)s trial.csv --model vendor.fmu --map map.json\n"
-        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written, but map.json where "
-        "an FMU's names do not suffice)",
+        "exit codes: 0 done, 2 bad input, 130 interrupted (what was shown is kept, and map.json "
+        "where an FMU's names do not suffice)",
     )
     fmu_options(made)
     made.add_argument(

@@ -522,6 +522,17 @@ def test_compare_writes_its_numbers_and_its_page(written, tmp_path):
     assert strict(tmp_path / "out" / "comparison.json") == {"verdict": "found"}
 
 
+def test_compare_shows_its_errors_before_it_draws_the_report(written, monkeypatch, tmp_path, capsys):
+    def draw(*_):
+        assert "shown, in" in capsys.readouterr().out
+        assert (tmp_path / "out" / "comparison.json").exists()
+        raise InputError("no picture")
+
+    monkeypatch.setattr("diagnosis.report.write_report", draw)
+    assert compare.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "out")]) == 2
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"comparison.json"}
+
+
 @pytest.mark.parametrize("prior", ["-0.1", "nan", "much"])
 def test_a_prior_that_is_none_is_refused(prior, runs, capfd):
     code, _ = run(learn.main, runs / "a.csv", f"--prior={prior}")

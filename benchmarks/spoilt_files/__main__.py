@@ -33,12 +33,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", nargs="+", choices=list(WAYS), metavar="NAME", help="of the ways")
     parser.add_argument("--truth", nargs="+", default=["X_u"], metavar="ID", help="effects in it (X_u)")
     parser.add_argument("--seed", type=int, default=0, help="of all that is random (0)")
+    parser.add_argument(
+        "--processes", type=int, default=PROCESSES, metavar="N", help=f"at a time ({PROCESSES})"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for outcomes.json")
     options = parser.parse_args(arguments)
     good = table(options.good)
     outcomes = []
     print("| way | outcome | says | s |\n|---|---|---|--:|")
-    with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
         tasks = [
             pool.submit(outcome, way, good, options.truth, options.seed) for way in options.only or WAYS
         ]

@@ -55,19 +55,27 @@ class Explanation:
             windows: number of independent ones that it counts as.
         """
         s, low, high = np.array(self.priors).T
-        x, unit = np.array(self.columns) * s[:, None, None], np.eye(s.size)
-        r, b, design = e, np.zeros(s.size), unit
+        columns, unit = np.array([*(np.array(self.columns) * s[:, None, None]), e]), np.eye(s.size)
+        # (3, s + 1, s + 1), of each axis: as good as its rows, and few.
+        axes = np.linalg.qr(columns.transpose(2, 1, 0), mode="r")
+        b, design = np.zeros(s.size), unit
         for _ in range(ROUNDS):
-            noise = np.sqrt((r**2).mean(axis=0) + least**2)
-            weight = np.sqrt(windows / len(e)) / noise
-            A = np.column_stack([(x * weight).reshape(s.size, -1).T, (e * weight).ravel()])
-            R = np.linalg.qr(A).R  # as good as the rows, and few
+            weight = np.sqrt(windows / len(e)) / _noise(axes, b, len(e), least)
+            R = np.linalg.qr((axes * weight[:, None, None]).reshape(-1, s.size + 1), mode="r")
             design, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
             b = lsq_linear(design, y, (low / s, high / s), method="bvls").x
-            r = e - np.tensordot(b, x, 1)
-        noise = np.sqrt((r**2).mean(axis=0) + least**2)
+        noise = _noise(axes, b, len(e), least)
         known = np.linalg.slogdet(design.T @ design)[1]
         return float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
+
+
+def _noise(axes: np.ndarray, b: np.ndarray, windows: int, least: np.ndarray) -> np.ndarray:
+    """(3,), noise that an explanation with factors b leaves in so many windows, no less than ``least``.
+
+    ``axes`` are the triangles (3, s + 1, s + 1) of columns and model error, with the latter last.
+    """
+    left = axes @ np.append(-b, 1.0)
+    return np.sqrt((left**2).sum(axis=1) / windows + least**2)
 
 
 class ReadingOdds:

@@ -76,8 +76,12 @@ class Region:
     def phrase(self) -> str:
         """The region as a part of a sentence."""
         by = self.covariate
+        ends = [x for x in (self.low, self.high) if x is not None]
+        apart, most = np.ptp(ends), np.abs(ends).max()
+        # Of the ends three digits, of two far from zero those that tell them apart.
+        digits = 3 + max(int(np.log10(most / apart)) if apart > 0.0 else 0, 0)
         low, high = (
-            None if x is None else f"{by.display_factor * x:.3g}" for x in (self.low, self.high)
+            None if x is None else f"{by.display_factor * x:.{digits}g}" for x in (self.low, self.high)
         )
         text = by.above.format(low) if high is None else by.between.format(low, high)
         text = by.below.format(high) if low is None else text

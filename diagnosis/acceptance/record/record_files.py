@@ -7,13 +7,12 @@ from pathlib import Path
 from ...report.content import Content
 from ...report.document import Document, Plot, write_document
 from ...report.formatting import as_json
+from .file_names import FILES, PAGE, PDF, RECORD, SIGNATURE
 from .pdf import write_pdf
 from .provenance import entry
 from .sections import sections
 from .signature import public_key, sign
 
-RECORD, PAGE, PDF, SIGNATURE = (f"validation.{kind}" for kind in ("json", "html", "pdf", "sig"))
-FILES = (RECORD, PAGE, PDF, SIGNATURE)
 TITLE = "Validation record"
 
 

@@ -310,10 +310,9 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
         raise InputError(f"{where}: {quoted(strange)} is not a signal of a run{nearest(strange, known)}")
     if not groups:
         forms = ", or ".join(", ".join(group) for group in every)
-        told = f'{{"columns": {{"{every[0][0]}": "name of its column", ...}}}}'
         raise InputError(
             f"{where} has no commands: {forms}{nearest(every[0][0], names)}; "
-            f"if they have other names, put {told} into a file of the same name with .json behind it"
+            "a side-car states other names ('cybership columns FILE --write' writes one)"
         )
     power = of.power_settings
     if tuple(of.command_forms[-1]) in groups and any(layout.column(s).name in names for s in power):

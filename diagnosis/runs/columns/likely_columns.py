@@ -32,6 +32,11 @@ WORDS = {
     "rate": dict.fromkeys(("r", "yaw", "psi", "heading"), "r"),
 }
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
+# Short and other words of names -> the words that actuators' names have.
+MEANT = {
+    **dict.fromkeys(("stbd", "stb", "right"), "starboard"),
+    "left": "port",
+}
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
@@ -57,7 +62,13 @@ class LikelyColumn(NamedTuple):
 
 def words_of(name: str) -> list[str]:
     """The words of a name, small letters."""
-    return re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    found = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    return [MEANT.get(word, word) for word in found]
+
+
+def unit_in(name: str) -> str:
+    """The unit that a word of a column's name is, as rpm; empty if none is."""
+    return next((word for word in words_of(name) if word in ("rpm", "rps")), "")
 
 
 def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
@@ -176,7 +187,9 @@ def _evidence(
         return None
     if np.abs(numbers).max() > LARGEST.get(quantity, np.inf):
         return None
-    reasons, score, like = [], 0.0, _likeness(signal, bare)
+    known = WORDS.get(quantity, {})
+    means = any(known.get(word) == signal for word in words_of(bare))
+    reasons, score, like = [], 0.0, 1.0 if means else _likeness(signal, bare)
     if quantity == "time":
         if not np.all(np.diff(numbers) > 0.0):
             return None

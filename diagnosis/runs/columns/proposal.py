@@ -32,7 +32,9 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .likely_columns import LikelyColumn, likely_columns, meaning_of_words, motion_of
+from .geographic import geographic_pair, local_columns
+from .likely_columns import LikelyColumn, likely_columns, meaning_of_words, motion_of, unit_in
+from .side_car import refuse_sentences
 from .unit_check import OFTENEST, RAREST, doubts, likely_unit
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
@@ -129,10 +131,11 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     """
     of = of or ship()
     quantity = quantities(of)
-    if path.suffix not in (".csv", ".parquet") or path.is_dir():
+    if path.suffix == ".mat" or path.is_dir():
         raise InputError(f"'{path}' is not a CSV or Parquet file with named columns")
     stated, text = stated_layout(path) or Layout(), Layout()
-    if path.is_file() and path.suffix == ".csv":
+    if path.is_file() and path.suffix != ".parquet":
+        refuse_sentences(path)
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)
         if found is None:
@@ -148,14 +151,12 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     units = _units_line(path, text) if text.units_line else [""] * len(names)
     kept = {s: c for s, c in stated.columns.items() if c.name.strip()}
     columns = _columns(path, names, units, quantity, kept)
+    columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     if blank := missing(layout, names, of):
-        needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
-        blanks = text.model_copy(update={"columns": needed | {s: Column(name="") for s in blank}})
-        below = dict(zip(names, units, strict=False))
-        likely = _likely(path, layout, {n: below.get(n, "") for n in unused}, blank, quantity)
-        return Proposal(blanks, unused, None, likely)
+        below = {n: unit for n, unit in zip(names, units, strict=False) if n in unused}
+        return _with_blanks(path, layout, kept, {n: below.get(n, "") for n in unused}, blank, quantity)
     try:
         signals(layout, names, f"'{path}'", of)
     except InputError as error:
@@ -168,6 +169,25 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
     return Proposal(layout, unused, read(path, layout, of))
+
+
+def _with_blanks(
+    path: Path,
+    layout: Layout,
+    kept: Mapping[str, Column],
+    unused: Mapping[str, str],
+    blank: Sequence[str],
+    quantity: Mapping[str, str],
+) -> Proposal:
+    """The proposal where signals have no column, by the unused ones with the units below them."""
+    columns = dict(layout.columns)
+    time = layout.column("time")
+    if "time" not in {*kept, *blank} and not time.unit:
+        cells = table_of_file(path, layout, {time.name})[time.name]
+        columns["time"] = time.model_copy(update={"unit": _time_unit(_numbers(cells, "time"))})
+    needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
+    blanks = layout.model_copy(update={"columns": needed | {s: Column(name="") for s in blank}})
+    return Proposal(blanks, [*unused], None, _likely(path, layout, unused, blank, quantity))
 
 
 def common_layout(
@@ -256,12 +276,25 @@ def _columns(
     found: dict[str, list[Column]] = {}
     for name, below in free:
         bare, unit = _bare(name, below)
+        unit = unit or unit_in(bare)
         signal = meaning_of_words(bare, unit, quantity)
         if name not in _names_of(columns) and signal:
             is_si = UNITS[quantity[signal]][unit] == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
     columns |= {s: each[0] for s, each in found.items() if len(each) == 1}
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _geographic(
+    path: Path, layout: Layout, names: Sequence[str], units: Sequence[str]
+) -> dict[str, Column]:
+    """Position by columns of latitude and longitude, if no other columns are known."""
+    free = [pair for pair in zip(names, units, strict=False) if pair[0] not in _names_of(layout.columns)]
+    pair = geographic_pair({name: _bare(name, below) for name, below in free})
+    if not pair or not layout.columns.keys().isdisjoint(pair):
+        return {}
+    table = table_of_file(path, layout, set(pair.values()))
+    return local_columns(pair, {signal: _numbers(table[name], signal) for signal, name in pair.items()})
 
 
 def _names_of(columns: Mapping[str, Column]) -> set[str]:
@@ -285,14 +318,15 @@ def _likely(
     known = {s: layout.column(s) for s in ("time", *POSE) if s not in blank}
     table = table_of_file(path, layout, {*unused, *_names_of(known)})
     pose = {s: to_si(_numbers(table[c.name], s), s, c, quantity[s]) for s, c in known.items()}
-    named = {n: (*_bare(n, below), _numbers(table[n], n)) for n, below in unused.items()}
+    kind = "time" if "time" in blank else ""
+    named = {n: (*_bare(n, below), _numbers(table[n], kind)) for n, below in unused.items()}
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}
 
 
 def _numbers(cells: pd.Series, signal: str) -> np.ndarray:
     """A column as floats, NaN where it is none; date stamps as seconds."""
-    stamps = date_stamps(cells, signal) if signal == "time" else None
+    stamps = date_stamps(cells) if signal == "time" else None
     return np.asarray(pd.to_numeric(cells, errors="coerce"), float) if stamps is None else stamps
 
 
@@ -300,14 +334,20 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     """Signals that seem to be in another unit, and in which."""
     if not np.isfinite(run.time).any():
         return
-    run = run.rows(in_order(run.time))
-    apart = float(np.median(np.diff(run.time))) if run.time.size > 1 else 1.0
-    unit = likely_unit(apart) if not OFTENEST < apart < RAREST else None
+    unit = _time_unit(run.time)
     if unit:
         yield "time", unit
+    run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     fresh = there & ~repeated(run.pose, there)
     if fresh.sum() > 1:
         time = UNITS["time"][unit or "s"] * run.time[fresh]
         for doubt in doubts(time, run.pose[fresh]):
             yield from ((signal, doubt.unit) for signal in doubt.signals)
+
+
+def _time_unit(time: np.ndarray) -> str | None:
+    """The unit that times (n,) seem to be in; None: seconds."""
+    time = time[in_order(time)]
+    apart = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    return likely_unit(apart) if not OFTENEST < apart < RAREST else None

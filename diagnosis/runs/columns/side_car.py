@@ -16,6 +16,7 @@ from ..files.text_layout import text_layout
 from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, read_layout
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,")  # how one of NMEA 0183 begins
 
 
 class ColumnChange(NamedTuple):
@@ -43,7 +44,7 @@ def line_beside(path: Path | None, changes: Mapping[str, ColumnChange], name: st
     Returns:
         The end of a sentence; empty where there is no such file, as beside a log.
     """
-    if path is None or path.is_dir() or path.suffix not in (".csv", ".parquet") or not changes:
+    if path is None or path.is_dir() or path.suffix == ".mat" or not changes:
         return ""
     layout = read_layout(path) or Layout()
     columns = {}
@@ -77,6 +78,16 @@ def refuse_encoding(path: Path, layout: Layout) -> None:
     if layout.encoding == UTF_8 and b"\0" not in path.read_bytes():
         line = _changed(path, layout, encoding="latin-1")
         raise InputError(f"'{path}' is not a text in UTF-8; if its encoding is Latin-1, {line}")
+
+
+def refuse_sentences(path: Path) -> None:
+    """Refuse a text of NMEA 0183 sentences, which is not a table."""
+    with path.open("rb") as content:
+        if SENTENCE.match(content.read(200)):
+            raise InputError(
+                f"'{path}' has NMEA 0183 sentences; a measurement is a table: write a CSV file with a "
+                "row for each time and the columns time, latitude, longitude, heading and commands"
+            )
 
 
 def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:

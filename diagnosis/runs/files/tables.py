@@ -1,5 +1,6 @@
 """CSV and Parquet files as tables, read as the JSON file beside them says, and cells as numbers."""
 
+import re
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,18 @@ from cosim import InputError
 from cybership.message_text import quoted
 
 from ..columns.columns import Layout
-from ..columns.side_car import decimal_comma, refuse_encoding, refuse_layout, refuse_units
+from ..columns.side_car import (
+    decimal_comma,
+    refuse_encoding,
+    refuse_layout,
+    refuse_sentences,
+    refuse_units,
+)
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
+DAY_FIRST = re.compile(r"^(\d\d)\.(\d\d)\.(\d{4})[ T]")
+LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 
 def column_names(path: Path, layout: Layout) -> list[str]:
@@ -28,6 +37,7 @@ def column_names(path: Path, layout: Layout) -> list[str]:
         from pyarrow import parquet
 
         return list(parquet.read_schema(path).names)
+    refuse_sentences(path)
     first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
     names = [name.strip() for name in first.iloc[0]]
     refuse_layout(path, layout, names)
@@ -43,7 +53,9 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
         KeyboardInterrupt: the user has asked for the end.
     """
     if path.suffix == ".parquet":
-        return pd.read_parquet(path, columns=list(wanted))
+        table = pd.read_parquet(path, columns=list(wanted))
+        index = [name for name in table.index.names if name in wanted]
+        return table.reset_index(index) if index else table
     table = csv_table(path, layout, wanted)
     refuse_units(path, layout, table)
     return table
@@ -81,22 +93,40 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
         raise
 
 
-def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
-    """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
+def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None:
+    """Seconds since the first of a column of date stamps, NaN where empty; None: numbers.
+
+    Stamps are of ISO 8601, or have a date such as 31.12.2026. A leap second of UTC is a second.
+
+    Args:
+        cells: the column.
+        where: what messages call the file; None: a cell that is not a stamp is NaN.
+
+    Raises:
+        InputError: a cell is not a stamp.
+    """
+    leap = np.zeros(len(cells), bool)
     if not pd.api.types.is_datetime64_any_dtype(cells):
         try:
             if not np.isnan(np.asarray(pd.to_numeric(cells, errors="coerce"), float)).all():
                 return None
         except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
             return None
-        cells = cells.astype("string").str.replace(",", ".")
-    stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
+        cells = cells.astype("string").str.strip().str.replace(",", ".")
+        given = cells.str.replace(DAY_FIRST, r"\3-\2-\1 ", regex=True)
+        leap = np.asarray(given.str.contains(LEAP_SECOND).fillna(False), bool)
+        stamps = given.mask(leap, given.str.replace(LEAP_SECOND, ":59", regex=True))
+    else:
+        stamps = cells
+    stamps = pd.to_datetime(stamps, errors="coerce", utc=True, format="ISO8601")
     if stamps.isna().all():
         return None
     wrong = _first(cells, stamps.isna())
-    if wrong is not None:
+    if wrong is not None and where is not None:
         raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a time stamp of ISO 8601")
-    return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+    seconds = np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+    ends = stamps[leap].dt.floor("s").unique() + pd.Timedelta(seconds=1)
+    return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
 
 
 def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
@@ -108,6 +138,8 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     wrong = _first(cells, np.isnan(found))
     if wrong is not None:
         hint = decimal_comma(path, layout, wrong)
+        if cells.name == layout.column("time").name:
+            hint = hint or " or a time stamp of ISO 8601, such as 2026-12-31T23:59:59.5Z"
         raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
     return found
 

@@ -1,0 +1,65 @@
+"""Columns of latitude and longitude as metres to north and east, by a factor and an offset each.
+
+    x = M (latitude - latitude_0),    y = N cos(latitude_0) (longitude - longitude_0)
+
+with the radii of curvature M and N of the ellipsoid of WGS 84 at the median position, the origin. The
+relative error of y is tan(latitude) times the distance to north over the earth's radius: at 60 degrees
+0.03 % for a kilometre.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .columns import Column
+from .likely_columns import words_of
+from .unit_check import UNITS
+
+EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
+WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
+MOST = {"x": 90.0, "y": 180.0}  # degrees
+DEGREES = {unit for unit, size in UNITS["angle"].items() if size != 1.0}
+
+
+def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
+    """Signals x and y -> names of the columns of latitude and longitude; empty without one of each.
+
+    Args:
+        named: column -> its name without the unit, and its unit (empty if not known).
+    """
+    found = {
+        signal: [
+            column
+            for column, (bare, unit) in named.items()
+            if words & {*words_of(bare)} and unit in ("", "-", *DEGREES)
+        ]
+        for signal, words in WORDS.items()
+    }
+    if any(len(columns) != 1 for columns in found.values()):
+        return {}
+    return {signal: columns[0] for signal, columns in found.items()}
+
+
+def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) -> dict[str, Column]:
+    """How columns of latitude and longitude are read as x and y [m]; empty where they are none.
+
+    Args:
+        pair: of :func:`geographic_pair`.
+        degrees: signals x and y -> the numbers (n,) of their columns; zero at both is no position.
+    """
+    there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
+    there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
+    origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
+    if not origin or any(np.abs(degrees[s][there]).max() > most for s, most in MOST.items()):
+        return {}
+    latitude = np.radians(origin["x"])
+    flat = 1.0 - SQUARED_ECCENTRICITY * np.sin(latitude) ** 2
+    radius = {
+        "x": EQUATOR * (1.0 - SQUARED_ECCENTRICITY) / flat**1.5,
+        "y": EQUATOR / flat**0.5 * np.cos(latitude),
+    }
+    columns = {}
+    for signal, name in pair.items():
+        factor = round(float(np.radians(radius[signal])), 3)  # m in a degree
+        columns[signal] = Column(name=name, factor=factor, offset=round(-factor * origin[signal], 3))
+    return columns

@@ -1,0 +1,139 @@
+"""Files as loggers write them: stamps, degrees of latitude, other words for a side; and those that are no table."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from cosim import InputError
+from diagnosis.predictors import ship_with
+from diagnosis.runs import propose, read
+from diagnosis.runs.columns.geographic import EQUATOR, SQUARED_ECCENTRICITY
+
+TIME = np.arange(0.0, 60.0, 0.5)
+NORTH, EAST = 40.0 * np.sin(0.05 * TIME), 60.0 * np.cos(0.05 * TIME)
+NAMES = {
+    "psi": 0.3 * np.sin(0.1 * TIME),
+    "tau_X": np.sin(TIME),
+    "tau_Y": np.cos(TIME),
+    "tau_N": np.sin(TIME),
+}
+OTTER = ship_with((), "otter")
+
+
+def table(**columns: object) -> pd.DataFrame:
+    return pd.DataFrame({"time": TIME, "x": NORTH, "y": EAST, **NAMES} | columns)
+
+
+def written(path: Path, content: pd.DataFrame) -> Path:
+    content.to_csv(path, index=False)
+    return path
+
+
+def placed(latitude: float, longitude: float) -> tuple[np.ndarray, np.ndarray]:
+    """Latitude and longitude [deg] of the points NORTH, EAST of a place, by their coordinates in space."""
+    phi, lam = np.radians([latitude, longitude])
+    radius = EQUATOR / np.sqrt(1.0 - SQUARED_ECCENTRICITY * np.sin(phi) ** 2)
+    centre = np.array(
+        [
+            radius * np.cos(phi) * np.cos(lam),
+            radius * np.cos(phi) * np.sin(lam),
+            radius * (1.0 - SQUARED_ECCENTRICITY) * np.sin(phi),
+        ]
+    )
+    north = np.array([-np.sin(phi) * np.cos(lam), -np.sin(phi) * np.sin(lam), np.cos(phi)])
+    east = np.array([-np.sin(lam), np.cos(lam), 0.0])
+    x, y, z = centre[:, None] + np.outer(north, NORTH) + np.outer(east, EAST)
+    flat = np.hypot(x, y)
+    # At the surface the normal's slope is that of the radius over 1 - e^2; heights are millimetres.
+    return np.degrees(np.arctan2(z, (1.0 - SQUARED_ECCENTRICITY) * flat)), np.degrees(np.arctan2(y, x))
+
+
+@pytest.mark.parametrize("latitude", [-35.0, 1.0, 63.44])
+def test_latitude_and_longitude_become_metres(tmp_path: Path, latitude: float) -> None:
+    degrees = dict(zip(("gps_latitude [deg]", "lon"), placed(latitude, 10.4), strict=True))
+    found = propose(written(tmp_path / "a.csv", table(**degrees).drop(columns=["x", "y"])))
+    assert found.run is not None
+    middle = np.median(found.run.pose[:, :2], axis=0)
+    assert np.abs(middle).max() < 1e-2, "the origin is the median position"
+    moved = found.run.pose[:, :2] - np.column_stack([NORTH, EAST])
+    # The meridians converge: y to 60 m tan(latitude) 40 m / R.
+    assert np.ptp(moved, axis=0).max() < 3e-3
+
+
+@pytest.mark.parametrize("other", [{"lat": 6326.4 + TIME}, {"lat": 63.0 + TIME, "latitude": TIME}])
+def test_other_latitudes_are_left_blank(tmp_path: Path, other: dict[str, np.ndarray]) -> None:
+    """Degrees and minutes in one number, or two columns of one meaning."""
+    content = table(**other, longitude=10.0 + 1e-5 * TIME).drop(columns=["x", "y"])
+    found = propose(written(tmp_path / "a.csv", content))
+    assert found.run is None
+    assert found.needed["columns"]["x"] == ""
+
+
+def test_a_leap_second_is_a_second(tmp_path: Path) -> None:
+    ticks = (TIME * 2).astype(int)  # half seconds, 23:59:60 from 30 s on
+    clock = pd.Timestamp("2016-12-31T23:59:30Z") + pd.to_timedelta(
+        0.5 * (ticks - 2 * (ticks >= 62)), "s"
+    )
+    stamps = np.array([f"{t:%Y-%m-%dT%H:%M:%S}.{t.microsecond // 100000}Z" for t in clock], dtype=object)
+    stamps[60:62] = ["2016-12-31T23:59:60.0Z", "2016-12-31T23:59:60.5Z"]
+    run = read(written(tmp_path / "a.csv", table(time=stamps)))
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+
+
+def test_dates_with_the_day_first(tmp_path: Path) -> None:
+    clock = pd.Timestamp("2026-05-04T23:59:40") + pd.to_timedelta(TIME, "s")
+    stamps = [f"{t:%d.%m.%Y %H:%M:%S}.{t.microsecond // 10000:02d}" for t in clock]
+    run = read(written(tmp_path / "a.csv", table(time=stamps)))
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+
+
+def test_a_date_with_slashes_is_ambiguous(tmp_path: Path) -> None:
+    path = written(
+        tmp_path / "a.csv", table(time=[f"05/04/2026 09:30:{k:02d}" for k in range(TIME.size)])
+    )
+    with pytest.raises(
+        InputError, match=r"time = '05/04/2026 09:30:00' is not a number or a time stamp"
+    ):
+        read(path)
+
+
+def test_an_index_of_a_parquet_file_is_a_column(tmp_path: Path) -> None:
+    stamps = pd.DatetimeIndex(pd.Timestamp("2026-05-04T09:30Z") + pd.to_timedelta(TIME, "s"), name="t")
+    table().drop(columns="time").set_axis(stamps).to_parquet(tmp_path / "a.parquet")
+    found = propose(tmp_path / "a.parquet")
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.time, TIME, atol=1e-9)
+
+
+def test_other_words_for_a_side_and_the_unit_in_a_name(tmp_path: Path) -> None:
+    own = {"RPM stbd": 60.0 * np.ones_like(TIME), "n left [1/s]": 2.0 * np.ones_like(TIME)}
+    content = table(**own).drop(columns=["tau_X", "tau_Y", "tau_N"])
+    found = propose(written(tmp_path / "a.csv", content), OTTER)
+    assert found.run is not None
+    assert found.run.commanded["starboard.n"][0] == pytest.approx(1.0)
+    assert found.run.commanded["port.n"][0] == pytest.approx(2.0)
+
+
+def test_the_unit_of_the_time_is_known_beside_a_blank(tmp_path: Path) -> None:
+    content = table(time=(1.7e18 + 1e9 * TIME).astype("int64"), deck=NORTH).drop(columns="x")
+    found = propose(written(tmp_path / "a.csv", content))
+    assert found.needed["columns"] == {"time": {"name": "time", "unit": "ns"}, "x": ""}
+
+
+@pytest.mark.parametrize("name", ["a.nmea", "a.csv"])
+def test_sentences_are_no_table(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(
+        "$GPGGA,093000.00,6326.4,N,01024.0,E,4,12,0.8,5.0,M,40.0,M,,*65\r\n" * 9
+    )
+    for reader in (propose, read):
+        with pytest.raises(InputError, match="NMEA 0183 sentences; a measurement is a table"):
+            reader(tmp_path / name)
+
+
+def test_a_table_may_have_any_ending(tmp_path: Path) -> None:
+    found = propose(written(tmp_path / "a.txt", table().rename(columns={"x": "North"})))
+    (tmp_path / "a.txt.json").write_text(json.dumps(found.needed))
+    np.testing.assert_allclose(read(tmp_path / "a.txt").pose[:, 0], NORTH)
