@@ -12,7 +12,7 @@ from support.project import COMPONENTS
 from fmus.controller import abs as abs_module
 from fmus.controller import bs, pid
 from fmus.controller.adaptive import Disturbance
-from fmus.controller.backstepping import FeedbackGains, Inputs, control_errors
+from fmus.controller.backstepping import FeedbackGains, Inputs, control_errors, tracking_energy
 from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
 from fmus.declare import flatten, packer
 from fmus.frames import rotate_to_body
@@ -74,6 +74,15 @@ def lyapunov(i, gains):
     z1, z2 = np.array(z[:3]), np.array(z[3:])
     M = np.array(mass_matrix(Inertia()))
     return 0.5 * z1 @ z1 + 0.5 * z2 @ M @ z2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_energy_that_controllers_report_is_that_of_the_thesis(seed):
+    """V2 of (4.8), whose mass matrix is not diagonal; each product has a value of its own."""
+    pose, nu = np.random.default_rng(seed).uniform(-0.5, 0.5, (2, 3))
+    i = Inputs(true_estimate(vessel.State(*pose, *nu)), rich_target(3.0))
+    z, _ = control_errors(i.estimate, i.target, bs.Params().gains)
+    assert tracking_energy(z, Inertia()) == pytest.approx(lyapunov(i, bs.Params().gains))
 
 
 @pytest.mark.parametrize("seed", range(5))

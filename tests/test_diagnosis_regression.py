@@ -5,13 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import optimize, stats
 from scipy.linalg import block_diag
 
 from diagnosis.predictors.weak_form import OVERLAP
+from diagnosis.runs.cleaning import CHANCE, DIGITS
 from diagnosis.search import candidates
 from diagnosis.search.candidates import Candidate, CandidateShape, scaled, smoothness
 from diagnosis.search.gram import Nuisance, block_folds, gram_table, noise
 from diagnosis.search.map_regression import Scored, held_out_loss, regression, score
+from diagnosis.search.most_likely import Quadratic, beyond, most_likely, ridge, rise
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.shortlist import in_order, novelty
 from diagnosis.search.significance import better, beyond_chance, harmful, matters
@@ -133,6 +136,42 @@ def test_novelty_is_the_share_that_what_was_found_cannot_give():
     found = Nuisance(np.concatenate([along, across], axis=2), PRIOR, np.zeros(2), np.ones(2))
     t = gram_table(Y, BLOCKS, [half], found, np.ones(3))
     assert [novelty(t, 0, free) for free in (0, 1, 2)] == pytest.approx([1.0, 0.5, 0.0], abs=1e-6)
+
+
+def test_a_ridge_is_a_tiny_share_of_the_information_and_of_that_of_one_unit():
+    H = np.array([[4.0, 1.0], [1.0, 9.0]])
+    assert ridge(H) == pytest.approx(DIGITS * np.diag([5.0, 10.0]))
+    assert ridge(H, np.array([0.5, np.inf])) == pytest.approx(DIGITS * np.diag([8.0, 9.0]))
+
+
+@pytest.mark.parametrize("places", [0, 1, 50])
+def test_limits_of_chance_are_those_of_the_normal_distribution(places):
+    assert rise() == pytest.approx(stats.norm.isf(0.025) ** 2)
+    assert beyond(places) == pytest.approx(stats.norm.isf(CHANCE / max(places, 1) / 2.0))
+
+
+@pytest.mark.parametrize("start", [-0.5, 4.0])
+def test_the_most_likely_value_is_that_of_scipy_and_each_step_is_downhill(start):
+    """A decay whose rate is sought, and a prior of unit deviation about zero, in Gauss-Newton steps."""
+    t, seen = np.linspace(0.0, 3.0, 30), []
+    y = np.exp(-1.3 * t)
+
+    def residual(x):
+        return (y - np.exp(-x * t)) / 0.05
+
+    def cost(x):
+        return float(residual(x) @ residual(x) + x * x)
+
+    def about(x):
+        seen.append(cost(x))
+        J = -t * np.exp(-x * t) / 0.05
+        return Quadratic(np.array([[J @ J + 1.0]]), np.array([J @ residual(x) - x]), cost)
+
+    found, last = most_likely(start, about, lambda x, step: x + float(step[0]))
+    true = optimize.minimize_scalar(cost, bracket=(1.0, 1.5)).x
+    assert cost(found) - cost(true) < 0.02
+    assert seen == sorted(seen, reverse=True)
+    assert last.cost(found) == seen[-1] == cost(found)
 
 
 def test_noise_is_what_all_columns_together_leave_on_each_axis():

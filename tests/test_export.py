@@ -15,10 +15,11 @@ from cosim.export.__main__ import main as export
 from cosim.files import file_stems
 from cosim.fmu import FmuModel
 from cosim.formats.elements import write_document
-from cosim.formats.groups import osp_model_description, variable_groups, variables_of_group
+from cosim.formats.groups import QUANTITIES, osp_model_description, variable_groups, variables_of_group
 from cosim.formats.namespaces import SSP_SPACES
 from cosim.scenario import load_scenario
 from cosim.system import prepare
+from fmus.base_units import base_exponents
 
 
 def test_parameters_are_baked_into_our_fmus(own, tmp_path):
@@ -296,6 +297,17 @@ def test_file_names_are_safe_and_differ():
     stems = file_stems(["a b", "a/b", "A_B", "../x", "ship"])
     assert len({stem.lower() for stem in stems}) == 5
     assert all(stem.replace("_", "").isalnum() for stem in stems)
+
+
+def test_the_quantities_of_osp_have_the_dimensions_of_their_units():
+    units = {"Force": "N", "Torque": "N.m"}
+    for of, time in (("Displacement", ""), ("Velocity", "/s"), ("Acceleration", "/s2")):
+        units |= {f"Linear{of}": f"m{time}", f"Angular{of}": f"rad{time}"}
+    assert {q.tag for q in QUANTITIES} == set(units)
+    for q in QUANTITIES:
+        exponents = dict(zip(("kg", "m", "s", "rad"), q.unit, strict=True))
+        assert {base: n for base, n in exponents.items() if n} == base_exponents(units[q.tag])
+        assert {len(axes) for axes in q.axes} == {3}
 
 
 def test_variable_groups_hold_what_belongs_together(fmus):

@@ -169,6 +169,32 @@ def test_force_inputs_are_those_in_newtons(fmu):
 # Properties
 
 
+def test_the_noise_of_an_output_is_given_or_the_median_of_runs_and_never_zero():
+    """In the unit of the variable; of an exact channel the digits of its numbers, of a constant one tiny."""
+    t = np.linspace(0.0, 10.0, 2001)
+    rng = np.random.default_rng(0)
+    sizes = (0.01, 0.02, 0.3)
+    runs = [
+        SimpleNamespace(name="a", columns={"y": 5.0 * np.sin(t) + s * rng.normal(size=t.size)})
+        for s in sizes
+    ]
+
+    def noise(columns, **column):
+        given = SimpleNamespace(
+            outputs={"y": SimpleNamespace(**{"noise": None, "factor": -2.0} | column)}
+        )
+        return noises(columns, given)[0]
+
+    assert noise(runs) == pytest.approx(2.0 * 0.02, rel=0.1)
+    assert noise(runs, noise=0.5) == 2.0 * 0.5
+    line = [SimpleNamespace(name="a", columns={"y": 40.0 * t})]
+    assert noise(line) == pytest.approx(2.0 * 1e-5 * np.std(40.0 * t))
+    still = [SimpleNamespace(name="a", columns={"y": 0.0 * t})]
+    assert 0.0 < noise(still) < 1e-100
+    with pytest.raises(InputError, match="column 'y' has no samples in 'a'"):
+        noise([SimpleNamespace(name="a", columns={"y": np.full(9, np.nan)})])
+
+
 def test_noise_of_a_smooth_signal_is_found():
     t = 0.02 * np.arange(5000)
     noisy = np.sin(t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)

@@ -43,6 +43,23 @@ def on_the_ellipse(shared):
     return log
 
 
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_a_measurement_that_moves_is_not_frozen_and_only_what_screens_finds_one_that_is(name):
+    component = COMPONENTS[name]
+    pack, params = packer(component.inputs), component.params()
+    screens = "rest_time" in [v.name for v in variables(component.params)]
+    state = component.init(pack([0.0] * 6), params)
+    found = []
+    for k in range(60):
+        k = min(k, 40)  # then it repeats, shorter than a ship at rest
+        state, e = component.step(
+            state, pack([1e-3 * k, 2e-3 * k, 1e-3 * k, 0.0, 0.0, 0.0]), params, 0.01
+        )
+        found.append(e.frozen)
+    assert found[5:41] == [0.0] * 36
+    assert found[-1] == float(screens)
+
+
 @pytest.mark.parametrize("observer", in_part(OBSERVERS, keep=["observer_mdf", "observer_kalman"]))
 def test_faults_of_the_measurement_are_survived(ellipse, tmp_path, observer):
     """NaN, zeros and spikes one after the other; three seconds later all is well again."""

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.command import command
+from support.fmu_variables import page as variables_page
 from support.project import ROOT
 
 from diagnosis import propose_columns
@@ -349,6 +350,11 @@ def test_the_page_has_the_parameters_of_a_law_with_their_units(law: str) -> None
     declared = [v for v in variables(Law.known[law].Parameters) if not inner.fullmatch(v.name)]
     declared += [v for v in variables(Law.known[law].Parameters) if v.name.endswith(("_1_1", "_9_3"))]
     assert told == {v.name: v.unit for v in declared}
+
+
+def test_the_page_of_parameters_has_the_start_values_of_the_code() -> None:
+    """``python tests/support/fmu_variables.py > docs/fmu_variables.md`` brings it up to date."""
+    assert (ROOT / "docs" / "fmu_variables.md").read_text(encoding="utf-8") == variables_page()
 
 
 def test_the_page_has_the_parameters_of_each_function() -> None:
