@@ -11,8 +11,9 @@ from support.measured import sail, smoothed
 from diagnosis import Model, Windows, diagnose
 from diagnosis.predictors.prediction import before_filters, filtered, true_motion
 from diagnosis.predictors.shooting import Shooting
-from diagnosis.predictors.uncertainty import omega_std
-from diagnosis.predictors.weak_form import HORIZON, weak_windows
+from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, omega_std
+from diagnosis.predictors.weak_form import HORIZON, omega, weak_windows
+from diagnosis.search.candidates import quieted
 
 LAGS = {"position_lag": 0.7, "heading_lag": 0.4}
 BEHIND = Model(measurement=LAGS)
@@ -126,6 +127,33 @@ def test_noise_before_a_filter_counts_in_full():
     h = w.smoothed.track.period
     plain, behind = (omega_std(w, m)[:, 2] for m in (Model(), Model(measurement={"heading_lag": 0.4})))
     assert np.median(behind / plain) == pytest.approx(1.0 / (1.0 - np.exp(-h / 0.4)), rel=0.3)
+
+
+def test_undoing_a_filter_is_one_over_its_frequency_response():
+    w = np.geomspace(0.01, 100.0, 50)
+    s = 1j * w[:, None]
+    T, lag = np.array(BOTH.filters.tracker), np.array(BOTH.filters.lag)
+    passed = (np.sqrt(2.0) * s * T + 1.0) / (s**2 * T**2 + np.sqrt(2.0) * s * T + 1.0) / (1.0 + s * lag)
+    np.testing.assert_allclose(BOTH.filters.undoing(w), 1.0 / np.abs(passed.T))
+
+
+def test_the_noise_that_a_tracker_takes_away_is_known():
+    """Two runs that differ in their noise alone: half the square of their difference is that of one.
+
+    The noise is claimed with its tolerance, and so is what becomes less of it.
+    """
+    tracked = Model(measurement={"position_tracker": 0.5})
+    made = [sail(120.0, h=0.1, noise=5.0, seed=seed)[0] for seed in range(8)]
+    windows = [weak_windows(smoothed(run)) for run in made]
+    charge = np.mean([quieted([w], Model(), tracked) for w in windows], axis=0)
+    fall = np.zeros(3)
+    for a, b in zip(windows[::2], windows[1::2], strict=True):
+        now, undone = (omega(a, m) - omega(b, m) for m in (Model(), tracked))
+        fall += np.sum(now**2 - undone**2, axis=0) / 2.0 / 4.0
+    assert (fall[:2] > 0.0).all()
+    assert (charge[:2] > 0.7 * fall[:2]).all()
+    assert (charge[:2] < NOISE_TOLERANCE**2 * 1.5 * fall[:2]).all()
+    assert quieted(windows, Model(), Model({"delta_X_u": -1.0, "heading_offset": 0.1})) is None
 
 
 def test_poses_and_rates_become_body_fixed_speeds():

@@ -105,27 +105,29 @@ def test_noise_of_a_window_is_what_its_samples_leave_through_the_kernel(
 ):
     """Samples at uneven times, some of which do not count, of a ship that rests at a heading psi.
 
-    A window of a larger ship is as many times as long, in a unit of time of its own.
+    Each channel has a rate of its own, as a receiver's 5 Hz and a compass' 10 Hz. A window of a larger ship is as many times as long, in a unit of time of its own.
     """
     rng = np.random.default_rng(seed)
     n, windows = 300, 4
     time = np.cumsum(dense * period * rng.uniform(0.6, 1.4, n))
     weights = rng.uniform(0.0, 1.0, (windows, n))
     weights /= weights.sum(axis=1, keepdims=True)
-    counts = rng.uniform(size=n) < used
+    periods = period * rng.choice([0.5, 1.0, 3.0], 3)
+    counts = rng.uniform(size=(n, 3)) < used * period / np.maximum(periods, period)
     noise = np.array([2e-3, 5e-3, 1e-3])
     std = np.sqrt(noise**2 * period * corner / 3.0) * np.ones((n, 3))  # R w0 / 3
     smoothed = SimpleNamespace(
         scale=SimpleNamespace(time=unit, forces=np.array([unit, unit, unit**2])),
-        track=SimpleNamespace(period=period, usual_rounding=np.zeros(3)),
+        track=SimpleNamespace(periods=periods, usual_rounding=np.zeros(3)),
         time=time,
-        used=counts,
+        agrees=counts,
         noise=noise,
         eta_std=std,
         eta=np.tile([0.0, 0.0, psi], (n, 1)),
     )
     w = SimpleNamespace(
         smoothed=smoothed,
+        scale=smoothed.scale,
         smooth=weights,
         known=np.ones(n, bool),
         width=WIDTH * unit,
@@ -138,18 +140,18 @@ def test_noise_of_a_window_is_what_its_samples_leave_through_the_kernel(
         found = omega_std(w, model)
     mass = model.reference_mass
     for k in range(windows):
-        share = 0.0
+        rate = np.zeros(3)  # of samples [1/s]
         for i in range(n):  # each sample stands for half of the way to both neighbours
             before, after = time[max(i - 1, 0)], time[min(i + 1, n - 1)]
             gap = (after - before) / (2.0 if 0 < i < n - 1 else 1.0)
-            share += weights[k, i] * counts[i] * period / gap
-        share = min(max(share, period / WIDTH / unit), 1.0)
-        density = noise**2 * period / share
-        w0 = min(max(corner * share * unit, 0.02), 60.0)
+            rate += weights[k, i] * counts[i] / gap
+        rate = np.minimum(np.maximum(rate, 1.0 / WIDTH / unit), 1.0 / periods)
+        density = noise**2 / rate
+        w0 = np.clip(corner * rate * period * unit, 0.02, 60.0)
         c, s = np.cos(psi), np.sin(psi)
         turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         acceleration, velocity = (
-            np.diag(turned @ np.diag(density * kernel_power(order, w0)) @ turned.T)
+            np.diag(turned @ np.diag(density * [kernel_power(order, x) for x in w0]) @ turned.T)
             / unit ** (2 * order + 1)
             for order in (2, 1)
         )

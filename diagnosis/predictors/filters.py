@@ -31,8 +31,14 @@ class Filters(NamedTuple):
         """Pose before the filters, its rate, and the pose between the two, (n, 3) each."""
         return _undone(self, s)
 
-    def first_response(self, h: float) -> np.ndarray:
-        """(3,), share of a new sample in the output of a filter that is computed at intervals h [s]."""
+    def undoing(self, w: np.ndarray) -> np.ndarray:
+        """(3, n), factor by which undoing the filters multiplies what has a frequency w (n,) [rad/s]."""
+        s = 1j * w
+        lag, T = (np.array(each)[:, None] for each in self)
+        return np.abs((1.0 + s * lag) * (1.0 + (s * T) ** 2 / (1.0 + 2.0 * DAMPING * T * s)))
+
+    def first_response(self, h: np.ndarray) -> np.ndarray:
+        """(3,), share of a new sample in the output of a filter computed at intervals h (3,) [s]."""
         with np.errstate(divide="ignore"):
             lag, tracker = (h / np.array(each) for each in self)
         return np.expm1(-lag) * np.expm1(-2.0 * DAMPING * tracker)
@@ -61,6 +67,9 @@ class Filters(NamedTuple):
                 off = _off(found[0, k], eta[k], k)
                 found[:, k] = _tracking(found[:, k], off, eta_dot[k], T, h)
         return found
+
+
+NO_FILTERS = Filters((0.0,) * 3, (0.0,) * 3)
 
 
 @lru_cache  # a fit asks for the same runs several times

@@ -18,13 +18,14 @@ of the receiver is larger, by the filter's first response to an impulse, and whi
 is undone. Rounding comes after the filter, and undoing it adds (w T)^2 to its density.
 """
 
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import hyp0f1
 
 from ..runs.cleaning import DIGITS
+from .filters import NO_FILTERS, Filters
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
@@ -49,14 +50,20 @@ NEGLIGIBLE = 0.05
 MEASURED = 0.1
 
 
-@cache
-def noise_gain() -> list[np.ndarray]:
-    """For order k = 0 to 3 and each w0 the integral of w^2k |kernel|^2 H [s^-2k-1]."""
+@lru_cache(maxsize=64)  # filters; a fit asks for the same several times
+def noise_gain(filters: Filters = NO_FILTERS, time: float = 1.0) -> list[np.ndarray]:
+    """For order k = 0 to 3, each channel and w0, (3, w0), the integral of w^2k |kernel U|^2 H [s^-2k-1].
+
+    Args:
+        filters: that are undone, which multiplies a pose by U.
+        time: s at the ship's size for one at the size of CyberShip Enterprise 1.
+    """
     half = WIDTH / 2
     transform = hyp0f1(4.5, -((FREQUENCIES * half / 2) ** 2))  # of (1 - s^2)^3: of its power + 3/2
     H = 1.0 / (1.0 + (FREQUENCIES / FREQUENCIES[:, None]) ** 6)
-    densities = [(FREQUENCIES**k * transform) ** 2 / np.pi for k in range(4)]
-    return [np.trapezoid(d * H, FREQUENCIES) for d in densities]
+    U = filters.undoing(FREQUENCIES / time)
+    densities = [(FREQUENCIES**k * transform * U) ** 2 / np.pi for k in range(4)]
+    return [np.trapezoid(d[:, None, :] * H, FREQUENCIES) for d in densities]
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
@@ -70,40 +77,82 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         (K, 3) [N, N, N m].
     """
     model = model or Model()
-    s, mass = w.smoothed, model.reference_mass
-    time, period = s.scale.time, s.track.period
-    # Share of a window's time that its samples cover, and the variance of the smoothed pose there.
-    share = np.clip(w.smooth @ (s.used * period / np.gradient(s.time)), period / w.width, 1.0)
-    rounding = np.minimum(s.noise, s.track.usual_rounding)
-    filters, sampled = model.filters, period / share[:, None]
-    density = sampled * (s.noise**2 - rounding**2) / filters.first_response(period) ** 2
-    variance = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
-    corner = 3.0 * variance / (sampled * s.noise**2) * time
+    filters = model.filters
+    period, sampled = w.smoothed.track.periods, _sampled(w)
+    rounding = np.minimum(w.smoothed.noise, w.smoothed.track.usual_rounding)
+    receiver = (w.smoothed.noise**2 - rounding**2) / filters.first_response(period) ** 2
+    late = filters.squared_time
+    gains = noise_gain()
+
+    def variances(order: int, corner: np.ndarray, time: float) -> np.ndarray:
+        gain = _gain(gains, corner, order) / time ** (2 * order + 1)
+        rounded = gain
+        if filters:
+            rounded = gain + late * _gain(gains, corner, order + 1) / time ** (2 * order + 3)
+        return sampled * (receiver * gain + rounding**2 * rounded)
+
+    floor = (FLOOR * w.scale.forces) ** 2
+    return np.sqrt(_force_variance(w, model, variances) + floor)
+
+
+def undone_variance(w: WeakWindows, model: Model) -> np.ndarray:
+    """Variance (K, 3) of the model error by the noise of the poses, as a model undoes its filters.
+
+    The noise is white in the poses as they were measured, so that this is what of it a model that
+    undoes a filter has in its error, whether or not there was a filter: undoing a tracker makes a motion
+    slower, and noise with it.
+    """
+    power, gains = _sampled(w) * w.smoothed.noise**2, noise_gain(model.filters, w.scale.time)
+    return _force_variance(
+        w, model, lambda k, corner, time: power * _gain(gains, corner, k) / time ** (2 * k + 1)
+    )
+
+
+def _sampled(w: WeakWindows) -> np.ndarray:
+    """(K, 3), time [s] of a window for each sample of a channel in it: channels have their own rates."""
+    s, period = w.smoothed, w.smoothed.track.periods
+    rate = w.smooth @ (s.agrees / np.gradient(s.time)[:, None])
+    # Weights of samples at uneven distances sum to a little more or less than one.
+    return 1.0 / np.clip(rate, 1.0 / w.width, 1.0 / period)
+
+
+def _force_variance(
+    w: WeakWindows, model: Model, variances: Callable[[int, np.ndarray, float], np.ndarray]
+) -> np.ndarray:
+    """Variance (K, 3) of the model error [N2, N2, N2 m2] by that of the pose's derivatives.
+
+    Args:
+        w: windows of a run.
+        model: by whose inertia an acceleration is a force.
+        variances: of a derivative's order, w0 (K, 3) and the ship's scale of time (K, 3), averaged
+            over windows.
+    """
+    s, mass, time = w.smoothed, model.reference_mass, w.scale.time
+    smooth = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
+    corner = 3.0 * smooth / (_sampled(w) * s.noise**2) * time
     # Weights of samples at uneven distances sum to a little more or less than one.
     c2 = np.clip(w.smooth @ np.where(w.known, np.cos(s.eta[:, 2]) ** 2, 0.0), 0.0, 1.0)
 
     def in_axes(order: int) -> np.ndarray:
-        """(K, 3), variance of a derivative of the pose in the ship's axes, averaged over windows."""
-        gain = _gain(corner, order) / time ** (2 * order + 1)
-        rounded = gain
-        if filters:
-            rounded = gain + filters.squared_time * _gain(corner, order + 1) / time ** (2 * order + 3)
-        x, y, psi = (density * gain + sampled * rounding**2 * rounded).T
+        """(K, 3), variance of a derivative of the pose in the ship's axes."""
+        x, y, psi = variances(order, corner, time).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
     pose, velocity, acceleration = map(in_axes, (0, 1, 2))
     slope, turned = _slope(w, model), np.zeros((w.middle.size, 3, 3))
     turned[:, :2, 2] = (w.smooth @ w.motion[1])[:, [1, 0]] * [1.0, -1.0]
-    variance = acceleration @ (mass**2).T + (FLOOR * s.scale.forces) ** 2
+    variance = acceleration @ (mass**2).T
     with np.errstate(over="ignore"):  # a force that no ship has is not known at all
         for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
             variance += np.einsum("kij,kj->ki", by**2, of)
-    return np.sqrt(variance)
+    return variance
 
 
-def _gain(corner: np.ndarray, order: int) -> np.ndarray:
-    """An entry of :func:`noise_gain` at corner frequencies between those of its grid."""
-    return np.exp(np.interp(np.log(corner), np.log(FREQUENCIES), np.log(noise_gain()[order])))
+def _gain(gains: Sequence[np.ndarray], corner: np.ndarray, order: int) -> np.ndarray:
+    """An entry (K, 3) of :func:`noise_gain` at corner frequencies (K, 3) between those of its grid."""
+    grid, at = np.log(FREQUENCIES), np.log(corner)
+    each = zip(at.T, np.broadcast_to(gains[order], (3, FREQUENCIES.size)), strict=True)
+    return np.exp(np.column_stack([np.interp(x, grid, np.log(gain)) for x, gain in each]))
 
 
 def _slope(w: WeakWindows, model: Model) -> np.ndarray:

@@ -99,6 +99,11 @@ class Track(ShortRepr):
         return float(self.run.time[0]) + RESPONSE * self.lag
 
     @cached_property
+    def periods(self) -> np.ndarray:
+        """(3,), from a measurement of each channel to its next, the median [s]."""
+        return np.array([np.median(np.diff(self.run.time[there])) for there in self.fresh.T])
+
+    @cached_property
     def valid(self) -> np.ndarray:
         """(n,), rows with a new measurement of the position."""
         return self.fresh[:, 0]

@@ -15,7 +15,7 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from ..predictors.uncertainty import FLOOR
+from ..predictors.uncertainty import FLOOR, undone_variance
 from ..predictors.weak_form import SMALL
 from .nonlinear.multistart import MULTIPLES, Landscape, best_values, limits
 from .nonlinear.segmentation import intervals, problem
@@ -37,6 +37,8 @@ class CandidateShape:
         unit: (p,), what one unit of each is at the size of the ship.
         nuisance_offset: (q,), nuisance parameters together with what is given; None: as they are.
         precision: (p, p), prior precision of the fitted ones; None: 0.
+        quieted: (3,), sum of squares of the noise that the shape takes out of the model error, or None,
+            see :func:`quieted`.
     """
 
     given: Mapping[str, float]
@@ -46,6 +48,7 @@ class CandidateShape:
     unit: np.ndarray
     nuisance_offset: np.ndarray | None = None
     precision: np.ndarray | None = None
+    quieted: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,20 @@ class Candidate:
 def model_error(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Model error (K, 3) [N, N, N m] of all runs one after the other."""
     return np.concatenate([omega(w, model) for w in data])
+
+
+def quieted(data: Sequence[WeakWindows], model: Model, changed: Model) -> np.ndarray | None:
+    """Sum of squares (3,) of the noise that a change of the measurement's filters takes out of omega.
+
+    To undo a filter is to filter the noise of the measurement as well. What becomes less of it is
+    nothing that the filter explains, and is charged to its loss: the expected optimism of a fit that
+    chooses how its data are smoothed (B. Efron, The estimation of prediction error: covariance
+    penalties and cross-validation, J. Am. Stat. Assoc. 99, 2004). None: the filters stay.
+    """
+    if model.filters == changed.filters:
+        return None
+    falls = [undone_variance(w, model) - undone_variance(w, changed) for w in data]
+    return np.concatenate(falls).sum(axis=0)
 
 
 def shape(
@@ -75,7 +92,8 @@ def shape(
     steps = zip(fitted, (step * unit).tolist(), strict=True)
     columns = [(start - model_error(data, model.plus({**given, n: h}))) / h for n, h in steps]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
-    return CandidateShape(dict(given), list(fitted), base - start if given else None, stacked, unit)
+    offset, noise = (base - start, quieted(data, model, model.plus(given))) if given else (None, None)
+    return CandidateShape(dict(given), list(fitted), offset, stacked, unit, quieted=noise)
 
 
 def covered(columns: np.ndarray) -> np.ndarray:

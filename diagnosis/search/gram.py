@@ -61,6 +61,7 @@ class Entry(NamedTuple):
         precision: (p, p), their prior precision.
         offset: (q,), offset of the nuisance parameters that belongs to what is given.
         nonlinear: number of parameters that are given, not fitted.
+        quieted: loss that it takes away by the noise alone, see :func:`.candidates.quieted`.
     """
 
     given: int
@@ -69,6 +70,7 @@ class Entry(NamedTuple):
     precision: np.ndarray
     offset: np.ndarray
     nonlinear: int
+    quieted: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +172,9 @@ def gram_table(
         precision = np.zeros((start.size, start.size)) if s.precision is None else s.precision
         offset = nuisance.offset if s.nuisance_offset is None else s.nuisance_offset
         nonlinear = len(set(s.given) - set(s.fitted))
-        return Entry(given, added(s.columns, s.unit), start, precision, offset, nonlinear)
+        noise = 0.0 if s.quieted is None else float(np.sum(s.quieted / sigma**2) / OVERLAP)
+        columns_of = added(s.columns, s.unit)
+        return Entry(given, columns_of, start, precision, offset, nonlinear, max(noise, 0.0))
 
     added(y[:, :, None], np.ones(1))
     entries = [[entry(s) for s in c.shapes] for c in candidates]

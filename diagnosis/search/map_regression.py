@@ -121,7 +121,7 @@ class Scored:
         blocks: (blocks,), loss of each block by a fit that has not seen it.
         runs: (blocks,), the same by a fit that has not seen its run; ``blocks`` where there is one run.
         prior: prior penalty of the fit to all data.
-        complexity: log n for each effective parameter.
+        complexity: log n for each effective parameter, and the noise that a filter takes away.
     """
 
     candidate: int
@@ -148,8 +148,9 @@ def score(t: GramTable, candidate: int, shapes: int) -> Scored:
     by_block = held_out_loss(t, options, t.by_block)
     by_run = held_out_loss(t, options, t.by_run) if len(t.by_run.held) > 1 else by_block
     fits = [o.fitted(t.total) for o in options]
-    shape = int(np.argmin([f.loss(t.total) + f.penalty for f in fits]))
-    complexity = options[shape].size(t.total) * t.per_parameter
+    noise = [e.quieted for e in t.entries[candidate]]
+    shape = int(np.argmin([f.loss(t.total) + f.penalty + q for f, q in zip(fits, noise, strict=False)]))
+    complexity = options[shape].size(t.total) * t.per_parameter + t.entries[candidate][shape].quieted
     return Scored(candidate, shape, by_block, by_run, float(fits[shape].penalty), complexity)
 
 

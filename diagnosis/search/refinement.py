@@ -20,7 +20,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
 from ..predictors.uncertainty import NEGLIGIBLE
 from ..predictors.weak_form import OVERLAP
-from .candidates import SMALL, CandidateShape, model_error
+from .candidates import SMALL, CandidateShape, model_error, quieted
 from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
 from .nonlinear.multistart import limits
@@ -331,12 +331,15 @@ def _with_intervals(
     return found if p is None else replace(found, intervals=likely(p, p.spans(present)))
 
 
-def as_shape(r: Refined, base: np.ndarray, at: RefinedModel, start: CandidateStart) -> CandidateShape:
+def as_shape(
+    t: TrainingSet, r: Refined, base: np.ndarray, at: RefinedModel, start: CandidateStart
+) -> CandidateShape:
     """A refined candidate as a shape, seen from the model ``at`` with the error ``base``."""
     given = r.own(at)
     fitted = [r.estimate.values[n] for n in at.fitted]
     offset = np.array([*fitted, *r.estimate.offset])
     unit = np.array([at.start.unit(n) for n in start.fitted])
+    noise = quieted(t.data, at.model(t.prior), r.estimate.model(t.prior))
     return CandidateShape(
-        given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision
+        given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision, noise
     )

@@ -151,7 +151,7 @@ def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking) -> Shortlist:
     starts = [start(at, ranking, s) for s in best]
     refined = for_each(lambda s: refine(t, at, ranking.nuisance, s), starts, [at.start])
     starts = [replace(s, values=r.own(at)) for r, s in zip(refined, starts, strict=True)]
-    shapes = [as_shape(r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
+    shapes = [as_shape(t, r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
     found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]
     table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)
     scored = in_order([score(table, k, 1) for k in range(len(best))])

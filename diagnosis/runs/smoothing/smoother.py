@@ -249,9 +249,8 @@ def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
     while True:
         even, origin = _problem(track, rows)
         # A spline that follows a few samples: its time constant is two sampling periods.
-        periods = [np.median(np.diff(time[there])) for there in track.fresh.T]
-        local = 2.0 * (2.0 * np.array(periods) / even.spline.grid.spacing) ** DEGREE
-        resolved = 2.0 * max(periods) <= QUICKEST * track.scale.time
+        local = 2.0 * (2.0 * track.periods / even.spline.grid.spacing) ** DEGREE
+        resolved = bool(2.0 * track.periods.max() <= QUICKEST * track.scale.time)
         try:
             alone = robust(even, local, least, resolved)
             return rows, even._replace(sigma=alone.problem.sigma), origin, alone

@@ -123,10 +123,10 @@ def _signals(
     motion = without_commands(smoothed)
     error, noise = model_error(smoothed, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
-        pose = np.where(smoothed.used[:, None], motion.eta + smoothed.noise * each, smoothed.track.pose)
+        pose = np.where(smoothed.agrees, motion.eta + smoothed.noise * each, smoothed.track.pose)
         other = model_error(smoothed, without_commands(smoothed, pose), model)
         noise += stretches(other - error, time, step)
-    white = 2.0 * smoothed.noise**2 * smoothed.track.period
+    white = 2.0 * smoothed.noise**2 * smoothed.track.periods
     return stretches(error, time, step), noise, white
 
 
