@@ -14,9 +14,10 @@ from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER, SI_UNIT
+from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER
 from ..predictors.windows import step_of, usable_windows
 from ..runs import QUANTITY, Smoothed
+from ..runs.columns.unit_check import SI_UNIT
 from ..runs.sensors.evidence import FEWEST
 from .additional_force import AdditionalForce, EarthDirection
 from .calibration_task import CalibrationTask
