@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ class ShipTask(CalibrationTask):
         lines = [predictor.lines["outputs"][s] for s in POSE]
         self.lines = np.array([[line.gain for line in lines], [line.offset for line in lines]])
 
-    @property
+    @cached_property
     def confined(self) -> ConfinedFmu:
         return self.predictor.confined
 
