@@ -205,7 +205,7 @@ def test_noise_of_a_smooth_signal_is_found():
 def test_whitening_is_the_inverse_root_of_the_covariance():
     S = np.random.default_rng(2).standard_normal((12, 2)) * [3.0, 0.1]
     U, size, _ = np.linalg.svd(S, full_matrices=False)
-    W = Whitening(U, 1.0 / np.sqrt(1.0 + size**2))(np.eye(12))
+    W = Whitening(U, 1.0 / np.sqrt(1.0 + size**2), {}, np.zeros(12))(np.eye(12))
     assert np.allclose(W @ (np.eye(12) + S @ S.T) @ W.T, np.eye(12))
 
 

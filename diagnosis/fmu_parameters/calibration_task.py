@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ class CalibrationTask(ABC):
         self.parameters, self.notes = parameters, notes
         self._processes: Processes | None = None
 
-    @property
+    @cached_property
     @abstractmethod
     def confined(self) -> ConfinedFmu:
         """The FMU in its processes.

@@ -123,11 +123,13 @@ def _promising(
     Returns:
         Gain in cost, force, and unit of its coefficient, of each; id -> ids of those like it.
     """
-    J, e = _with_prior(at), np.concatenate([at.residuals, at.setting.z])
+    p = len(at.setting.z)
+    J = np.concatenate([at.slopes, np.eye(p, at.slopes.shape[1])])
+    e = np.concatenate([at.residuals, at.setting.z])
     Q = np.linalg.qr(J)[0] if J.shape[1] else np.zeros((len(e), 0))
     ranked = []
     for force, size, s in scaled:
-        beyond = np.concatenate([s, np.zeros(len(at.setting.z))])
+        beyond = np.concatenate([s, np.zeros(p)])
         beyond = beyond - Q @ (Q.T @ beyond)
         norm = float(np.linalg.norm(beyond))
         # What the parameters do as well is no candidate: its change is theirs to rounding.
@@ -148,11 +150,6 @@ def _same(gain: float, correlation: float) -> bool:
     """Whether the runs do not discriminate two forces: the second would gain hardly less."""
     lost = gain * (1.0 - correlation**2)
     return abs(correlation) > SAME and lost < -2.0 * float(np.log(1.0 - LEVEL))
-
-
-def _with_prior(at: ParameterFit) -> np.ndarray:
-    p = len(at.setting.z)
-    return np.concatenate([at.slopes, np.eye(p, at.slopes.shape[1])])
 
 
 def _distinct(

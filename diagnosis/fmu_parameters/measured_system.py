@@ -13,11 +13,11 @@ from cybership.message_text import quoted
 
 from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
-from ..runs.files.tables import column_names, numbers, table_of_file
+from ..runs.files.reading import LOGS
+from ..runs.files.tables import as_table, column_names, numbers, table_of_file
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
-LOGS = ("log.csv", "log.parquet")
 MOST_STEPS = 20  # between two samples; chosen, an FMU that wants more of them takes them itself
 DIGITS = 1e-5  # of an output's spread: noise below that is rounding; chosen
 # By which the standard deviation of a start value is larger than that of its parabola, which also bends
@@ -90,10 +90,8 @@ def columns_of(path: Path) -> list[str]:
         InputError: the file cannot be read.
     """
     table = _table(path)
-    try:
+    with as_table(path):
         return column_names(table, stated_layout(table) or Layout())
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read as a table: {error}") from None
 
 
 def _table(path: Path) -> Path:
@@ -107,10 +105,8 @@ def _read(path: Path, wanted: Sequence[str] | None) -> MeasuredRun:
     for name in names:
         if name not in there:
             raise InputError(f"'{path}' has no column {quoted(name)}{nearest(name, there)}")
-    try:
+    with as_table(path):
         frame = table_of_file(table, layout, names)
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read as a table: {error}") from None
     columns = {name: numbers(frame[name], table, layout) for name in names}
     time = columns.pop(TIME)
     if time.size < FEWEST or not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):

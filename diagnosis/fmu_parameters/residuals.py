@@ -7,7 +7,7 @@ the slopes are those about the most likely start (Laplace's method).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
@@ -57,8 +57,8 @@ class Whitening:
 
     along: np.ndarray
     kept: np.ndarray
-    begin: Mapping[str, float] = field(default_factory=dict)
-    lead: np.ndarray | None = None
+    begin: Mapping[str, float]
+    lead: np.ndarray
 
     def __call__(self, r: np.ndarray) -> np.ndarray:
         """Whitened residuals (n,), or slopes (n, q)."""
@@ -197,21 +197,11 @@ class WindowResiduals:
         """Each window with its part of residuals (size,)."""
         return ((w, r[rows]) for w, rows in zip(self.windows, self.rows, strict=True))
 
-    def whiten(self, r: np.ndarray) -> np.ndarray:
-        """Whitened residuals (size,), or slopes (size, q)."""
-        return np.concatenate(
-            [white(r[rows]) for white, rows in zip(self._whitening, self.rows, strict=True)]
-        )
-
     def whitened(self, settings: Sequence[Setting]) -> list[np.ndarray]:
         """Of each setting the whitened residuals (size,)."""
         found = self._residuals(settings, [white.begin for white in self._whitening])
-        led = [
-            np.zeros(w.measured.size) if x.lead is None else x.lead
-            for w, x in zip(self.windows, self._whitening, strict=True)
-        ]
-        lead = np.concatenate(led)
-        return [self.whiten(r - lead) for r in found]
+        each = [*zip(self._whitening, self.rows, strict=True)]
+        return [np.concatenate([white(r[rows] - white.lead) for white, rows in each]) for r in found]
 
     def whiten_about(self, setting: Setting) -> None:
         """Take the slopes by the start values about a setting.
@@ -247,7 +237,7 @@ class WindowResiduals:
             raise InputError(f"'{self.processes.name}' fails on run '{w.run}': {here.fault}")
         base = self._off(w, here)
         if not names:
-            return Whitening(np.zeros((base.size, 0)), np.zeros(0))
+            return Whitening(np.zeros((base.size, 0)), np.zeros(0), {}, np.zeros(base.size))
         S = slopes(z)
         best = -np.linalg.solve(np.eye(z.size) + S.T @ S, S.T @ base)
         bend = off(best)[: base.size] - base - S @ best

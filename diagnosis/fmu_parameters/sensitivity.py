@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim import InputError
-
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
 from ..search.most_likely import STEPS
@@ -104,15 +102,3 @@ def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedPara
 def _fault(r: WindowResiduals, start: Setting, k: int, z: float) -> str:
     (predicted,) = r.predict([r.at(start, k, z)], [0])[0]
     return predicted.fault
-
-
-def refuse_unknown(found: Sensitivities) -> None:
-    """Refuse a calibration in which the runs tell no parameter.
-
-    Raises:
-        InputError: they tell none.
-    """
-    if not any(s.known for s in found.each):
-        raise InputError(
-            "the runs do not identify any parameter: no output changes by more than its noise"
-        )

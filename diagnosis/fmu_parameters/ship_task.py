@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER, SI_UNIT
+from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER
 from ..predictors.windows import step_of, usable_windows
 from ..runs import QUANTITY, Smoothed
+from ..runs.columns.unit_check import SI_UNIT
 from ..runs.sensors.evidence import FEWEST
 from .additional_force import AdditionalForce, EarthDirection
 from .calibration_task import CalibrationTask
@@ -58,7 +60,7 @@ class ShipTask(CalibrationTask):
         lines = [predictor.lines["outputs"][s] for s in POSE]
         self.lines = np.array([[line.gain for line in lines], [line.offset for line in lines]])
 
-    @property
+    @cached_property
     def confined(self) -> ConfinedFmu:
         return self.predictor.confined
 

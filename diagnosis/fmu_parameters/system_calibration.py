@@ -113,12 +113,15 @@ def calibrate(
     def left(f: ParameterFit) -> SystemRemainder:
         return remainder(train, f.residuals, first_white, f.slopes.shape[1], names, units)
 
+    def far(f: ParameterFit) -> bool:
+        return bool(np.abs(f.setting.z).max() > FAR_OFF)
+
     best, accepted = alone, []
 
     def temper(f: ParameterFit) -> float:
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
-    while possible and len(accepted) < MOST_FORCES and (left(best).significant or _far(best)):
+    while possible and len(accepted) < MOST_FORCES and (left(best).significant or far(best)):
         found = search(train, best, possible, dict(usual), temper, advance)
         if found is None:
             break
@@ -200,23 +203,15 @@ def verdict_of(
     """
     if rejected:
         return "unexplained"
-    if forces and forces[0].together >= EVEN_ODDS and not (rest.significant and rest_is_large(rest)):
+    # Where half of the first squares of an output or more is left nothing is explained.
+    large = rest.significant and any(o.share > EVEN_ODDS and o.matters for o in rest.outputs)
+    if forces and forces[0].together >= EVEN_ODDS and not large:
         return "found" if forces[0].probability >= FOUND and not forces[0].alike else "ambiguous"
     if rest.significant:
         return "unexplained"
     if not moved.any:
         return "none"
     return "parameters" if any(moved.each) else "ambiguous"
-
-
-def _far(best: ParameterFit) -> bool:
-    """Whether a parameter is further from its prior mean than that allows."""
-    return bool(np.abs(best.setting.z).max() > FAR_OFF)
-
-
-def rest_is_large(rest: SystemRemainder) -> bool:
-    """Whether half of the first squares of an output or more is left: then nothing is explained."""
-    return any(o.share > EVEN_ODDS and o.matters for o in rest.outputs)
 
 
 def _rejected(validate: WindowResiduals | None, best: ParameterFit, start: Setting) -> str:

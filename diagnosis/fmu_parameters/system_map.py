@@ -2,7 +2,7 @@
 
     {
         "inputs": {"force": "f"},
-        "outputs": {"position": {"name": "s", "unit": "mm", "noise": 0.5}},
+        "outputs": {"position": {"name": "s", "factor": 0.001, "noise": 0.5}},
         "start": {"position": "springDamper.s_rel", "der(position)": "springDamper.v_rel"},
         "disturbance_inputs": ["f"],
         "window": 20.0,

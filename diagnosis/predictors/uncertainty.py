@@ -44,9 +44,9 @@ SHARE_OF_COMMAND = 0.02
 # 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
 # from a limit; the same for commands and windows, and for what must be explained.
 NEGLIGIBLE = 0.05
-# Relative standard deviation of a measured coefficient: at the most, where one is given for all, of what
-# no other ship had to lend (masses, thrusters' forces and places), and of every coefficient in the
-# search. So much of the inertial force a model lacks at the least.
+# Relative standard deviation of a measured coefficient. The search has no more for any coefficient; one
+# prior for all has no more for masses, thrusters' forces and places, which no other ship had to lend.
+# So much of the inertial force a model lacks at the least.
 MEASURED = 0.1
 
 

@@ -11,7 +11,7 @@ from fmus.ops import wrap
 
 from .cleaning import FEWEST, SHOWN, noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
-from .columns.unit_check import UNITS
+from .columns.unit_check import SI_UNIT
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
@@ -134,8 +134,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
 
 def _unit(name: str) -> str:
     """The SI unit of a signal."""
-    quantity = (QUANTITY | outputs([name])).get(name, "command")
-    return next(unit for unit, factor in UNITS[quantity].items() if factor == 1.0)
+    return SI_UNIT[(QUANTITY | outputs([name])).get(name, "command")]
 
 
 def _of_differences(samples: int) -> float:

@@ -4,13 +4,15 @@ import argparse
 from collections.abc import Mapping
 from contextlib import closing
 
+from cosim import InputError
+
 from ...execution.progress import Advance
 from ...execution.result_folder import together
 from ...predictors import WRITTEN, Execution
 from ...predictors.predictor import FOUND, MAP
 from ..calibration_task import CalibrationTask
 from ..residuals import WindowResiduals
-from ..sensitivity import refuse_unknown, sensitivities
+from ..sensitivity import sensitivities
 from ..ship_task import ship_task
 from ..system_calibration import calibrate
 from ..system_task import is_system, system_task
@@ -71,7 +73,10 @@ def _only_known(task: CalibrationTask, parts: Mapping[str, WindowResiduals], adv
         InputError: they can tell nothing.
     """
     found = sensitivities(parts["train"], advance)
-    refuse_unknown(found)
+    if not any(s.known for s in found.each):
+        raise InputError(
+            "the runs do not identify any parameter: no output changes by more than its noise"
+        )
     task.notes += [s.fault for s in found.each if s.fault]
     if untold := [s.parameter.name for s in found.each if not s.known]:
         task.notes.append(

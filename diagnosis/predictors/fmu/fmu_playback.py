@@ -119,13 +119,13 @@ class Playback:
         """Whether a reset leaves the FMU as its instantiation does, as far as can be seen."""
         new = self._run(prediction)
         with suppress(SimulationError):
-            again = self._run(prediction)
-            return np.array_equal(new.outputs, again.outputs, equal_nan=True)
-        self.close()  # a failed reset has left it in an unknown state
+            if np.array_equal(new.outputs, self._run(prediction).outputs, equal_nan=True):
+                return True
+        self.close()  # a reset has left it in an unknown state
         return False
 
     def _ready(self, h: float) -> IsolatedInstance:
-        if self._instance is not None and self._resets is not False and h == self._h:
+        if self._instance is not None and h == self._h:
             self._instance.reset()
             return self._instance
         self.close()
@@ -151,9 +151,11 @@ class Playback:
         told = np.frombuffer(instance.whole_run(start, rows.tobytes(), steps, h, prediction.terms))
         known = told.reshape(-1, len(self.outputs))
         outputs[: len(known)] = known
-        if np.isfinite(outputs).all():
+        fine = bool(np.isfinite(outputs).all())
+        if self._resets is False or not fine:  # a reset may not cure what has failed
+            self.close()
+        if fine:
             return PlayedBack(outputs)
-        self.close()  # a reset may not cure it
         k = len(known) - 1
         place = int(np.argmax(np.nan_to_num(np.abs(outputs[k]), nan=np.inf)))
         how = "diverges" if np.isfinite(outputs[k, place]) else "is not finite"

@@ -177,7 +177,7 @@ class Fmu:
         maps = self.given(measured), self.variables(measured)  # before a process is started
         process = confined(self.model, self.execution)
         predictor = FmuPredictor(self, process, maps, runs)
-        finalize(predictor, predictor.processes.close)
+        finalize(predictor, process.close)
         return predictor
 
 

@@ -41,6 +41,7 @@ from fmus.base_units import base_exponents
 
 from ...execution.user_files import json_content
 from ...runs import QUANTITY, UNITS, Column
+from ...runs.columns.unit_check import SI_UNIT
 from ..black_box import MOTION, POSE, VELOCITY
 from .signal_names import NONE, Meant, lone, meant
 
@@ -54,9 +55,6 @@ BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
 # What marks a variable as a start value, before or behind the name of the signal.
 BEFORE = re.compile(r"(initial|init|start)_?(?P<core>.+)")
 BEHIND = re.compile(r"(?P<core>.+?)_?(0|initial|init|start)")
-SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
-           "moment": "N.m", "shaft speed": "1/s", "command": "1", "acceleration": "m/s2",
-           "angular acceleration": "rad/s2"}  # fmt: skip
 
 
 Map = TypeVar("Map", bound=BaseModel)

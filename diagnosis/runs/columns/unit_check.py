@@ -25,6 +25,7 @@ OTHERS: dict[str, tuple[str, dict[str, float]]] = {
     "acceleration": ("m/s2", {"mm/s2": c.milli, "g": c.g}),
     "angular acceleration": ("rad/s2", {"deg/s2": c.degree}),
 }
+SI_UNIT = {quantity: unit for quantity, (unit, _) in OTHERS.items()}
 UNITS = {quantity: {unit: 1.0, **others} for quantity, (unit, others) in OTHERS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"

@@ -39,7 +39,7 @@ from ..columns.columns import (
 from ..columns.unit_check import LARGEST, UNITS, remedy
 from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
-from .tables import column_names, date_stamps, numbers, table_of_file
+from .tables import as_table, column_names, date_stamps, numbers, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
@@ -183,18 +183,11 @@ def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None)
 def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tuple[pd.DataFrame, Layout]:
     """What is needed of a CSV or Parquet file, and which column is which signal."""
     given = layout or read_layout(path)
-    try:
+    with as_table(path):
         names = column_names(path, given or Layout())
         layout = given or layout_of(names, {}, f"'{path}'", of, path.parent)
         wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of)}
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
-    except ImportError:
-        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
-    except InputError:
-        raise
-    except Exception as error:  # a broken file makes the readers stumble in many ways
-        text = " ".join(str(error).split())
-        raise InputError(f"'{path}' cannot be read as a table: {text}") from None
 
 
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:

@@ -1,7 +1,8 @@
 """CSV and Parquet files as tables, read as the JSON file beside them says, and cells as numbers."""
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,24 @@ from ..columns.side_car import (
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 DAY_FIRST = re.compile(r"^(\d\d)\.(\d\d)\.(\d{4})[ T]")
 LEAP_SECOND = re.compile(r"(?<=:59):60")
+
+
+@contextmanager
+def as_table(path: Path) -> Iterator[None]:
+    """Where a file is read as a table.
+
+    Raises:
+        InputError: in one line, in place of what the readers raise.
+    """
+    try:
+        yield
+    except ImportError:
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
+    except InputError:
+        raise
+    except Exception as error:  # a broken file makes the readers stumble in many ways
+        text = " ".join(str(error).split())
+        raise InputError(f"'{path}' cannot be read as a table: {text}") from None
 
 
 def column_names(path: Path, layout: Layout) -> list[str]:
