@@ -23,7 +23,10 @@ from .fmu_playback import PlaybackRequest, PlayedBack, Processes
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-STEP = 0.02  # of a central difference, in prior standard deviations; chosen: solvers keep some digits
+STEP = 0.02  # of a central difference at most, in prior standard deviations; chosen
+# Rms change of the residuals by one step of a difference, in units of the noise, at most: a longer step
+# shows the curvature of a prediction in its slope. Chosen: a shorter one shows the rounding of solvers.
+MOST_CHANGE = 1.0
 REMEMBERED = 50  # settings whose residuals are kept; chosen: those of one step of a fit
 LARGEST = 1e50  # of a residual: more is not finite, and its square is; chosen
 START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
@@ -98,6 +101,7 @@ class WindowResiduals:
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
         self._known: dict[tuple[Setting, bool], np.ndarray] = {}
         self.failed: list[tuple[dict[str, float], str]] = []
+        self._steps: dict[str, float] = {}
         self._whitening: list[Whitening] = []
         sizes = [w.measured.size for w in windows]
         ends = np.cumsum([0, *sizes])
@@ -268,6 +272,19 @@ class WindowResiduals:
         Returns:
             The slopes, and why those that are zero are not known.
         """
+        found = self._differences(setting, sizes)
+        change = np.sqrt(np.mean(found[0] ** 2, axis=0))
+        names = [*(p.name for p in self.parameters), *(f.id for f in setting.forces)]
+        last = [self._steps.get(n, STEP) for n in names]
+        steps = np.minimum(STEP, MOST_CHANGE / np.maximum(change, MOST_CHANGE / STEP))
+        self._steps |= zip(names, steps.tolist(), strict=True)
+        again = np.any(np.array(last) > 2.0 * steps)
+        return self._differences(setting, sizes) if again else found
+
+    def _differences(
+        self, setting: Setting, sizes: Sequence[float]
+    ) -> tuple[np.ndarray, list[str]]:
+        """The same with the steps that the last slopes ask for."""
         each = [*self._moved(setting, sizes)]
         settings = [s for _, low, high, _, _ in each for s in (low, high)]
         found = self.whitened([setting, *settings])
@@ -293,11 +310,13 @@ class WindowResiduals:
         for k, p in enumerate(self.parameters):
             low, high = p.bounds
             z = setting.z[k]
-            down, up = min(STEP, max(z - low, 0.0)), min(STEP, max(high - z, 0.0))
+            step = self._steps.get(p.name, STEP)
+            down, up = min(step, max(z - low, 0.0)), min(step, max(high - z, 0.0))
             yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
         for k, (f, size) in enumerate(zip(setting.forces, sizes, strict=True)):
-            low, high = (self._forced(setting, k, sign * STEP * size) for sign in (-1.0, 1.0))
-            yield f.id, low, high, STEP, STEP
+            step = self._steps.get(f.id, STEP)
+            low, high = (self._forced(setting, k, sign * step * size) for sign in (-1.0, 1.0))
+            yield f.id, low, high, step, step
 
     @staticmethod
     def _forced(setting: Setting, k: int, change: float) -> Setting:

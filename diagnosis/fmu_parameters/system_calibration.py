@@ -118,7 +118,10 @@ def calibrate(
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
     while possible and len(accepted) < MOST_FORCES and (left(best).significant or _far(best)):
-        found = search(train, best, possible, dict(usual), temper, advance)
+        # Parameters that imitate a force may be far from where they are with it.
+        held = Setting(start.z, best.setting.forces)
+        others = [fit(train, held, best.sizes, range(len(start.z)))] if _far(best) else []
+        found = search(train, best, others, possible, dict(usual), temper, advance)
         if found is None:
             break
         best = fitted(train, found[0].setting, found[0].sizes)
