@@ -118,10 +118,10 @@ class WindowResiduals:
         if not self.failed:
             return ""
         values, why = self.failed[0]
-        at = ", ".join(f"{name} = {x:.4g}" for name, x in values.items())
+        at = "".join(f", {name} = {x:.4g}" for name, x in values.items())
         return (
             f"The FMU fails with {len(self.failed)} of the values that the fit tried, which it avoids; "
-            f"the first at {at}: {why}"
+            f"the first{at}: {why}"
         )
 
     @property

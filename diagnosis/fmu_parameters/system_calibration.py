@@ -178,6 +178,8 @@ class Moved:
 def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
     """Which parameters the runs show to be off, forces fitted anew where they are not."""
     p = len(best.setting.z)
+    if not p:
+        return Moved(False, ())
     held = Setting((0.0,) * p, best.setting.forces)
     if not np.isfinite(r.whitened([held])[0]).all():  # forces of other parameters make the FMU diverge
         held = Setting(held.z, tuple(replaced(f, 0.0) for f in held.forces))
@@ -213,7 +215,7 @@ def verdict_of(
 
 def _far(best: ParameterFit) -> bool:
     """Whether a parameter is further from its prior mean than that allows."""
-    return bool(np.abs(best.setting.z).max() > MOST_MOVED)
+    return any(abs(z) > MOST_MOVED for z in best.setting.z)
 
 
 def rest_is_large(rest: SystemRemainder) -> bool:

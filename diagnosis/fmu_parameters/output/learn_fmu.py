@@ -38,7 +38,7 @@ def learn_system(
     try:
         parts = task.residuals()
         train = parts["train"]
-        if options.parameters is None:
+        if options.parameters is None and task.parameters:
             _only_known(task, parts, advance)
         result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
         use = {r.name: u for u, every in task.runs.items() for r in every}
