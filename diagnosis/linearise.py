@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .fmu_parameters.system_map import SystemMap
 
 FILES = ("linear.json", "linear.mat")
+DOUBTFUL = 0.02  # change of A by longer steps, from which on it is reported; chosen
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,9 +72,20 @@ def linearise(options: argparse.Namespace, advance: Advance) -> Done:
         f"states: {', '.join(found.states)}; inputs: {', '.join(found.inputs) or 'none'}; "
         f"outputs: {', '.join(found.outputs)}",
         f"eigenvalues of A [1/s]: {roots}",
+        *_doubt(found.doubt),
         f"Files in {options.out}: {', '.join(FILES)}",
     ]
     return Done(0, shown)
+
+
+def _doubt(share: float) -> list[str]:
+    """What longer steps say of rates that are differences."""
+    if share <= DOUBTFUL:
+        return []
+    return [
+        f"A is uncertain by {share:.0%}: its rates are differences over short steps, and steps of twice "
+        "the length change them. A tighter tolerance of the FMU, or rates that it declares, are better."
+    ]
 
 
 def _read_state(path: Path, model: "FmuModel") -> dict[str, float]:

@@ -49,6 +49,8 @@ def parameters(options: argparse.Namespace, advance: Advance) -> Done:
         task = ship_task(options, {"train": options.runs}, advance, execution)
     else:
         task = system_task(options.fmu, options.map, {"train": options.runs}, None, execution=execution)
+    if not task.parameters:
+        raise InputError("; ".join(task.notes))
     shown: list[RenderableType]
     try:
         if options.runs:

@@ -14,13 +14,20 @@ from support.foreign import needs_compiler
 from support.oscillator import build_oscillator
 
 import cosim
+from benchmarks.foreign_parameters.c_fmu import CSystem, Quantity, build_c_fmu
 from cosim import InputError, Unit
 from cosim.fmu import ConfinedFmu, FmuModel
 from diagnosis import learn, linearise, parameters
 from diagnosis.fmu_parameters.additional_force import AdditionalForce
 from diagnosis.fmu_parameters.force_search import candidates
 from diagnosis.fmu_parameters.linear_model import linearised, states_of
-from diagnosis.fmu_parameters.measured_system import MeasuredRun, noise_of, noises, windows_of
+from diagnosis.fmu_parameters.measured_system import (
+    MeasuredRun,
+    Window,
+    noise_of,
+    noises,
+    windows_of,
+)
 from diagnosis.fmu_parameters.output.found_fmu import write_found
 from diagnosis.fmu_parameters.parameter_file import (
     CalibratedParameter,
@@ -29,11 +36,12 @@ from diagnosis.fmu_parameters.parameter_file import (
     proposed,
     read_parameters,
 )
-from diagnosis.fmu_parameters.residuals import Whitening
+from diagnosis.fmu_parameters.residuals import Setting, Whitening, WindowResiduals
+from diagnosis.fmu_parameters.sensitivity import confounded
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 from diagnosis.fmu_parameters.system_remainder import change_of_squares
 from diagnosis.predictors.black_box import laid
-from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes
+from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, PlayedBack, Processes
 
 pytestmark = needs_compiler
 
@@ -131,6 +139,9 @@ WRONG = {
     "of the map": (some(c={"name": "f"}), "variable of the map"),
     "twice": (some(c={"name": "m"}), "twice"),
     "extra key": (some(c={"guess": 1}), "guess"),
+    "misspelt key": (some(c={"valu": 1}), "did you mean 'value'"),
+    "misspelt key of a prior": (some(c={"prior": {"relstd": 1}}), "did you mean 'rel_std'"),
+    "misspelt list": ({"parameter": []}, "did you mean 'parameters'"),
     "none": ({"parameters": []}, "parameters"),
     "no object": ([1], "parameters.json"),
 }
@@ -200,6 +211,43 @@ def test_noise_of_a_smooth_signal_is_found():
     noisy = np.sin(t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)
     assert noise_of(noisy) == pytest.approx(0.01, rel=0.05)
     assert noise_of(np.round(np.sin(t), 2)) > 0.0
+
+
+@pytest.mark.parametrize(
+    "signal", [lambda k: np.sin(0.25 * k), lambda k: (k // 40) % 2], ids=["few samples", "steps"]
+)
+def test_noise_is_not_that_which_a_signal_does_between_samples(signal):
+    noisy = signal(np.arange(2000)) + 0.01 * np.random.default_rng(1).standard_normal(2000)
+    assert noise_of(noisy) == pytest.approx(0.01, rel=0.1)
+
+
+def test_slopes_of_a_prediction_that_bends_are_those_of_its_equation():
+    """An oscillation of 40 periods: a fiftieth of the prior turns its end by half of a period."""
+    t = np.linspace(0.0, 40.0, 801)
+    p = CalibratedParameter(name="w", value=2.0 * np.pi, prior=Prior(rel_std=0.5))
+
+    def run(requests):
+        return [PlayedBack(np.sin(r.start["w"] * t)[:, None]) for r in requests]
+
+    w = Window("run", 0.0, PlaybackRequest(0.05, {}, np.zeros((800, 0))), t, np.zeros((801, 1)), {})
+    r = WindowResiduals(SimpleNamespace(run=run, name="fmu"), [w], np.array([0.01]), [p])
+    r.whiten_about(Setting((0.0,)))
+    J, faults = r.slopes(Setting((0.0,)), ())
+    exact = -p.std * t * np.cos(p.value * t) / 0.01
+    assert not faults
+    assert np.abs(J[:, 0] - exact).max() < 1e-3 * np.abs(exact).max()
+
+
+def test_groups_are_those_that_the_predictions_do_not_discriminate():
+    X = np.random.default_rng(0).standard_normal((400, 8))
+    twice = np.column_stack([X[:, 0], 3.0 * X[:, 0], X[:, 1]])
+    thrice = np.column_stack([twice, -X[:, 0]])
+    scale = np.column_stack([X[:, :4], -X[:, :4].sum(axis=1), X[:, 5]])  # all five by one factor
+    pairs = np.column_stack([X[:, 0], X[:, 0] + 0.2 * X[:, 6], X[:, 1], X[:, 1] + 1e-4 * X[:, 2]])
+    cases = [(X, []), (twice, ["ab"]), (thrice, ["abd"]), (scale, ["abcde"]), (pairs, ["ab", "cd"])]
+    for slopes, groups in cases:
+        names = "abcdefgh"[: slopes.shape[1]]
+        assert ["".join(g) for g in confounded(slopes, names)] == groups
 
 
 def test_whitening_is_the_inverse_root_of_the_covariance():
@@ -288,7 +336,7 @@ CUBIC = {
     "if (vr[k] == 0) m->u": "if (vr[k] == 1) m->y = v[k]; else if (vr[k] == 0) m->u",
     "const double dk[], double du[]) { return 3; }": """const double dk[], double du[]) {
     Lag *m = c; for (size_t i = 0; i < nu; i++) { du[i] = 0.0; for (size_t j = 0; j < nk; j++) {
-        if (u[i] == 1) du[i] += dk[j] * (k[j] == 1);
+        if (u[i] == 1) continue; /* as the Reference FMUs: 0 of a state that is an output */
         else du[i] += dk[j] * (k[j] == 1 ? -3.0 * m->y * m->y / m->T : 1.0 / m->T); } } return 0; }""",
 }
 CUBIC_VARIABLES = """<ScalarVariable name="der(y)" valueReference="3" causality="output" initial="calculated">
@@ -310,7 +358,10 @@ def test_derivatives_of_the_fmu_are_those_of_differences(work, monkeypatch, prov
     told = f'{foreign.ANY_STEP} providesDirectionalDerivative="{str(provided).lower()}"'
     model = FmuModel(foreign.build_lag(work, capabilities=told))
     at = {"out, filtered": 0.7, "in[1]": 0.2, "T": 2.0}
-    found = linearised(model, states_of(model, None), at, ["out, filtered"])
+    states = states_of(model, None)
+    given = {"outputs": {"y": "out, filtered"}, "start": {"y": "out, filtered"}}
+    assert states_of(model, SystemMap.model_validate(given)) == states  # by the rate that it declares
+    found = linearised(model, states, at, ["out, filtered"])
     # A central difference of a cube is off by the square of its step, which is 1e-3 here.
     error = {"abs": 1e-12 if provided else 1e-6}
     assert pytest.approx(np.array([[-3.0 * 0.49 / 2.0]]), **error) == found.A
@@ -333,6 +384,13 @@ def test_state_that_cannot_be_is_refused(fmu, work, capsys, arguments, message):
     assert linearise.main([str(fmu), *arguments, "--map", given, "--out", "linear"]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
     assert not (work / "linear").exists()
+
+
+def test_rates_by_steps_that_a_coarse_fmu_spoils_are_reported(work, capsys):
+    coarse = build_oscillator(work, "coarse", habit="p[V_v] = round(p[V_v] * 1e5) / 1e5;")
+    given = written(work / "map.json", {**MAP, "start": START})
+    assert linearise.main([str(coarse), "--map", given, "--out", "linear"]) == 0
+    assert "A is uncertain by" in capsys.readouterr().out
 
 
 def test_fmu_whose_states_cannot_be_set_is_refused(work, capsys):
@@ -374,6 +432,42 @@ def test_fmu_without_parameters(work, capsys):
     assert parameters.main([str(bare)]) == 2
     assert "no parameter that can be calibrated" in " ".join(capsys.readouterr().err.split())
     assert not (work / "parameters.json").exists()
+
+
+@pytest.mark.slow
+def test_fmu_without_parameters_is_searched_for_forces(fmu, work, capsys):
+    run = measured(fmu, work, "run", {}, [DRAG])
+    bare = build_oscillator(work, "bare", left_out=("m", "c", "d", "x0", "v0", "c3", "unused"))
+    given = written(work / "map.json", MAP)
+    assert learn.main([run, "--model", str(bare), "--map", given, "--out", "out"]) == 0
+    assert "no parameter that can be calibrated" in " ".join(capsys.readouterr().out.split())
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert (found["verdict"], found["parameters"]) == ("found", [])
+    assert [e["id"] for e in found["effects"]] == ["f:|v|v"]
+
+
+@pytest.mark.slow
+def test_parameters_that_imitate_a_force_do_not_hide_it(work):
+    """Two springs without a damper: without drag the fit ends at a heavy mass and a weak spring."""
+    undamped = CSystem(
+        {"f": Quantity(0.0, "N")},
+        {"x": Quantity(0.0, "m"), "v": Quantity(1.0, "m/s")},
+        {"k": Quantity(1.0, "N/m"), "c": Quantity(1.0, "N/m"), "m": Quantity(1.0, "kg")},
+        "der_x = v; der_v = (k * f - (k + c) * x + 0.1 * v) / m;",
+    )
+    fmu = build_c_fmu(work, "undamped", undamped)
+    runs = [
+        measured(fmu, work, f"r{k}", {}, [AdditionalForce("f", "v", 1, False, -0.3)], k) for k in (1, 2)
+    ]
+    each = [("k", 0.3), ("c", 0.3), ("m", 0.01)]
+    content = [{"name": n, "value": 1.0, "log": True, "prior": {"rel_std": s}} for n, s in each]
+    written(work / "parameters.json", {"parameters": content})
+    written(work / "map.json", MAP)
+    given = ["--map", "map.json", "--parameters", "parameters.json", "--out", "out"]
+    assert learn.main([*runs, "--model", str(fmu), *given]) == 0
+    found = json.loads((work / "out/diagnosis.json").read_text())
+    assert (found["verdict"], [e["id"] for e in found["effects"]]) == ("found", ["f:|v|v"])
+    assert not any(p["moved"] for p in found["parameters"])
 
 
 @pytest.mark.slow

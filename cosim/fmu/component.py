@@ -183,8 +183,9 @@ class FmuComponent:
             uri.encode(),
             ctypes.byref(self._callbacks),
             fmi2.fmi2False,
-            # Debug logging of some tools takes more time than their model.
-            fmi2.fmi2False if self.on_message is None else fmi2.fmi2True,
+            # Debug logging of some tools takes more time than their model. A Python FMU without it does
+            # not report its exceptions either.
+            fmi2.fmi2False if self.on_message is None and not self.is_python else fmi2.fmi2True,
         )
         self.slave.component = pointer
         if own:
@@ -192,7 +193,8 @@ class FmuComponent:
             for module in self._modules:
                 _hold(vars(module))
             self._classes = [found for module in self._modules for found in _classes(module, folder)]
-            self.model.forget_modules()
+            if not self.model.alone:
+                self.model.forget_modules()
         sys.modules.update(others)
         if not pointer:
             why = f": {self.complaint}" if self.complaint else ""

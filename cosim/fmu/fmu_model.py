@@ -73,6 +73,10 @@ class FmuModel:
         path: the ``.fmu`` file.
         folder: where it is unpacked already, and removed by the caller.
 
+    Attributes:
+        alone: whether the process runs no other FMU: then modules of a Python FMU may be imported at
+            any call, else only while it is instantiated.
+
     Raises:
         InputError: not there, not an FMU, or not one for FMI 2.0 co-simulation.
     """
@@ -112,6 +116,7 @@ class FmuModel:
         except Exception as error:
             raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
         self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        self.alone = False
         self._folder = folder
         self._scratch: Scratch | None = None
 

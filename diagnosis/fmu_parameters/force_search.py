@@ -62,6 +62,7 @@ def candidates(
 def search(
     r: WindowResiduals,
     at: ParameterFit,
+    others: Sequence[ParameterFit],
     possible: Sequence[AdditionalForce],
     usual: dict[str, float],
     temper_of: Callable[[ParameterFit], float],
@@ -75,6 +76,7 @@ def search(
     Args:
         r: the residuals.
         at: the fit without it.
+        others: further fits from which the search begins.
         possible: the candidates.
         usual: of each input a usual size.
         temper_of: by which squares are divided where the residuals of a fit are not as white as noise.
@@ -82,24 +84,29 @@ def search(
     """
     advance("which additional force explains the residual")
     present = {f.id for f in at.setting.forces}
-    tried = [f for f in _distinct(r, at, possible) if f.id not in present]
-    scaled = _scaled(r, at, tried, usual)
-    if not scaled:
-        return None
-    kept, same = _promising(at, scaled)
-    charge = float(np.log(r.samples) + 2.0 * np.log(len(scaled)))
-    fits: list[tuple[float, ParameterFit, AdditionalForce]] = []
-    for gain, force, size in kept:
-        if gain < charge / 4.0:  # a fit gains hardly more than its slopes promise
+    best: dict[str, tuple[ParameterFit, AdditionalForce, Sequence[str]]] = {}
+    charge = 0.0
+    for begin in (at, *others):
+        tried = [f for f in _distinct(r, begin, possible) if f.id not in present]
+        scaled = _scaled(r, begin, tried, usual)
+        if not scaled:
             continue
-        advance(f"fit with {force.id}")
-        begin, sizes = added(at, force, size)
-        one = fit(r, begin, sizes)
-        fits.append((2.0 * (one.log_evidence - at.log_evidence), one, force))
-    if not fits:
+        kept, same = _promising(begin, scaled)
+        charge = max(charge, float(np.log(r.samples) + 2.0 * np.log(len(scaled))))
+        for gain, force, size in kept:
+            if gain < charge / 4.0:  # a fit gains hardly more than its slopes promise
+                continue
+            advance(f"fit with {force.id}")
+            one = fit(r, *added(begin, force, size))
+            if force.id not in best or one.cost < best[force.id][0].cost:
+                best[force.id] = one, force, same.get(force.id, ())
+    if not best:
         return None
-    temper = temper_of(min((one for _, one, _ in fits), key=lambda one: one.cost))
-    fits = [(gain / temper - charge, one, force) for gain, one, force in fits]
+    temper = temper_of(min((one for one, *_ in best.values()), key=lambda one: one.cost))
+    fits = [
+        (2.0 * (one.log_evidence - at.log_evidence) / temper - charge, one, force)
+        for one, force, _ in best.values()
+    ]
     fits.sort(key=lambda x: -x[0])
     if fits[0][0] <= 0.0:
         return None
@@ -107,11 +114,11 @@ def search(
     weight = np.exp(log - log.max())
     weight /= weight.sum()
     own, unlikely = weight[1:], 1.0 - LEVEL
-    best, (_, one, force) = float(own[0]), fits[0]
+    first, (_, one, force) = float(own[0]), fits[0]
     near = [f.id for w, (_, _, f) in zip(own, fits, strict=True) if f.id != force.id and w > unlikely]
-    alike = (*same.get(force.id, ()), *near)
+    alike = (*dict.fromkeys((*best[force.id][2], *near)),)
     end = one.setting.forces[-1]
-    gained = Accepted(end, best, float(own[own > unlikely].sum()), alike, at.cost - one.cost)
+    gained = Accepted(end, first, float(own[own > unlikely].sum()), alike, at.cost - one.cost)
     return one, gained
 
 

@@ -50,6 +50,7 @@ class LinearModel:
         at: variable -> value about which: states and inputs, and what outputs are there.
         x_dot: (n,), rate of the states there.
         A, B, C, D: the matrices.
+        doubt: change of A by longer steps, as a share of its largest value; 0: no rate is by steps.
     """
 
     states: Sequence[str]
@@ -61,6 +62,7 @@ class LinearModel:
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
+    doubt: float = 0.0
 
     def write(self, folder: Path, units: Mapping[str, str]) -> list[str]:
         """Write ``linear.json`` and ``linear.mat``; returns their names."""
@@ -94,7 +96,7 @@ def states_of(model: FmuModel, given: SystemMap | None) -> list[LinearState]:
         InputError: none is known.
     """
     if given is not None and given.start:
-        return _of_map(given)
+        return _of_map(given, model)
     listed = _listed(model)
     if listed:
         return listed
@@ -108,14 +110,19 @@ def states_of(model: FmuModel, given: SystemMap | None) -> list[LinearState]:
     return found
 
 
-def _of_map(given: SystemMap) -> list[LinearState]:
+def _of_map(given: SystemMap, model: FmuModel) -> list[LinearState]:
+    """Those of a map, by the rates that the FMU declares, else by differences of the outputs."""
+    listed = model.description.modelVariables
+    declared = {v.derivative.name: v.name for v in listed if v.derivative is not None}
     rates = {column_of_start(key)[0] for key in given.start if column_of_start(key)[1]}
     found = []
     for key, c in given.start.items():
         column, rate = column_of_start(key)
-        found.append(
-            LinearState(c.name, given.outputs[column].name, 2 if rate and column in rates else 1)
-        )
+        if c.name in declared:
+            found.append(LinearState(c.name, declared[c.name], 0))
+        else:
+            order = 2 if rate and column in rates else 1
+            found.append(LinearState(c.name, given.outputs[column].name, order))
     return found
 
 
@@ -172,11 +179,35 @@ def linearised(
     driven = {n: at.get(n, float(model.variables[n].start or 0.0)) for n in inputs}
     suggested = model.description.defaultExperiment
     h = float(suggested.stepSize) if suggested is not None and suggested.stepSize else STEP
+    with closing(confined(model, execution)) as fmu:
+        base, J = _by_steps(fmu, states, start, driven, outputs, h)
+        n, exact = len(states), _exact(fmu, states, start, driven, outputs, h)
+        doubt = 0.0
+        if exact is not None:
+            J = exact
+        elif any(s.order for s in states):
+            _, longer = _by_steps(fmu, states, start, driven, outputs, 2.0 * h)
+            doubt = float(np.abs(longer - J)[:n, :n].max() / max(np.abs(J[:n, :n]).max(), 1e-300))
+    if not (np.isfinite(J).all() and np.isfinite(base).all()):
+        raise InputError(f"'{model.path.name}' has no finite derivatives in this state")
+    values = {**start, **driven, **dict(zip(outputs, base[n:].tolist(), strict=True))}
+    names = [s.name for s in states]
+    return LinearModel(
+        names, inputs, list(outputs), values, base[:n], J[:n, :n], J[:n, n:], J[n:, :n], J[n:, n:], doubt
+    )
+
+
+def _by_steps(
+    fmu: ConfinedFmu,
+    states: Sequence[LinearState],
+    start: Mapping[str, float],
+    driven: Mapping[str, float],
+    outputs: Sequence[str],
+    h: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rates and outputs at a state, and their slopes by states and inputs, by central differences."""
     seen = [*outputs, *(s.seen for s in states)]
-    with (
-        closing(confined(model, execution)) as fmu,
-        closing(ShortSteps(fmu, inputs, seen, h, False)) as steps,
-    ):
+    with closing(ShortSteps(fmu, [*driven], seen, h, False)) as steps:
 
         def answer(start: Mapping[str, float], driven: Mapping[str, float]) -> np.ndarray:
             found = steps.run(start, driven)
@@ -187,29 +218,19 @@ def linearised(
             return np.array([*rates, *(found[n][0] for n in outputs)])
 
         base = answer(start, driven)
-        J = _exact(fmu, states, start, driven, outputs, h)
-        if J is None:
-            columns = []
-            for name in (*(s.name for s in states), *inputs):
-                value = {**start, **driven}[name]
-                d = SMALL * max(abs(value), 1.0)  # of one unit where the value is less
-                sides = []
-                for moved in (value - d, value + d):
-                    changed = {name: moved}
-                    if name in driven:
-                        sides.append(answer(start, {**driven, **changed}))
-                    else:
-                        sides.append(answer({**start, **changed}, driven))
-                columns.append((sides[1] - sides[0]) / (2.0 * d))
-            J = np.column_stack([*columns, np.zeros((base.size, 0))])
-    if not (np.isfinite(J).all() and np.isfinite(base).all()):
-        raise InputError(f"'{model.path.name}' has no finite derivatives in this state")
-    n, m = len(states), len(states)
-    values = {**start, **driven, **dict(zip(outputs, base[n:].tolist(), strict=True))}
-    names = [s.name for s in states]
-    return LinearModel(
-        names, inputs, list(outputs), values, base[:n], J[:n, :m], J[:n, m:], J[n:, :m], J[n:, m:]
-    )
+        columns = []
+        for name in (*(s.name for s in states), *driven):
+            value = {**start, **driven}[name]
+            d = SMALL * max(abs(value), 1.0)  # of one unit where the value is less
+            sides = []
+            for moved in (value - d, value + d):
+                changed = {name: moved}
+                if name in driven:
+                    sides.append(answer(start, {**driven, **changed}))
+                else:
+                    sides.append(answer({**start, **changed}, driven))
+            columns.append((sides[1] - sides[0]) / (2.0 * d))
+    return base, np.column_stack([*columns, np.zeros((base.size, 0))])
 
 
 def _exact(
@@ -237,8 +258,14 @@ def _exact(
         unknown = [variables[n] for n in (*(s.seen for s in states), *outputs)]
         known = [variables[n] for n in (*(s.name for s in states), *driven)]
         columns = [instance.directional_derivative(unknown, v) for v in known]
-        return np.array(columns).reshape(len(known), len(unknown)).T
+        J = np.array(columns).reshape(len(known), len(unknown)).T
     except SimulationError:
         return None
     finally:
         instance.free()
+    # Of an output that is a state some tools return 0.
+    for row, name in enumerate(outputs, len(states)):
+        same = [variables[name].reference == v.reference for v in known]
+        if any(same):
+            J[row] = same
+    return J

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..runs.files.tables import as_table, column_names, numbers, table_of_file
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
+ORDERS = (2, 4)  # of differences, by which noise is estimated; chosen
 MOST_STEPS = 20  # between two samples; chosen, an FMU that wants more of them takes them itself
 DIGITS = 1e-5  # of an output's spread: noise below that is rounding; chosen
 # By which the standard deviation of a start value is larger than that of its parabola, which also bends
@@ -115,18 +117,25 @@ def _read(path: Path, wanted: Sequence[str] | None) -> MeasuredRun:
 
 
 def noise_of(values: np.ndarray) -> float:
-    """Standard deviation of white noise on a smooth signal (n,), by its second differences.
+    """Standard deviation of white noise on a smooth signal (n,), by its differences.
 
-    These have the variance 6 sigma^2. The median is not moved by a few steps of the signal.
+    Of white noise those of an order have the variance of the sum of the squared binomial coefficients.
+    Signals that a few samples resolve are in those of second order, steps widen those of fourth order:
+    the smaller estimate is taken. The median is not moved by a few steps of the signal.
     """
     known = values[np.isfinite(values)]
-    second = np.abs(np.diff(known, 2))
-    if not second.size:
+    return min(_noise_by_differences(known, order) for order in ORDERS)
+
+
+def _noise_by_differences(values: np.ndarray, order: int) -> float:
+    off = np.abs(np.diff(values, order))
+    if not off.size:
         return 0.0
-    if np.mean(second == 0.0) > 0.5:  # of a coarse channel the median is zero
-        return float(np.sqrt(np.mean(second**2) / 6.0))
+    gain = float(np.sqrt(comb(2 * order, order)))
+    if np.mean(off == 0.0) > 0.5:  # of a coarse channel the median is zero
+        return float(np.sqrt(np.mean(off**2))) / gain
     # Of a normal distribution the median of the absolute value is 0.6745 standard deviations.
-    return float(np.median(second) / 0.6745 / np.sqrt(6.0))
+    return float(np.median(off)) / 0.6745 / gain
 
 
 def noises(runs: Sequence[MeasuredRun], given: SystemMap) -> np.ndarray:

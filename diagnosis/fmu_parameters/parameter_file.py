@@ -30,7 +30,7 @@ import cosim
 from cosim import InputError, Unit
 from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
-from cybership.message_text import first_fault, quoted
+from cybership.message_text import Location, first_fault, quoted
 
 from ..execution.user_files import json_content
 
@@ -180,7 +180,7 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
     try:
         found = ParameterFile.model_validate(content).parameters
     except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error)}") from None
+        raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
     possible = {v.name for v in model.variables.values() if can_be_calibrated(v)} - set(mapped)
     for p in found:
         if p.name in mapped:
@@ -192,6 +192,13 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
             hint = nearest(p.name, possible)
             raise InputError(f"'{path}': {model.path.name} has no parameter {quoted(p.name)}{hint}")
     return found
+
+
+def _nearest_key(at: Location) -> str:
+    table: type[BaseModel] = ParameterFile
+    if len(at) > 1:
+        table = Prior if "prior" in at else CalibratedParameter
+    return nearest(str(at[-1]), table.model_fields)
 
 
 def write_parameters(path: Path, parameters: Collection[CalibratedParameter]) -> None:

@@ -24,9 +24,11 @@ from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-# Of a difference, in standard deviations of a prior or of a start value; chosen: solvers keep some
-# digits.
-STEP = 0.05
+STEP = 0.02  # of a central difference at most, in prior standard deviations; chosen
+# Rms change of the residuals by one step of a difference, in units of the noise, at most: a longer step
+# shows the curvature of a prediction in its slope. Chosen: a shorter one shows the rounding of solvers.
+MOST_CHANGE = 1.0
+START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
 MOST_STEPS = 30  # of a fit; chosen: a dozen suffices from a start value
 LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
@@ -97,6 +99,7 @@ class WindowResiduals:
         self._gain, self._offset = np.stack([np.ones(m), np.zeros(m)]) if lines is None else lines
         self._known: dict[tuple[Setting, bool], np.ndarray] = {}
         self.failed: list[tuple[dict[str, float], str]] = []
+        self._steps: dict[str, float] = {}
         self._whitening: list[Whitening] = []
         sizes = [w.measured.size for w in windows]
         ends = np.cumsum([0, *sizes])
@@ -113,10 +116,10 @@ class WindowResiduals:
         if not self.failed:
             return ""
         values, why = self.failed[0]
-        at = ", ".join(f"{name} = {x:.4g}" for name, x in values.items())
+        at = "".join(f", {name} = {x:.4g}" for name, x in values.items())
         return (
             f"The FMU fails with {len(self.failed)} of the values that the fit tried, which it avoids; "
-            f"the first at {at}: {why}"
+            f"the first{at}: {why}"
         )
 
     @property
@@ -228,8 +231,8 @@ class WindowResiduals:
             return np.concatenate([np.nan_to_num(self._off(w, there), nan=LARGEST), z])
 
         def slopes(z: np.ndarray) -> np.ndarray:
-            base, *moved = (self._off(w, p) for p in at([z, *(z + STEP * np.eye(z.size))]))
-            S = np.column_stack([(r - base) / STEP for r in moved])
+            base, *moved = (self._off(w, p) for p in at([z, *(z + START_STEP * np.eye(z.size))]))
+            S = np.column_stack([(r - base) / START_STEP for r in moved])
             return np.where(np.isfinite(S).all(axis=0), S, 0.0)
 
         (here,) = at([z])
@@ -260,6 +263,17 @@ class WindowResiduals:
         Returns:
             The slopes, and why those that are zero are not known.
         """
+        found = self._differences(setting, sizes)
+        change = np.sqrt(np.mean(found[0] ** 2, axis=0))
+        names = [*(p.name for p in self.parameters), *(f.id for f in setting.forces)]
+        last = [self._steps.get(n, STEP) for n in names]
+        steps = np.minimum(STEP, MOST_CHANGE / np.maximum(change, MOST_CHANGE / STEP))
+        self._steps |= zip(names, steps.tolist(), strict=True)
+        again = np.any(np.array(last) > 2.0 * steps)
+        return self._differences(setting, sizes) if again else found
+
+    def _differences(self, setting: Setting, sizes: Sequence[float]) -> tuple[np.ndarray, list[str]]:
+        """The same with the steps that the last slopes ask for."""
         each = [*self._moved(setting, sizes)]
         settings = [s for _, low, high, _, _ in each for s in (low, high)]
         found = self.whitened([setting, *settings])
@@ -285,11 +299,13 @@ class WindowResiduals:
         for k, p in enumerate(self.parameters):
             low, high = p.bounds
             z = setting.z[k]
-            down, up = min(STEP, max(z - low, 0.0)), min(STEP, max(high - z, 0.0))
+            step = self._steps.get(p.name, STEP)
+            down, up = min(step, max(z - low, 0.0)), min(step, max(high - z, 0.0))
             yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
         for k, (f, size) in enumerate(zip(setting.forces, sizes, strict=True)):
-            low, high = (self._forced(setting, k, sign * STEP * size) for sign in (-1.0, 1.0))
-            yield f.id, low, high, STEP, STEP
+            step = self._steps.get(f.id, STEP)
+            low, high = (self._forced(setting, k, sign * step * size) for sign in (-1.0, 1.0))
+            yield f.id, low, high, step, step
 
     @staticmethod
     def _forced(setting: Setting, k: int, change: float) -> Setting:

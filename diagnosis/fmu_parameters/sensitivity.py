@@ -8,13 +8,15 @@ import numpy as np
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
 from ..search.most_likely import STEPS
-from ..search.prediction_fit.joint_posterior import together
+from ..search.prediction_fit.joint_posterior import TOGETHER
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
 
 # Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
 # it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
+ROUNDING = 1e-9  # of the squared length of a slope, below which a combination changes nothing; chosen
+SHARED = 0.1  # of a direction that two parameters share, as a cosine; chosen
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,37 @@ def sensitivities(r: WindowResiduals, advance: Advance) -> Sensitivities:
         for (p, fault), s, c in zip(ranges, std, change, strict=True)
     ]
     seen = [k for k, s in enumerate(found) if s.change > 0.0]
-    # The prior tells apart what the data do not: groups are those of the data alone.
-    data = J[:, seen].T @ J[:, seen]
-    names = [found[k].parameter.name for k in seen]
-    scale = np.sqrt(np.diag(data))
-    weak = np.linalg.pinv(data / np.outer(scale, scale), rcond=1e-9) if seen else np.zeros((0, 0))
-    return Sensitivities(found, together(names, weak))
+    groups = confounded(J[:, seen], [found[k].parameter.name for k in seen])
+    return Sensitivities(found, groups)
+
+
+def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
+    """Groups of parameters of which the data alone determine combinations only.
+
+    The prior tells apart what the data do not. A parameter is in a group if the others inflate its
+    variance as much as one whose slope has the correlation TOGETHER with its own, and shares with the
+    group a direction in which the predictions do not change (D. A. Belsley et al., 1980, Regression
+    Diagnostics, chapter 3).
+
+    Args:
+        slopes: (n, p), of the predictions by each parameter; none is zero.
+        names: of the parameters.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    if not names:
+        return []
+    unit = slopes / np.linalg.norm(slopes, axis=0)
+    size, along = np.linalg.eigh(unit.T @ unit)
+    inflated = along**2 @ (1.0 / np.maximum(size, ROUNDING))
+    weak = along[:, size < 1.0 - TOGETHER]
+    shared = np.abs(weak @ weak.T)
+    own = np.sqrt(np.diag(shared))
+    inside = inflated > 1.0 / (1.0 - TOGETHER**2)
+    edges = (shared > SHARED * np.outer(own, own)) & np.outer(inside, inside)
+    count, group = connected_components(edges, directed=False)
+    groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
+    return [members for members in groups if len(members) > 1]
 
 
 def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedParameter, str]:

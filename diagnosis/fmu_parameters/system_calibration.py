@@ -114,7 +114,7 @@ def calibrate(
         return remainder(train, f.residuals, first_white, f.slopes.shape[1], names, units)
 
     def far(f: ParameterFit) -> bool:
-        return bool(np.abs(f.setting.z).max() > FAR_OFF)
+        return any(abs(z) > FAR_OFF for z in f.setting.z)
 
     best, accepted = alone, []
 
@@ -122,7 +122,10 @@ def calibrate(
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
     while possible and len(accepted) < MOST_FORCES and (left(best).significant or far(best)):
-        found = search(train, best, possible, dict(usual), temper, advance)
+        # Parameters that imitate a force may be far from where they are with it.
+        held = Setting(start.z, best.setting.forces)
+        others = [fit(train, held, best.sizes, range(len(start.z)))] if far(best) else []
+        found = search(train, best, others, possible, dict(usual), temper, advance)
         if found is None:
             break
         best = fitted(train, found[0].setting, found[0].sizes)
@@ -179,6 +182,8 @@ class Moved:
 def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
     """Which parameters the runs show to be off, forces fitted anew where they are not."""
     p = len(best.setting.z)
+    if not p:
+        return Moved(False, ())
     held = Setting((0.0,) * p, best.setting.forces)
     if not np.isfinite(r.whitened([held])[0]).all():  # forces of other parameters make the FMU diverge
         held = Setting(held.z, tuple(replace(f, coefficient=0.0) for f in held.forces))

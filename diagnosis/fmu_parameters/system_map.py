@@ -31,7 +31,7 @@ from pydantic import (
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
-from cybership.message_text import quoted
+from cybership.message_text import Location, quoted
 
 from ..predictors.fmu.variable_map import map_content, with_names_alone
 
@@ -108,7 +108,15 @@ def read_system_map(path: Path) -> SystemMap:
     Raises:
         InputError: it is none.
     """
-    return map_content(path, SystemMap)
+    return map_content(path, SystemMap, _nearest_key)
+
+
+def _nearest_key(at: Location) -> str:
+    tables: dict[int | str, type[BaseModel]] = {
+        "inputs": DrivenInput, "outputs": MeasuredOutput, "start": MappedVariable
+    }  # fmt: skip
+    table = tables.get(at[0], SystemMap) if len(at) > 1 else SystemMap
+    return nearest(str(at[-1]), table.model_fields)
 
 
 def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemMap:

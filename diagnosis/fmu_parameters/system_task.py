@@ -159,7 +159,7 @@ def system_task(
         chosen, notes = proposed(model, found.variables)
     if not chosen:
         why = f" ({'; '.join(notes[:3])})" if notes else ""
-        raise InputError(f"{quoted(fmu.name)} has no parameter that can be calibrated{why}")
+        notes = [f"{quoted(fmu.name)} has no parameter that can be calibrated{why}"]
     columns = [*found.inputs, *found.outputs]
     if TIME in columns:
         raise InputError(f"'{map}': {TIME} is the time of the samples and cannot be a column of the map")

@@ -12,7 +12,6 @@ import ctypes
 import os
 import platform
 import signal
-import site
 import sys
 import sysconfig
 from collections.abc import Callable, Sequence
@@ -23,6 +22,7 @@ from typing import NamedTuple
 NAMESPACES, LANDLOCK = MEANS = ("namespaces", "landlock")
 # What programs need in order to run, and what libraries ask of the processor.
 SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc", "/sys/devices/system/cpu")
+PACKAGES = ("site-packages", "dist-packages")  # folders of installed Python packages
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
 ABOUT_COMPUTER = ("/proc/cpuinfo", "/proc/meminfo", "/proc/stat")
 PROCESSES, SHARED, TEMPORARY = "/proc", "/dev/shm", "/tmp"
@@ -90,8 +90,11 @@ def available(means: Sequence[str], trial: Callable[[Confinement], str]) -> Conf
 def needed_folders() -> list[str]:
     """What a process of Python needs to read: the system, Python, its packages, and this one."""
     own = Path(__file__).resolve().parents[2]
-    python = [sys.prefix, sys.base_prefix, sysconfig.get_path("stdlib"), *site.getsitepackages()]
-    places = [*SYSTEM, *python, str(own), str(own.with_name("cybership"))]
+    python = [sys.prefix, sys.base_prefix, sysconfig.get_path("stdlib")]
+    # Those of the user and of other environments too, which a Python FMU may import; no other folder of
+    # sys.path, as an editable installation is a folder of the user's files.
+    packages = [p for p in sys.path if Path(p).name in PACKAGES]
+    places = [*SYSTEM, *python, *packages, str(own), str(own.with_name("cybership"))]
     return [p for p in dict.fromkeys(places) if os.path.isdir(p) and p != "/"]
 
 

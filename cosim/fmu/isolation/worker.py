@@ -77,6 +77,7 @@ class Worker:
 
     def _start(self, name: str, path: str, folder: str) -> None:
         self._model = self._known or FmuModel(Path(path), Path(folder))
+        self._model.alone = True
         self._instance = LocalInstance(name, self._model, self._listener)
 
     def _log(self, _: str, status: int, text: str) -> None:

@@ -48,7 +48,7 @@ def learn_fmu(
         task = ship_task(options, runs, advance, execution)
     with closing(task):
         parts = task.residuals()
-        if options.parameters is None:
+        if options.parameters is None and task.parameters:
             _only_known(task, parts, advance)
         result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
         report = CalibrationReport(result, task, parts["train"].samples)

@@ -254,11 +254,14 @@ class CalibrationReport:
     def shown(self, out: str) -> Iterator[RenderableType]:
         """The answer on the terminal."""
         yield Text(self.sentence, "bold")
-        yield _table(PARAMETERS, self.rows())
+        if self.result.values:
+            yield _table(PARAMETERS, self.rows())
         if self.result.forces:
             yield _table(FORCES, self.force_rows())
         for group in self.result.together:
             yield f"Identifiable only together: {', '.join(group)}."
+        if self.result.together:
+            yield ALONE
         yield _table(ERRORS, self.error_rows())
         yield self.result.remainder.sentence
         for f in self.result.forces:
@@ -276,7 +279,7 @@ class CalibrationReport:
             sections.append(ReportSection("Additional forces", text, [table]))
         if r.together:
             lines = [f"Identifiable only together: {', '.join(group)}." for group in r.together]
-            sections.append(ReportSection("Not identifiable alone", lines))
+            sections.append(ReportSection("Not identifiable alone", [*lines, ALONE]))
         sections.append(
             ReportSection(
                 "Errors", [r.remainder.sentence], [PageTable(ERRORS, [*self.error_rows()], True)], plots
@@ -286,6 +289,10 @@ class CalibrationReport:
         return Document("Calibration of an FMU", self.sentence, sections, origin)
 
 
+ALONE = (
+    "To identify one of them alone, leave known ones out of the parameter file, or measure a further "
+    "output."
+)
 PARAMETERS = ("parameter", "start", "value", "95 % interval", "unit", "")
 FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indistinguishable")
 ERRORS = ("run", "output", "rms before", "rms after", "unit")
