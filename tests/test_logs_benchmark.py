@@ -63,8 +63,9 @@ def test_each_aim_is_counted():
         Recorded("clean", verdict="found", found={"X_u": 0.95}, error=1.0, **known),
         Recorded(
             "heading filtered 1 s",
-            noise=(1.0, 2.0, 1.0),
+            noise=(1.0, 2.0, 0.5),
             rel_std=(0.1, 0.5, 0.1),
+            at_most=(False, False, True),
             verdict="found",
             found={"X_u": 0.9, "heading_lag": 0.95},
             error=1.2,
@@ -76,7 +77,8 @@ def test_each_aim_is_counted():
     numbers = dict(aims(found, None))
     assert [*numbers.values()] == [
         "1 of 5 refused",
-        "3 of 4 channels; 1 are said to be unknown",
+        "2 of 3 channels; 1 are said to be unknown",
+        "0 of 1 channels",
         "1 of 1",
         "0 channels of 9",
         "1 of 2",

@@ -11,6 +11,7 @@ from diagnosis.interactive import compare, load
 from diagnosis.report.content import file_content
 from diagnosis.report.report_data import ReportData
 from diagnosis.runs import channels_of, prepare, table_of
+from diagnosis.runs.smoothing.likelihood import equal_variances, excess_kurtosis
 from diagnosis.search.findings import Finding
 from diagnosis.verdict.confidence import confidence_of, doubt_of_data
 
@@ -148,15 +149,50 @@ def test_a_noise_is_hardly_known_where_motions_are_quicker_than_samples():
     pose = run.pose + np.outer(quick, [1.0, 1.0, 0.0])
     rows = np.arange(0, run.time.size, 5)
     found = table(replace(run, pose=pose, measured={}).rows(rows))
-    assert not found["x"].known
-    assert found["psi"].known
+    assert (found["x"].known, found["x"].noise_at_most) == (False, True)
+    assert (found["psi"].known, found["psi"].noise_at_most) == (True, False)
+
+
+def test_parts_of_one_noise_have_one_variance_by_chance():
+    rng = np.random.default_rng(5)
+    free = rng.uniform(1.5, 30.0, (400, 25))
+    chances = [equal_variances(rng.chisquare(row), row) for row in free]
+    assert np.mean(np.array(chances) < 0.05) == pytest.approx(0.05, abs=0.03)
+    quick = np.where(np.arange(25) < 5, 3.0, 1.0)
+    assert max(equal_variances(quick * rng.chisquare(row), row) for row in free + 30.0) < 0.05
+    assert equal_variances(np.ones(1), np.ones(1)) == 1.0
+
+
+def test_rare_large_errors_in_all_parts_are_one_noise():
+    rng, part = np.random.default_rng(6), np.arange(1000) // 40
+    found = []
+    for _ in range(200):
+        squares = rng.logistic(size=part.size) ** 2
+        sums, free = np.bincount(part, squares), np.full(25, 40.0)
+        found.append(
+            (equal_variances(sums, free), equal_variances(sums, free, excess_kurtosis(squares, part)))
+        )
+    normal, corrected = np.mean(np.array(found) < 0.05, axis=0)
+    assert normal > 0.3
+    assert corrected < 0.15
 
 
 def test_files_hold_each_channel_by_its_name():
     run = sailed()
     compared = compare(load([table_of(run), table_of(sailed(1))], anyway=True))  # forces of no ship
     data = file_content(ReportData.of(compared))["data"]
-    keys = {"rate", "held", "noise", "noise_from", "correlation", "latency", "outliers", "used", "why"}
+    keys = {
+        "rate",
+        "held",
+        "noise",
+        "noise_from",
+        "noise_at_most",
+        "correlation",
+        "latency",
+        "outliers",
+        "used",
+        "why",
+    }
     assert set(data["channels"]) == {"x", "y", "psi", "r"}
     for channels in (data["channels"], *(of["channels"] for of in data["runs"])):
         assert all(keys <= set(c) for c in channels.values())

@@ -57,6 +57,42 @@ def test_remaining_time_is_right_within_a_factor_of_two_on_any_machine(speed):
         clock.time += took[k]
 
 
+def search(effects: int) -> list[tuple[str, float]]:
+    """The steps of a search that finds so many effects, and what each takes [s]."""
+    steps = SEARCH[:4]
+    for k in range(1, effects + 2):
+        steps = [*steps, f"effect {k}: {ROUND[0]}", f"effect {k}: {ROUND[1]}"]
+        if k <= effects:
+            steps += [f"effect {j}: its place searched again" for j in range(1, k)]
+    steps += SEARCH[SEARCH.index("waves") :]
+    took = [next(usual for name, usual in USUAL.items() if name in what) for what in steps]
+    many = [effects if "validation data" in what else 1.0 for what in steps]
+    return [(what, t * n) for what, t, n in zip(steps, took, many, strict=True)]
+
+
+@pytest.mark.parametrize("effects", [1, 2, 3, 6])
+def test_in_the_second_half_it_is_right_whatever_is_found(effects):
+    clock, steps = Clock(), search(effects)
+    left, whole = RemainingTime(clock), sum(t for _, t in steps)
+    for what, took in steps:
+        left.begin(what)
+        rest = whole - clock.time
+        if rest < 0.5 * whole:
+            assert 0.5 * rest < left.seconds < 2.0 * rest, what
+        clock.time += took
+
+
+def test_a_part_of_a_step_has_the_time_of_that_step():
+    clock = Clock()
+    left = RemainingTime(clock)
+    for what in (*SEARCH[:6], "stability"):
+        left.begin(what)
+        clock.time += 1.0
+    before = left.seconds
+    left.begin("closed loop on the ellipse")
+    assert left.seconds == before
+
+
 def test_the_bar_moves_while_a_step_goes_on():
     clock = Clock()
     left = RemainingTime(clock)

@@ -14,10 +14,11 @@ SURE = 0.8  # confidence from which on a cause that is not there is wrong
 
 
 def line(o: Recorded, clean: Recorded | None) -> str:
-    """A row of the table that is printed; a noise that is said to be unknown in parentheses."""
-    pairs = zip(o.noise, o.rel_std, strict=True)
+    """A row of the table that is printed; in parentheses a noise that is unknown, or a bound (<)."""
+    each = zip(o.noise, o.rel_std, o.at_most, strict=True)
     ratio = " ".join(
-        "-" if np.isnan(r) else f"{r:.2f}" if std <= WITHIN else f"({r:.2f})" for r, std in pairs
+        "-" if np.isnan(r) else f"{r:.2f}" if std <= WITHIN and not bound else f"({'<' * bound}{r:.2f})"
+        for r, std, bound in each
     )
     said = ", ".join(f"{e} {'-' if c is None else f'{c:.2f}'}" for e, c in o.found.items())
     doubt = f"; doubted: {' '.join(o.doubted)}" if o.doubted else ""
@@ -34,12 +35,17 @@ def aims(found: Sequence[Recorded], there: Sequence[str] | None) -> Iterator[tup
     """
     read_ones = [o for o in found if not o.refused]
     yield "none refused", f"{len(found) - len(read_ones)} of {len(found)} refused"
-    noise = [p for o in read_ones if not o.misstated for p in zip(o.noise, o.rel_std, strict=True)]
-    white = [(ratio, std) for ratio, std in noise if np.isfinite(ratio)]
-    known = [abs(np.log(ratio)) < np.log1p(WITHIN) for ratio, std in white if std <= WITHIN]
-    if known:
-        unknown = f"{len(white) - len(known)} are said to be unknown"
+    each = [
+        c for o in read_ones if not o.misstated for c in zip(o.noise, o.rel_std, o.at_most, strict=True)
+    ]
+    white = [c for c in each if np.isfinite(c[0])]
+    known = [abs(np.log(r)) < np.log1p(WITHIN) for r, std, bound in white if std <= WITHIN and not bound]
+    bounds = [np.log(r) > -np.log1p(WITHIN) for r, _, bound in white if bound]
+    if white:
+        unknown = f"{len(white) - len(known) - len(bounds)} are said to be unknown"
         yield f"noise within {WITHIN:.0%}", f"{sum(known)} of {len(known)} channels; {unknown}"
+    if bounds:
+        yield f"noise below its upper bound + {WITHIN:.0%}", f"{sum(bounds)} of {len(bounds)} channels"
     wrong = [o for o in read_ones if o.misstated]
     if wrong:
         doubted = sum({*o.misstated} <= {*o.doubted} for o in wrong)

@@ -62,6 +62,7 @@ class Recorded:
         refused: the line; empty where it was read.
         noise: (3,), what was found over what there is; NaN where it is given, or not white.
         rel_std: (3,), relative standard deviation of it, as it was found.
+        at_most: (3,), whether it was found to be an upper bound.
         misstated: channels whose given noise is ten times too large or small.
         doubted: channels of whose given noise a line says that it is wrong.
         verdict: of ``learn``; empty where nothing was learned.
@@ -74,6 +75,7 @@ class Recorded:
     refused: str = ""
     noise: tuple[float, ...] = (np.nan, np.nan, np.nan)
     rel_std: tuple[float, ...] = (np.nan, np.nan, np.nan)
+    at_most: tuple[bool, ...] = (False, False, False)
     misstated: tuple[str, ...] = ()
     doubted: tuple[str, ...] = ()
     verdict: str = ""
@@ -142,7 +144,9 @@ def _read(o: Recorded, file: Path, good: Good, table: pd.DataFrame) -> Recorded:
     ratio = s.noise / how.noise(good.noise(how.rates), table)
     ratio[np.isin(POSE, [*how.given])] = np.nan
     rounded = (tuple(np.round(x, 3).tolist()) for x in (ratio, s.noise_rel_std))
-    return replace(o, doubted=doubted, **dict(zip(("noise", "rel_std"), rounded, strict=True)))
+    at_most = tuple(s.noise_at_most.tolist())
+    named = dict(zip(("noise", "rel_std"), rounded, strict=True))
+    return replace(o, doubted=doubted, at_most=at_most, **named)
 
 
 def _learned(o: Recorded, file: Path, ship: str | None, seed: int, test: Good | None) -> Recorded:

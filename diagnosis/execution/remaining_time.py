@@ -1,8 +1,9 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
-The number of effects is known only in the end: that of the rounds is the usual one, or the present one
-and half a round more. Where no effect was found, none is validated and
-fitted. How long a step takes is scaled by what the steps so far took.
+The number of effects is known only in the end. It is taken between the present one and one more: either
+is then off by less than a factor of two. Where no effect was found, none is validated and fitted. A kind
+of step that has ended takes what it took; any other one its usual time, scaled by what the steps so far
+took.
 """
 
 import re
@@ -10,27 +11,26 @@ import time
 from collections.abc import Callable
 
 # s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count.
-ROUND = {"every effect as a candidate": 1.0, "candidates refined": 0.5}
-AGAIN = {"its place searched again": 3.0}
-OF_EFFECTS = {"validation data are predicted better": 1.1, "fit to predictions": 1.3}
+ROUND = {"every effect as a candidate": 0.8, "candidates refined": 1.1}
+AGAIN = {"its place searched again": 4.8}  # of one effect, each time that another one is found
+OF_EACH = {"validation data are predicted better": 1.2}  # for each effect
+OF_EFFECTS = {**OF_EACH, "fit to predictions": 5.0}
 LAST = {
-    "waves": 0.7,
+    "waves": 0.6,
     **OF_EFFECTS,
     "residual": 0.1,
-    "gain of the search over calibration": 1.7,
-    "predicting": 0.4,
-    "stability": 1.1,
-    "report: figures": 1.0,
-    "report: page": 0.1,
+    "gain of the search over calibration": 1.5,
+    "predicting": 0.8,
+    "stability": 0.9,
+    "report: figures": 1.1,
+    "report: page": 0.3,
 }
-FIRST = {"reading": 0.1, "smoothing": 1.2, "calibration of the coefficients": 2.9}
+FIRST = {"reading": 0.1, "smoothing": 1.4, "calibration of the coefficients": 2.4}
 USUAL = {**FIRST, **ROUND, **AGAIN, **LAST}
-# Usual number, the last of which finds nothing. Chosen: simulated runs take 2 and measured ones up to 5,
-# and the remaining time of 3 is between theirs.
-ROUNDS = 3.0
-LATE = (
-    0.3  # share of its time that a step is taken to go on for where it takes longer than usual; chosen
-)
+# Usual number. Chosen: simulated runs have 1, and measured ones up to 6, which nothing shows beforehand.
+EFFECTS = 1.5
+# Share of its time that a step is taken to go on for where it takes longer than usual; chosen.
+LATE = 0.3
 
 
 class RemainingTime:
@@ -43,7 +43,8 @@ class RemainingTime:
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._started = now, now()
         self._step, self._begun, self._round, self._again = "", self._started, 0, 0
-        self._took, self._usual = 0.0, 0.0
+        self._took: dict[str, list[float]] = {}  # kind of step -> how long each took, over its number
+        self._number = 1.0  # of the present step: of effects where it takes as long as they are many
         self._left: dict[str, float] = {}
 
     @property
@@ -56,9 +57,9 @@ class RemainingTime:
         """The remaining time [s]; None: the search has not begun."""
         if not self._round:
             return None
-        usual = self._scale * USUAL.get(self._step, 0.0)
         spent = self._now() - self._begun
-        return max(usual - spent, LATE * spent) + self._scale * sum(self._left.values())
+        rest = sum(number * self._usual(name) for name, number in self._left.items())
+        return max(self._number * self._usual(self._step) - spent, LATE * spent) + rest
 
     @property
     def share(self) -> float | None:
@@ -66,38 +67,48 @@ class RemainingTime:
         left = self.seconds
         return None if left is None else self.elapsed / max(self.elapsed + left, 1e-9)
 
-    @property
-    def _scale(self) -> float:
-        """Time of the steps so far over their usual one."""
-        return self._took / self._usual if self._usual else 1.0
+    def _usual(self, name: str) -> float:
+        """What a step takes [s]: as those of its kind so far, else by what all others took."""
+        if own := self._took.get(name):
+            return sum(own) / len(own)
+        took = sum(map(sum, self._took.values()))
+        usual = sum(len(each) * USUAL[kind] for kind, each in self._took.items())
+        return USUAL.get(name, 0.0) * (took / usual if usual else 1.0)
 
     def begin(self, what: str) -> None:
-        """A step begins, and the one before it has ended."""
+        """A step begins, and the one before it has ended; one that is not known is a part of that."""
+        step = next((name for name in USUAL if name in what), "")
+        if not step:
+            return
         now = self._now()
         if self._step:
-            self._took += now - self._begun
-            self._usual += USUAL[self._step]
-        self._step, self._begun = next((name for name in USUAL if name in what), ""), now
-        if self._step in ROUND or self._step in AGAIN:
-            self._again = self._again + 1 if self._step in AGAIN else 0
+            self._took.setdefault(self._step, []).append((now - self._begun) / self._number)
+        self._step, self._begun, self._number = step, now, 1.0
+        if step in ROUND or step in AGAIN:
+            self._again = self._again + 1 if step in AGAIN else 0
             number = re.match(r"effect (\d+)", what)
-            self._round = max(self._round, int(number[1]) if number else 1)
+            self._round = max(self._round, int(number[1]) if number and step in ROUND else 1)
             self._left = self._following()
-        elif self._step in LAST and self._round:
-            names = [*LAST]
-            skipped = OF_EFFECTS if self._round == 1 else ()
-            names = [name for name in names[names.index(self._step) + 1 :] if name not in skipped]
-            self._left = {name: LAST[name] for name in names}
+        elif step in LAST and self._round:
+            names, effects = [*LAST], self._round - 1.0
+            self._number = max(effects, 1.0) if step in OF_EACH else 1.0
+            numbers = dict.fromkeys(LAST, 1.0) | self._of_effects(effects)
+            self._left = {name: numbers[name] for name in names[names.index(step) + 1 :]}
+
+    def _of_effects(self, effects: float) -> dict[str, float]:
+        """The number of steps that depend on how many effects there are."""
+        return dict.fromkeys(OF_EFFECTS, min(effects, 1.0)) | dict.fromkeys(OF_EACH, effects)
 
     def _following(self) -> dict[str, float]:
-        """The time of each kind of step that usually follows the present one of a round."""
-        rounds = max(ROUNDS, self._round + 0.5)
-        left = {name: (rounds - self._round) * usual for name, usual in ROUND.items()}
-        # A place is searched again twice for each effect but one, and goes on where it went on long.
-        before, effects = self._round - 1.0, rounds - 1.0
-        again = effects * (effects - 1.0) - before * (before - 1.0)
-        if self._again:
-            again = max(2.0 - self._again, 0.5 * self._again)
+        """The number of each kind of step that usually follows the present one of a round."""
+        found = self._round if self._again else self._round - 1.0
+        effects = max(EFFECTS, found + 0.5)
+        left = dict.fromkeys(ROUND, effects + 1.0 - self._round)
         if self._step == next(iter(ROUND)):
-            left["candidates refined"] += ROUND["candidates refined"]
-        return left | {name: again * usual for name, usual in AGAIN.items()} | LAST
+            left["candidates refined"] += 1.0
+        # With each further effect the place of each before it is searched again.
+        again = 0.5 * (effects * (effects - 1.0) - found * (found - 1.0))
+        if self._again:
+            again += max(found - 1.0 - self._again, 0.0)
+        last = dict.fromkeys(LAST, 1.0) | self._of_effects(effects)
+        return left | dict.fromkeys(AGAIN, again) | last

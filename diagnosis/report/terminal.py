@@ -173,7 +173,7 @@ def channel_table(
             c.name,
             f"{_number(c.rate)} Hz",
             _percent(c.held),
-            f"{_number(c.noise, 2)} {c.unit}",
+            f"{'at most ' if c.noise_at_most else ''}{_number(c.noise, 2)} {c.unit}",
             c.noise_from if c.known else "uncertain",
             f"{c.outliers}{first}",
             c.why or "yes",

@@ -39,6 +39,7 @@ class MeasuredChannel:
         outliers: number of samples that contradict all others.
         outlier_times: of the first ones [s].
         why: reason why it is not used; empty: it is.
+        noise_at_most: whether the noise is an upper bound, as residuals are not of a constant noise.
     """
 
     name: str
@@ -53,6 +54,7 @@ class MeasuredChannel:
     outliers: int
     outlier_times: tuple[float, ...] = ()
     why: str = ""
+    noise_at_most: bool = False
 
     @property
     def used(self) -> bool:
@@ -82,6 +84,7 @@ def by_name(channels: Iterable[MeasuredChannel]) -> Iterator[MeasuredChannel]:
             outliers=sum(c.outliers for c in of),
             outlier_times=next((c.outlier_times for c in of if c.outliers), ()),
             why=next((c.why for c in of if c.why), ""),
+            noise_at_most=any(c.noise_at_most for c in of),
         )
 
 
@@ -107,6 +110,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
             latency=0.0,  # all others are late against the pose
             outliers=wrong.size,
             outlier_times=tuple(s.time[wrong[:SHOWN]].tolist()),
+            noise_at_most=bool(s.noise_at_most[k]),
         )
     if s.sensors is None:
         return

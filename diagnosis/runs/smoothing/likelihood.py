@@ -22,16 +22,19 @@ parabolas that cost nothing,
 
 where samples are so rare that the spline goes through all of them, a residual is none of noise. A noise
 is constant; where residuals are larger in some parts of a run than in others by more than chance, they
-are of motions that the samples are too rare to follow, and the noise is as uncertain as they differ.
+are of motions that the samples are too rare to follow. The noise is as uncertain as they differ, and the
+estimate is an upper bound.
 """
 
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.optimize import brentq
+from scipy.special import chdtrc
 
+from ..cleaning import CHANCE
 from .penalised import JERK, POSE, Equations, Fit, LinearSystem, Problem, solve
 from .spline import ORDER, third
 
@@ -175,8 +178,22 @@ def running_mean(x: np.ndarray, width: int) -> np.ndarray:
     return np.cumsum(np.vstack([longer[:width].mean(axis=0), steps]), axis=0)
 
 
-def noise_rel_std(p: Problem, smoothness: np.ndarray, weights: np.ndarray, fit: Fit) -> np.ndarray:
-    """(3,), relative standard deviation of the noise; infinite where the samples say nothing of it.
+class NoiseUncertainty(NamedTuple):
+    """What is known of an estimated noise.
+
+    Attributes:
+        rel_std: (3,), relative standard deviation; infinite where the samples say nothing of the noise.
+        at_most: (3,), whether it is an upper bound, as the residuals are not of a constant noise.
+    """
+
+    rel_std: np.ndarray
+    at_most: np.ndarray
+
+
+def noise_uncertainty(
+    p: Problem, smoothness: np.ndarray, weights: np.ndarray, fit: Fit
+) -> NoiseUncertainty:
+    """How well the noise of a run is known.
 
     Args:
         p: the problem, its noise estimated.
@@ -188,7 +205,7 @@ def noise_rel_std(p: Problem, smoothness: np.ndarray, weights: np.ndarray, fit: 
     off = p.share * weights * (p.z - p.spline.b(fit.coefficients)) ** 2 / p.sigma**2
     # Of as many intervals as the jerk is averaged over, when the penalty is adapted to it.
     part = p.spline.b.first // p.average
-    found = np.full(3, np.inf)
+    found = NoiseUncertainty(np.full(3, np.inf), np.zeros(3, bool))
     for k, e in enumerate(p.equations(weights)):
         low, high = (
             LinearSystem(e, p.precision(k, float(smoothness[k] * np.exp(step)))).trace(POSE)
@@ -202,7 +219,38 @@ def noise_rel_std(p: Problem, smoothness: np.ndarray, weights: np.ndarray, fit: 
         counted = free > 1.0
         if not (information > 0.0 and counted.any()):
             continue
-        ratio = np.bincount(part, off[:, k])[counted] / free[counted]
-        by_part = float(np.average((ratio - 1.0) ** 2 - 2.0 / free[counted], weights=free[counted]))
-        found[k] = 0.5 * np.sqrt(1.0 / information + max(by_part, 0.0))  # of sigma, not of its square
+        free, squares = free[counted], np.bincount(part, off[:, k])[counted]
+        by_part = float(np.average((squares / free - 1.0) ** 2 - 2.0 / free, weights=free))
+        found.rel_std[k] = 0.5 * np.sqrt(1.0 / information + max(by_part, 0.0))  # of sigma
+        found.at_most[k] = (
+            equal_variances(squares, free, excess_kurtosis(off[:, k], part)) < CHANCE / 3.0
+        )
     return found
+
+
+def excess_kurtosis(squares: np.ndarray, part: np.ndarray) -> float:
+    """Of residuals with squares (n,), each over the mean of its part (n,); not below zero.
+
+    The mean of k normal residuals takes 2 / (k + 2) of their kurtosis away, which is added.
+    """
+    there = squares > 0.0
+    counts, sums = np.bincount(part, there)[part[there]], np.bincount(part, squares)[part[there]]
+    ratio = (squares[there] * counts / sums) ** 2 * (1.0 + 2.0 / counts)
+    return max(float(np.mean(ratio)) - 3.0, 0.0) if ratio.size else 0.0
+
+
+def equal_variances(squares: np.ndarray, free: np.ndarray, kurtosis: float = 0.0) -> float:
+    """Chance of sums of squares (k,) with some degrees of freedom (k,), if all have one variance.
+
+    It is Bartlett's test (1937), the likelihood ratio with a correction for few degrees of freedom, and
+    with that of Box (1953) for an excess kurtosis.
+    """
+    if squares.size < 2:
+        return 1.0
+    whole, least = float(free.sum()), np.finfo(float).tiny
+    ratio = whole * np.log(max(float(squares.sum()), least) / whole) - float(
+        np.sum(free * np.log(np.maximum(squares, least) / free))
+    )
+    more = squares.size - 1
+    correction = 1.0 + (float(np.sum(1.0 / free)) - 1.0 / whole) / (3.0 * more)
+    return float(chdtrc(more, ratio / correction / (1.0 + 0.5 * kurtosis)))

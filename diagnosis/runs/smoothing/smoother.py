@@ -28,7 +28,7 @@ from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
-from .likelihood import adapt, criteria, likeliest, noise_rel_std, with_noise
+from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots
@@ -94,6 +94,7 @@ class Smoothed(ShortRepr):
         doubted: lines on noise that was given and contradicts the samples.
         sensors: what the run's channels say of each other; None where nobody asked.
         noise_rel_std: (3,), relative standard deviation of the noise; zero where it was given.
+        noise_at_most: (3,), whether the noise is an upper bound, see :mod:`.likelihood`.
     """
 
     track: Track
@@ -115,6 +116,7 @@ class Smoothed(ShortRepr):
     doubted: tuple[str, ...] = ()
     sensors: Examined | None = None
     noise_rel_std: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    noise_at_most: np.ndarray = field(default_factory=lambda: np.zeros(3, bool))
 
     @property
     def time(self) -> np.ndarray:
@@ -281,7 +283,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
     estimated = np.isnan(given_noise(track))
-    uncertain = np.where(estimated, noise_rel_std(p, smoothness, weights, fit), 0.0)
+    uncertain = noise_uncertainty(p, smoothness, weights, fit)
     spikes = track.valid.copy()  # those of parts that agree with nothing
     spikes[rows] = False
     spikes[dense] = track.valid[dense] & (weights[:, 0] == 0.0)
@@ -306,7 +308,8 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         response.sure,
         pose_only,
         tuple(_doubted(track, alone, even)),
-        noise_rel_std=uncertain,
+        noise_rel_std=np.where(estimated, uncertain.rel_std, 0.0),
+        noise_at_most=estimated & uncertain.at_most,
     )
 
 
