@@ -176,6 +176,16 @@ def test_box_is_found_by_its_means_over_windows(start, end):
     assert found == pytest.approx((start, end, size), abs=0.01)
 
 
+def test_predictions_do_not_depend_on_what_was_predicted_before():
+    """What thrusters do is kept for models whose thrusters respond alike, and for no other."""
+    data = [smoothed(sail(20.0)[0])]
+    kept, late = Shooting(data, HORIZON), Model(thrusters={"lag": 2.0})
+    first, second = kept.residuals(late), kept.residuals(Model())
+    np.testing.assert_array_equal(second, Shooting(data, HORIZON).residuals(Model()))
+    np.testing.assert_array_equal(kept.residuals(late), first)
+    assert np.abs(first - second).max() > 1e-3
+
+
 def test_coarse_steps_predict_what_fine_ones_do():
     run = smoothed(sail(noise=0.0)[0])
     coarse = Shooting([run], HORIZON).residuals(Model(vessel={"N_r": -0.6}))[:, -1]
