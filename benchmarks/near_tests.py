@@ -48,14 +48,15 @@ class Nearness:
         self.known = Counter(w for text in self.texts.values() for w in set(re.findall(r"\w+", text)))
 
     def __call__(self, m: Mutant, names: Sequence[str], file: str, own: str = "") -> float:
-        """Steps of imports from a test file, less where it, or a test's own text, names the place."""
+        """Steps of imports from a test file, less where its text or path, or a test's text, names it."""
         place = Path(m.module)
         component = f"{place.parent.name}_{place.stem}"
         telling = [n for n in names if len(n) > 3 and self.known[n] <= SHARED_NAME]
         steps = self.steps[m.module].get(file, FOUND if m.package == "fmus" else FAR)
         by_test = any(word(n, own) for n in (*telling, component))
         by_file = any(word(n, self.texts[file]) for n in (*telling, place.stem, component))
-        return steps - 3.0 * by_test - 1.5 * by_file
+        folders = {*re.split(r"[/_.]", m.module)[1:-1]}
+        return steps - 3.0 * by_test - 1.5 * by_file - 2.0 * bool(folders & {*re.split(r"[/_.]", file)})
 
 
 def word(name: str, text: str) -> bool:
