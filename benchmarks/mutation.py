@@ -1,328 +1,319 @@
-"""Do the tests fail where the code is wrong? ``python -m benchmarks.mutation``.
+"""Do the tests fail where the code is wrong? ``python -m benchmarks.mutation --mutants 60 --seed 2046``.
 
-Seeded mutants of each package (mutmut's operators on what stands in functions, texts left out). The
-quick tests run once with coverage, which tells the tests that execute a line; each mutant runs those of
-its line in a process of its own, the quickest of every test function first, until one fails. One that no
-test kills, and that ``benchmarks/equivalent_mutants.toml`` does not call equivalent, survives.
+Mutants are drawn at random lines of all packages (:mod:`.line_mutants`). pytest collects the quick tests
+once. Each mutant is judged in a fork of that process, in which the functions of the module get the
+changed code, and a copy of the project the changed file, for the processes that tests start. Tests run
+in the order of how near they are to the changed line by imports and by the names of its function, class
+and module, one case of each first, until one fails or the mutant has spent its processor time. What is
+changed outside of the bodies of functions needs a new process, which runs the nearest files.
 
-Needs ``pip install -e ".[dev]" --group mutation`` and a system that can fork. The log has each mutant as
-it is judged; what stands there is not done again. ``--again`` takes its survivors, where they exist.
+A mutant that survives may still be detected by a test further away, or by a slow one (``--slow``,
+``--tests``); ``--again`` judges the survivors of the log once more, on the present code.
+``benchmarks/equivalent_mutants.toml`` names mutants that no test can detect. Needs CPython 3.11 and a
+system that forks.
 """
 
 import argparse
-import importlib
+import functools
+import gc
+import inspect
 import json
-import multiprocessing
 import os
-import random
 import re
+import resource
+import select
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
+import types
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
-from itertools import islice, repeat, starmap
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import libcst
 import pytest
-from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
+import tomllib
 from scipy.stats import binomtest
 
-from benchmarks.covering_tests import Covering, copied
+from benchmarks.line_mutants import PACKAGES, ROOT, Mutant, again, draw
+from benchmarks.near_tests import FARTHEST, FOUND, OURS, Nearness, around
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-ROOT = Path(__file__).parents[1]
-PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "studies", "thesis")
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
-# What the tests import that is not ours: taken over by every process that is forked.
-LIBRARIES = (
-    *("fmpy.fmi2", "hypothesis", "jinja2", "matplotlib.pyplot", "numpy", "orjson", "pandas", "pydantic"),
-    *("pyarrow.parquet", "pythonfmu.builder", "rich.progress", "scipy.optimize", "scipy.signal"),
-    *("scipy.stats", "sklearn.cross_decomposition", "sklearn.decomposition"),
-)
-# Package -> those that may import it; cosim and fmus know nothing of each other.
-USERS = {
-    "thesis": ("thesis", "benchmarks"),
-    "studies": ("studies", "thesis", "benchmarks"),
-    "diagnosis": ("diagnosis", "studies", "thesis", "benchmarks", "cybership"),
-    "cosim": ("cosim", "diagnosis", "studies", "thesis", "benchmarks", "cybership"),
-    "fmucheck": ("fmucheck", "fmus"),
-    "fmus": ("fmus", "fmucheck", "diagnosis", "studies", "thesis", "benchmarks", "cybership"),
+KILLED, SURVIVED, SAME = "killed", "survived", "equivalent"
+MEMORY = 8 * 2**30  # bytes of address space of a mutant
+ALONE = 45  # s of processor time of one test, after which it does not end
+# Pages that tests compare with the code, for what stands outside of functions.
+PAGES = {
+    "fmus": "tests/test_ship_files.py::test_the_page_of_parameters_has_the_start_values_of_the_code",
+    "diagnosis": "tests/test_constants.py::test_the_page_is_current",
 }
-KILLED, SURVIVED, SAME, UNTESTED, GONE = "killed", "survived", "equivalent", "no test", "gone"
-STRICT = r",?\s*strict=\w+,?"
-FIRST = 4.0  # s, the tests that are tried before all others are collected
-MEMORY = 8 * 2**30  # bytes of address space that a mutant may take
+QUIET = ("-q", "--assert=plain", "-pno:cacheprovider", "-pno:xdist")
 
 
-class Mutant(NamedTuple):
-    """A changed module: path, first line that changes, number among its mutants, and the whole text."""
-
-    module: str
-    line: int
-    number: int
-    before: str
-    after: str
-    text: str
-
-    def row(self) -> dict[str, Any]:
-        """What the log tells of it."""
-        return {k: v for k, v in self._asdict().items() if k != "text"}
-
-
-def found(module: str) -> tuple[libcst.Module, list[Mutation]]:
-    """A module's tree and its mutations, those of texts left out."""
-    tree, every, *_ = create_mutations(module, (ROOT / module).read_text(encoding="utf-8"))
-    texts = (libcst.BaseString, libcst.FormattedString)
-    return tree, [m for m in every if not isinstance(m.original_node, texts)]
-
-
-def made(module: str, tree: libcst.Module, number: int, mutation: Mutation) -> Mutant:
-    """One mutant, as text."""
-    changed = deep_replace(tree, mutation.original_node, mutation.mutated_node)
-    assert isinstance(changed, libcst.Module)
-    old, new = tree.code.splitlines(), changed.code.splitlines()
-    first = next((i for i, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1]), 0)
-    return Mutant(module, first + 1, number, old[first].strip(), new[first].strip(), changed.code)
-
-
-def draw(package: str, count: int, seed: int) -> tuple[int, list[Mutant]]:
-    """How many mutants a package or a module has, and some of them."""
-    place = ROOT / package
-    files = [place] if place.is_file() else sorted(place.glob("**/*.py"))
-    every = []
-    for module in (file.relative_to(ROOT).as_posix() for file in files):
-        tree, mutations = found(module)
-        every += [(module, tree, number, mutation) for number, mutation in enumerate(mutations)]
-    random.Random(seed).shuffle(every)
-    drawn = (mutant for mutant in starmap(made, every) if not asserts(mutant))
-    return len(every), list(islice(drawn, count))
-
-
-def asserts(mutant: Mutant) -> bool:
-    """Whether all that changes is ``strict`` of a zip, by which the code asserts what it knows."""
-    return re.sub(STRICT, "", mutant.before) == re.sub(STRICT, "", mutant.after)
-
-
-def drawn_again(rows: Sequence[dict[str, Any]]) -> Iterator[tuple[dict[str, Any], Mutant | None]]:
-    """Each row of a log with its mutant; None where the code has changed so that there is none."""
-    for row in rows:
-        module, lines = row["module"], (row["before"], row["after"])
-        tree, mutations = found(module) if (ROOT / module).is_file() else (libcst.Module([]), [])
-        order = sorted(range(len(mutations)), key=lambda number: abs(number - row["number"]))
-        every = (made(module, tree, number, mutations[number]) for number in order)
-        yield row, next((m for m in every if (m.before, m.after) == lines), None)
-
-
-def key(row: dict[str, Any]) -> tuple[str, int, str, str]:
-    """What tells mutants apart."""
-    return row["module"], row["number"], row["before"], row["after"]
+def functions(code: types.CodeType) -> Iterator[types.CodeType]:
+    """The outermost functions of a module's code, those of classes included."""
+    for c in code.co_consts:
+        if isinstance(c, types.CodeType) and not c.co_name.startswith("<"):
+            if c.co_flags & inspect.CO_NEWLOCALS:
+                yield c
+            else:
+                yield from functions(c)
 
 
 class Judge:
-    """A plugin of pytest: notes the tests that fail, and hands over FMUs of unchanged source."""
+    """A plugin of pytest that judges mutants in place of a run of its tests."""
 
-    def __init__(self, killer: Path, cache: Path | None) -> None:
-        self.killer, self.cache = killer, cache
+    def __init__(self, mutants: Sequence[Mutant], copy: Path, log: Path, options: Any) -> None:
+        self.mutants, self.copy, self.log, self.options = mutants, copy, log, options
+        self.near, self.seconds = Nearness(), {}
 
-    @pytest.fixture(scope="session", autouse=True)
-    def _fmus_of_unchanged_source(self, tmp_path_factory):
-        if self.cache is not None:
-            shutil.copytree(self.cache, tmp_path_factory.getbasetemp() / "cache", copy_function=os.link)
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Judge every mutant by the collected tests."""
+        self.items = session.items
+        self.texts = {
+            i.nodeid: inspect.getsource(i.function) for i in self.items if hasattr(i, "function")
+        }
+        for name in ("fmus", "native"):  # what sessions share is made before the forks
+            for item in [i for i in self.items if name in getattr(i, "fixturenames", ())][:1]:
+                item.config.hook.pytest_runtest_protocol(item=item, nextitem=self.items[-1])
+        self._look_for_code()
+        self.shared = Path(session.config._tmp_path_factory.getbasetemp())  # pyright: ignore
+        later = []
+        for m in self.mutants:
+            names, inside = around(m)
+            if inside:
+                self._write(m, *self._changed(m, lambda m=m, names=names: self._forked(m, names)))
+            else:
+                later.append((m, names))
+        for m, names in later:
+            self._write(m, *self._changed(m, lambda m=m, names=names: self._anew(m, names)))
+        return True
 
-    def pytest_runtest_logreport(self, report):
-        if report.failed:
-            with open(self.killer, "a", encoding="utf-8") as file:
-                file.write(f"{report.nodeid}\n")
+    def _look_for_code(self) -> None:
+        """The functions of this process by their code, and what remembers results."""
+        gc.unfreeze()
+        self.code, self.caches = defaultdict(list), []
+        for x in gc.get_objects():
+            if isinstance(x, types.FunctionType):
+                self.code[x.__code__.co_filename, x.__code__.co_qualname].append(x)
+            elif isinstance(x, functools._lru_cache_wrapper) and x.__module__.partition(".")[0] in OURS:
+                self.caches.append(x)
+        gc.freeze()
+
+    def _changed(self, m: Mutant, judge: Any) -> tuple[str, str]:
+        """What becomes of a mutant, whose text is in the copy meanwhile."""
+        target = self.copy / m.module
+        whole, before = target.read_text(encoding="utf-8"), {p.name for p in self.shared.iterdir()}
+        target.write_text(m.text, encoding="utf-8")
+        try:
+            return judge()
+        finally:
+            target.write_text(whole, encoding="utf-8")
+            for path in self.shared.iterdir():  # what a mutant has made is not shared
+                if path.name not in before and path.name != "cache":
+                    shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink()
+
+    def _ordered(self, m: Mutant, names: Sequence[str]) -> list[pytest.Item]:
+        cases: Counter[str] = Counter()
+        found = []
+        for n, item in enumerate(self.items):
+            file, function = item.nodeid.partition("::")[0], item.nodeid.partition("[")[0]
+            near = self.near(m, names, file, self.texts.get(item.nodeid, ""))
+            if near < FARTHEST:
+                rank = near + 0.5 * min(cases[function], 5)
+                found.append((rank, self.seconds.get(item.nodeid, 0.3), n, item))
+            cases[function] += 1
+        return [item for *_, item in sorted(found, key=lambda each: each[:3])]
+
+    def _forked(self, m: Mutant, names: Sequence[str]) -> tuple[str, str]:
+        """Fate and the test that fails, or how many ran, of a change in a function."""
+        order = self._ordered(m, names)
+        read, write = os.pipe()
+        pid = os.fork()
+        if not pid:
+            os.close(read)
+            with suppress(BaseException):
+                self._run(m, order, write)
+            os._exit(3)
+        os.close(write)
+        told, end = b"", time.monotonic() + 100.0 * self.options.cpu
+        while (left := end - time.monotonic()) > 0.0 and select.select([read], [], [], left)[0]:
+            if not (part := os.read(read, 65536)):
+                break
+            told += part
+        with suppress(ProcessLookupError):
+            os.killpg(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        os.close(read)
+        lines = [line.split("\t") for line in told.decode(errors="replace").splitlines()]
+        passed = {line[1]: float(line[2]) for line in lines if line[0] == "passed"}
+        self.seconds |= passed
+        fails = [line[1] for line in lines if line[0] == "failed"]
+        if fails or not [line for line in lines if line[0] == "end"]:
+            return KILLED, fails[0] if fails else "does not end"
+        return SURVIVED, str(len(passed))
+
+    def _run(self, m: Mutant, order: Sequence[pytest.Item], write: int) -> None:
+        """In the fork: put the code in place, and run tests until one fails or the time is over."""
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        quiet = os.open(os.devnull, os.O_RDWR)
+        os.dup2(quiet, 1)
+        os.dup2(quiet, 2)
+        out, path, failed = os.fdopen(write, "w", buffering=1), str(self.copy / m.module), []
+        for code in functions(compile(m.text, path, "exec")):
+            for function in self.code[path, code.co_qualname]:
+                with suppress(ValueError):  # another one of that name
+                    function.__code__ = code
+        for cache in self.caches:
+            cache.cache_clear()
+
+        class Watch:
+            def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+                failed.extend([report.nodeid] * report.failed)
+
+        if order:
+            order[0].config.pluginmanager.register(Watch())
+        spent = 0.0
+        for item, after in zip(order, [*order[1:], None], strict=True):
+            began = sum(os.times()[:4])
+            limit = int(sum(os.times()[:2])) + ALONE, resource.RLIM_INFINITY
+            resource.setrlimit(resource.RLIMIT_CPU, limit)
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=after or item)
+            if failed:
+                out.write(f"failed\t{failed[0]}\n")
+                break
+            seconds = sum(os.times()[:4]) - began
+            out.write(f"passed\t{item.nodeid}\t{seconds:.2f}\n")
+            spent += seconds
+            if spent > self.options.cpu:
+                break
+        out.write("end\n")
+        out.flush()
+        os._exit(0)
+
+    def _anew(self, m: Mutant, names: Sequence[str]) -> tuple[str, str]:
+        """The same of a change outside of functions: the page that shows it, then the nearest files."""
+        near = sorted((self.near(m, names, file), len(t), file) for file, t in self.near.texts.items())
+        files = [file for rank, _, file in near if rank < 4.0][:3]
+        limit = round(10.0 + 3.0 * self.options.cpu)
+        for tests in ([PAGES[m.package]] if m.package in PAGES else [], files):
+            if tests:
+                done = subprocess.run(
+                    [
+                        sys.executable,
+                        "-m",
+                        "pytest",
+                        *QUIET,
+                        "-x",
+                        "-rfE",
+                        "--tb=no",
+                        *self.options.marks,
+                        *tests,
+                    ],
+                    cwd=self.copy,
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
+                )
+                fails = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+                if fails or done.returncode in (
+                    pytest.ExitCode.INTERRUPTED,
+                    pytest.ExitCode.USAGE_ERROR,
+                ):
+                    return KILLED, fails[0] if fails else "cannot be imported"
+        return SURVIVED, " ".join(files)
+
+    def _write(self, m: Mutant, fate: str, by: str) -> None:
+        row = {k: v for k, v in m._asdict().items() if k != "text"} | {"fate": fate, "by": by}
+        with self.log.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
 
 
-def loaded(copies: Path) -> Path:
-    """This process' copy of the project, all modules of which it has imported."""
-    copy = copies / str(os.getpid()) / "copy"
-    if copy.exists():
-        return copy
-    copied(ROOT, copy)
-    os.chdir(copy)
-    sys.path[0], sys.dont_write_bytecode = str(copy), False
-    for path in sorted(path for package in PACKAGES for path in Path(package).glob("**/*.py")):
-        if path.name not in ("__init__.py", "__main__.py"):
-            with suppress(Exception):  # the tests that need it fail without a mutant, too
-                importlib.import_module(".".join(path.with_suffix("").parts))
-    return copy
-
-
-def tested(
-    copy: Path, killer: Path, cache: Path | None, changed: str, seconds: int, arguments: Sequence[str]
-) -> None:
-    """Run pytest in this process, which was forked for it; what may use the changed package is new."""
-    import resource
-
-    os.setsid()
-    quiet = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1, 2):
-        os.dup2(quiet, stream)
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-    for name in [n for n in sys.modules if n.partition(".")[0] in USERS[changed]]:
-        del sys.modules[name]
-    os.environ["PYTHONPATH"] = str(copy)
-    without = [f"-pno:{plugin}" for plugin in ("cacheprovider", "pytest_cov", "xdist")]
-    options = ["-q", "--assert=plain", "-mnot slow", f"--basetemp={copy.parent / 'session'}"]
-    os._exit(pytest.main([*without, *options, *arguments], plugins=[Judge(killer, cache)]))
-
-
-def fails(
-    copy: Path, tests: Sequence[str], seconds: float, cache: Path | None, changed: str, stop: str = "-x"
-) -> list[str]:
-    """The tests that fail in the copy, a package of which has changed; none if all pass.
-
-    They have some time of the processor [s], and ten times of it by the clock.
-    """
-    killer = copy.parent / "killer"
-    killer.unlink(missing_ok=True)
-    process = multiprocessing.get_context("fork").Process(
-        target=tested, args=(copy, killer, cache, changed, int(seconds), [stop, *tests])
-    )
-    process.start()
-    process.join(10.0 * seconds)
-    code = process.exitcode
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid or 0, signal.SIGKILL)
-    process.join()
-    if killer.exists():
-        return killer.read_text(encoding="utf-8").split("\n")[:-1]
-    if code in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
-        return []
-    files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
-    if code == pytest.ExitCode.USAGE_ERROR and list(tests) != files:  # a test is called otherwise now
-        return fails(copy, files, 4.0 * seconds, cache, changed, stop)
-    return ["does not end" if code in (None, -signal.SIGXCPU) else f"exit code {code}"]
-
-
-def judged(
-    mutant: Mutant, tests: Sequence[tuple[str, float]], cache: Path | None, limit: float, copies: Path
-) -> dict[str, Any]:
-    """What becomes of a mutant by its tests, each with its seconds, in a limit of processor time [s]."""
-    began, copy = time.monotonic(), loaded(copies)
-    target, package = copy / mutant.module, mutant.module.partition("/")[0]
-    whole, then = target.read_text(encoding="utf-8"), target.stat().st_mtime
-    batches, spent = ([], []), 0.0
-    for test, seconds in tests:
-        spent += seconds
-        batches[spent > FIRST].append(test)
-    target.write_text(mutant.text, encoding="utf-8")
-    os.utime(target, (then, random.uniform(1e9, 1.2e9)))  # byte code is told apart by this time
-    try:
-        found = (fails(copy, each, limit, cache, package) for each in batches if each)
-        killers = next(filter(None, found), [])
-    finally:
-        target.write_text(whole, encoding="utf-8")
-        os.utime(target, (then, then))
-    fate = KILLED if killers else SURVIVED if tests else UNTESTED
-    by = killers[0] if killers else len(tests)
-    return {**mutant.row(), "fate": fate, "by": by, "seconds": round(time.monotonic() - began, 1)}
-
-
-def unsound(tests: Sequence[str], copies: Path) -> list[str]:
-    """Tests that fail in such a process without a mutant, too."""
-    return fails(loaded(copies), tests, 3600.0, None, "fmus", "--maxfail=9999") if tests else []
-
-
-def print_table(rows: Sequence[dict[str, Any]]) -> None:
-    """Killed over made by module and package, with its exact 95 % interval, and the survivors."""
+def table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Survivors, and killed over judged by package, with its exact 95 % interval."""
     listed = tomllib.loads(EQUIVALENT.read_text("utf-8"))["mutant"]
     known = {(each["module"], each["after"]) for each in listed if each["reason"]}
     fates: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for row in rows:
-        if row["fate"] == SURVIVED and (row["module"], row["after"]) in known:
-            row = {**row, "fate": SAME}
-        fates[row["module"]][row["fate"]] += 1
-        fates[row["module"].partition("/")[0]][row["fate"]] += 1
-        if row["fate"] in (SURVIVED, UNTESTED):
-            print(
-                f"{row['fate']}: {row['module']}:{row['line']}\n  - {row['before']}\n  + {row['after']}"
-            )
-    for name in sorted(fates):
-        count = fates[name]
-        rest = ", ".join(f"{n} {fate}" for fate, n in sorted(count.items()) if fate != KILLED)
-        made, within = sum(count.values()) - count[GONE], ""
-        if made and "/" not in name:
-            low, high = binomtest(count[KILLED], made).proportion_ci()
-            within = f" ({100 * low:.0f} to {100 * high:.0f} %)"
-        print(f"{count[KILLED]} / {made}{within}  {name}  {rest}")
+        same = row["fate"] == SURVIVED and (row["module"], row["after"]) in known
+        fate = SAME if same else row["fate"]
+        for name in (row["module"].partition("/")[0], "all"):
+            fates[name][fate] += 1
+        if fate == SURVIVED:
+            yield f"{row['module']}:{row['line']}\n  - {row['before']}\n  + {row['after']}"
+    for name in (*(p for p in PACKAGES if p in fates), "all"):
+        killed, made = fates[name][KILLED], fates[name].total() - fates[name][SAME]
+        low, high = binomtest(killed, made).proportion_ci() if made else (0.0, 1.0)
+        interval = f"{100 * low:.0f} to {100 * high:.0f} %"
+        yield f"{name}: {killed} / {made} ({interval}), {fates[name][SAME]} equivalent"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure the tests, draw, test, print."""
+def main() -> None:
+    """Draw, judge, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument(
         "packages", nargs="*", default=PACKAGES, metavar="PACKAGE", help="or FILE.py (all)"
     )
-    parser.add_argument("--mutants", type=int, default=300, help="of each package (300)")
+    parser.add_argument("--mutants", type=int, default=60, help="in all (60)")
     parser.add_argument("--seed", type=int, default=0, help="of the draw (0)")
-    parser.add_argument("--seconds", type=float, default=20.0, help="tests of a mutant, without it (20)")
-    parser.add_argument("--limit", type=float, default=90.0, help="processor time of a mutant, s (90)")
-    parser.add_argument("--processes", type=int, default=2, help="at the same time (2)")
-    parser.add_argument("--out", type=Path, default=Path("results/mutation"), help="logs, and the tests")
-    parser.add_argument("--again", action="store_true", help="the survivors of the log, not new mutants")
-    options = parser.parse_args(arguments)
-    out = options.out.resolve()
-    covering = Covering(ROOT, out, options.processes)
-    log = out / f"seed_{options.seed}.jsonl"
-    rows = [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
-    done = {key(row): row for row in rows}  # the last one of each
-    places = tuple(
-        (ROOT / package).resolve().relative_to(ROOT).as_posix() for package in options.packages
+    parser.add_argument(
+        "--cpu", type=float, default=7.0, help="processor time of a mutant's tests, s (7)"
     )
-    mutants: list[Mutant] = []
+    parser.add_argument("--slow", action="store_true", help="slow tests, too")
+    parser.add_argument(
+        "--tests", default="", metavar="REGEX", help="only test files with this in their path"
+    )
+    parser.add_argument(
+        "--again", action="store_true", help="the survivors of the log, on the present code"
+    )
+    parser.add_argument("--out", type=Path, default=Path("results/mutation"), help="folder of the logs")
+    options = parser.parse_args()
+    options.marks = [] if options.slow else ["-mnot slow"]
+    options.out.mkdir(parents=True, exist_ok=True)
+    log = options.out.resolve() / f"seed_{options.seed}.jsonl"
+    rows = [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
+    done = {(r["module"], r["before"], r["after"]): r for r in rows}  # the last one of each
     if options.again:
-        alive = [r for r in done.values() if r["fate"] in (SURVIVED, UNTESTED)]
-        for row, mutant in drawn_again([row for row in alive if row["module"].startswith(places)]):
-            if mutant is None:
-                done[key(row)] = {**row, "fate": GONE}
-            else:
-                mutants.append(mutant._replace(number=row["number"]))
+        alive = [key for key, row in done.items() if row["fate"] == SURVIVED]
+        mutants = [m for key in alive if (m := again(*key))]
     else:
-        for package in places:
-            every, drawn = draw(package, options.mutants, options.seed)
-            print(f"{package}: {len(drawn)} of {every} mutants", flush=True)
-            mutants += [mutant for mutant in drawn if key(mutant.row()) not in done]
-        random.Random(0).shuffle(mutants)  # what is done so far is a sample of all packages
-    for name in LIBRARIES:
-        importlib.import_module(name)
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        open(log, "a", encoding="utf-8") as file,
-        ProcessPoolExecutor(options.processes, multiprocessing.get_context("fork")) as pool,
-    ):
-        copies = Path(folder)
-        while mutants:
-            tasks = [
-                pool.submit(judged, m, *covering.tests(*m[:2], options.seconds), options.limit, copies)
-                for m in mutants
-            ]
-            for task in as_completed(tasks):
-                row = task.result()
-                done[key(row)] = row
-                file.write(json.dumps(row) + "\n")
-                file.flush()
-            killers = sorted({done[key(m.row())]["by"] for m in mutants} & covering.seconds.keys())
-            parts = [killers[k :: options.processes] for k in range(options.processes)]
-            covering.unsound |= {
-                test for tests in pool.map(unsound, parts, repeat(copies)) for test in tests
-            }
-            mutants = [m for m in mutants if done[key(m.row())]["by"] in covering.unsound]
-    print_table([row for row in done.values() if row["module"].startswith(places)])
+        drawn = draw(options.mutants, options.seed, options.packages)
+        mutants = [m for m in drawn if (m.module, m.before, m.after) not in done]
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "copy"
+        made = shutil.ignore_patterns("__pycache__", ".*", "*.fmu", "*.egg-info")
+        top = {str(ROOT): {"results", "site"}}  # folders of the project itself
+        shutil.copytree(ROOT, copy, ignore=lambda at, names: {*made(at, names), *top.get(at, ())})
+        judge = Judge(mutants, copy, log, options)
+        modules = {m.module for m in mutants}
+        files = [
+            f
+            for f in judge.near.texts
+            if any(judge.near.steps[m].get(f, FOUND) <= FOUND for m in modules)
+        ]
+        files = [f for f in files if re.search(options.tests, f)]
+        os.chdir(copy)
+        sys.path[:] = [str(copy), *(p for p in sys.path if Path(p or ".").resolve() != ROOT)]
+        for name in [n for n in sys.modules if n.partition(".")[0] in OURS]:
+            del sys.modules[name]
+        os.environ["PYTHONPATH"] = str(copy)
+        if mutants:
+            pytest.main(
+                [*QUIET, "-s", *options.marks, f"--basetemp={folder}/base", *files], plugins=[judge]
+            )
+        os.chdir(ROOT)
+    rows = {
+        (r["module"], r["before"], r["after"]): r
+        for r in map(json.loads, log.read_text("utf-8").splitlines())
+    }
+    print(*table([*rows.values()]), sep="\n")
 
 
 if __name__ == "__main__":

@@ -23,8 +23,10 @@ from diagnosis.assessment.plausibility import (
     refuse_implausible,
     same_columns,
 )
-from diagnosis.assessment.readings import of_pose, reread
+from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
+from diagnosis.assessment.readings import AS_READ, of_commands, of_pose, reread, swapped
 from diagnosis.predictors import ship_with
+from diagnosis.runs.columns.columns import POSE
 from diagnosis.runs.columns.side_car import ColumnChange
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -48,6 +50,78 @@ def edited(pose=None, commands=None):
 
 def flipped(*signs):
     return lambda values: values * np.array(signs)
+
+
+def explained(*columns):
+    """An explanation by columns (column, deviation[, low, high])."""
+    why = Explanation()
+    for column in columns:
+        why.may(*column)
+    return why
+
+
+def test_a_density_is_that_of_a_normal_prior_and_normal_noise():
+    """One column, noise far above all else, so that it hardly depends on what is explained."""
+    rng = np.random.default_rng(0)
+    x, e, least, s, windows = (
+        rng.normal(size=(30, 3)),
+        rng.normal(size=(30, 3)),
+        np.array([20.0, 30.0, 50.0]),
+        7.0,
+        12.0,
+    )
+    w = np.sqrt(windows / 30) / np.sqrt((e**2).mean(axis=0) + least**2)
+    information = 1.0 + s**2 * ((x * w) ** 2).sum()
+    b = s * (x * w * e * w).sum() / information
+    noise = np.sqrt(((e - b * s * x) ** 2).mean(axis=0) + least**2)
+    expected = -windows * np.log(noise).sum() - 0.5 * (b**2 + np.log(information))
+    assert explained((x, s)).density(e, least, windows) == pytest.approx(expected, abs=1e-2)
+
+
+def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit():
+    rng = np.random.default_rng(1)
+    x, other, least = rng.normal(size=(60, 3)), rng.normal(size=(60, 3)), np.full(3, 0.01)
+    e = 2.0 * x + 0.05 * rng.normal(size=(60, 3))
+
+    def density(*columns, unit=1.0):
+        return explained(*((unit * c, *rest) for c, *rest in columns)).density(
+            unit * e, unit * least, 20.0
+        )
+
+    plain = density((other, 1.0))
+    assert density((x, 1.0)) > plain + 20.0
+    assert density((x, 1.0), (other, 0.0)) == density((x, 1.0)), "what has no deviation explains nothing"
+    assert density((x, 1.0, -np.inf, 0.0)) < plain + 2.0
+    assert plain < density((x, 1.0, 0.0, 1.0)) < density((x, 1.0, 0.0, 3.0))
+    assert density((x, 1.0), unit=10.0) == pytest.approx(density((x, 1.0)) - 20.0 * 3.0 * np.log(10.0))
+
+
+def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
+    odds = ReadingOdds(weak_windows(smoothed(base())), Model())
+    right = odds.log_density(AS_READ)
+    for reading in (
+        of_pose("", (1.0, 1.0, -1.0)),
+        of_commands("", (-1.0, -1.0, -1.0)),
+        swapped(POSE, 0, 1),
+    ):
+        assert odds.log_density(reading) < right
+    assert odds.log_density(of_pose("", (np.nan, 1.0, 1.0))) == -np.inf
+    assert odds.log_density(of_pose("", (1e200, 1.0, 1.0))) == -np.inf
+
+
+@pytest.mark.parametrize("pace", [1.0, 4.0])
+def test_another_reading_changes_motion_and_density_by_its_factors(pace):
+    w = weak_windows(smoothed(base()))
+    half = replace(of_pose("", (0.5, 0.5, 1.0)), pace=pace, turn=np.pi)
+    meant = reread(w, half, Model())
+    factors = np.array([0.5, 0.5, 1.0])
+    np.testing.assert_allclose(meant.smoothed.eta, w.smoothed.eta * factors + [0.0, 0.0, np.pi])
+    np.testing.assert_allclose(meant.smoothed.eta_dot, w.smoothed.eta_dot * factors / pace)
+    np.testing.assert_allclose(meant.slope.toarray(), w.slope.toarray() / pace)
+    assert half.density == pytest.approx(np.log(0.25) - 6.0 * np.log(pace))
+    np.testing.assert_array_equal(meant.run.tau_cmd, w.run.tau_cmd)
+    turned = reread(w, of_commands("", (1.0, -2.0, 0.5)), Model())
+    np.testing.assert_allclose(turned.run.tau_cmd, w.run.tau_cmd * [1.0, -2.0, 0.5])
 
 
 MISTAKES = [

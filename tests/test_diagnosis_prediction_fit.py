@@ -13,7 +13,7 @@ from support.measured import commands, sail, smoothed
 
 from diagnosis import Smoothed
 from diagnosis.predictors import Model, shooting, weak_windows
-from diagnosis.predictors.prediction import at_rest
+from diagnosis.predictors.prediction import WindowStarts, at_rest
 from diagnosis.predictors.shooting import Linear, Shooting
 from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.predictors.windows import Windows
@@ -66,6 +66,53 @@ def jolted(t, seed):
     ):
         tau[(t >= start) & (t < start + 1.0), 2] += 0.08 * sign
     return tau
+
+
+def test_what_is_given_and_the_air_are_means_over_each_step_of_each_window():
+    """A value counts from halfway to the sample before to halfway to the next."""
+    rng, h, steps = np.random.default_rng(0), 0.25, 6
+    runs, tables, airs = [], {}, {}
+    for name, n in (("a", 9), ("b", 12)):
+        t = np.cumsum(rng.uniform(0.4, 0.9, n))
+        tables[name] = SimpleNamespace(still=rng.normal(size=(n, 3)), slope=rng.normal(size=(n, 3, 6)))
+        airs[name] = rng.normal(size=(n, 2)) if name == "a" else None
+        track = SimpleNamespace(run=SimpleNamespace(name=name, power=None))
+        runs.append((SimpleNamespace(time=t, track=track, air=airs[name]), np.array([0, 3])))
+    starts = WindowStarts(tuple(runs), h, steps)
+    windy = SimpleNamespace(given=tables, hull=SimpleNamespace(effects=SimpleNamespace(wind=0)))
+    still, slope = starts.given(windy)
+    air = starts.air(windy)
+    assert still.shape == (steps, 3, 1, 4)
+    assert slope.shape == (steps, 3, 6, 1, 4) or slope.shape == (steps, 6, 3, 1, 4)
+    fine = (np.arange(2000) + 0.5) / 2000
+    for w, (s, row) in enumerate((s, row) for s, rows in runs for row in rows):
+        for k in range(steps):
+            at = s.time[row] + h * (k + fine)
+            near = np.abs(at[:, None] - s.time).argmin(axis=1)
+            given = tables[s.track.run.name]
+            assert still[k, :, 0, w] == pytest.approx(given.still[near].mean(axis=0), abs=5e-3)
+            of = airs[s.track.run.name]
+            expected = [0.0, 0.0] if of is None else of[near].mean(axis=0)
+            assert air[k, :, 0, w] == pytest.approx(expected, abs=5e-3)
+    assert starts.given(SimpleNamespace(given={})) is None
+    calm = SimpleNamespace(hull=SimpleNamespace(effects=SimpleNamespace(wind=-1)))
+    assert starts.air(calm) is None
+    assert starts.power(0.0) is None
+
+
+def test_power_settings_are_those_of_the_middle_of_each_step():
+    t = np.arange(0.0, 5.0, 0.5)
+    power = np.column_stack([t, 10.0 + t])
+    runs = []
+    for p in (power, None):
+        track = SimpleNamespace(run=SimpleNamespace(power=p))
+        runs.append((SimpleNamespace(time=t, track=track), np.array([2, 4])))
+    found = WindowStarts(tuple(runs), 0.25, 3).power(0.2)
+    middle = t[[2, 4]] + 0.25 * (np.arange(3)[:, None] + 0.5) - 0.2
+    expected = np.floor(middle / 0.5) * 0.5
+    assert found[:, 0, :2] == pytest.approx(expected)
+    assert found[:, 1, :2] == pytest.approx(10.0 + expected)
+    assert (found[:, :, 2:] == 1.0).all()
 
 
 @cache
@@ -127,6 +174,16 @@ def test_box_is_found_by_its_means_over_windows(start, end):
     w = SimpleNamespace(middle=middle, width=width, every=every)
     found = box(w, np.ones(middle.size, bool), error)
     assert found == pytest.approx((start, end, size), abs=0.01)
+
+
+def test_predictions_do_not_depend_on_what_was_predicted_before():
+    """What thrusters do is kept for models whose thrusters respond alike, and for no other."""
+    data = [smoothed(sail(20.0)[0])]
+    kept, late = Shooting(data, HORIZON), Model(thrusters={"lag": 2.0})
+    first, second = kept.residuals(late), kept.residuals(Model())
+    np.testing.assert_array_equal(second, Shooting(data, HORIZON).residuals(Model()))
+    np.testing.assert_array_equal(kept.residuals(late), first)
+    assert np.abs(first - second).max() > 1e-3
 
 
 def test_coarse_steps_predict_what_fine_ones_do():

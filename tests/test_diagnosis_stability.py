@@ -105,6 +105,24 @@ def test_the_damping_of_a_described_ship_and_its_changes_count():
     np.testing.assert_allclose(force(nominal.plus({"scale_damping": 0.5}), nu), 1.5 * before, rtol=1e-9)
 
 
+@pytest.mark.parametrize("before", [2.0, -2.0])
+def test_less_is_less_by_more_than_a_share_of_what_was_before(before):
+    share = 2.0 * SETTINGS.hardly
+    found = stability._less(before + share * np.array([1.1, -0.9, -1.1]), before)
+    assert found.tolist() == [False, False, True]
+
+
+def test_a_hull_drives_on_where_it_adds_energy_and_the_other_adds_less():
+    def is_driven(changed, other):
+        return stability.drives_on(Model({"delta_X_u": changed}), Model({"delta_X_u": other}), OPERATING)
+
+    assert is_driven(3.0, 0.0)
+    assert is_driven(3.0, 2.0)
+    assert not is_driven(3.0, 3.0)
+    assert not is_driven(3.0, 3.1)
+    assert not is_driven(0.3, 0.0), "less damping is damping"
+
+
 @pytest.mark.parametrize("whole", [False, slow(True)])
 def test_the_nominal_model_is_as_good_as_itself(whole, monkeypatch):
     if whole:

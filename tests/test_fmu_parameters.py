@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,9 +40,16 @@ from diagnosis.fmu_parameters.parameter_file import (
 from diagnosis.fmu_parameters.residuals import Setting, Whitening, WindowResiduals
 from diagnosis.fmu_parameters.sensitivity import confounded
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
-from diagnosis.fmu_parameters.system_remainder import change_of_squares
+from diagnosis.fmu_parameters.system_remainder import (
+    _beyond,
+    _chance,
+    _spread,
+    change_of_squares,
+    inflation,
+)
 from diagnosis.predictors.black_box import laid
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, PlayedBack, Processes
+from fmus.ops import wrap
 
 pytestmark = needs_compiler
 
@@ -255,6 +263,63 @@ def test_whitening_is_the_inverse_root_of_the_covariance():
     U, size, _ = np.linalg.svd(S, full_matrices=False)
     W = Whitening(U, 1.0 / np.sqrt(1.0 + size**2), {}, np.zeros(12))(np.eye(12))
     assert np.allclose(W @ (np.eye(12) + S @ S.T) @ W.T, np.eye(12))
+
+
+def windows(*measured, runs=None, angles=()):
+    """What the remainder looks at: windows of some outputs, a second from sample to sample."""
+    each = [
+        SimpleNamespace(measured=m, time=3.0 + np.arange(len(m)), run=run)
+        for m, run in zip(measured, runs or ["a"] * len(measured), strict=True)
+    ]
+    ends = np.cumsum([0, *(m.size for m in measured)])
+    rows = [slice(a, b) for a, b in pairwise(ends.tolist())]
+    noise = np.ones(measured[0].shape[1])
+    return SimpleNamespace(windows=each, rows=rows, angles=angles, noise=noise)
+
+
+def test_the_spread_of_an_output_is_about_the_line_of_each_window():
+    t, rng = 3.0 + np.arange(30.0), np.random.default_rng(0)
+    first, second = (
+        np.column_stack([5.0 + 2.0 * t, wrap(t / 3.0)]) + rng.normal(size=(30, 2)) for _ in "ab"
+    )
+    second[4, 0] = np.nan
+    r = windows(first, second, angles=[1])
+    known = np.isfinite(second[:, 0])
+    lines = [
+        np.polyval(np.polyfit(x, y, 1), x) - y
+        for x, y in ((t, first[:, 0]), (t[known], second[known, 0]))
+    ]
+    assert _spread(r, 0) == pytest.approx(np.concatenate(lines).std(), rel=1e-6)
+    still = windows(np.column_stack([7.0 - 0.5 * t, wrap(t / 3.0)]), angles=[1])
+    assert [_spread(still, k) for k in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("lasts", "size"), [(1, 1.0), (20, 0.5), (20, 2.0)])
+def test_what_lasts_is_beyond_white_noise_and_no_chance(lasts, size):
+    """Noise of unit size, and in addition an error that keeps its sign for some samples."""
+    rng = np.random.default_rng(1)
+    parts = [
+        rng.normal(size=4000) + (lasts > 1) * size * np.repeat(rng.choice([-1.0, 1.0], 200), 20)
+        for _ in "ab"
+    ]
+    known = [np.arange(4000) % 7 != 0, np.ones(4000, bool)]
+    expected = size if lasts > 1 else 0.0
+    assert _beyond(parts, known) == pytest.approx(expected, abs=0.05 + 0.08 * expected)
+    assert (_chance(parts, known, 3.0) < 1e-6) == (lasts > 1)
+    assert _beyond([np.zeros(3)], [np.ones(3, bool)]) == 0.0
+    assert _chance([np.zeros(3)], [np.ones(3, bool)], 0.0) == 1.0, "of too few nothing is told"
+
+
+@pytest.mark.parametrize("lasts", [1, 10])
+def test_variances_grow_by_how_long_residuals_last(lasts):
+    rng = np.random.default_rng(2)
+    slopes, found = np.full((800, 1), 0.1), []
+    for _ in range(100):
+        white = np.repeat(rng.normal(size=800 // lasts), lasts)
+        found.append(inflation(windows(white.reshape(-1, 2)), white, slopes, slopes.T @ slopes))
+    assert np.mean(found) == pytest.approx(lasts, rel=0.35)  # 1 at the least
+    r = windows(white.reshape(-1, 2))
+    assert inflation(r, white, np.zeros((800, 0)), np.zeros((0, 0))) == 1.0
 
 
 def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():

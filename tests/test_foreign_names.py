@@ -51,6 +51,13 @@ def test_names_of_other_tongues(names):
     )
 
 
+@pytest.mark.parametrize(
+    "name", ["north_east_pos", "surge_force_speed", "surge_position", "rudder_angle", "n_2"]
+)
+def test_names_that_say_two_things_or_another_one_are_no_signals(name):
+    assert outputs(name)[0] == {}
+
+
 def test_a_unit_at_the_end_of_a_name_and_one_that_limits_say():
     found, _, _ = outputs("Heading_deg", "x_km")
     assert found["psi"].unit == "deg"

@@ -23,9 +23,10 @@ from diagnosis.acceptance.budget import (
     sources_of,
 )
 from diagnosis.acceptance.criterion import Criterion
-from diagnosis.acceptance.judged_criterion import Predicted, decide, judge
+from diagnosis.acceptance.judged_criterion import Judgement, Predicted, WindowCounts, decide, judge
 from diagnosis.acceptance.predictions import Predictions, difference, judged
-from diagnosis.acceptance.statistics import independent, root_mean_square, share
+from diagnosis.acceptance.record.validation import _result
+from diagnosis.acceptance.statistics import Interval, independent, root_mean_square, share
 from diagnosis.acceptance.validity import window_means
 from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
 from diagnosis.verify import main as verify_main
@@ -36,6 +37,25 @@ WITHIN = {"quantity": "position", "horizon": 8.0, "tolerance": 1.0, "unit": "m"}
 
 def criterion(**changes):
     return Criterion(**{**WITHIN, **changes})
+
+
+@pytest.mark.parametrize("statistic", ["fraction", "rms"])
+def test_a_record_has_the_statistics_of_the_errors_in_the_unit_of_the_criterion(statistic):
+    """In cm; a fraction has no unit."""
+    errors, bounds = np.array([0.03, -0.04, 0.01]), Interval(0.9, 0.8, 0.95)
+    made = Judgement(
+        criterion(unit="cm", tolerance=5.0, statistic=statistic), None, "", WindowCounts(3, 3, {}, ["a"], {}),
+        errors=errors, offset=np.array([0.02, -0.01]), interval=bounds,
+    )  # fmt: skip
+    found = _result(made)
+    assert found["E"] == pytest.approx(0.0)
+    assert found["rms"] == pytest.approx(100.0 * (26e-4 / 3.0) ** 0.5)
+    assert found["largest"] == pytest.approx(4.0)
+    assert found["E_axes"] == pytest.approx([2.0, -1.0])
+    factor = 100.0 if statistic == "rms" else 1.0
+    assert [found[n] for n in ("estimate", "low", "high")] == pytest.approx([factor * x for x in bounds])
+    none = _result(made._replace(errors=np.zeros(0), interval=None))
+    assert [none[n] for n in ("E", "rms", "largest", "E_axes", "estimate", "budget")] == [None] * 6
 
 
 def outcome(errors, u_val=0.0, n=None, **changes):

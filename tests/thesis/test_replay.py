@@ -1,6 +1,8 @@
 """``thesis.replay``: a run through observer and controller FMUs open loop gives what was lost."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,8 +13,10 @@ import cosim
 from fmus.controller import cl_win_eps
 from fmus.controller.backstepping import Applied, acting
 from fmus.declare import packer, variables
+from fmus.ship import ship
 from fmus.signals import Force
 from thesis.open_loop import gather_source, loop_of, play
+from thesis.open_loop.playback import COMMAND, OpenLoop, fed, watch_loop
 from thesis.replay import main
 
 LOST = [f"{stem}_{axis}" for stem in ("thrusters.tau_cmd", "controller.tau") for axis in "XYN"]
@@ -120,3 +124,60 @@ def test_controller_learns_by_the_force_that_is_told():
         for _ in range(3):
             state, out = c.step(state, inputs, p, 0.01)
         assert out.learning.beta == beta
+
+
+def test_a_loop_is_that_of_the_log_but_for_what_is_named(tmp_path):
+    """Observer, guidance, law and what the allocation believes are of the run; the plant never is."""
+    believed, plant = sorted(ship().allocation_parameters)[0], "loss_bow"
+    assert plant not in ship().allocation_parameters
+    fmus = {
+        "observer": {"path": "observer_df.fmu", "parameters": {"b": 2.0}, "step": 0.1},
+        "guidance": {"path": "guidance_ellipse.fmu"},
+        "controller": {"path": "controller_cl_win_eps.fmu", "parameters": {"K_p_x": 0.7}},
+        "thrusters": {"path": "thrusters.fmu", "parameters": {believed: 1.5, plant: 9.0}},
+        "vessel": {"path": "vessel.fmu", "parameters": {"m": 20.0}},
+    }
+    content = {"fmus": fmus, "connections": [["thrusters.tau_cmd_X", "controller.tau_cmd_X"]]}
+    (tmp_path / "log.json").write_text(json.dumps({"scenario": content}))
+    eyes = {"path": "observer_df.fmu", "parameters": {"b": 2.0}}
+    drive = {"path": "thrusters.fmu", "parameters": {believed: 1.5}}
+    for run in (tmp_path, tmp_path / "log.csv"):
+        own = loop_of(run, "cl_win_eps", None, None)
+        assert own == OpenLoop(fmus["controller"], eyes, drive, fmus["guidance"], True, True)
+    assert loop_of(tmp_path, "cl_win_eps", "df", None).own, "the observer of the run by its name"
+    other = loop_of(tmp_path, "controller_bs", "observer_mdf.fmu", None)
+    mdf = {"path": "observer_mdf.fmu"}
+    assert other == OpenLoop({"path": "controller_bs.fmu"}, mdf, drive, fmus["guidance"], True, False)
+    content["connections"] = []
+    (tmp_path / "log.json").write_text(json.dumps({"scenario": content}))
+    assert not loop_of(tmp_path, "cl_win_eps", None, None).told, "its own controller was told nothing"
+    assert loop_of(tmp_path, "cl_win_eps", "mdf", None).told, "one that saw something else is told"
+    watch = watch_loop(tmp_path, "watch_thrusters", None, None)
+    assert watch == OpenLoop({"path": "watch_thrusters.fmu"}, eyes, None, None, True, False)
+    for text in ("{", "[]", "{}"):  # cut off
+        (tmp_path / "log.json").write_text(text)
+        plain = {"path": "thrusters.fmu", "parameters": {}}
+        found = loop_of(tmp_path, str(tmp_path / "mine.fmu"), None, None)
+        assert found == OpenLoop({"path": str(tmp_path / "mine.fmu")}, mdf, plain, None, True, False)
+    beside = loop_of(tmp_path / "other.csv", "bs", None, None)
+    assert beside.observer == mdf, "a log of another tool beside one of ours"
+
+
+def test_what_is_fed_is_held_where_it_is_lost_and_forces_are_those_of_the_step_before():
+    nan = np.nan
+    tau = np.array([[1.0, 0.0, 0.0], [nan, 2.0, 0.0], [3.0, nan, 0.5]])
+    pose = np.arange(9.0).reshape(3, 3)
+    run = SimpleNamespace(run=SimpleNamespace(pose=pose))
+    source = SimpleNamespace(tau=tau, track=run, target=None)
+    loop = OpenLoop({}, {})
+    found = fed(source, loop)
+    held = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0]])
+    assert np.column_stack([found[name] for name in COMMAND]).tolist() == held.tolist()
+    assert [found[f"observer.{n}"].tolist() for n in ("x_m", "y_m", "psi_m")] == pose.T.tolist()
+    assert len(found) == 6
+    target = np.where(np.arange(27).reshape(3, 9) == 10, nan, 1.0 * np.arange(27).reshape(3, 9))
+    source.target = target
+    assert fed(source, loop)["controller.y_t"].tolist() == [1.0, 1.0, 19.0]
+    guided = fed(source, replace(loop, guidance={}, thrusters={}))
+    np.testing.assert_array_equal(guided["controller.y_t"], [1.0, nan, 19.0])
+    np.testing.assert_array_equal(guided[COMMAND[0]], [1.0, 1.0, nan])
