@@ -244,7 +244,7 @@ def _share(track: Track, sigma: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
     """Rows of a run in stretches that agree, their problem and origin, and the splines through them."""
-    rows, time = np.flatnonzero(track.fresh.any(axis=1)), track.run.time
+    rows = np.flatnonzero(track.fresh.any(axis=1))
     least = np.where(np.isnan(given_noise(track)), least_noise(track), np.inf)
     while True:
         even, origin = _problem(track, rows)
