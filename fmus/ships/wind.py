@@ -24,8 +24,8 @@ VELOCITY = ("W_n", "W_e")  # of the wind over the water, parameters of the effec
 # of the wind is 0.7 to 0.8 of that at an anemometer two to three times as high, and the regression adds
 # a tenth or two.
 REGRESSED = Known("wind", "Fujiwara's regression, anemometer at another place than the sides", 0.3)
-# Wind of 10 m height drives the surface at 3 % of its speed (Wu, J. Fluid Mech. 68, 1975). The mean over a
-# draft is less, and an anemometer aboard is lower. Chosen: zero within 2 %.
+# Wind of 10 m height drives the surface at 3 % of its speed (Wu, J. Fluid Mech. 68, 1975). The mean over
+# a draft is less, and an anemometer aboard is lower. Chosen: zero within 2 %.
 DRIFT = Known("wind", "3 % of the wind at the surface, less in the depth; none is described", 0.0, 0.02)
 
 

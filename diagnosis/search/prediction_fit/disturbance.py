@@ -6,8 +6,8 @@ size^2 int int w(a) w(b) exp(-|l + a - b| / time) at a lag l, and the measuremen
 its second derivative. What it does to a prediction follows from the motion about it, x' = F x + M^-1 f.
 
 Errors of a hull's and a rudder's force grow with the speed U, and so does the effect of moving water on
-them, rho A U dU. Of the variance a share grows with U^2, by least squares over the runs. Bands follow it; the
-weights of a fit do not, with which it predicts runs left out of one ship better and of another worse.
+them, rho A U dU. Of the variance a share grows with U^2, by least squares over the runs. Bands follow
+it; the weights of a fit do not: with it errors on runs left out fall on one ship and rise on another.
 """
 
 from collections.abc import Sequence
