@@ -35,7 +35,7 @@ class ForceDisturbance:
         size: (..., 3) [N, N, N m], at ``speed``; 0: none.
         time: (3,), correlation time [s].
         growth: (3,), share of its variance that grows with the square of the ship's speed.
-        speed: at which the size holds [m/s].
+        speed: at which the size holds, any where nothing grows [m/s].
     """
 
     size: np.ndarray
