@@ -226,6 +226,34 @@ def test_unrecorded_force_stays_as_large_as_it_is_and_is_forgotten_in_its_time()
     assert not each[1].any()
 
 
+def runs_with(variance):
+    """The disturbance of six runs of some speeds, by its variance over the square of the speed."""
+    speed = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5])
+    each = [ForceDisturbance(np.sqrt(variance(v**2)), np.ones(3)) for v in speed]
+    whole = ForceDisturbance(np.sqrt(np.mean([d.size**2 for d in each], axis=0)), np.ones(3))
+    return whole.growing(each, speed), each, speed
+
+
+def test_a_disturbance_grows_with_speed_as_far_as_runs_show_it():
+    shares = np.array([0.0, 0.5, 1.0])  # of each axis, of what grows
+    found, each, speed = runs_with(lambda square: 4.0 * (1.0 - shares + shares * square / 0.09))
+    assert (np.diff(found.growth) > 0.2).all()
+    assert found.growth[0] == pytest.approx(0.0, abs=1e-9)
+    assert found.growth[2] > 0.7  # one run at rest is assumed in addition
+    assert found.at(np.array([found.speed])).size[0] == pytest.approx(found.size)
+    true = np.array([d.size for d in each])
+    off, constant = (np.abs(s - true).mean(axis=0) for s in (found.at(speed).size, found.size))
+    assert (off[1:] < 0.5 * constant[1:]).all()
+
+
+def test_runs_of_one_speed_or_none_show_no_growth_of_a_disturbance():
+    one = ForceDisturbance(np.full(3, 2.0), np.ones(3))
+    for speed in (np.full(3, 0.2), np.zeros(3)):
+        found = one.growing([one] * 3, speed)
+        assert found.growth == pytest.approx(np.zeros(3), abs=1e-9)
+    assert one.at(np.array([0.0, 3.0])).size == pytest.approx(np.full((2, 3), 2.0))
+
+
 @pytest.mark.parametrize("scale", [1e-3, 0.3, 20.0])
 def test_exponential_of_matrices_is_that_of_scipy(scale):
     A = scale * np.random.default_rng(0).normal(size=(4, 2, 5, 5)) - scale * 2.0 * np.eye(5)

@@ -91,7 +91,7 @@ def test_only_a_ship_with_a_measured_wind_has_it_as_an_input():
 
 def test_only_a_measured_wind_has_coefficients_with_a_prior(tmp_path):
     groups = {n: known.group for n, known in SHIP.coefficients.items()}
-    assert {n for n, group in groups.items() if group == "wind"} == set(
+    assert {n for n, group in groups.items() if group == "wind"} == {"wind_drift"} | set(
         regression(1.0, 1.0, Superstructure())
     )
     without = ship(description=TANKER._replace(wind_measured=False))
@@ -133,6 +133,21 @@ def test_in_a_current_the_wind_is_over_the_water():
     zeta = np.arctan2(0.1, -0.2)
     out = stepped(ForceInWind(0.0, 0.0, 0.0, np.hypot(0.2, 0.1), zeta), moved, 20.0)
     assert (out.velocity.u, out.velocity.v, out.velocity.r) == pytest.approx((0.2, -0.1, 0.0), abs=1e-9)
+
+
+def test_the_measured_wind_moves_the_water_by_its_share():
+    """As a current of that share does, and not at all where the ship's wind is not measured."""
+    share, (W_n, W_e) = 0.03, air_velocity(1.5, 2.0)
+    blown = ForceInWind(2.0, 0.5, 0.1, 1.5, 2.0)
+    drifting, current = (
+        stepped(blown, values)
+        for values in ({"wind_drift": share}, {"V_n": share * W_n, "V_e": share * W_e})
+    )
+    assert tuple(drifting.pose) == pytest.approx(tuple(current.pose), rel=1e-12)
+    assert tuple(drifting.velocity) == pytest.approx(tuple(current.velocity), rel=1e-12)
+    assert drifting.pose.x != pytest.approx(stepped(blown).pose.x, abs=1e-3)
+    assert "wind_drift" not in SHIPS["gunnerus"].wind
+    assert "wind_drift" not in ship(description=SHIPS["gunnerus"]).parameters["vessel"]
 
 
 # A run
@@ -220,6 +235,16 @@ def test_calibration_finds_the_force_of_a_measured_wind(measured):
     fit = Calibrator(Findings(model=start, searched=prior), [run], start, prior).coefficients()
     assert fit.findings.model.value("wind_Y_1") == pytest.approx(true, rel=0.1)
     assert start.value("wind_Y_1") > 1.3 * true
+
+
+@pytest.mark.slow
+def test_calibration_finds_that_the_water_does_not_move_with_the_wind(measured):
+    """All else known, from a share of 2 % it returns to none; propeller and rudder meet the same water."""
+    run = weak_windows(smoothed(measured, "wind_speed_relative", "wind_direction_relative"))
+    start = Model(ship=SHIP).plus({"wind_drift": 0.02})
+    prior = NominalPrior.of(start, {name: 0.0 for name in SHIP.coefficients if name != "wind_drift"})
+    fit = Calibrator(Findings(model=start, searched=prior), [run], start, prior).coefficients()
+    assert fit.findings.model.value("wind_drift") == pytest.approx(0.0, abs=0.002)
 
 
 @pytest.mark.slow

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from support.measured import DATA
+from support.measured import DATA, sail, smoothed
 
 import diagnosis
 from cosim import InputError
 from diagnosis import Model
-from diagnosis.predictors import ship_with
-from diagnosis.predictors.windows import free_runs
+from diagnosis.predictors import ship_with, weak_windows
+from diagnosis.predictors.windows import free_runs, usable_windows
 from diagnosis.runs import Run, examine
 from diagnosis.search import DEFAULT
 from fmus.ship import ship
@@ -433,6 +433,19 @@ def test_tests_of_one_log_are_left_out_together():
     first, second = ([w.run.name for w in fold] for fold in low_speed_tanker.dealt(runs, 2))
     assert sorted(first) == [*names[:2], names[3]]
     assert sorted(second) == [names[2], names[4]]
+
+
+@pytest.mark.slow
+def test_errors_are_compared_test_by_test(tmp_path):
+    w = weak_windows(smoothed(sail()[0]))
+    before = {w.run.name: [(1.0, 2.0, np.nan), (4.0, 4.0, np.nan)]}
+    after = {w.run.name: [(0.5, 3.0, 0.9), (4.4, 2.0, 0.9)]}
+    report = Report(tmp_path, "Tests")
+    low_speed_tanker.compare_tests(report, [w], before, after)
+    text = report.write().read_text()
+    windows = " | ".join(str(usable_windows(w.smoothed, h).first_rows.size) for h in (20.0, 60.0))
+    assert f"| {w.run.name} | {windows} | 0.50 | 1.50 | 1.10 | 0.50 |" in text
+    assert "0 in position, 20 s; 1 in heading, 20 s; 1 in position, 60 s; 0 in heading, 60 s" in text
 
 
 @needs_esso

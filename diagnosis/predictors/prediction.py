@@ -227,9 +227,9 @@ def propagate(
         with np.errstate(all="ignore"):
             if power is not None:
                 thrusters = layout.powered(drive, power[k])
-            now = layout.running(s.t + h, *inflow(s, model), tuple(given), thrusters)
-            tau = Force(*layout.act(tuple(shares), now, thrusters))
             at = body if air is None else vessel.blown(body, s, *air[k])
+            now = layout.running(s.t + h, *inflow(s, at), tuple(given), thrusters)
+            tau = Force(*layout.act(tuple(shares), now, thrusters))
             if beside is None:
                 s = moved(s, tau, at, h)
             else:

@@ -66,10 +66,11 @@ def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bo
         s: vessel.State, i: Fields, b: Ready, h: Number
     ) -> tuple[vessel.State, Measurement]:
         drive = layout.powered(b.drive, i[power]) if settings else b.drive
-        u_c, v_c = vessel.water_velocity(s, b.hull)
+        hull = vessel.blown(b.hull, s, *i[wind]) if windy else b.hull
+        u_c, v_c = vessel.water_velocity(s, hull)
         now = layout.running(s.t + h, s.u - u_c, s.v - v_c, s.r, i[given], drive)
         tau = Force(*layout.act(i[acting], now, drive))
-        after = moved(s, tau, vessel.blown(b.hull, s, *i[wind]) if windy else b.hull, h)
+        after = moved(s, tau, hull, h)
         return after, vessel.measured(after, b.hull)
 
     def step(s: vessel.State, i: Fields, p: Fields, h: Number) -> tuple[vessel.State, Measurement]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from fmus.actuators.response import PreparedThrusters, at_rest, command_response, force_response
 from fmus.effects import Memory
-from fmus.vessel.vessel import State, water_velocity
+from fmus.vessel.vessel import PreparedVessel, State, water_velocity
 
 from ..runs.files.reading import Run
 from ..runs.linear_filter import filtered
@@ -49,9 +49,9 @@ def full_thrust(model: Model) -> np.ndarray:
     return np.array(model.drive.effects.layout.full(model.drive.params))
 
 
-def inflow(s: State, model: Model) -> tuple[Any, Any, Any]:
+def inflow(s: State, b: PreparedVessel) -> tuple[Any, Any, Any]:
     """u, v, r of a ship as the FMU of its thrusters meets the water [m/s, m/s, rad/s]."""
-    u_c, v_c = water_velocity(s, model.hull)
+    u_c, v_c = water_velocity(s, b)
     return s.u - u_c, s.v - v_c, s.r
 
 

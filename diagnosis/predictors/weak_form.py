@@ -270,7 +270,8 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
 
 def inflow_along(w: WeakWindows, model: Model, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """Velocity (n, 3) with which a ship's thrusters meet the water, at its pose and velocity (n, 3)."""
-    return np.column_stack(inflow(vessel.State._make([*eta.T, *nu.T, w.run.time]), model))
+    s = vessel.State._make([*eta.T, *nu.T, w.run.time])
+    return np.column_stack(inflow(s, in_wind(model, w.smoothed, s)))
 
 
 def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
@@ -320,9 +321,13 @@ def acceleration(model: Model, run: Smoothed, eta: np.ndarray, nu: np.ndarray) -
     The wind is that of the run, where it was measured.
     """
     s = vessel.State._make([*eta.T, *nu.T, run.time])
-    body = model.hull if run.air is None else vessel.blown(model.hull, s, *run.air.T)
-    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), body)
+    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), in_wind(model, run, s))
     return np.column_stack(np.broadcast_arrays(*nu_dot))
+
+
+def in_wind(model: Model, run: Smoothed, s: vessel.State) -> vessel.PreparedVessel:
+    """A model's vessel at states of a run, in the wind that was measured there."""
+    return model.hull if run.air is None else vessel.blown(model.hull, s, *run.air.T)
 
 
 def by_mass(model: Model, force: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from ..hull import Triple
 from ..hull_functions import CHANGES, FUNCTIONS, Change
 from ..ops import Number
 from ..ship_description import Description
-from .wind import wind
+from .wind import wind, wind_drift
 
 HULL = Family("hull", "steady legs at several speeds, and turns of several radii both ways")
 
@@ -59,4 +59,5 @@ def changed(function: str, change: Change) -> Effect:
 def hull_errors(ship: Description) -> list[Effect]:
     """All that a ship's hull may have otherwise than described."""
     found = [changed(part.law, c) for part in ship.functions for c in CHANGES[part.law]]
-    return [*found, *([wind(ship)] if ship.wind else [])]
+    blown = [wind(ship)] if ship.wind else []
+    return [*found, *blown, *([wind_drift] if ship.wind_measured else [])]

@@ -24,6 +24,9 @@ VELOCITY = ("W_n", "W_e")  # of the wind over the water, parameters of the effec
 # of the wind is 0.7 to 0.8 of that at an anemometer two to three times as high, and the regression adds
 # a tenth or two.
 REGRESSED = Known("wind", "Fujiwara's regression, anemometer at another place than the sides", 0.3)
+# Wind of 10 m height drives the surface at 3 % of its speed (Wu, J. Fluid Mech. 68, 1975). The mean over
+# a draft is less, and an anemometer aboard is lower. Chosen: zero within 2 %.
+DRIFT = Known("wind", "3 % of the wind at the surface, less in the depth; none is described", 0.0, 0.02)
 
 
 def wind_force(
@@ -220,6 +223,33 @@ def wind(ship: Description) -> Effect:
         search=Search(differentiable=True),
         wording=Wording(_blown, EARTH_FIXED),
     )(function)
+
+
+@effect(
+    "wind_drift",
+    "environment",
+    "XYN",
+    formula="nu_r = nu - R^T(psi) k (W_n, W_e), W the wind as it is measured over time",
+    symbol="k",
+    sign="the water moves to where the air moves",
+    source="Wu 1975",
+    linear=False,
+    gives="water velocity",
+    settings=("air_n", "air_e"),
+    parameters=(
+        Variable("wind_drift", "1", "velocity of the water, as a share of the wind's", 0.0, known=DRIFT),
+        Variable("air_n", "m/s", "measured velocity of the air to the north; set in each step", 0.0),
+        Variable("air_e", "m/s", "measured velocity of the air to the east; set in each step", 0.0),
+    ),
+    search=Search(by="given"),  # with its prior it is a coefficient of each ship that has this
+    wording=Wording(
+        lambda f: f"The water moves with {number(100.0 * f['wind_drift'])} % of the measured wind.",
+        EARTH_FIXED,
+    ),
+)
+def wind_drift(ship: Motion, share: Number, air_n: Number, air_e: Number) -> tuple[Number, Number]:
+    """Current that the measured wind drives; gives the water's body-fixed velocity [m/s, m/s]."""
+    return rotate_to_body(ship.psi, share * air_n, share * air_e)
 
 
 def _blown(f: Found) -> str:

@@ -153,7 +153,7 @@ def water_velocity(s: State, b: PreparedVessel) -> tuple[Number, Number]:
 
 
 def blown(b: PreparedVessel, s: State, W_n: Number, W_e: Number) -> PreparedVessel:
-    """The vessel in a wind that is measured, beside the one of its parameters.
+    """The vessel in a wind that is measured, beside the one of its parameters, and drives the water.
 
     Args:
         b: the vessel; one that takes no measured wind stays as it is.
@@ -163,9 +163,10 @@ def blown(b: PreparedVessel, s: State, W_n: Number, W_e: Number) -> PreparedVess
     k = b.effects.wind
     if k < 0:
         return b
-    c_n, c_e = rotate_to_earth(s.psi, *water_velocity(s, b))
+    params = b.params._replace(water=b.params.water._replace(air_n=W_n, air_e=W_e))
+    c_n, c_e = rotate_to_earth(s.psi, *water_velocity(s, b._replace(params=params)))
     at = b.params.outside
-    params = b.params._replace(outside=at._replace(W_n=at.W_n + W_n - c_n, W_e=at.W_e + W_e - c_e))
+    params = params._replace(outside=at._replace(W_n=at.W_n + W_n - c_n, W_e=at.W_e + W_e - c_e))
     outside = tuple([True if k == j else acts for j, acts in enumerate(b.outside)])
     return b._replace(params=params, outside=outside, disturbed=True)
 

@@ -17,7 +17,7 @@ from fmus.vessel.vessel import State
 from ...execution.parallel import for_each
 from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
-from ...predictors.weak_form import acceleration, by_mass
+from ...predictors.weak_form import acceleration, by_mass, in_wind
 from ...runs import Run, Smoothed, SmoothMotion, without_commands
 from ...runs.cleaning import BRIEF, between
 from ...runs.files.telegrams import groups_of
@@ -204,7 +204,8 @@ def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.nd
     u, v, r = nu.T
     nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, eta_ddot[:, 2]])
     between = Response(run, model).between_samples
-    met = inflow(State._make([*eta.T, *nu.T, run.time]), model)
+    s = State._make([*eta.T, *nu.T, run.time])
+    met = inflow(s, in_wind(model, smoothed, s))
     driven = by_mass(model, thrust(run, model, between, np.nan_to_num(np.column_stack(met))))
     free = acceleration(model, smoothed, eta, nu)
     return (nu_dot - free - driven) @ model.reference_mass.T

@@ -10,7 +10,7 @@ motion.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,6 @@ from ..findings import Findings
 from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
-from .disturbance import ForceDisturbance
 from .disturbance_summary import unrecorded
 from .fit import Information, PredictionFit, fit_to, push_of, shootings, whitened
 from .joint_posterior import JointPosterior
@@ -68,7 +67,7 @@ class Calibration(PredictionFit):
     def information(self, at: RefinedModel) -> Information:
         model, q = at.model(self.prior), self.unit.size
         whole, pushes = push_of(self.runs, model_error(self.runs, model), self.std)
-        self.assumed = ForceDisturbance(np.median([p.size for p in pushes], axis=0), whole.time)
+        self.assumed = replace(whole, size=np.median([p.size for p in pushes], axis=0))
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
         unit = np.concatenate([self.unit, self.assumed.size[1:]])
         folds = len(run_folds(self.runs))

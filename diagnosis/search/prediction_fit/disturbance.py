@@ -4,12 +4,17 @@ Its covariance at a distance t is size^2 exp(-|t| / time). Both come from the au
 error that a model leaves: a mean over windows w(t) of such a force has the covariance
 size^2 int int w(a) w(b) exp(-|l + a - b| / time) at a lag l, and the measurement's noise adds that of
 its second derivative. What it does to a prediction follows from the motion about it, x' = F x + M^-1 f.
+
+Errors of a hull's and a rudder's force grow with the speed U, and so does the effect of moving water on
+them, rho A U dU. Of the variance a share grows with U^2, by least squares over the runs. Bands follow
+it; the weights of a fit do not: with it errors on runs left out fall on one ship and rise on another.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import nnls
 
 from ...predictors import WeakWindows
 from ...predictors.shooting import PARTS, Linear
@@ -24,10 +29,46 @@ TIMES = np.geomspace(0.2, 12.0, 25)
 
 @dataclass(frozen=True, eq=False)
 class ForceDisturbance:
-    """Size (..., 3) [N, N, N m] and correlation time (3,) [s] of the unrecorded force; size 0: none."""
+    """The unrecorded force.
+
+    Attributes:
+        size: (..., 3) [N, N, N m], at ``speed``; 0: none.
+        time: (3,), correlation time [s].
+        growth: (3,), share of its variance that grows with the square of the ship's speed.
+        speed: at which the size holds, any where nothing grows [m/s].
+    """
 
     size: np.ndarray
     time: np.ndarray
+    growth: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    speed: float = 1.0
+
+    def at(self, speed: np.ndarray) -> "ForceDisturbance":
+        """That of ships at some speeds (w,) [m/s]."""
+        faster = np.square(speed[:, None] / self.speed)
+        return ForceDisturbance(self.size * np.sqrt(1.0 + self.growth * (faster - 1.0)), self.time)
+
+    def growing(self, each: Sequence["ForceDisturbance"], speed: np.ndarray) -> "ForceDisturbance":
+        """The same with the growth that its parts show.
+
+        Least squares of their variances, with a further one at rest that is as large as usual: few runs,
+        or runs of one speed, determine no growth.
+
+        Args:
+            each: that of each run.
+            speed: of each run, root mean square [m/s].
+        """
+        usual = float(np.sqrt(np.mean(np.square(speed))))
+        variance = np.square([d.size for d in each])
+        mean = variance.mean(axis=0)
+        if not (usual > 0.0 and mean.any()):
+            return self
+        A = np.column_stack([np.ones(speed.size + 1), np.append(np.square(speed / usual), 0.0)])
+        found = np.zeros(3)
+        for k in np.flatnonzero(mean):
+            still, moving = nnls(A, np.append(variance[:, k] / mean[k], 1.0))[0]
+            found[k] = moving / (still + moving)
+        return replace(self, growth=found, speed=usual)
 
 
 def _kernels() -> tuple[np.ndarray, np.ndarray]:

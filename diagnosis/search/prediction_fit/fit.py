@@ -74,7 +74,9 @@ def push_of(
     edges = np.cumsum([w.middle.size for w in runs])[:-1]
     parts = zip(runs, np.split(error, edges), np.split(std, edges), strict=True)
     whole = estimate(runs, error, std)
-    return whole, [estimate([w], e, s, whole.time) for w, e, s in parts]
+    each = [estimate([w], e, s, whole.time) for w, e, s in parts]
+    speed = [np.sqrt(np.mean(np.sum(w.smoothed.nu[w.known, :2] ** 2, axis=1))) for w in runs]
+    return whole.growing(each, np.array(speed)), each
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,9 +127,11 @@ def prediction_bands(
     around = shots.around(model, {n: SMALL * s for n, s in std.items() if s > 0.0})
     kept = [k for k, s in enumerate(std.values()) if s > 0.0]
     C = posterior.covariance[np.ix_(kept, kept)]
-    later = covariance(around.motion, shots.at_start, push)
     first = smoothed.eta[shots.starts.runs[0][1]]
     predicted = np.concatenate([first[:, None], shots.measured - around.residuals], axis=1)
+    moved = np.diff(predicted[..., :2], axis=1) / shots.every
+    speed = np.nan_to_num(np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=1)), nan=0.0, posinf=0.0)
+    later = covariance(around.motion, shots.at_start, push.at(speed))
     instants = np.arange(shots.since.size)
     found = np.zeros((len(later), shots.since.size + 1, 3, 3))
     found[:, 1:] = later[:, instants, :, instants].swapaxes(0, 1)
