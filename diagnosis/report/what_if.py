@@ -1,7 +1,7 @@
 """What the page of a report needs to predict the windows itself while a reader moves coefficients.
 
 One text holds all of it, compressed: the step of a prediction as WebAssembly, of each run the windows'
-start states and inputs and the measured pose, and the coefficients. ``templates/what_if.js`` reads it.
+start states and inputs and the measured pose, and the coefficients. The program in ``templates/what_if`` reads it.
 """
 
 import json
@@ -40,7 +40,9 @@ from .report_data import ReportData
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-SCRIPT = Path(__file__).parent / "templates" / "what_if.js"
+SCRIPTS = Path(__file__).parent / "templates" / "what_if"
+# Files of the page's program, in this order.
+PROGRAM = ("data", "predictions", "residual_force", "fit", "own_run", "pictures", "results", "controls")
 CANDIDATES = 12  # effects of the ranking that a reader may try; chosen: of more the list is not read
 MOST_VALUES = 6  # of an effect that was not found: a shape of more has no use as sliders; chosen
 REACH = 3.0  # a slider ends so many standard deviations, or changes, from the first value; chosen
@@ -106,7 +108,8 @@ class WhatIf(NamedTuple):
         """The program of the page, which is no text of a user."""
         from markupsafe import Markup
 
-        return Markup(SCRIPT.read_text(encoding="utf-8"))
+        files = ((SCRIPTS / f"{name}.js").read_text(encoding="utf-8") for name in PROGRAM)
+        return Markup("\n".join(files))
 
     @property
     def policy(self) -> "Markup":
