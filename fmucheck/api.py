@@ -13,7 +13,7 @@ from pathlib import Path
 from time import sleep
 from typing import Any
 
-from .description import Variable
+from .description import DescribedVariable
 from .registry import NotApplicableError
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -101,7 +101,7 @@ class Library:
 _C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 
 
-class Instance:
+class InstanceOnTrial:
     """An instance; a method is an FMI function.
 
     It raises :class:`StatusError` on more than a warning, but NotApplicableError where the FMU may
@@ -191,7 +191,7 @@ class Instance:
         texts = (c_char_p * len(categories))(*(c.encode() for c in categories))
         self.call("fmi2SetDebugLogging", 1, c_size_t(len(categories)), texts)
 
-    def get(self, variables: Sequence[Variable]) -> list[Any]:
+    def get(self, variables: Sequence[DescribedVariable]) -> list[Any]:
         """Values in the order of the variables; strings as bytes."""
         found: dict[int, Any] = {}
         for kind, group in _by_kind(variables):
@@ -200,7 +200,7 @@ class Instance:
             found.update(zip((v.index for v in group), values, strict=True))
         return [found[v.index] for v in variables]
 
-    def set(self, values: dict[Variable, Any]) -> None:
+    def set(self, values: dict[DescribedVariable, Any]) -> None:
         """Set variables, one call for each type."""
         for kind, group in _by_kind(list(values)):
             array = (_C_TYPES[kind] * len(group))(*(values[v] for v in group))
@@ -234,13 +234,13 @@ class Instance:
         return state
 
 
-def _by_kind(variables: Sequence[Variable]) -> list[tuple[str, list[Variable]]]:
+def _by_kind(variables: Sequence[DescribedVariable]) -> list[tuple[str, list[DescribedVariable]]]:
     """Variables by the type that the functions know; an Enumeration is an Integer there."""
-    groups: dict[str, list[Variable]] = {}
+    groups: dict[str, list[DescribedVariable]] = {}
     for v in variables:
         groups.setdefault("Integer" if v.type == "Enumeration" else v.type, []).append(v)
     return list(groups.items())
 
 
-def _references(variables: Sequence[Variable]) -> Any:
+def _references(variables: Sequence[DescribedVariable]) -> Any:
     return (c_uint * len(variables))(*(v.reference for v in variables))

@@ -18,7 +18,7 @@ from fmus.declare import DeclarationError
 from fmus.interruption import program
 
 from .examine import examine
-from .fmu import Fmu
+from .fmu import FmuArchive
 from .registry import RULES, Rule, in_order
 from .report import Outcomes, as_json, listing, show
 from .source import BadFileError
@@ -55,13 +55,13 @@ def _refuse(error: Exception) -> int:
     return BAD_INPUT
 
 
-def _open(names: Sequence[str]) -> tuple[list[Fmu], int]:
+def _open(names: Sequence[str]) -> tuple[list[FmuArchive], int]:
     """FMUs that can be checked, all of ours without names, and BAD_INPUT if there are others."""
-    fmus: list[Fmu] = []
+    fmus: list[FmuArchive] = []
     code = CLEAN
     for name in names or [None]:
         try:
-            fmus += map(Fmu, build([]) if name is None else [_path(name)])
+            fmus += map(FmuArchive, build([]) if name is None else [_path(name)])
         except (BadFileError, BuildError, DeclarationError, OSError) as error:
             code = _refuse(error)
     return fmus, code
@@ -83,7 +83,7 @@ def _chosen(names: Sequence[str]) -> list[Rule]:
 
 
 def _examine_all(
-    fmus: Sequence[Fmu], chosen: Sequence[Rule], options: argparse.Namespace
+    fmus: Sequence[FmuArchive], chosen: Sequence[Rule], options: argparse.Namespace
 ) -> list[Outcomes]:
     """All FMUs, some at a time, with a bar on a terminal."""
     from rich.console import Console
@@ -97,7 +97,7 @@ def _examine_all(
     ):
         task = bar.add_task("checking", total=len(fmus) * len(chosen))
 
-        def check(fmu: Fmu) -> Outcomes:
+        def check(fmu: FmuArchive) -> Outcomes:
             run, done = not options.no_run, lambda: bar.advance(task)
             return examine(fmu, chosen, options.timeout, run, done, stopped)
 

@@ -13,8 +13,8 @@ from typing import NoReturn
 from xml.etree import ElementTree
 
 from .api import Library, StatusError
-from .bench import Bench
-from .description import Description
+from .description import FmuDescription
+from .fmu_on_trial import FmuOnTrial
 from .registry import RULES, NotApplicableError
 
 
@@ -27,11 +27,11 @@ def _run(rule: str, folder: Path, library: str, note: Path) -> dict[str, object]
             file.seek(0)
             file.write(name.encode().ljust(64))
 
-        description = Description(ElementTree.parse(folder / "modelDescription.xml").getroot())
+        description = FmuDescription(ElementTree.parse(folder / "modelDescription.xml").getroot())
         found: list[str] = []
         try:
-            bench = Bench(description, folder, Library(folder / library, write))
-            for text in RULES[rule].check(bench):
+            fmu = FmuOnTrial(description, folder, Library(folder / library, write))
+            for text in RULES[rule].check(fmu):
                 found.append(text)
         except NotApplicableError as reason:
             return {"found": found, "skipped": str(reason)}

@@ -49,7 +49,7 @@ def flag(text: str | None) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Variable:
+class DescribedVariable:
     """One ScalarVariable.
 
     Attributes:
@@ -106,7 +106,7 @@ class Unknown:
     kinds: list[str] | None
 
 
-class Description:
+class FmuDescription:
     """The whole description.
 
     Args:
@@ -125,7 +125,7 @@ class Description:
         return flag(self.cs.get(capability))
 
     @cached_property
-    def variables(self) -> list[Variable]:
+    def variables(self) -> list[DescribedVariable]:
         """All variables in order."""
         declared = {t.get("name"): t[0].attrib for t in self.types if len(t)}
         items = {t.get("name"): _items(t) for t in self.types}
@@ -134,7 +134,7 @@ class Description:
             for k, element in enumerate(self.root.iterfind("ModelVariables/ScalarVariable"), 1)
         ]
 
-    def variable(self, index: int | None) -> Variable | None:
+    def variable(self, index: int | None) -> DescribedVariable | None:
         """By one-based index; None if there is none."""
         if index is None or not 1 <= index <= len(self.variables):
             return None
@@ -152,11 +152,11 @@ class Description:
             for u in listed.iterfind("Unknown")
         ]
 
-    def inputs(self) -> list[Variable]:
+    def inputs(self) -> list[DescribedVariable]:
         """Variables with causality input."""
         return [v for v in self.variables if v.causality == "input"]
 
-    def outputs(self) -> list[Variable]:
+    def outputs(self) -> list[DescribedVariable]:
         """Variables with causality output."""
         return [v for v in self.variables if v.causality == "output"]
 
@@ -195,13 +195,13 @@ def _variable(
     element: Element,
     declared: dict[str | None, dict[str, str]],
     items: dict[str | None, frozenset[int]],
-) -> Variable:
+) -> DescribedVariable:
     kinds = [child for child in element if child.tag in TYPES]
     own = dict(kinds[0].attrib) if kinds else {}
     causality = element.get("causality", "local")
     variability = element.get("variability", "continuous")
     defaults: Sequence[str | None] = INITIAL.get((causality, variability)) or (None,)
-    return Variable(
+    return DescribedVariable(
         index,
         element.get("name", ""),
         whole(element.get("valueReference")),

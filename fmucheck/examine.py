@@ -4,13 +4,13 @@ import threading
 from collections.abc import Callable, Sequence
 
 from . import rules  # noqa: F401  # registers them
-from .fmu import Fmu, platform
+from .fmu import FmuArchive, platform
 from .registry import RULES, NotApplicableError, NotInstalledError, Outcome, Rule
 from .trial import StoppedError, attempt
 
 
 def examine(
-    fmu: Fmu,
+    fmu: FmuArchive,
     chosen: Sequence[Rule],
     timeout: float = 60.0,
     run: bool = True,
@@ -49,7 +49,7 @@ def examine(
     return outcomes
 
 
-def _obstacle(fmu: Fmu) -> str:
+def _obstacle(fmu: FmuArchive) -> str:
     """Why the FMU cannot be run, or nothing."""
     if fmu.library not in {member.filename for member in fmu.members}:
         return f"there is no binary for {platform()}"
@@ -60,7 +60,7 @@ def _obstacle(fmu: Fmu) -> str:
     return ""
 
 
-def _read(rule: Rule, fmu: Fmu) -> Outcome:
+def _read(rule: Rule, fmu: FmuArchive) -> Outcome:
     outcome = Outcome()
     try:
         outcome.found += rule.check(fmu)

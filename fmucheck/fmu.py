@@ -4,7 +4,7 @@ import sys
 import zipfile
 from pathlib import Path
 
-from .description import Description
+from .description import FmuDescription
 from .source import BadFileError, read_archive, read_xml
 
 # Folder of this machine's binaries, and the suffix of a shared library, by sys.platform (2.3).
@@ -24,7 +24,7 @@ def suffix(folder: str) -> str:
     return SUFFIXES.get(folder.rstrip("0123456789"), "")
 
 
-class Fmu:
+class FmuArchive:
     """An FMU archive, its description, and the folder that it is unpacked to.
 
     Args:
@@ -47,7 +47,7 @@ class Fmu:
             raise BadFileError(f"'{path}' is for FMI {version}; FMI 2.0 is supported")
         if root.find("CoSimulation") is None:
             raise BadFileError(f"'{path}' is not for co-simulation")
-        self.description = Description(root)
+        self.description = FmuDescription(root)
 
     @property
     def library(self) -> str:

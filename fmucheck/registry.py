@@ -9,7 +9,7 @@ function, its first paragraph tells what it demands; the clause is one of FMI 2.
         ...
 
     @trial("2.1.6")
-    def reset(bench):
+    def reset(fmu):
         '''fmi2Reset brings back the FMU as it was instantiated.'''
         ...
 """
@@ -89,10 +89,10 @@ def _register(clause: str, runs: bool) -> Callable[[_Check], _Check]:
 
 
 def rule(clause: str) -> Callable[[_Check], _Check]:
-    """Register a function of an :class:`~fmucheck.fmu.Fmu` that reads the archive."""
+    """Register a function of an :class:`~fmucheck.fmu.FmuArchive` that reads the archive."""
     return _register(clause, runs=False)
 
 
 def trial(clause: str) -> Callable[[_Check], _Check]:
-    """Register a function of a :class:`~fmucheck.bench.Bench` that runs the FMU."""
+    """Register a function of a :class:`~fmucheck.fmu_on_trial.FmuOnTrial` that runs the FMU."""
     return _register(clause, runs=True)

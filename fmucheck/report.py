@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from .fmu import Fmu
+from .fmu import FmuArchive
 from .registry import Outcome, Rule, in_order
 
 MOST_LINES = 8  # of one rule on one FMU in the terminal; JSON tells all
@@ -21,7 +21,7 @@ This page lists each rule, its demand on an FMI 2.0 co-simulation FMU, and the c
 """
 
 
-def show(fmus: Sequence[Fmu], chosen: Sequence[Rule], outcomes: Sequence[Outcomes]) -> None:
+def show(fmus: Sequence[FmuArchive], chosen: Sequence[Rule], outcomes: Sequence[Outcomes]) -> None:
     """The table, in as many parts as the terminal needs, and what is to be said of it."""
     from rich.console import Console
     from rich.table import Table
@@ -90,7 +90,9 @@ def _skipped(
         yield f"not checked: {', '.join(rules)} of {those}: {reason}"
 
 
-def as_json(fmus: Sequence[Fmu], chosen: Sequence[Rule], outcomes: Sequence[Outcomes]) -> dict[str, Any]:
+def as_json(
+    fmus: Sequence[FmuArchive], chosen: Sequence[Rule], outcomes: Sequence[Outcomes]
+) -> dict[str, Any]:
     """Everything, for other programs to read."""
     return {
         "rules": {r.name: {"clause": r.clause, "demand": r.demand, "runs": r.runs} for r in chosen},

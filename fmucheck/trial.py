@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from cybership.scratch_folder import scratch_folder
 
-from .fmu import Fmu
+from .fmu import FmuArchive
 from .registry import Outcome, Rule
 
 PACKAGES = Path(__file__).parents[1]
@@ -23,7 +23,7 @@ class StoppedError(Exception):
     """The user wants no more trials."""
 
 
-def attempt(rule: Rule, fmu: Fmu, timeout: float, stopped: threading.Event) -> Outcome:
+def attempt(rule: Rule, fmu: FmuArchive, timeout: float, stopped: threading.Event) -> Outcome:
     """Run a trial in a fresh process; a crash or a hang is a finding.
 
     Args:

@@ -429,7 +429,7 @@ OF_COMPONENTS = {"Inputs", "Outputs", "Params", "State"}
 
 def test_a_class_name_has_one_meaning():
     homes: dict[str, list[str]] = {}
-    for package in ("fmus", "cosim", "cybership", "diagnosis", "studies", "thesis"):
+    for package in ("fmus", "fmucheck", "cosim", "cybership", "diagnosis", "studies", "thesis"):
         for module, path in sources(package).items():
             for node in ast.walk(ast.parse(path.read_text())):
                 if isinstance(node, ast.ClassDef):

@@ -20,11 +20,11 @@ from support.project import COMPONENTS, ROOT
 
 from fmucheck import checking, report, source, trial
 from fmucheck.api import Library
-from fmucheck.bench import Bench, near, other
 from fmucheck.checking import main
-from fmucheck.description import Description
+from fmucheck.description import FmuDescription
 from fmucheck.examine import examine
-from fmucheck.fmu import Fmu
+from fmucheck.fmu import FmuArchive
+from fmucheck.fmu_on_trial import FmuOnTrial, near, other
 from fmucheck.registry import RULES, NotApplicableError, Outcome, in_order
 from fmucheck.report import listing
 from fmucheck.source import BadFileError
@@ -46,7 +46,7 @@ compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on t
 
 def found(path, *names, timeout=30.0):
     """Name of the rule -> what it found; rules that say nothing are left out."""
-    outcomes = examine(Fmu(path), [RULES[name] for name in names or RULES], timeout)
+    outcomes = examine(FmuArchive(path), [RULES[name] for name in names or RULES], timeout)
     return {name: outcome.found for name, outcome in outcomes.items() if outcome.found}
 
 
@@ -170,7 +170,7 @@ def test_a_description_without_a_fault_passes(tmp_path):
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_archive_that_reaches_outside_is_told_and_not_run(member, text, tmp_path):
     path = lag.pack(tmp_path, compiled=False, extra=[(member, "x")])
-    outcomes = examine(Fmu(path), [RULES["archive"], RULES["life"]])
+    outcomes = examine(FmuArchive(path), [RULES["archive"], RULES["life"]])
     assert any(text in line for line in outcomes["archive"].found)
     assert "archive is refused" in outcomes["life"].skipped
 
@@ -178,13 +178,13 @@ def test_archive_that_reaches_outside_is_told_and_not_run(member, text, tmp_path
 def test_missing_library_is_told(tmp_path):
     path = lag.pack(tmp_path, [('modelIdentifier="lag"', 'modelIdentifier="other"')], compiled=False)
     assert any("is missing" in line for line in found(path, "binaries")["binaries"])
-    outcomes = examine(Fmu(path), [RULES["life"]])
+    outcomes = examine(FmuArchive(path), [RULES["life"]])
     assert "no binary" in outcomes["life"].skipped
 
 
 def test_variable_without_a_type_is_told_and_not_run(tmp_path):
     path = lag.pack(tmp_path, [('<Real derivative="3"/>', "")], compiled=False)
-    outcomes = examine(Fmu(path), [RULES["xsd"], RULES["life"]])
+    outcomes = examine(FmuArchive(path), [RULES["xsd"], RULES["life"]])
     assert outcomes["xsd"].found
     assert "no type" in outcomes["life"].skipped
 
@@ -257,7 +257,7 @@ def test_another_value_is_one_the_variable_may_have(xml, values):
         '<Item name="b" value="2"/></Enumeration></SimpleType></TypeDefinitions>'
         f"<ModelVariables><ScalarVariable>{xml}</ScalarVariable></ModelVariables></m>"
     )
-    (v,) = Description(ElementTree.fromstring(text)).variables
+    (v,) = FmuDescription(ElementTree.fromstring(text)).variables
     for value in values:
         changed = other(v, value)
         assert changed != value
@@ -279,7 +279,7 @@ def test_another_value_is_one_the_variable_may_have(xml, values):
 )
 def test_a_value_nearby_is_a_tenth_of_the_start_or_of_the_nominal_away(xml, share, value):
     text = f"<m><ModelVariables><ScalarVariable>{xml}</ScalarVariable></ModelVariables></m>"
-    (v,) = Description(ElementTree.fromstring(text)).variables
+    (v,) = FmuDescription(ElementTree.fromstring(text)).variables
     assert near(v, share) == pytest.approx(value)
     if xml == '<Real start="2"/>':
         assert other(v, near(v, 1.0)) == pytest.approx(1.9), "half as far to the other side"
@@ -298,13 +298,13 @@ def test_a_value_nearby_is_a_tenth_of_the_start_or_of_the_nominal_away(xml, shar
 )
 def test_step_is_that_of_the_default_experiment_or_a_hundredth_of_it(attributes, time):
     text = f"<m><DefaultExperiment {attributes}/></m>"
-    assert Description(ElementTree.fromstring(text)).time() == pytest.approx(time)
+    assert FmuDescription(ElementTree.fromstring(text)).time() == pytest.approx(time)
 
 
 @compiled
 @pytest.mark.parametrize(("rule", "c", "xml", "why"), ALLOWED)
 def test_what_the_standard_allows_is_no_finding(rule, c, xml, why, tmp_path):
-    outcome = examine(Fmu(lag.pack(tmp_path, xml, c)), [RULES[rule]], 30.0)[rule]
+    outcome = examine(FmuArchive(lag.pack(tmp_path, xml, c)), [RULES[rule]], 30.0)[rule]
     assert outcome.found == []
     assert why in outcome.skipped
     assert bool(why) == bool(outcome.skipped)
@@ -332,7 +332,7 @@ def test_single_instance_per_process_is_respected(tmp_path):
     once = [("canGetAnd", 'canBeInstantiatedOnlyOncePerProcess="true" canGetAnd')]
     path = lag.pack(tmp_path, once, [("alive++;", "if (alive++) abort();"), ("alive--;", "")])
     names = ("life", "step-dependencies", "reset", "state", "serialised-state", "instances", "free")
-    outcomes = examine(Fmu(path), [RULES[name] for name in names])
+    outcomes = examine(FmuArchive(path), [RULES[name] for name in names])
     assert {name: o.found for name, o in outcomes.items() if o.found} == {}
     assert "OnlyOncePerProcess" in outcomes["instances"].skipped
 
@@ -346,7 +346,9 @@ def test_fmu_without_abilities_is_not_asked_for_them(tmp_path):
         xml,
         [("fmi2GetFMUstate(void *c, void **s) {", "fmi2GetFMUstate(void *c, void **s) { abort();")],
     )
-    outcomes = examine(Fmu(path), [RULES[name] for name in ("state", "serialised-state", "step-size")])
+    outcomes = examine(
+        FmuArchive(path), [RULES[name] for name in ("state", "serialised-state", "step-size")]
+    )
     assert all(not o.found and "not declared" in o.skipped for o in outcomes.values())
 
 
@@ -381,10 +383,10 @@ def test_one_of_ours_runs_well(fmus):
 
 def in_this_process(path, folder, *names):
     """As ``found``, of trials that share this process: for FMUs that do no harm."""
-    fmu, said = Fmu(path), {}
+    fmu, said = FmuArchive(path), {}
     for name in names:
         fmu.unpack(folder / name)
-        bench = Bench(
+        bench = FmuOnTrial(
             fmu.description, folder / name, Library(folder / name / fmu.library, lambda _: None)
         )
         try:
@@ -512,7 +514,7 @@ def test_command_refuses_with_one_line(arguments, message):
 )
 def test_what_is_no_fmu_for_this_is_refused(edit, message, tmp_path):
     with pytest.raises(BadFileError, match=message):
-        Fmu(lag.pack(tmp_path, [edit], compiled=False))
+        FmuArchive(lag.pack(tmp_path, [edit], compiled=False))
 
 
 @pytest.mark.parametrize(
@@ -525,7 +527,7 @@ def test_archive_that_becomes_too_large_is_refused(limit, message, tmp_path, mon
     for name, value in limit.items():
         monkeypatch.setattr(source, name, value)
     with pytest.raises(BadFileError, match=message):
-        Fmu(path)
+        FmuArchive(path)
 
 
 @pytest.mark.parametrize(
@@ -555,7 +557,7 @@ def test_a_rule_that_cannot_be_checked_says_why(tmp_path):
         raise NotApplicableError("there is nothing to see")
 
     rule = replace(RULES["xsd"], name="new", check=check)
-    outcome = examine(Fmu(lag.pack(tmp_path, compiled=False)), [rule])["new"]
+    outcome = examine(FmuArchive(lag.pack(tmp_path, compiled=False)), [rule])["new"]
     assert (outcome.found, outcome.skipped, outcome.missing) == ([], "there is nothing to see", False)
 
 
@@ -570,7 +572,7 @@ def test_end_of_a_trial_is_told_by_its_code(code, said):
 def test_absent_tool_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "fmu_manipulation_toolbox.checker", None)
     path = lag.pack(tmp_path, compiled=False)
-    outcome = examine(Fmu(path), [RULES["fmutool"]])["fmutool"]
+    outcome = examine(FmuArchive(path), [RULES["fmutool"]])["fmutool"]
     assert outcome.missing
     assert "fmu-manipulation-toolbox is not installed" in outcome.skipped
 

@@ -13,7 +13,7 @@ from support.events import once_there
 from support.project import ROOT
 
 from fmucheck.examine import examine
-from fmucheck.fmu import Fmu
+from fmucheck.fmu import FmuArchive
 from fmucheck.registry import RULES
 
 compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
@@ -36,7 +36,7 @@ OWN = "Dl_info d; dladdr(fmi2DoStep, &d); char b[5000]; "  # where an FMU finds 
     [("unlink(d.dli_fname);", 1), ('sprintf(b, "rm -rf $(dirname %s)/../../../*", d.dli_fname); system(b);', 3)],
 )  # fmt: skip
 def test_fmu_that_removes_files_spoils_no_other_trial(habit, number, tmp_path):
-    outcomes = examine(Fmu(pack(tmp_path, OWN + habit)), [RULES["life"], RULES["reset"]])
+    outcomes = examine(FmuArchive(pack(tmp_path, OWN + habit)), [RULES["life"], RULES["reset"]])
     assert f"it removed {number} of its own files, such as 'binaries/" in outcomes["life"].found[0]
     assert outcomes["reset"].found == []
 
@@ -49,7 +49,7 @@ def test_nothing_that_an_fmu_leaves_or_does_at_the_end_stays(tmp_path, monkeypat
     path = lag.pack(tmp_path, c=edits)
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
-    assert examine(Fmu(path), [RULES["life"]])["life"].found == []
+    assert examine(FmuArchive(path), [RULES["life"]])["life"].found == []
     assert sorted(tmp_path.rglob("*")) == before
 
 

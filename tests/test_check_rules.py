@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmucheck.description import Variable
+from fmucheck.description import DescribedVariable
 from fmucheck.rules.units import units_defined
 from fmucheck.rules.variables import aliases
 
@@ -26,7 +26,7 @@ VARIABLE = st.tuples(
 def variable(index, given):
     type_, reference, causality, variability, initial, start, unit = given
     own = {k: v for k, v in {"start": start, "unit": unit}.items() if v is not None}
-    return Variable(
+    return DescribedVariable(
         index, f"v{index}", reference, type_, causality, variability, initial, {}, own, own, frozenset()
     )
 

@@ -19,7 +19,7 @@ from diagnosis.predictors.prediction import predict
 from diagnosis.predictors.prediction_component import prediction_component
 from diagnosis.report import ReportData, write_report
 from diagnosis.report.reported_effect import ReportedCoefficient
-from diagnosis.report.what_if import FIXED, Bench, what_if
+from diagnosis.report.what_if import FIXED, MovableModel, what_if
 
 HIDDEN = {"thrust_curve_deadband": 0.1, "thrust_curve_astern": -0.3}
 LEARNED = HIDDEN | {"X_u": -0.1, "heading_offset": 0.01}
@@ -208,7 +208,7 @@ def test_own_run_is_compared_as_the_report_compares_it(driven, report, data):
 
 
 def test_what_changes_the_past_of_commands_stays_as_it_is(report):
-    choices = {c.name: c for c in Bench(report).choices}
+    choices = {c.name: c for c in MovableModel(report).choices}
     assert choices["lag"].fixed == FIXED
     assert choices["mass"].fixed == choices["X_u"].fixed == ""
     assert [s.ci95 is not None for s in choices["thrust_curve"].sliders] == [False, False, True]
@@ -221,7 +221,7 @@ def test_page_says_why_a_model_cannot_be_changed(data, report, tmp_path, monkeyp
     assert what_if(ReportData(report.comparison)) == ("", "")
     behind = diagnosed(data[:1], replace(Model(), measurement={"position_lag": 0.2}))
     assert "behind a filter" in what_if(behind).missing
-    monkeypatch.setattr("diagnosis.report.what_if.webassembly_of", lambda bench: None)
+    monkeypatch.setattr("diagnosis.report.what_if.webassembly_of", lambda movable: None)
     text = write_report(tmp_path / "report.html", report).read_text(encoding="utf-8")
     words = re.sub(r"<[^>]+>", "", text)  # without the links of terms
     assert "The model cannot be changed in this page: an effect cannot be translated" in words
@@ -244,7 +244,7 @@ def test_a_term_that_a_calibration_added_is_ticked(data):
     """It is no finding, and the learned model has it all the same."""
     effect = Model().ship.effects["N_ur"]
     (name,) = (p.name for p in effect.parameters)
-    choices = {c.name: c for c in Bench(diagnosed(data, Model().plus({name: 0.3})))._choices()}
+    choices = {c.name: c for c in MovableModel(diagnosed(data, Model().plus({name: 0.3})))._choices()}
     (slider,) = choices["N_ur"].sliders
     assert choices["N_ur"].ticked
     assert (slider.before, slider.after) == (0.0, pytest.approx(0.3))

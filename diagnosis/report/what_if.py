@@ -1,7 +1,8 @@
 """What the page of a report needs to predict the windows itself while a reader moves coefficients.
 
 One text holds all of it, compressed: the step of a prediction as WebAssembly, of each run the windows'
-start states and inputs and the measured pose, and the coefficients. The program in ``templates/what_if`` reads it.
+start states and inputs and the measured pose, and the coefficients. The program in ``templates/what_if``
+reads it.
 """
 
 import json
@@ -126,22 +127,22 @@ def what_if(r: ReportData) -> WhatIf:
         return WhatIf()
     if not r.comparison.predictor.parametric:
         return WhatIf(missing="the model is not a described ship, so the page cannot compute it")
-    bench = Bench(r)
-    if bench.learned.filters:
+    movable = MovableModel(r)
+    if movable.learned.filters:
         return WhatIf(missing="the pose was measured behind a filter, which the page does not have")
-    if len({(e.smoothed.track.run.signals, _settings(e)) for e in bench.runs}) > 1:
+    if len({(e.smoothed.track.run.signals, _settings(e)) for e in movable.runs}) > 1:
         return WhatIf(missing="the runs have commands of different kinds")
-    module = webassembly_of(bench)
+    module = webassembly_of(movable)
     if module is None:
         return WhatIf(missing="an effect cannot be translated to WebAssembly")
-    return WhatIf(bench.content(module))
+    return WhatIf(movable.content(module))
 
 
-def webassembly_of(bench: "Bench") -> bytes | None:
+def webassembly_of(movable: "MovableModel") -> bytes | None:
     """A step of the prediction with the parameters that can be moved; None: it cannot be translated."""
-    run = bench.runs[0].smoothed.track.run
+    run = movable.runs[0].smoothed.track.run
     try:
-        made = prediction_component(bench.learned, bench.names, run, bench.windy)
+        made = prediction_component(movable.learned, movable.names, run, movable.windy)
         return component_module(program(made))
     except TraceError:
         return None
@@ -154,7 +155,7 @@ def _settings(e: Evaluation) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class MovableModel:
     """The runs, models and coefficients of a report.
 
     Attributes:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath, PureWindowsPath
 from zipfile import ZIP_DEFLATED, ZIP_STORED
 
-from ..fmu import Fmu, suffix
+from ..fmu import FmuArchive, suffix
 from ..registry import rule
 
 
 @rule("2.3")
-def archive(fmu: Fmu) -> Iterator[str]:
+def archive(fmu: FmuArchive) -> Iterator[str]:
     """Every path in the archive is relative, stays inside, occurs once, is not a link, has forward
     slashes, and is stored or compressed with deflate.
     """
@@ -33,7 +33,7 @@ def archive(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.3")
-def binaries(fmu: Fmu) -> Iterator[str]:
+def binaries(fmu: FmuArchive) -> Iterator[str]:
     """Each platform folder contains the library that modelIdentifier names; without such folders
     there are sources.
     """

@@ -3,28 +3,28 @@
 from collections.abc import Iterator, Sequence
 
 from ..api import StatusError
-from ..bench import Bench, near, other, same, start_value
-from ..description import Unknown, Variable
+from ..description import DescribedVariable, Unknown
+from ..fmu_on_trial import FmuOnTrial, near, other, same, start_value
 from ..registry import NotApplicableError, trial
 
 # Two short steps, as shares of the usual one.
 SHORT, SHORTER = 1e-3, 1e-6
 
 
-def _told(bench: Bench, element: str) -> list[tuple[Variable, set[int | None]]]:
+def _told(fmu: FmuOnTrial, element: str) -> list[tuple[DescribedVariable, set[int | None]]]:
     """Real unknowns that list their dependencies, with those; without a list, any may be."""
-    listed: list[Unknown] = bench.description.unknowns(element) or []
-    pairs = [(bench.description.variable(u.index), u.dependencies) for u in listed]
+    listed: list[Unknown] = fmu.description.unknowns(element) or []
+    pairs = [(fmu.description.variable(u.index), u.dependencies) for u in listed]
     return [(v, set(d)) for v, d in pairs if v is not None and v.type == "Real" and d is not None]
 
 
 @trial("2.2.8")
-def initial_dependencies(bench: Bench) -> Iterator[str]:
+def initial_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
     """During initialisation an unknown changes only with its dependencies in InitialUnknowns."""
-    told = _told(bench, "InitialUnknowns")
+    told = _told(fmu, "InitialUnknowns")
     unknowns = [v for v, _ in told]
-    one = bench.initialising()
-    for known in bench.description.variables:
+    one = fmu.initialising()
+    for known in fmu.description.variables:
         if known.type != "Real" or not (known.causality == "input" or known.initial == "exact"):
             continue
         if not known.settable or start_value(known) is None:
@@ -40,13 +40,13 @@ def initial_dependencies(bench: Bench) -> Iterator[str]:
 
 
 @trial("2.2.8")
-def output_dependencies(bench: Bench) -> Iterator[str]:
+def output_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
     """At a communication point, before the next step, an output depends only on inputs that it lists."""
-    told = _told(bench, "Outputs")
+    told = _told(fmu, "Outputs")
     outputs = [v for v, _ in told]
-    one = bench.ready()
-    bench.play(one, 5, seed=0)
-    for v in bench.description.inputs():
+    one = fmu.ready()
+    fmu.play(one, 5, seed=0)
+    for v in fmu.description.inputs():
         if v.type != "Real":
             continue
         (usual,) = one.get([v])
@@ -57,20 +57,20 @@ def output_dependencies(bench: Bench) -> Iterator[str]:
 
 
 @trial("2.2.7, 2.2.8")
-def step_dependencies(bench: Bench) -> Iterator[str]:
+def step_dependencies(fmu: FmuOnTrial) -> Iterator[str]:
     """Over a step of vanishing length an output depends only on inputs that it lists, or that are
     discrete: by convention these act at communication points.
 
     What follows an input through a state shrinks with the step, what follows it directly does not.
     """
-    bench.needs("canHandleVariableCommunicationStepSize")
-    told = _told(bench, "Outputs")
+    fmu.needs("canHandleVariableCommunicationStepSize")
+    told = _told(fmu, "Outputs")
     outputs = [v for v, _ in told]
-    usual = [_after(bench, outputs, share) for share in (SHORT, SHORTER)]
-    for v in bench.description.inputs():
+    usual = [_after(fmu, outputs, share) for share in (SHORT, SHORTER)]
+    for v in fmu.description.inputs():
         if v.type != "Real" or v.variability != "continuous":
             continue
-        changed = [_after(bench, outputs, share, v) for share in (SHORT, SHORTER)]
+        changed = [_after(fmu, outputs, share, v) for share in (SHORT, SHORTER)]
         moved = set()
         for k, output in enumerate(outputs):
             large, small = (abs(b[k] - a[k]) for a, b in zip(usual, changed, strict=True))
@@ -80,16 +80,19 @@ def step_dependencies(bench: Bench) -> Iterator[str]:
 
 
 def _after(
-    bench: Bench, outputs: Sequence[Variable], share: float, changed: Variable | None = None
+    fmu: FmuOnTrial,
+    outputs: Sequence[DescribedVariable],
+    share: float,
+    changed: DescribedVariable | None = None,
 ) -> list[float]:
     """Outputs of a new instance after some steps and a short one, for which one input may be changed."""
-    one = bench.ready()
-    bench.play(one, 3, seed=0)
+    one = fmu.ready()
+    fmu.play(one, 3, seed=0)
     if changed is not None:
         (usual,) = one.get([changed])
         one.set({changed: other(changed, usual)})
     try:
-        one.step(bench.start + 3 * bench.step, share * bench.step)
+        one.step(fmu.start + 3 * fmu.step, share * fmu.step)
     except StatusError as refused:
         raise NotApplicableError(f"the FMU refuses so short a step: {refused}") from None
     found = one.get(outputs)
@@ -97,12 +100,17 @@ def _after(
     return found
 
 
-def _moved(names: Sequence[Variable], before: Sequence[float], after: Sequence[float]) -> set[str]:
+def _moved(
+    names: Sequence[DescribedVariable], before: Sequence[float], after: Sequence[float]
+) -> set[str]:
     return {v.name for v, a, b in zip(names, before, after, strict=True) if not same(a, b)}
 
 
 def _undeclared(
-    told: Sequence[tuple[Variable, set[int | None]]], known: Variable, moved: set[str], when: str
+    told: Sequence[tuple[DescribedVariable, set[int | None]]],
+    known: DescribedVariable,
+    moved: set[str],
+    when: str,
 ) -> Iterator[str]:
     for unknown, dependencies in told:
         if unknown.name in moved and known.index not in dependencies:

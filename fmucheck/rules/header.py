@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from ..description import number, whole
-from ..fmu import Fmu
+from ..fmu import FmuArchive
 from ..registry import rule
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
@@ -18,14 +18,14 @@ def twice(names: Iterable[str | None]) -> list[str]:
 
 
 @rule("2.2")
-def encoding(fmu: Fmu) -> Iterator[str]:
+def encoding(fmu: FmuArchive) -> Iterator[str]:
     """The description is encoded in UTF-8."""
     if fmu.encoding.upper() != "UTF-8":
         yield f"modelDescription.xml is in {fmu.encoding}"
 
 
 @rule("2.2.1")
-def header(fmu: Fmu) -> Iterator[str]:
+def header(fmu: FmuArchive) -> Iterator[str]:
     """guid and modelName exist, and the date of generation has the form YYYY-MM-DDThh:mm:ssZ."""
     root = fmu.description.root
     for attribute in ("guid", "modelName"):
@@ -40,7 +40,7 @@ def header(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("4.3.1")
-def capabilities(fmu: Fmu) -> Iterator[str]:
+def capabilities(fmu: FmuArchive) -> Iterator[str]:
     """modelIdentifier is a C name, and the capabilities do not contradict each other."""
     description = fmu.description
     identifier = description.cs.get("modelIdentifier", "")
@@ -61,7 +61,7 @@ def capabilities(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.4")
-def log_categories(fmu: Fmu) -> Iterator[str]:
+def log_categories(fmu: FmuArchive) -> Iterator[str]:
     """Log categories have unique names."""
     names = [c.get("name") for c in fmu.description.root.iterfind("LogCategories/Category")]
     for name in twice(names):
@@ -71,7 +71,7 @@ def log_categories(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.5")
-def experiment(fmu: Fmu) -> Iterator[str]:
+def experiment(fmu: FmuArchive) -> Iterator[str]:
     """The default experiment has finite values, ends after its start, and is not shorter than its
     positive step size.
     """
@@ -94,7 +94,7 @@ def experiment(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.6")
-def annotations(fmu: Fmu) -> Iterator[str]:
+def annotations(fmu: FmuArchive) -> Iterator[str]:
     """Each tool has one entry among the vendor annotations."""
     root = fmu.description.root
     for name in twice(t.get("name") for t in root.iterfind("VendorAnnotations/Tool")):

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from ..description import Description, Unknown, Variable
-from ..fmu import Fmu
+from ..description import DescribedVariable, FmuDescription, Unknown
+from ..fmu import FmuArchive
 from ..registry import rule
 from .header import twice
 
@@ -11,7 +11,7 @@ ELEMENTS = ("Outputs", "Derivatives", "InitialUnknowns")
 KINDS = ("dependent", "constant", "fixed", "tunable", "discrete")
 
 
-def _listed(description: Description, element: str) -> list[str]:
+def _listed(description: FmuDescription, element: str) -> list[str]:
     found = [description.variable(u.index) for u in description.unknowns(element) or []]
     return [v.name for v in found if v is not None]
 
@@ -23,7 +23,7 @@ def _without(names: Sequence[str], others: Sequence[str]) -> list[str]:
 
 
 @rule("2.2.8")
-def outputs(fmu: Fmu) -> Iterator[str]:
+def outputs(fmu: FmuArchive) -> Iterator[str]:
     """Outputs lists every variable with causality output and no other; without outputs it is absent."""
     description = fmu.description
     unknowns = description.unknowns("Outputs")
@@ -35,7 +35,7 @@ def outputs(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.8")
-def state_derivatives(fmu: Fmu) -> Iterator[str]:
+def state_derivatives(fmu: FmuArchive) -> Iterator[str]:
     """Derivatives lists only variables with the attribute derivative, and all of them if
     directional derivatives need them.
     """
@@ -54,7 +54,7 @@ def state_derivatives(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.8")
-def initial_unknowns(fmu: Fmu) -> Iterator[str]:
+def initial_unknowns(fmu: FmuArchive) -> Iterator[str]:
     """InitialUnknowns lists, in ascending order, the outputs, states and derivatives that are
     calculated or approx, and all calculated parameters.
     """
@@ -83,7 +83,7 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.8")
-def structure(fmu: Fmu) -> Iterator[str]:
+def structure(fmu: FmuArchive) -> Iterator[str]:
     """Each entry is a variable that occurs once; so are its dependencies, in ascending order and
     with one kind each.
     """
@@ -101,7 +101,7 @@ def structure(fmu: Fmu) -> Iterator[str]:
                 yield from (f"{where}: {text}" for text in _lists(description, unknown))
 
 
-def _lists(description: Description, unknown: Unknown) -> Iterator[str]:
+def _lists(description: FmuDescription, unknown: Unknown) -> Iterator[str]:
     dependencies, kinds = unknown.dependencies, unknown.kinds
     if dependencies is None:
         if kinds is not None:
@@ -120,7 +120,7 @@ def _lists(description: Description, unknown: Unknown) -> Iterator[str]:
 
 
 @rule("2.2.8")
-def dependencies(fmu: Fmu) -> Iterator[str]:
+def dependencies(fmu: FmuArchive) -> Iterator[str]:
     """Dependencies are on known quantities: inputs, states and time; at initialisation inputs,
     exact values and time.
     """
@@ -141,13 +141,13 @@ def dependencies(fmu: Fmu) -> Iterator[str]:
                     yield from _kind(v, known, element, unknown.kinds[k])
 
 
-def _is_known(v: Variable, element: str, states: set[int | None]) -> bool:
+def _is_known(v: DescribedVariable, element: str, states: set[int | None]) -> bool:
     if v.causality in ("input", "independent"):
         return True
     return v.initial == "exact" if element == "InitialUnknowns" else v.index in states
 
 
-def _kind(v: Variable, known: Variable, element: str, kind: str) -> Iterator[str]:
+def _kind(v: DescribedVariable, known: DescribedVariable, element: str, kind: str) -> Iterator[str]:
     where = f"{v.name} in {element}: the kind of {known.name}"
     if kind not in KINDS:
         yield f"{where} is '{kind}'"

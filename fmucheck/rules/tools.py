@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import tostring
 
-from ..fmu import Fmu
+from ..fmu import FmuArchive
 from ..registry import NotInstalledError, rule
 
 
 @rule("2.2")
-def xsd(fmu: Fmu) -> Iterator[str]:
+def xsd(fmu: FmuArchive) -> Iterator[str]:
     """The description is valid against the XML schema of FMI 2.0 (as FMPy ships it)."""
     try:
         import fmpy
@@ -27,7 +27,7 @@ def xsd(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2")
-def fmpy(fmu: Fmu) -> Iterator[str]:
+def fmpy(fmu: FmuArchive) -> Iterator[str]:
     """FMPy's validate_fmu reports no error."""
     try:
         from fmpy.validation import validate_fmu
@@ -38,7 +38,7 @@ def fmpy(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2")
-def fmutool(fmu: Fmu) -> Iterator[str]:
+def fmutool(fmu: FmuArchive) -> Iterator[str]:
     """The checkers of the FMU Manipulation Toolbox report no error."""
     try:
         from fmu_manipulation_toolbox.checker import get_checkers

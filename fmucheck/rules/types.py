@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from ..description import Variable, number
-from ..fmu import Fmu
+from ..description import DescribedVariable, number
+from ..fmu import FmuArchive
 from ..registry import rule
 from .header import twice
 
 
 @rule("2.2.3")
-def types(fmu: Fmu) -> Iterator[str]:
+def types(fmu: FmuArchive) -> Iterator[str]:
     """Types have unique names that no variable has, ordered limits, and one value for each item of
     an enumeration.
     """
@@ -39,7 +39,7 @@ def _items(name: str, enumeration: Element) -> Iterator[str]:
 
 
 @rule("2.2.3, 2.2.7")
-def declared_types(fmu: Fmu) -> Iterator[str]:
+def declared_types(fmu: FmuArchive) -> Iterator[str]:
     """The declared type of a variable exists, is of the same kind, and its limits include those of
     the variable.
     """
@@ -57,7 +57,7 @@ def declared_types(fmu: Fmu) -> Iterator[str]:
             yield from _limits(v, known[name])
 
 
-def _limits(v: Variable, declared: Element) -> Iterator[str]:
+def _limits(v: DescribedVariable, declared: Element) -> Iterator[str]:
     low, high = number(declared.get("min")), number(declared.get("max"))
     own_low, own_high = number(v.own.get("min")), number(v.own.get("max"))
     if low is not None and own_low is not None and own_low < low:

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 from fmus.base_units import base_exponents
 
 from ..description import number, whole
-from ..fmu import Fmu
+from ..fmu import FmuArchive
 from ..registry import rule
 from .header import twice
 
@@ -15,7 +15,7 @@ BASES = ("kg", "m", "s", "A", "K", "mol", "cd")  # and rad, which may be left ou
 
 
 @rule("2.2.2")
-def units(fmu: Fmu) -> Iterator[str]:
+def units(fmu: FmuArchive) -> Iterator[str]:
     """Units and their display units have unique names, and factors that are not zero."""
     for name in twice(u.get("name") for u in fmu.description.units):
         yield f"unit '{name}' is defined twice"
@@ -35,7 +35,7 @@ def _conversion(element: Element, where: str) -> Iterator[str]:
 
 
 @rule("2.2.2")
-def base_units(fmu: Fmu) -> Iterator[str]:
+def base_units(fmu: FmuArchive) -> Iterator[str]:
     """A unit whose name is made of SI symbols (m/s, N.m) has the exponents and the factor of its
     name.
     """
@@ -58,7 +58,7 @@ def base_units(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.2, 2.2.7")
-def units_defined(fmu: Fmu) -> Iterator[str]:
+def units_defined(fmu: FmuArchive) -> Iterator[str]:
     """Every unit and display unit that is used is defined, and a display unit has a unit."""
     known = {
         u.get("name"): {d.get("name") for d in u.iterfind("DisplayUnit")} for u in fmu.description.units

@@ -3,16 +3,16 @@
 import math
 from collections.abc import Iterator
 
-from ..bench import Bench, near, same, start_value
-from ..description import Variable
+from ..description import DescribedVariable
+from ..fmu_on_trial import FmuOnTrial, near, same, start_value
 from ..registry import trial
 
 
 @trial("2.1.7, 2.2.7")
-def start_values(bench: Bench) -> Iterator[str]:
+def start_values(fmu: FmuOnTrial) -> Iterator[str]:
     """Before any value is set, inputs and exact values equal the start values of the description."""
-    one = bench.initialising()
-    told = [v for v in bench.description.variables if v.initial == "exact" or v.causality == "input"]
+    one = fmu.initialising()
+    told = [v for v in fmu.description.variables if v.initial == "exact" or v.causality == "input"]
     told = [v for v in told if start_value(v) is not None]
     for v, value in zip(told, one.get(told), strict=True):
         if not same(value, start_value(v)):
@@ -21,14 +21,14 @@ def start_values(bench: Bench) -> Iterator[str]:
 
 
 @trial("2.1.7, 4.2.4")
-def read_back(bench: Bench) -> Iterator[str]:
+def read_back(fmu: FmuOnTrial) -> Iterator[str]:
     """Inputs and parameters that a master sets during initialisation have these values when they
     are read.
     """
-    one = bench.initialising()
+    one = fmu.initialising()
     settable = [
         v
-        for v in bench.description.variables
+        for v in fmu.description.variables
         if v.type == "Real" and v.settable and v.causality in ("input", "parameter")
     ]
     for v in settable:
@@ -41,21 +41,21 @@ def read_back(bench: Bench) -> Iterator[str]:
 
 
 @trial("2.2.7")
-def range_of_values(bench: Bench) -> Iterator[str]:
+def range_of_values(fmu: FmuOnTrial) -> Iterator[str]:
     """Outputs are finite, items if they are Enumerations, and within their min and max, after
     initialisation and after each step.
     """
-    outputs = [v for v in bench.description.outputs() if v.type in ("Real", "Integer", "Enumeration")]
-    one = bench.ready()
+    outputs = [v for v in fmu.description.outputs() if v.type in ("Real", "Integer", "Enumeration")]
+    one = fmu.ready()
     for k in range(20):
         for v, value in zip(list(outputs), one.get(outputs), strict=True):
             if wrong := _wrong(v, value):
                 outputs.remove(v)
                 yield f"{v.name} is {value:g}, {wrong}, at step {k}"
-        bench.advance(one, k)
+        fmu.advance(one, k)
 
 
-def _wrong(v: Variable, value: float) -> str:
+def _wrong(v: DescribedVariable, value: float) -> str:
     """What is wrong with a value of a variable; empty if nothing is."""
     low, high = v.limits
     if not math.isfinite(value):

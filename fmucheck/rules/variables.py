@@ -4,8 +4,8 @@ import math
 import re
 from collections.abc import Iterator
 
-from ..description import INITIAL, Variable, flag, number
-from ..fmu import Fmu
+from ..description import INITIAL, DescribedVariable, flag, number
+from ..fmu import FmuArchive
 from ..registry import rule
 from .header import twice
 
@@ -17,7 +17,7 @@ _STRUCTURED = re.compile(rf"{_NAME}|der\({_NAME}(?:,\d+)?\)")
 
 
 @rule("2.2.7, 2.2.9")
-def names(fmu: Fmu) -> Iterator[str]:
+def names(fmu: FmuArchive) -> Iterator[str]:
     """Every variable has a unique name that follows variableNamingConvention."""
     variables = fmu.description.variables
     for name in twice(v.name for v in variables):
@@ -33,7 +33,7 @@ def names(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.7")
-def causality(fmu: Fmu) -> Iterator[str]:
+def causality(fmu: FmuArchive) -> Iterator[str]:
     """causality, variability and initial are a combination of the standard's table, and fit the type."""
     independent = [v.name for v in fmu.description.variables if v.causality == "independent"]
     if len(independent) > 1:
@@ -51,7 +51,7 @@ def causality(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.7")
-def start(fmu: Fmu) -> Iterator[str]:
+def start(fmu: FmuArchive) -> Iterator[str]:
     """A start value exists where it is required, is absent where it is not allowed, and is a finite
     value of its type.
     """
@@ -68,7 +68,7 @@ def start(fmu: Fmu) -> Iterator[str]:
             yield f"{v.name}: start '{v.start}' is not a finite {v.type}"
 
 
-def _of_type(v: Variable) -> bool:
+def _of_type(v: DescribedVariable) -> bool:
     text = v.start or ""
     if v.type == "Real":
         value = number(text)
@@ -79,7 +79,7 @@ def _of_type(v: Variable) -> bool:
 
 
 @rule("2.2.7")
-def limits(fmu: Fmu) -> Iterator[str]:
+def limits(fmu: FmuArchive) -> Iterator[str]:
     """min is not above max, start lies between them or is an item, nominal is positive and finite."""
     for v in fmu.description.variables:
         low, high = v.limits
@@ -100,11 +100,11 @@ def limits(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.7")
-def aliases(fmu: Fmu) -> Iterator[str]:
+def aliases(fmu: FmuArchive) -> Iterator[str]:
     """Of variables that share type and value reference one can be set, one has a start, and units
     agree.
     """
-    groups: dict[tuple[str, int | None], list[Variable]] = {}
+    groups: dict[tuple[str, int | None], list[DescribedVariable]] = {}
     for v in fmu.description.variables:
         # An Enumeration is got and set as an Integer.
         kind = "Integer" if v.type == "Enumeration" else v.type
@@ -130,7 +130,7 @@ def aliases(fmu: Fmu) -> Iterator[str]:
 
 
 @rule("2.2.7, 3.3.1")
-def derivatives(fmu: Fmu) -> Iterator[str]:
+def derivatives(fmu: FmuArchive) -> Iterator[str]:
     """derivative points from a continuous Real to another one; reinit and repeated setting are for
     model exchange.
     """

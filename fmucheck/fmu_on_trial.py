@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from .api import ERROR, Instance, Library, StatusError
-from .description import Description, Variable, flag, number, whole
+from .api import ERROR, InstanceOnTrial, Library, StatusError
+from .description import DescribedVariable, FmuDescription, flag, number, whole
 from .registry import NotApplicableError
 
 Row = list[Any]
 
 
-class Bench:
+class FmuOnTrial:
     """The FMU under trial.
 
     Args:
@@ -25,19 +25,19 @@ class Bench:
         start, step: start time [s] and communication step [s] of the default experiment.
     """
 
-    def __init__(self, description: Description, folder: Path, library: Library) -> None:
+    def __init__(self, description: FmuDescription, folder: Path, library: Library) -> None:
         self.description = description
         self.folder = folder
         self.library = library
         self.start, self.step = description.time()
-        self.instances: list[Instance] = []
+        self.instances: list[InstanceOnTrial] = []
 
     def needs(self, capability: str) -> None:
         """End the trial unless the FMU says that it can do this."""
         if not self.description.has(capability):
             raise NotApplicableError(f"{capability} is not declared")
 
-    def instance(self) -> Instance:
+    def instance(self) -> InstanceOnTrial:
         """A new instance, just instantiated."""
         if self.instances and self.description.has("canBeInstantiatedOnlyOncePerProcess"):
             raise NotApplicableError("canBeInstantiatedOnlyOncePerProcess is declared")
@@ -46,35 +46,35 @@ class Bench:
         name = f"instance_{len(self.instances)}"
         asynchronous = self.description.has("canRunAsynchronuously")  # the standard's spelling
         try:
-            self.instances.append(Instance(self.library, name, guid, resources, asynchronous))
+            self.instances.append(InstanceOnTrial(self.library, name, guid, resources, asynchronous))
         except StatusError as refused:
             if self.description.has("needsExecutionTool"):
                 raise NotApplicableError(f"needsExecutionTool is declared, and {refused}") from None
             raise
         return self.instances[-1]
 
-    def initialising(self) -> Instance:
+    def initialising(self) -> InstanceOnTrial:
         """A new instance in initialisation mode."""
         made = self.instance()
         made.set_up(self.start)
         made.enter()
         return made
 
-    def ready(self) -> Instance:
+    def ready(self) -> InstanceOnTrial:
         """A new instance that waits for its first step."""
         made = self.initialising()
         made.exit()
         return made
 
-    def advance(self, instance: Instance, k: int) -> None:
+    def advance(self, instance: InstanceOnTrial, k: int) -> None:
         """The communication step number ``k``."""
         instance.step(self.start + k * self.step, self.step)
 
-    def given(self) -> list[Variable]:
+    def given(self) -> list[DescribedVariable]:
         """What a master gives to the FMU: inputs and parameters."""
         return [v for v in self.description.variables if v.causality in ("input", "parameter")]
 
-    def disturb(self, instance: Instance) -> None:
+    def disturb(self, instance: InstanceOnTrial) -> None:
         """Change what may change between steps, inputs and tunable parameters; not to be stepped with,
         since no FMU must be able to do with just any values.
         """
@@ -88,7 +88,7 @@ class Bench:
                 if refused.status != ERROR:
                     raise
 
-    def play(self, instance: Instance, steps: int, seed: int, first: int = 0) -> list[Row]:
+    def play(self, instance: InstanceOnTrial, steps: int, seed: int, first: int = 0) -> list[Row]:
         """Outputs after each of some steps with inputs that depend on seed and number of the step.
 
         Args:
@@ -108,7 +108,7 @@ class Bench:
         return rows
 
 
-def start_value(v: Variable) -> Any:
+def start_value(v: DescribedVariable) -> Any:
     """The start value that the description gives, as the API takes it; None if there is none."""
     if v.start is None:
         return None
@@ -119,7 +119,7 @@ def start_value(v: Variable) -> Any:
     return v.start.encode() if v.type == "String" else whole(v.start)
 
 
-def near(v: Variable, share: float) -> float:
+def near(v: DescribedVariable, share: float) -> float:
     """A value of a Real variable near its start, of the same sign, and inside its limits.
 
     Args:
@@ -135,7 +135,7 @@ def near(v: Variable, share: float) -> float:
     return min(max(value, low), high)
 
 
-def other(v: Variable, value: Any) -> Any:
+def other(v: DescribedVariable, value: Any) -> Any:
     """A value of a variable that is not the one it has, if there is one; a String stays."""
     if v.type == "Real":
         changed = near(v, 1.0)
@@ -156,14 +156,14 @@ def same(a: Any, b: Any) -> bool:
     return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12) or (math.isnan(a) and math.isnan(b))
 
 
-def unlike(names: Sequence[Variable], meant: Row, found: Row) -> Iterator[str]:
+def unlike(names: Sequence[DescribedVariable], meant: Row, found: Row) -> Iterator[str]:
     """One text for each variable that is not what it is meant to be."""
     for v, a, b in zip(names, meant, found, strict=True):
         if not same(a, b):
             yield f"{v.name} is {b!r}, not {a!r}"
 
 
-def differing(names: Sequence[Variable], rows: Sequence[Row], others: Sequence[Row]) -> str:
+def differing(names: Sequence[DescribedVariable], rows: Sequence[Row], others: Sequence[Row]) -> str:
     """Names of the columns in which two runs differ, and where first; empty if they are the same."""
     found: dict[str, int] = {}
     for k, (row, other) in enumerate(zip(rows, others, strict=True)):
