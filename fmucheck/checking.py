@@ -4,18 +4,16 @@ import argparse
 import difflib
 import json
 import os
-import sys
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-from cybership.message_text import printable
+from cybership.command_arguments import command_parser, complain, positive, whole_number
 from cybership.scratch_folder import sweep
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
-from fmus.interruption import program
 
 from .examine import examine
 from .fmu import FmuArchive
@@ -51,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(error: Exception) -> int:
-    print("error:", printable(str(error)), file=sys.stderr)
+    complain(error)
     return BAD_INPUT
 
 
@@ -108,33 +106,16 @@ def _examine_all(
             pool.shutdown(cancel_futures=True)
 
 
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"needs a positive number, not '{text}'")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"needs a whole number above zero, not '{text}'")
-    return int(text)
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("fmus.check"),
-        description="Check FMI 2.0 co-simulation FMUs, of this project or others, against the standard.",
-        epilog="examples:  %(prog)s\n"
+    parser = command_parser(
+        "fmus.check",
+        "Check FMI 2.0 co-simulation FMUs, of this project or others, against the standard.",
+        "examples:  %(prog)s\n"
         "           %(prog)s mine.fmu other.fmu\n"
         "           %(prog)s vessel --json\n"
         "           %(prog)s mine.fmu --no-run\n"
         "exit codes: 0 no findings, 1 findings, 2 bad input (the rest is checked), 130 interrupted\n"
         "An FMU is a program, and checking it runs it: --no-run only reads it.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "files",
@@ -154,14 +135,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-run", action="store_true", help="only read the FMU, do not run it")
     parser.add_argument(
         "--timeout",
-        type=_positive,
+        type=positive,
         default=60.0,
         metavar="S",
         help="time limit of each rule that runs the FMU [s] (60)",
     )
     parser.add_argument(
         "--jobs",
-        type=_count,
+        type=whole_number(1),
         default=os.cpu_count() or 1,
         metavar="N",
         help="number of FMUs at a time (default: processors)",

@@ -1,4 +1,4 @@
-"""Ctrl-C, requests to terminate and the usage line, for the commands of this package."""
+"""Ctrl-C and requests to terminate, for the commands of this package."""
 
 from __future__ import annotations
 
@@ -41,11 +41,6 @@ def _raise(*_: object) -> NoReturn:
         signal.signal(signal.SIGALRM, _leave)
         signal.setitimer(signal.ITIMER_REAL, GRACE)
     raise KeyboardInterrupt
-
-
-def program(module: str) -> str:
-    """The name of a command in its usage line: ``cybership NAME`` if that began it."""
-    return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
 
 
 def run_interruptible(main: Callable[[], int]) -> NoReturn:

@@ -326,7 +326,10 @@ def test_modules_import_modules_inside_cosim():
 
 
 # What any command shares, whatever it is about.
-SHARED = {f"cybership.{n}" for n in ("message_text", "renamed", "scratch_folder", "user_cache")}
+SHARED = {
+    f"cybership.{n}"
+    for n in ("command_arguments", "message_text", "renamed", "scratch_folder", "user_cache")
+}
 
 
 @pytest.mark.parametrize("package", ["fmus", "cosim"])

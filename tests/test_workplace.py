@@ -35,7 +35,6 @@ from diagnosis import compare
 from diagnosis.commands import command_line
 from diagnosis.execution import result_folder
 from diagnosis.verdict import judging
-from fmus import interruption
 from fmus.build import BuildError
 
 SHORT = {"stop": 1.0, "metrics": {}}
@@ -265,11 +264,10 @@ def test_cybership_names_the_nearest_command_and_imports_little(capsys, monkeypa
 
 
 def test_usage_lines_name_the_command_that_was_called(monkeypatch):
-    for program in (command.program, interruption.program):
-        monkeypatch.setattr(sys, "argv", ["cosim/run.py", "--help"])
-        assert program("cosim.run") == "python -m cosim.run"
-        monkeypatch.setattr(sys, "argv", ["cybership run", "--help"])
-        assert program("cosim.run") == "cybership run"
+    monkeypatch.setattr(sys, "argv", ["cosim/run.py", "--help"])
+    assert command.program("cosim.run") == "python -m cosim.run"
+    monkeypatch.setattr(sys, "argv", ["cybership run", "--help"])
+    assert command.program("cosim.run") == "cybership run"
     done = subprocess.run(
         [sys.executable, "-m", "cybership", "metrics", "--help"],
         capture_output=True, text=True, cwd=ROOT, check=True,

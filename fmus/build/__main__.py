@@ -5,20 +5,20 @@ if __name__ == "__main__":
 
     leave_on_interrupt()  # before all other imports, which take a while
 
-import argparse
 import os
 import sys
 import zipfile
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
-from cybership.message_text import printable
+from cybership.command_arguments import command_parser, complain, folder_name
 from cybership.scratch_folder import sweep
 
 from ..declare import DeclarationError, Range, variables
 from ..effects import STANDARD
 from ..installed import plus_files
-from ..interruption import program, run_interruptible
+from ..interruption import run_interruptible
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ships.naming import described_ship
@@ -32,10 +32,10 @@ from .start_values_file import read_starts
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; prints the path of each FMU, one a line, in the order asked for."""
-    parser = argparse.ArgumentParser(
-        prog=program("fmus.build"),
-        description="Build the FMUs of the project, or an FMU from a component file of your own.",
-        epilog="examples:  %(prog)s\n"
+    parser = command_parser(
+        "fmus.build",
+        "Build the FMUs of the project, or an FMU from a component file of your own.",
+        "examples:  %(prog)s\n"
         "           %(prog)s vessel controller_abs --out fmu\n"
         "           %(prog)s my_controller.py --out fmu\n"
         "           %(prog)s --list vessel\n"
@@ -46,10 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           %(prog)s --native vessel --target linux64,win64,darwin64 --out fmu\n"
         "           %(prog)s --native vessel thrusters --source firmware\n"
         "           %(prog)s --verify fmu/vessel.fmu",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (default: all)")
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="copy the FMUs to this folder (default: cache of the user)")
+    parser.add_argument("--out", type=folder_name, metavar="DIR", help="copy the FMUs to this folder (default: cache of the user)")
     parser.add_argument(
         "--overwrite",
         action="store_true",
@@ -96,18 +95,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="with --native: linux64, win64, darwin64 (this computer); python: run all others in Python",
     )
     parser.add_argument(
-        "--source", type=_folder, metavar="DIR", help="with --native: write plain C to this folder, build no FMU"
+        "--source", type=folder_name, metavar="DIR", help="with --native: write plain C to this folder, build no FMU"
     )
     parser.add_argument(
-        "--webassembly", type=_folder, metavar="DIR", help="write WebAssembly for pages to this folder, build no FMU"
+        "--webassembly", type=folder_name, metavar="DIR", help="write WebAssembly for pages to this folder, build no FMU"
     )
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):
         parser.error("--target and --source need --native")
     sweep()
+    note = partial(complain, kind="note: ")
     try:
         effects = plus_files(STANDARD, options.effects)
-        with ship_warnings_to(_note):
+        with ship_warnings_to(note):
             ship = described_ship(options.ship)
         if options.verify:
             _verify(options.names)
@@ -120,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     options.names,
                     folder,
                     starts,
-                    _note,
+                    note,
                     effects,
                     options.overwrite,
                     ship,
@@ -129,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             else:
                 native = native_targets(options.target) if options.native else None
                 made = build(
-                    options.names, options.out, starts, _note, effects, native, options.overwrite, ship
+                    options.names, options.out, starts, note, effects, native, options.overwrite, ship
                 )
             for path in made:
                 print(path)
@@ -137,15 +137,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (BuildError, DeclarationError, OSError) as error:
-        print("error:", printable(str(error)), file=sys.stderr)
+        complain(error)
         return 2
     return 0
-
-
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise argparse.ArgumentTypeError("needs the name of a folder")
-    return Path(text)
 
 
 def _verify(names: Sequence[str]) -> None:
@@ -180,10 +174,6 @@ def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
             for v in variables(group):
                 start = f"{v.start:g}" if kind != "output" else ""
                 print(f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{_limits(v.range)}")
-
-
-def _note(text: str) -> None:
-    print("note:", printable(text), file=sys.stderr)
 
 
 def _limits(allowed: Range) -> str:

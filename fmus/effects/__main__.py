@@ -5,11 +5,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cybership.message_text import printable
+from cybership.command_arguments import complain, program
 
 from ..declare import DeclarationError, Variable
 from ..installed import plus_files
-from ..interruption import program
 from ..ship import ship
 from . import STANDARD
 from .effect import Effect
@@ -91,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         effects = plus_files(STANDARD, options.files)
     except DeclarationError as error:
-        print("error:", printable(str(error)), file=sys.stderr)
+        complain(error)
         return 2
     print(table(ship(effects).effects), end="")
     return 0

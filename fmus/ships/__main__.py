@@ -5,7 +5,8 @@ import json
 import sys
 from collections.abc import Sequence
 
-from ..interruption import program
+from cybership.command_arguments import program
+
 from .ship_file import json_schema
 
 

@@ -1,0 +1,66 @@
+"""What the commands of all packages share: parser, types of options, and lines on standard error."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from .message_text import printable
+
+
+def complain(message: object, kind: str = "error: ") -> None:
+    """Say on standard error why the command ends, in one line."""
+    print(f"{kind}{printable(str(message))}", file=sys.stderr, flush=True)
+
+
+def program(module: str) -> str:
+    """The name of a command in its usage line: ``cybership NAME`` if that began it."""
+    return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
+
+
+def command_parser(module: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser of the command that a module is.
+
+    Args:
+        module: ``python -m`` runs it.
+        description: what the command does.
+        epilog: examples and exit codes, line by line.
+    """
+    return argparse.ArgumentParser(
+        prog=program(module),
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def whole_number(least: int) -> Callable[[str], int]:
+    """Type of an option that takes a whole number from 0, 1 or 2 on."""
+    wanted = ("from zero on", "above zero", "from two on")[least]
+
+    def of(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"needs a whole number {wanted}, not '{text}'")
+        return int(text)
+
+    return of
+
+
+def positive(text: str) -> float:
+    """Type of an option that takes a positive number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(
+            f"needs a positive number, not '{text}' (the file of a command comes before this option)"
+        )
+    return value
+
+
+def folder_name(text: str) -> Path:
+    """Type of an option that names a folder: nothing is no name of the working directory."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("needs the name of a folder")
+    return Path(text)
