@@ -101,7 +101,7 @@ def bare(content: dict[str, Any]) -> None:
         master = Master(varied, lambda _: None, pool=pool)
         recorder = Recorder(varied, master, None)
         recorder.take(0.0)
-        for _ in choose_loop(master, recorder.pending, False, 0.2).run():
+        for _ in choose_loop(master, recorder.pending).steps:
             recorder.flush()
         master.close()
         compute(recorder.kept(), varied.scenario.metrics.start, varied.scenario.metrics.stop)

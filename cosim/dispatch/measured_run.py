@@ -1,7 +1,5 @@
 """A run of which the metrics are kept, and its log on request."""
 
-import gc
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,9 +11,9 @@ from ..errors import SimulationError
 from ..master.algorithm import Master
 from ..master.ending import metrics_of, trial_of
 from ..master.loop_surroundings import interruptible, paused_collector
-from ..master.loops.chosen_loop import choose_loop
+from ..master.loops.chosen_loop import choose_loop, run_loop
 from ..master.recorder import Recorder, demand_memory
-from ..master.simulation import UPDATE_INTERVAL, simulate
+from ..master.simulation import simulate
 from ..process.run_state import STATE
 from ..results import performance
 from ..results.log import LogInMemory
@@ -90,19 +88,14 @@ def run_in_memory(
 
 
 def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -> None:
-    """Run to the end, looking for an interrupt after each step."""
-    recorder.take(0.0)
-    due = time.perf_counter() + UPDATE_INTERVAL
+    """Run to the end.
+
+    Raises:
+        KeyboardInterrupt: the user has stopped it.
+    """
     try:
-        for _, full in choose_loop(master, recorder.pending, False, UPDATE_INTERVAL).run():
-            if full:
-                recorder.flush()
-            if interrupted():
-                raise KeyboardInterrupt
-            if time.perf_counter() > due:
-                gc.collect()
-                due = time.perf_counter() + UPDATE_INTERVAL
-        recorder.flush()
+        if run_loop(choose_loop(master, recorder.pending), recorder, interrupted):
+            raise KeyboardInterrupt
     except SimulationError:
         if interrupted():  # an FMU may report the interrupt as an error of its own
             raise KeyboardInterrupt from None

@@ -1,10 +1,8 @@
 """The run of a scenario: prepare, step, record, and write metrics and pictures."""
 
-import gc
 import json
 import math
 import os
-import time
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,13 +25,10 @@ from ..system.system import System
 from .algorithm import Master
 from .ending import Result, finish, interrupted_late, not_written, writing
 from .loop_surroundings import interruptible, quiet_collector
-from .loops.chosen_loop import ChosenLoop, choose_loop
+from .loops.chosen_loop import choose_loop, run_loop
 from .real_time import RealTimePace
 from .recorder import Recorder, demand_memory
 from .run_record import describe
-
-# Wall time between two updates of progress and log [s]; chosen: smooth, and cheap beside the steps.
-UPDATE_INTERVAL = 0.2
 
 
 def simulate(
@@ -206,7 +201,7 @@ def _record(
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
     STATE.numbers[LOGGING] = 1
-    steps = choose_loop(master, recorder.pending, realtime is not None, UPDATE_INTERVAL)
+    steps = choose_loop(master, recorder.pending, realtime is not None)
     result.loop, result.loop_reason = steps.loop, steps.reason
     pace: RealTimePace | None = None
     result.status = "failed"  # until the loop has ended otherwise
@@ -219,7 +214,7 @@ def _record(
                     if realtime is None
                     else RealTimePace(realtime, system.scenario.step, interrupted)
                 )
-                stopped = _loop(system, steps, recorder, pace, interrupted, progress)
+                stopped = run_loop(steps, recorder, interrupted, pace, progress)
             result.status = "interrupted" if stopped else "done"
         except (SimulationError, OSError, KeyboardInterrupt) as error:
             # A second request may interrupt an FMU in the middle of its step.
@@ -250,35 +245,3 @@ def _record(
         with writing(result):
             update_json(folder / logs.SIDECAR, sidecar, told)
     return result, recorder
-
-
-def _loop(
-    system: System,
-    steps: ChosenLoop,
-    recorder: Recorder,
-    pace: RealTimePace | None,
-    interrupted: Callable[[], bool],
-    progress: Callable[[float], None],
-) -> bool:
-    """Step and record, with updates of progress and log; returns whether the user stopped it."""
-    recorder.take(0.0)
-    clock = time.perf_counter
-    due = clock() + UPDATE_INTERVAL
-    for t, full in steps.run():
-        if pace is not None:
-            pace.wait(t)
-        if interrupted():
-            recorder.flush()
-            return True
-        # At every step: the next may be a slow one, and the last of its process.
-        is_due = clock() > due
-        if full or is_due:
-            STATE.calls_nothing()
-            recorder.flush()
-        if is_due:
-            gc.collect()
-            progress(t)
-            due = clock() + UPDATE_INTERVAL
-    recorder.flush()
-    progress(system.scenario.stop)
-    return False
