@@ -26,7 +26,7 @@ from .command import (
     run_command,
     whole_number,
 )
-from .compiled.library import NATIVE, kind_of
+from .compiled.library import kind_of
 from .errors import InputError, SimulationError
 from .interrupts import on_interrupt, restore
 from .master.ending import Result
@@ -266,17 +266,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.json",
         help="mean and covariance of parameters, as the command learn writes it, for --ensemble",
     )
-    parser.add_argument(
-        "--timeout",
-        type=positive,
-        metavar="SECONDS",
-        help="longest time of a call to an FMU [s] (default: 100 times its usual step, at least 30 s)",
-    )
-    parser.add_argument("--quiet", action="store_true", help="print only errors")
+    add_scenario_options(parser, "--timeout", "--quiet")
     parser.add_argument(
         "--verbose", action="store_true", help="also print which step loop ran, and the reason"
     )
-    parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
+    add_scenario_options(parser, "--native")
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
     parser.add_argument(
         "--only-own",

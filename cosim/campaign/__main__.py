@@ -26,15 +26,14 @@ from ..command import (
     command_parser,
     complain,
     folder_name,
-    positive,
     printable,
     run_command,
     whole_number,
 )
-from ..compiled.library import NATIVE
 from ..errors import InputError, SimulationError
 from ..process.run_state import STATE
 from ..process.spawned import mute_started_processes
+from ..scenario.scenario_options import add_scenario_options
 from ..trials.measures import EVERY
 from .conduct import demand_packages, result_folder, run_campaign
 from .shown_progress import shown_progress
@@ -213,13 +212,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="allow the loss of runs of another campaign in DIR/runs.parquet",
     )
-    parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
-    parser.add_argument(
-        "--timeout",
-        type=positive,
-        metavar="SECONDS",
-        help="longest time of a call to an FMU [s] (default: 100 times its usual step, at least 30 s)",
-    )
+    add_scenario_options(parser, "--native", "--timeout")
     parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
     parser.add_argument(
         "--stop-when",
@@ -245,7 +238,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="M1,M2",
         help=f"metrics for pictures and --compare (default: {','.join(USUAL)})",
     )
-    parser.add_argument("--quiet", action="store_true", help="print only errors")
+    add_scenario_options(parser, "--quiet")
     return parser
 
 

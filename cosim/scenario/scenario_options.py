@@ -1,9 +1,10 @@
-"""Options of commands that say which ship a scenario has, and what differs from its file."""
+"""Options of commands that run scenarios: which ship, what differs from the file, and how FMUs run."""
 
 import argparse
 from typing import Any
 
 from ..command import positive, whole_number
+from ..compiled.library import NATIVE
 
 OPTIONS: dict[str, dict[str, Any]] = {
     "--stop": {
@@ -35,6 +36,14 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "help": "SSP parameter set for the plant, the simulated ship; its values override those of the "
         "scenario; may be given several times",
     },
+    "--timeout": {
+        "type": positive,
+        "metavar": "SECONDS",
+        "help": "longest time of a call to an FMU [s] (default: 100 times its usual step, at least "
+        "30 s)",
+    },
+    "--native": {"action": argparse.BooleanOptionalAction, "help": NATIVE},
+    "--quiet": {"action": "store_true", "help": "print only errors"},
 }
 
 
