@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim.results import hulls
+
 from .designing import Designer
 from .information import Knowledge
 from .planned_motion import PlannedMotion
@@ -29,11 +31,8 @@ def draw(d: Designer, k: Knowledge, motion: PlannedMotion, spread: Spread, path:
             colour_of = {"color": f"C{colour}", "alpha": 0.4, "linewidth": 0.7}
             axes.plot(track[:, 1], track[:, 0], label=label, **colour_of)
     axes.plot(eta[:, 1], eta[:, 0], "k--", linewidth=0.8, label="target")
-    for row in np.linspace(0, len(eta) - 1, OUTLINES).astype(int):
-        c, s = np.cos(eta[row, 2]), np.sin(eta[row, 2])
-        hull = np.concatenate([d.outline, d.outline[:1]])
-        x, y = eta[row, 0] + hull @ [c, -s], eta[row, 1] + hull @ [s, c]
-        axes.plot(y, x, color="0.5", linewidth=0.5)
+    for corners in hulls(eta[np.linspace(0, len(eta) - 1, OUTLINES).astype(int)], d.outline):
+        axes.plot(*np.vstack([corners, corners[:1]]).T, color="0.5", linewidth=0.5)
     axes.plot(eta[0, 1], eta[0, 0], "ko", markersize=4, label="start")
     axes.set_aspect("equal")
     axes.set_xlabel("east [m]")
