@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 only_own=options.only_own,
                 show=show,
                 progress=progress,
-                believe=options.controller_model,
+                controller_model=options.controller_model,
                 overwrite=options.overwrite,
                 measured=measured,
             )

@@ -124,6 +124,8 @@ def simulate(
         scenario = with_settings(scenario, settings.items(), Path.cwd(), "set")
     if stop is not None:
         scenario = cut_short(scenario)
-    sets, beliefs = ([p] if isinstance(p, (str, Path)) else p for p in (parameters, controller_model))
+    sets, controllers = (
+        [p] if isinstance(p, (str, Path)) else p for p in (parameters, controller_model)
+    )
     with _one_at_a_time():
-        return simulation.simulate(scenario, out, sets, believe=beliefs, **options)
+        return simulation.simulate(scenario, out, sets, controller_model=controllers, **options)

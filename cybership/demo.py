@@ -78,28 +78,32 @@ def demonstrate(out: Path) -> None:
         "does not adapt."
     )
     nominal = out / "nominal.ssv"
-    # One nominal value is enough: of all others the plant's own start values are believed.
+    # One nominal value is enough: of all others the plant's own start values hold in the controller.
     drag = cosim.Parameter(found.start.value("X_u"))
     cosim.write_parameters(nominal, cosim.ParameterSet({"vessel": {"X_u": drag}}))
-    beliefs = {"nominal model": nominal, "learned model": out / "model.ssv"}
-    folders = {label: out / f"ellipse_{label.replace(' ', '_')}" for label in beliefs}
-    for label, believe in beliefs.items():
-        metrics = _sail("ellipse_bs", folders[label], hidden, believe, SECONDS).metrics
+    models = {"nominal model": nominal, "learned model": out / "model.ssv"}
+    folders = {label: out / f"ellipse_{label.replace(' ', '_')}" for label in models}
+    for label, controller_model in models.items():
+        metrics = _sail("ellipse_bs", folders[label], hidden, controller_model, SECONDS).metrics
         print(f"   {label}: distance to the target {1e3 * metrics['e_pos_rms']:.0f} mm RMS")
     told = {label: read_options(folder) for label, folder in folders.items()}
     draw({label: cosim.read_log(folder) for label, folder in folders.items()}, out, told)
 
 
 def _sail(
-    name: str, folder: Path, hidden: Path, believe: Path | None = None, stop: float | None = None
+    name: str,
+    folder: Path,
+    hidden: Path,
+    controller_model: Path | None = None,
+    stop: float | None = None,
 ) -> cosim.Result:
     """A run of a shipped scenario with the hidden drag, to its end or to another one [s].
 
     Raises:
         InputError: it did not go through.
     """
-    beliefs = [] if believe is None else [believe]
-    result = cosim.simulate(name, folder, [hidden], stop=stop, log="compact", controller_model=beliefs)
+    given = [] if controller_model is None else [controller_model]
+    result = cosim.simulate(name, folder, [hidden], stop=stop, log="compact", controller_model=given)
     if result.status != "done":
         raise cosim.InputError(f"the run in '{folder}' {result.status}: {result.message}")
     return result

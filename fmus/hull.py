@@ -2,7 +2,7 @@
 
 Written with +, -, *, / and abs() only, so that every expression runs on floats, on numpy arrays and
 on traced symbols. The values are those of CyberShip Enterprise 1 (Table 2.1, corrected). The plant
-and a controller's belief about it are two separate sets of these parameters.
+and the controller model of it are two separate sets of these parameters.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Components for a ship: what they believe of it, and all else to its size."""
+"""Components for a ship: their models of it, and all else to its size."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -19,7 +19,7 @@ from support.ships import (
 
 from fmus.actuators.actuation import forces
 from fmus.actuators.response import total
-from fmus.actuators.steering import believed, commands_at, limits, roles, steer, steerable
+from fmus.actuators.steering import commands_at, limits, nominal_values, roles, steer, steerable
 from fmus.build.finding import BuildError, load
 from fmus.controller import heading
 from fmus.ship import ship
@@ -35,11 +35,11 @@ def speed(name, d=None):
 
 
 def steered(d, tau_X, tau_N, nu, helm=0.0):
-    return steer(d, tau_X, tau_N, helm, nu, HARD, believed(d))
+    return steer(d, tau_X, tau_N, helm, nu, HARD, nominal_values(d))
 
 
 def force_of(d, drive, helm, nu):
-    values = believed(d)
+    values = nominal_values(d)
     return total(forces(d, commands_at(d, drive, helm, HARD, values), nu, values))
 
 
@@ -103,7 +103,10 @@ def test_a_force_in_reach_is_given(name, drive, helm, ahead, drift):
 def test_commands_stay_within_their_limits(name, X, N, u, v):
     d = SHIPS[name]
     for command, steers, (low, high) in zip(
-        steered(d, X, N, (u, v, 0.0)).commands, roles(d).steers, limits(d, believed(d)), strict=True
+        steered(d, X, N, (u, v, 0.0)).commands,
+        roles(d).steers,
+        limits(d, nominal_values(d)),
+        strict=True,
     ):
         assert low <= command <= high
         assert not steers or abs(command) <= HARD

@@ -40,7 +40,7 @@ def smoothed(rows, noise=0.0, usable=lambda t: True):
     for t, x, _, tau in rows:
         pose = np.array(x[:3]) + noise * rng.normal(size=3)
         now = Now(t, tuple(map(float, pose)), x[3:6], tuple(tau))
-        s, sample, done = advanced(ROTATIONAL, ROTATIONAL.belief, s, now, SPAN, H, usable(t))
+        s, sample, done = advanced(ROTATIONAL, ROTATIONAL.controller_model, s, now, SPAN, H, usable(t))
         if done:
             final.append(sample)
         if s.age == SOON:

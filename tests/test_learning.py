@@ -128,7 +128,7 @@ def test_improved_controller_finds_surge_damping_and_loss_of_thrust(smoothing):
     phi = loop[-1][3].phi_hat
     true, wrong = [], []
     for _, s, _, out in loop[1000::50]:
-        F = SURGE.regressors((s.u, s.v, s.r), STILL, out.tau, p.belief)
+        F = SURGE.regressors((s.u, s.v, s.r), STILL, out.tau, p.controller_model)
         force, estimate = np.array(SURGE.force(F, SYSID4)), np.array(SURGE.force(F, phi))
         true.append(force @ force)
         wrong.append((force - estimate) @ (force - estimate))
@@ -140,7 +140,7 @@ def store_of(model, rng, count=SIZE, noise=0.0, phi=None):
     rows = []
     for _ in range(count):
         nu, tau = rng.uniform(-1.0, 1.0, 3), rng.uniform(-1.0, 1.0, 3)
-        F = model.regressors(tuple(nu), tuple(rng.uniform(-1, 1, 3)), tuple(tau), model.belief)
+        F = model.regressors(tuple(nu), tuple(rng.uniform(-1, 1, 3)), tuple(tau), model.controller_model)
         y = tuple(np.array(model.force(F, phi)) + noise * rng.normal(size=3))
         rows.append(StoredSample(1.0, 0.0, rng.uniform(-3, 3), y, F))
     return tuple(rows) + empty_store(model).rows[count:]

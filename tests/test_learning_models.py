@@ -23,16 +23,16 @@ def terms(**values):
 
 def force_by_model(model, nu, nu_dot, tau, phi):
     """known + F phi [N, N, N m]."""
-    F = model.regressors(nu, nu_dot, tau, model.belief)
-    return np.add(model.known(*nu, model.belief), model.force(F, phi))
+    F = model.regressors(nu, nu_dot, tau, model.controller_model)
+    return np.add(model.known(*nu, model.controller_model), model.force(F, phi))
 
 
 def nothing_left(model, nu, tau, phi, plant, loss=(0.0, 0.0, 0.0)):
     """What M nu_dot - tau has beyond known + F phi."""
     state = vessel.State(0.0, 0.0, 0.0, *nu)
     nu_dot = motion(*nu, acting(state, tau, loss), VESSEL.prepare(plant).hull)
-    y = model.error(nu, nu_dot, tau, model.belief)
-    F = model.regressors(nu, nu_dot, tau, model.belief)
+    y = model.error(nu, nu_dot, tau, model.controller_model)
+    F = model.regressors(nu, nu_dot, tau, model.controller_model)
     return np.subtract(y, model.force(F, phi))
 
 
@@ -96,8 +96,8 @@ def test_factors_of_inertia_damping_and_thrust_are_known_but_for_one(factor):
         force = acting(state, tau, (0.3, 0.3, 0.3))
         _, found = c.step(state, Force(*force), plant, 0.0)
         nu_dot = (found.u_dot, found.v_dot, found.r_dot)
-        y = SCALED.error(nu, nu_dot, tau, SCALED.belief)
-        F = SCALED.regressors(nu, nu_dot, tau, SCALED.belief)
+        y = SCALED.error(nu, nu_dot, tau, SCALED.controller_model)
+        F = SCALED.regressors(nu, nu_dot, tau, SCALED.controller_model)
         assert SCALED.force(F, (phi[0], phi[1], -phi[2])) == pytest.approx(y, abs=1e-12)
 
 
@@ -107,7 +107,7 @@ def test_projection_and_turning_are_those_of_the_dense_matrix(name):
     rng = np.random.default_rng(4)
     n = len(model.coefficients)
     nu, tau = random_motion(rng)
-    F = model.regressors(nu, (0.1, -0.2, 0.3), tau, model.belief)
+    F = model.regressors(nu, (0.1, -0.2, 0.3), tau, model.controller_model)
     dense = np.array([model.force(F, row) for row in np.eye(n)]).T
     e, psi = rng.normal(size=3), 0.7
     R = np.array([[np.cos(psi), -np.sin(psi), 0], [np.sin(psi), np.cos(psi), 0], [0, 0, 1]])
@@ -124,7 +124,7 @@ def test_blocks_hold_all_eigenvalues(name):
     Q, grams = np.zeros((n, n)), [np.zeros((len(p), len(p))) for p in model.pattern]
     for _ in range(30):
         nu, tau = random_motion(rng)
-        F = model.regressors(nu, tuple(rng.normal(size=3)), tau, model.belief)
+        F = model.regressors(nu, tuple(rng.normal(size=3)), tau, model.controller_model)
         dense = np.array([model.force(F, row) for row in np.eye(n)]).T
         Q += dense.T @ dense
         grams = [g + np.outer(f, f) for g, f in zip(grams, F, strict=True)]
@@ -170,7 +170,7 @@ from fmus.controller.store import singular
 YAW = Parametrisation(
     coefficients=(LearnedCoefficient("N_r", "N.m.s/rad", "yaw moment, r", -1.9, 100.0),),
     pattern=((), (), (0,)),
-    regressors=lambda nu, nu_dot, tau, belief: ((), (), (nu[2],)),
+    regressors=lambda nu, nu_dot, tau, controller_model: ((), (), (nu[2],)),
     known=towed_and_coriolis,
     blocks=((2,),),
 )

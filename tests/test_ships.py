@@ -30,7 +30,7 @@ from fmus.actuators.actuation import actuators, command_names, forces, ordered, 
 from fmus.actuators.failings import failings
 from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import at_rest, command_response, total
-from fmus.actuators.steering import believed
+from fmus.actuators.steering import nominal_values
 from fmus.actuators.weighted_allocation import allocate, axes
 from fmus.declare import group_of, variables
 from fmus.effects import Running
@@ -282,7 +282,7 @@ def test_a_rudder_is_a_plate_whose_force_turns_with_the_flow(u, delta, v):
 @given(speed, speed, st.floats(-30.0, 30.0), st.floats(-30.0, 30.0))
 def test_a_force_at_a_place_gives_its_moment(x, y, X, Y):
     tug = described(part("tug", "given_force", {"F_X": 30.0, "F_Y": 30.0, "x": x, "y": y}))
-    tau = total(forces(tug, (X, Y), REST, believed(tug)))
+    tau = total(forces(tug, (X, Y), REST, nominal_values(tug)))
     assert tau == pytest.approx((X, Y, x * Y - y * X))
 
 
@@ -290,7 +290,7 @@ def test_a_force_at_a_place_gives_its_moment(x, y, X, Y):
 @given(st.data())
 def test_commands_beyond_their_limits_count_as_the_limits(name, data):
     d = SHIPS[name]
-    values = believed(d)
+    values = nominal_values(d)
     limits = [
         span for a in ordered(d) for span in a.law.limits(a.law.Parameters._make(values[a.k][:-2]))
     ]
@@ -304,8 +304,8 @@ def test_commands_beyond_their_limits_count_as_the_limits(name, data):
 @given(st.floats(-16.0, 16.0), st.floats(-16.0, 16.0))
 def test_mirrored_propellers_turn_the_ship_the_other_way(port, starboard):
     d = SHIPS["otter"]
-    X, Y, N = total(forces(d, (port, starboard), REST, believed(d)))
-    mirrored = total(forces(d, (starboard, port), REST, believed(d)))
+    X, Y, N = total(forces(d, (port, starboard), REST, nominal_values(d)))
+    mirrored = total(forces(d, (starboard, port), REST, nominal_values(d)))
     assert mirrored == pytest.approx((X, -Y, -N), abs=1e-12)
 
 
@@ -347,7 +347,7 @@ def test_a_ship_is_asked_only_for_what_it_can_give(layout):
     tau = (0.3, 0.2, -0.1)
     others = tuple(x if k in able else 1e3 for k, x in enumerate(tau))
     nu = (0.5, 0.0, 0.0)
-    assert allocate(d, others, nu, believed(d)) == allocate(d, tau, nu, believed(d))
+    assert allocate(d, others, nu, nominal_values(d)) == allocate(d, tau, nu, nominal_values(d))
 
 
 @every_layout
@@ -355,7 +355,7 @@ def test_a_ship_is_asked_only_for_what_it_can_give(layout):
 def test_the_allocation_gives_what_is_asked_where_it_can(layout, data):
     d, able = LAYOUTS[layout]
     nu = (1.0, 0.0, 0.0)
-    values = believed(d)
+    values = nominal_values(d)
     # A third of what the actuators can give together, which none needs more than all of itself for.
     pulled = []
     for a, own in zip(actuators(d), values, strict=True):
@@ -376,7 +376,7 @@ def test_the_allocation_gives_what_is_asked_where_it_can(layout, data):
 @given(st.tuples(*[st.floats(-1e6, 1e6)] * 3), st.tuples(speed, speed, speed))
 def test_whatever_is_asked_the_commands_are_finite_and_within_limits(layout, tau, nu):
     d, _ = LAYOUTS[layout]
-    values = believed(d)
+    values = nominal_values(d)
     given = iter(allocate(d, tau, nu, values))
     for a, own in zip(actuators(d), values, strict=True):
         for low, high in a.law.limits(a.law.Parameters._make(own[:-2])):
@@ -385,9 +385,9 @@ def test_whatever_is_asked_the_commands_are_finite_and_within_limits(layout, tau
 
 def test_what_a_limit_cuts_off_is_asked_of_the_others():
     row = described(*[part(f"at_{k}", "given_force", {"y": y}) for k, y in enumerate((-1.0, 0.0, 1.0))])
-    first, _, middle, _, last, _ = allocate(row, (1.2, 0.0, 1.4), REST, believed(row))
+    first, _, middle, _, last, _ = allocate(row, (1.2, 0.0, 1.4), REST, nominal_values(row))
     assert (first, middle, last) == pytest.approx((1.0, 0.6, -0.4), abs=1e-6)
-    tau = total(forces(row, (first, 0.0, middle, 0.0, last, 0.0), REST, believed(row)))
+    tau = total(forces(row, (first, 0.0, middle, 0.0, last, 0.0), REST, nominal_values(row)))
     assert tau == pytest.approx((1.2, 0.0, 1.4), abs=1e-6)
 
 
@@ -395,7 +395,7 @@ def test_what_a_limit_cuts_off_is_asked_of_the_others():
 def test_vsp_and_tunnel_are_allocated_as_the_thesis_does(a, b, c):
     tau = thrust(a, b, c, Allocation())
     d = SHIPS["cse1"]
-    assert allocate(d, tau, REST, believed(d)) == pytest.approx(
+    assert allocate(d, tau, REST, nominal_values(d)) == pytest.approx(
         allocate_three(*tau, Allocation()), abs=1e-12
     )
 
@@ -558,9 +558,9 @@ def test_the_otter_is_that_of_its_publication():
     p = params("otter")
     assert mass_matrix(p.inertia)[2][2] == pytest.approx(42.65, abs=0.05)
     d = SHIPS["otter"]
-    X, Y, N = total(forces(d, (99.0, 99.0), REST, believed(d)))
+    X, Y, N = total(forces(d, (99.0, 99.0), REST, nominal_values(d)))
     assert pytest.approx((24.4 * 9.81, 0.0, 0.0), rel=1e-3) == (X, Y, N)
-    astern, _, _ = total(forces(d, (-99.0, -99.0), REST, believed(d)))
+    astern, _, _ = total(forces(d, (-99.0, -99.0), REST, nominal_values(d)))
     assert astern == pytest.approx(-13.6 * 9.81, rel=1e-3)
     # It leaves out the moment that turns a drifting hull across.
     drift = damping_force(1.5, 0.4, 0.0, p.damping)[2] - coriolis_force(1.5, 0.4, 0.0, p.inertia)[2]
@@ -609,7 +609,7 @@ def test_cybership_2_gives_a_force_on_every_axis():
 
 def test_cybership_2_has_the_lift_of_its_publication_near_amidships():
     a = actuators(SHIPS["cybership2"])[-1]
-    p = a.law.Parameters._make(believed(SHIPS["cybership2"])[-1][:-2])
+    p = a.law.Parameters._make(nominal_values(SHIPS["cybership2"])[-1][:-2])
     _, Y = a.law.force((0.01,), Flow(1.0 / (1.0 - p.wake), 0.0), p)
     slope = -Y / 0.01
     assert slope == pytest.approx(6.43306, rel=1e-3)

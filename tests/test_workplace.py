@@ -210,7 +210,7 @@ def model_file(path, **values):
 def test_beliefs_are_the_learned_model(ellipse, tmp_path, observer):
     ellipse["fmus"]["observer"] = {"path": observer}
     file = model_file(tmp_path / "model.ssv", delta_X_u=-2.0, Y_r=-6.0, V_n=0.1)
-    system = prepare(load_scenario(ellipse), beliefs=[(file, cosim.read_parameters(file))])
+    system = prepare(load_scenario(ellipse), controller_models=[(file, cosim.read_parameters(file))])
     told = {name: {v.name: x for v, x in values} for name, values in system.parameters.items()}
     controller = told["controller"]
     assert controller["X_u"] == pytest.approx(-2.6555)  # the nominal value and the addition

@@ -85,8 +85,8 @@ def run_ensemble(
         raise InputError(f"an ensemble needs two members or more; got {members}")
     demand_packages()
     given = read_posterior(posterior)
-    overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(controller_model))
-    system = prepare(scenario, overrides, only_own, beliefs=beliefs)
+    overrides, controllers = (list(find_parameters(p)) for p in (parameters, controller_model))
+    system = prepare(scenario, overrides, only_own, controller_models=controllers)
     try:
         for warning in system.warnings:
             show(f"warning: {warning}")

@@ -42,7 +42,7 @@ def simulate(
     progress: Callable[[float], None] = lambda _: None,
     pool: InstancePool | None = None,
     native: bool | str | None = None,
-    believe: Sequence[str | Path] = (),
+    controller_model: Sequence[str | Path] = (),
     overwrite: bool = False,
     measured: Callable[[dict[str, float]], None] = lambda _: None,
 ) -> Result:
@@ -60,7 +60,7 @@ def simulate(
         pool: FMUs that serve several runs, for a scenario whose paths are all files.
         native: in place of the scenario's: True compiles the project's own FMUs and the step loop, False
             nothing, "auto" where the system has a C compiler; None leaves it to the scenario.
-        believe: SSP parameter sets for the controller models in controllers and observers.
+        controller_model: SSP parameter sets for the controller models in controllers and observers.
         overwrite: whether the default folder is ``results/<name>``, whatever is there, and whether files
             of no run may be replaced.
         measured: receives the metrics as soon as they are known, before anything is drawn.
@@ -75,7 +75,7 @@ def simulate(
         raise InputError("out must be the name of a folder; got an empty text")
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime must be a positive factor; got {realtime:g}")
-    overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(believe))
+    overrides, controllers = (list(find_parameters(p)) for p in (parameters, controller_model))
     if native is not None:
         scenario = with_settings(scenario, [("native", native)], Path.cwd())
     # FMUs may change the working directory.
@@ -85,7 +85,7 @@ def simulate(
     result: Result | None = None
     try:
         models = None if pool is None else pool.models(scenario)
-        system = prepare(scenario, overrides, only_own, models, beliefs)
+        system = prepare(scenario, overrides, only_own, models, controllers)
         try:
             description = describe(system)
             usual = default_folder(scenario.name, description, overwrite)

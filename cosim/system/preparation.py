@@ -30,7 +30,7 @@ def prepare(
     overrides: Overrides = (),
     only_own: bool = False,
     models: Mapping[str, FmuModel] | None = None,
-    beliefs: Overrides = (),
+    controller_models: Overrides = (),
     unlogged: Collection[str] = (),
 ) -> System:
     """Read the FMUs of a scenario and check all that can be checked without running.
@@ -40,7 +40,7 @@ def prepare(
         overrides: parameter sets whose values override the scenario's.
         only_own: whether to refuse FMUs with programs that were not built on this computer.
         models: the FMU of each instance, where they have been read before.
-        beliefs: parameter sets of what other FMUs believe of the models that these name.
+        controller_models: parameter sets for the models of the plant that other FMUs have.
         unlogged: instances of which nothing is logged, whatever the scenario says.
 
     Raises:
@@ -54,7 +54,7 @@ def prepare(
     check_processes(system)
     check_window(scenario)
     _count_steps(system)
-    check_parameters(system, overrides, beliefs)
+    check_parameters(system, overrides, controller_models)
     connect(system)
     system.recordings = check_recordings(system)
     find_free_inputs(system)

@@ -10,7 +10,7 @@ from cybership.message_text import name_of
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import INT_LIMIT, FmuModel, FmuVariable, Value
 from ..formats.ssv import ParameterSet
-from .belief import Chosen, believe
+from .controller_model import Chosen, set_controller_models
 from .parameter_table import read_table, table_parameters
 from .system import System
 
@@ -18,20 +18,20 @@ from .system import System
 Overrides = Sequence[tuple[Path, ParameterSet]]
 
 
-def check_parameters(system: System, overrides: Overrides, beliefs: Overrides = ()) -> None:
+def check_parameters(system: System, overrides: Overrides, controller_models: Overrides = ()) -> None:
     """Fill in the start values of a system.
 
     Args:
         system: is changed.
         overrides: parameter sets of the models that they name.
-        beliefs: parameter sets of what other FMUs believe of these models.
+        controller_models: parameter sets of the models of these that other FMUs have.
 
     Raises:
         InputError: no such parameter, or a value that it cannot have.
     """
     chosen = _merge_parameters(system, overrides)
-    for path, given in beliefs:
-        believe(system, path, given, chosen)
+    for path, given in controller_models:
+        set_controller_models(system, path, given, chosen)
     for name, values in chosen.items():
         model = system.models[name]
         known = model.variables

@@ -38,7 +38,7 @@ class CommandRoles(NamedTuple):
 
 
 @cache
-def believed(ship: Description) -> tuple[Fields, ...]:
+def nominal_values(ship: Description) -> tuple[Fields, ...]:
     """The parameters of a ship's actuators, as its description has them."""
     return tuple([parameters(ship, a, "", False)() for a in actuators(ship)])
 
@@ -46,7 +46,7 @@ def believed(ship: Description) -> tuple[Fields, ...]:
 @cache
 def roles(ship: Description) -> CommandRoles:
     """What the commands of a ship are for, by the forces that they have in its description."""
-    values = believed(ship)
+    values = nominal_values(ship)
     angles = [c.unit == "rad" for a in ordered(ship) for c in a.law.commands]
     full = [high for _, high in limits(ship, values)]
     places = range(len(full))

@@ -71,7 +71,7 @@ class State(NamedTuple):
 
 def parameters(model: Parametrisation, **more: tuple[object, ...]) -> type[Fields]:
     """The Params class of a controller that learns a model."""
-    groups = {"belief": model.belief, "phi": model.start(), "gamma": model.gamma()}
+    groups = {"controller_model": model.controller_model, "phi": model.start(), "gamma": model.gamma()}
     return bundle("Params", Learner, **groups, truth=model.truth(), **more)
 
 
@@ -100,7 +100,7 @@ def climb(
 def energy(z: Errors, p: Fields, phi: Sequence[Number], omega: Triple) -> Energy:
     """V3 of (4.14), corrected; an estimate whose gain is 0 is left out."""
     known = weighted(p.truth, phi, p.gamma) + weighted(p.omega_true, omega, p.disturbance)
-    return Energy(tracking_energy(z, p.belief.inertia) + 0.5 * known)
+    return Energy(tracking_energy(z, p.controller_model.inertia) + 0.5 * known)
 
 
 def weighted(truth: Sequence[Number], estimates: Sequence[Number], gains: Sequence[Number]) -> Number:
@@ -123,14 +123,14 @@ def adaptive(name: str, description: str, model: Parametrisation) -> Component:
         e = i.estimate
         nu = (e.u_hat, e.v_hat, e.r_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)
-        F = model.regressors(nu, alpha_dot, acting(i.applied, s.tau), p.belief)
+        F = model.regressors(nu, alpha_dot, acting(i.applied, s.tau), p.controller_model)
         dt = where(attentive(e, p.hold_frozen), h, 0.0)
         z2 = (z.z2_u, z.z2_v, z.z2_r)
         phi = model.hat._make(climb(s.phi_hat, p.gamma, model.project(F, z2), dt))
         a, b, c = climb(s.omega, p.disturbance, to_earth(e.psi_hat, z2), dt)
         omega = (a, b, c)
         w = to_body(e.psi_hat, omega)
-        demand = control(model, nu, errors, p.gains, p.belief, F, phi, w)
+        demand = control(model, nu, errors, p.gains, p.controller_model, F, phi, w)
         tau = choose(h > 0.0, demand.tau, s.tau)
         return State(phi, omega, tau), Outputs(*demand, phi, energy(z, p, phi, omega))
 

@@ -153,7 +153,7 @@ def control(
     nu: Triple,
     errors: tuple[Errors, Triple],
     k: FeedbackGains,
-    belief: B,
+    controller_model: B,
     F: Regressors,
     phi: Sequence[Number],
     w: Triple,
@@ -167,7 +167,7 @@ def control(
         nu: velocity [m/s, m/s, rad/s].
         errors: z1, z2 and alpha_dot from :func:`control_errors`.
         k: feedback gains.
-        belief: about the hull.
+        controller_model: about the hull.
         F: regressors at this velocity and at alpha_dot.
         phi: estimated parameters.
         w: body-fixed part R^T omega_n_hat of the estimated model error [N, N, N m].
@@ -176,8 +176,8 @@ def control(
         The force and its parts.
     """
     z, alpha_dot = errors
-    MX, MY, MN = inertia_force(*alpha_dot, belief.inertia)
-    KX, KY, KN = model.known(*nu, belief)
+    MX, MY, MN = inertia_force(*alpha_dot, controller_model.inertia)
+    KX, KY, KN = model.known(*nu, controller_model)
     PX, PY, PN = model.force(F, model.without_loss(phi))
     oX, oY, oN = PX + w[0], PY + w[1], PN + w[2]
     lX = -z.z1_x - k.K_d_u * z.z2_u + MX

@@ -25,7 +25,7 @@ Outputs = outputs(ROTATIONAL)
 
 class Params(NamedTuple):
     gains: FeedbackGains = FeedbackGains()
-    belief: ControllerModel = ControllerModel()
+    controller_model: ControllerModel = ControllerModel()
     phi: Fields = ROTATIONAL.start()
 
 
@@ -42,9 +42,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Fields]:
     nu = (e.u_hat, e.v_hat, e.r_hat)
     errors = control_errors(e, i.target, p.gains)
     rest = (0.0, 0.0, 0.0)
-    F = ROTATIONAL.regressors(nu, errors[1], rest, p.belief)
-    demand = control(ROTATIONAL, nu, errors, p.gains, p.belief, F, p.phi, rest)
-    energy = Energy(tracking_energy(errors[0], p.belief.inertia))
+    F = ROTATIONAL.regressors(nu, errors[1], rest, p.controller_model)
+    demand = control(ROTATIONAL, nu, errors, p.gains, p.controller_model, F, p.phi, rest)
+    energy = Energy(tracking_energy(errors[0], p.controller_model.inertia))
     return s, Outputs(*demand, ROTATIONAL.hat._make(p.phi), energy)
 
 

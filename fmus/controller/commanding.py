@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 from ..actuators.actuation import actuators
 from ..actuators.command_variables import commands_of
-from ..actuators.steering import believed, steer
+from ..actuators.steering import nominal_values, steer
 from ..declare import Component, Fields, Range, bundle
 from ..ops import Number, choose
 from ..ship_description import Description
@@ -54,8 +54,8 @@ def commanding(controller: Component, ship: Description) -> Component:
     """
     commands = commands_of(ship)
     names = [a.part.name for a in actuators(ship)]
-    parts = bundle("Believed", None, **dict(zip(names, believed(ship), strict=True)))
-    params = bundle("Params", own=controller.params(), believed=parts(), helm=HelmLimit())
+    parts = bundle("Actuators", None, **dict(zip(names, nominal_values(ship), strict=True)))
+    params = bundle("Params", own=controller.params(), actuators=parts(), helm=HelmLimit())
     outputs = bundle("Outputs", own=controller.outputs(), commands=commands(), force=CommandedForce())
     unreported = controller.inputs().applied
 
@@ -72,7 +72,7 @@ def commanding(controller: Component, ship: Description) -> Component:
         own, out = controller.law(s.own, inputs(i, s.applied), b.own, h)
         asked: Force = out.demand.tau
         nu = i.estimate.u_hat, i.estimate.v_hat, i.estimate.r_hat
-        given = steer(ship, asked.tau_X, asked.tau_N, s.helm, nu, b.helm.angle_max, b.believed)
+        given = steer(ship, asked.tau_X, asked.tau_N, s.helm, nu, b.helm.angle_max, b.actuators)
         after = State(own, type(unreported)(*given.tau), given.helm)
         kept = choose(h > 0.0, (after.applied, after.helm), (s.applied, s.helm))
         return State(own, *kept), outputs(out, commands(*given.commands), CommandedForce(*given.tau))

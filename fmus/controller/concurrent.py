@@ -81,8 +81,8 @@ def explained(
     model: Parametrisation, sample: LearningSample, s: State, p: Fields
 ) -> tuple[StoredSample, Triple]:
     """A sample as it is stored, y or as printed eps, and eps = y - F phi_hat - R^T omega_hat, (4.33)."""
-    F = model.regressors(sample.nu, sample.nu_dot, sample.tau, p.belief)
-    y = model.error(sample.nu, sample.nu_dot, sample.tau, p.belief)
+    F = model.regressors(sample.nu, sample.nu_dot, sample.tau, p.controller_model)
+    y = model.error(sample.nu, sample.nu_dot, sample.tau, p.controller_model)
     a, b = model.force(F, s.phi_hat), to_body(sample.psi, s.omega)
     eps = (y[0] - a[0] - b[0], y[1] - a[1] - b[1], y[2] - a[2] - b[2])
     return StoredSample(1.0, sample.time, sample.psi, choose(p.store.stale > 0.5, eps, y), F), eps
@@ -134,7 +134,7 @@ def concurrent(
         nu, nu_dot = (e.u_hat, e.v_hat, e.r_hat), (e.u_dot_hat, e.v_dot_hat, e.r_dot_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)
         acted = acting(i.applied, s.tau)
-        F = model.regressors(nu, alpha_dot, acted, p.belief)
+        F = model.regressors(nu, alpha_dot, acted, p.controller_model)
 
         gate = blocked(s.blocker, exceeds(nu, nu_dot, acted, p.blocker), p.blocker.block_time, h)
         learns = (h > 0.0) & (gate.beta > 0.5) & attentive(e, p.hold_frozen)
@@ -154,7 +154,9 @@ def concurrent(
             pose = (e.x_hat, e.y_hat, e.psi_hat)
             seen = learns & not_(e.frozen > 0.5)
             new = Now(time, pose, nu, acted)
-            point, past, ready = advanced(model, p.belief, s.point, new, p.samples.fixed_point, h, seen)
+            point, past, ready = advanced(
+                model, p.controller_model, s.point, new, p.samples.fixed_point, h, seen
+            )
             return point, explained(model, past, s, p)[0], ready
 
         point, offered, ready = when(
@@ -188,7 +190,9 @@ def concurrent(
             dt,
         )
 
-        demand = control(model, nu, errors, p.gains, p.belief, F, phi, to_body(e.psi_hat, omega))
+        demand = control(
+            model, nu, errors, p.gains, p.controller_model, F, phi, to_body(e.psi_hat, omega)
+        )
         sigma = sqrt(kept.sums.least)
         count = kept.sums.count
         met = where((count > 0.5) & (sigma > p.store.rank_tolerance), 1.0, 0.0)

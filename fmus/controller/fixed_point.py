@@ -87,11 +87,13 @@ def later(sigma: tuple[Triple, Triple, Triple], K: Triple, h: Number) -> tuple[T
     return i, j, k
 
 
-def driving(model: Parametrisation[B], psi: Number, nu: Triple, tau: Triple, belief: B) -> Triple:
+def driving(
+    model: Parametrisation[B], psi: Number, nu: Triple, tau: Triple, controller_model: B
+) -> Triple:
     """Earth-fixed acceleration [m/s2, m/s2, rad/s2] by the force and what is known of the hull."""
     u, v, r = nu
-    kX, kY, kN = model.known(u, v, r, belief)
-    a, b, c = accelerated(inverse_mass(belief.inertia), tau[0] + kX, tau[1] + kY, tau[2] + kN)
+    kX, kY, kN = model.known(u, v, r, controller_model)
+    a, b, c = accelerated(inverse_mass(controller_model.inertia), tau[0] + kX, tau[1] + kY, tau[2] + kN)
     x, y = rotate_to_earth(psi, a - r * v, b + r * u)
     return x, y, c
 
@@ -116,7 +118,7 @@ def begun(now: Now) -> FixedPoint:
 
 def advanced(
     model: Parametrisation[B],
-    belief: B,
+    controller_model: B,
     s: FixedPoint,
     now: Now,
     span: Number,
@@ -127,7 +129,7 @@ def advanced(
 
     Args:
         model: of which what is known is used.
-        belief: about the hull.
+        controller_model: about the hull.
         s: before.
         now: what the step brought.
         span: how long a sample is smoothed [s].
@@ -145,7 +147,7 @@ def advanced(
     def stepped() -> tuple[FixedPoint, LearningSample, Condition]:
         turn = s.axes[2]
         u, v = rotate_to_body(turn.p, s.axes[0].v, s.axes[1].v)
-        push = driving(model, turn.p, (u, v, turn.v), now.tau, belief)
+        push = driving(model, turn.p, (u, v, turn.v), now.tau, controller_model)
         axes, smooth = [], []
         for axis, old, pushed, measured in zip(s.axes, s.smooth, push, now.pose, strict=True):
             rate = pushed + axis.d
@@ -163,7 +165,7 @@ def advanced(
         # The next one begins where the filter has settled and none is under way.
         psi = going[2].p
         a, b = rotate_to_body(psi, going[0].v, going[1].v)
-        drive = driving(model, psi, (a, b, going[2].v), now.tau, belief)
+        drive = driving(model, psi, (a, b, going[2].v), now.tau, controller_model)
         fresh = FixedPoint(going, ran, SOON, now.time, now.tau, drive, going, P)
         idle = FixedPoint(going, ran)
         settled = ran >= span

@@ -6,7 +6,7 @@ Control, 2nd ed., Wiley, 2021, ch. 15). The heading wanted passes a reference mo
     psi_d''' + (2 zeta + 1) w psi_d'' + (2 zeta + 1) w^2 psi_d' + w^3 psi_d = w^3 psi_t,
 
 whose rate settles at no more than ``r_max``: the error that drives it is limited, so nothing winds up.
-The moment is feed-forward of the reference, by the believed yaw inertia m and damping d, and
+The moment is feed-forward of the reference, by yaw inertia m and damping d of the controller model, and
 
     tau_N = m w^2 (psi_d - psi) + (2 zeta w m - d) (r_d - r) + integral,
 

@@ -138,11 +138,11 @@ ALL_UNKNOWN = Parametrisation(
     regressors=_all,
     known=nothing,
     blocks=((0, 1, 2),),
-    belief=InertiaOnly(),
+    controller_model=InertiaOnly(),
 )
 
 
-class FullBelief(NamedTuple):
+class FullControllerModel(NamedTuple):
     """The whole hull, right up to two factors."""
 
     inertia: Inertia = Inertia()
@@ -150,20 +150,20 @@ class FullBelief(NamedTuple):
     rotational: RotationalDamping = RotationalDamping()
 
 
-def _damping(u: Number, v: Number, r: Number, b: FullBelief) -> Triple:
+def _damping(u: Number, v: Number, r: Number, b: FullControllerModel) -> Triple:
     X1, Y1, N1 = towed_damping_force(u, v, b.towed)
     X2, Y2, N2 = rotational_damping_force(v, r, b.rotational)
     return X1 + X2, Y1 + Y2, N1 + N2
 
 
-def everything(u: Number, v: Number, r: Number, b: FullBelief) -> Triple:
+def everything(u: Number, v: Number, r: Number, b: FullControllerModel) -> Triple:
     """-C(nu) nu - D(nu) nu."""
     CX, CY, CN = coriolis_force(u, v, r, b.inertia)
     X, Y, N = _damping(u, v, r, b)
     return X - CX, Y - CY, N - CN
 
 
-def _scaled(nu: Triple, nu_dot: Triple, tau: Triple, b: FullBelief) -> Regressors:
+def _scaled(nu: Triple, nu_dot: Triple, tau: Triple, b: FullControllerModel) -> Regressors:
     MX, MY, MN = inertia_force(*nu_dot, b.inertia)
     CX, CY, CN = coriolis_force(*nu, b.inertia)
     X, Y, N = _damping(*nu, b)
@@ -183,7 +183,7 @@ SCALED = Parametrisation(
     regressors=_scaled,
     known=everything,
     blocks=((0, 1, 2),),
-    belief=FullBelief(),
+    controller_model=FullControllerModel(),
     loss=(2, 2, 2),
     by_acceleration=True,
 )

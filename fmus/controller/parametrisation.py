@@ -23,7 +23,7 @@ Regressors = tuple[tuple[Number, ...], tuple[Number, ...], tuple[Number, ...]]
 class LearnedCoefficient(NamedTuple):
     """A parameter that is learned: its true value for the default vessel, and an adaptation gain.
 
-    ``added`` is whether it is learned what is to be added to what the controller believes.
+    ``added`` is whether it is learned what is to be added to the controller model.
     """
 
     parameter: str
@@ -43,7 +43,7 @@ class LearnedCoefficient(NamedTuple):
 
 
 class ControllerModel(NamedTuple):
-    """What the controller believes of the hull: M, C(nu) and g(nu) of (2.27)."""
+    """The model of the hull in a controller: M, C(nu) and g(nu) of (2.27)."""
 
     inertia: Inertia = Inertia()
     towed: TowedDamping = TowedDamping()
@@ -72,10 +72,11 @@ class Parametrisation(Generic[B]):
     Attributes:
         coefficients: the n parameters phi.
         pattern: for surge, sway and yaw the indices of the parameters that act there.
-        regressors: (velocity, acceleration, tau, belief) -> F: force on the hull by each parameter.
-        known: (u, v, r, belief) -> known force on the hull [N, N, N m].
+        regressors: (velocity, acceleration, tau, controller_model) -> F: force on the hull by each
+            parameter.
+        known: (u, v, r, controller_model) -> known force on the hull [N, N, N m].
         blocks: groups of axes that share parameters; of equal groups one is enough.
-        belief: what is believed beforehand; has a field ``inertia``.
+        controller_model: known beforehand; has a field ``inertia``.
         loss: index of the thruster loss of each axis, where it is learned.
         by_acceleration: True where F depends on the acceleration.
     """
@@ -85,7 +86,7 @@ class Parametrisation(Generic[B]):
     regressors: Callable[[Triple, Triple, Triple, B], Regressors]
     known: Callable[[Number, Number, Number, B], Triple]
     blocks: tuple[tuple[int, ...], ...]
-    belief: B = field(default_factory=ControllerModel)  # pyright: ignore[reportAssignmentType]
+    controller_model: B = field(default_factory=ControllerModel)  # pyright: ignore[reportAssignmentType]
     loss: tuple[int, int, int] | None = None
     by_acceleration: bool = False
 
@@ -150,10 +151,10 @@ class Parametrisation(Generic[B]):
         columns = [self.project(F, x) for x in ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))]
         return tuple(zip(*columns, strict=True))
 
-    def error(self, nu: Triple, nu_dot: Triple, tau: Triple, belief: B) -> Triple:
+    def error(self, nu: Triple, nu_dot: Triple, tau: Triple, controller_model: B) -> Triple:
         """y = M nu_dot - known - tau [N, N, N m], (2.36): what F phi + R^T omega_n has to explain."""
-        MX, MY, MN = inertia_force(*nu_dot, belief.inertia)
-        X, Y, N = self.known(*nu, belief)
+        MX, MY, MN = inertia_force(*nu_dot, controller_model.inertia)
+        X, Y, N = self.known(*nu, controller_model)
         return MX - X - tau[0], MY - Y - tau[1], MN - N - tau[2]
 
     def losses(self, phi: Sequence[Number]) -> Triple | None:

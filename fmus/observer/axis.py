@@ -50,7 +50,7 @@ class LearningRates(NamedTuple):
 
 
 class Covariance(NamedTuple):
-    """Entries of the symmetric matrix; its start is what is believed before anything is measured."""
+    """Entries of the symmetric matrix; its start is that before anything is measured."""
 
     pp: Number = 1.0
     pv: Number = 0.0

@@ -37,7 +37,7 @@ class KalmanNoise(NamedTuple):
 
 
 class Rejection(NamedTuple):
-    """What is not believed, and what is done without measurements."""
+    """What is rejected, and what is done without measurements."""
 
     gate: Annotated[float, "1", "standard deviations beyond which a sample is a spike", Range(1.0)] = 5.0
     position_slack: Annotated[float, "m", "standard deviation added before that", STD] = 0.005
@@ -68,7 +68,7 @@ class KalmanState(NamedTuple):
 
 class State(NamedTuple):
     seen: Seen = Seen()
-    belief: KalmanState = KalmanState()
+    estimate: KalmanState = KalmanState()
     acceleration: Acceleration = Acceleration()
     refused: Number = 0.0
 
@@ -81,7 +81,7 @@ def predicted(
     This is the midpoint method, halfway by the old acceleration; it needs the model once a step. Where
     only a share of the velocity is kept, nothing is known of its change.
     """
-    (x, y, psi, u, v, r), surge, sway, yaw = s.belief
+    (x, y, psi, u, v, r), surge, sway, yaw = s.estimate
     u_dot, v_dot, r_dot = s.acceleration
     half = 0.5 * h
     um, vm, rm = u + half * u_dot, v + half * v_dot, r + half * r_dot
@@ -98,11 +98,11 @@ def predicted(
     ), Acceleration(X, Y, N)
 
 
-def believed(
+def before_sample(
     s: State, ahead: MotionState, keep: Number, p: Params, k: LearningRates, h: Number
 ) -> KalmanState:
-    """What is believed after h [s], before the sample of that instant."""
-    _, surge, sway, yaw = s.belief
+    """The estimate after h [s], before the sample of that instant."""
+    _, surge, sway, yaw = s.estimate
     n = p.noise
     return when(
         keep < 1.0,
@@ -125,7 +125,7 @@ def believed(
 def corrected(
     b: KalmanState, s: ScreenedSample, p: Params, k: LearningRates
 ) -> tuple[KalmanState, Condition]:
-    """The belief after a sample, and whether the sample fits to what was believed."""
+    """The estimate after a sample, and whether the sample fits to the one before."""
     m, n, rejection = b.motion, p.noise, p.rejection
     ahead, aside = rotate_to_body(m.psi, s.x - m.x, s.y - m.y)
     turn = s.psi - m.psi
@@ -165,7 +165,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     k = rates(p.learning, period, h)
     keep = where(s.seen.age > p.screening.rest_time, exp(-h / p.rejection.fade_time), 1.0)
     ahead, model = predicted(s, tau, hull, keep, h)
-    before = believed(s, ahead, keep, p, k, h)
+    before = before_sample(s, ahead, keep, p, k, h)
     seen, sample = look(s.seen, i.measurement, before.motion.psi, p.screening, h)
     # A sample that is held until the next measurement tells nothing new.
     new = sample.good & ((seen.age <= 0.0) | sample.overdue) & (h > 0.0)
@@ -173,18 +173,18 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     fits = new & fitting
     refused = where(fits, 0.0, where(new, s.refused + fmax(h, period), s.refused))
     elsewhere = sample.first | (refused > p.rejection.jump_time)
-    belief = when(
+    estimate = when(
         elsewhere,
         lambda: KalmanState(MotionState(sample.x, sample.y, finite(sample.psi, 0.0))),
         lambda: choose(fits, after, before),
     )
-    m = belief.motion
+    m = estimate.motion
     known = Acceleration(
-        where(sample.overdue, 0.0, clip(model.u_dot + belief.surge.d, -MOST, MOST)),
-        where(sample.overdue, 0.0, clip(model.v_dot + belief.sway.d, -MOST, MOST)),
-        where(sample.overdue, 0.0, clip(model.r_dot + belief.yaw.d, -MOST, MOST)),
+        where(sample.overdue, 0.0, clip(model.u_dot + estimate.surge.d, -MOST, MOST)),
+        where(sample.overdue, 0.0, clip(model.v_dot + estimate.sway.d, -MOST, MOST)),
+        where(sample.overdue, 0.0, clip(model.r_dot + estimate.yaw.d, -MOST, MOST)),
     )
-    state = State(seen, belief, choose(h > 0.0, known, s.acceleration), where(elsewhere, 0.0, refused))
+    state = State(seen, estimate, choose(h > 0.0, known, s.acceleration), where(elsewhere, 0.0, refused))
     frozen = where(sample.good, 0.0, 1.0)
     return state, Estimate(m.x, m.y, m.psi, m.u, m.v, m.r, *known, frozen)
 

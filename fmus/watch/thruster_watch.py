@@ -19,7 +19,7 @@ from ..actuators.attack import Attack, attacking
 from ..actuators.weighted_allocation import axes, components, solution
 from ..controller.backstepping import HELD, Inputs, acting
 from ..controller.eigen import dot
-from ..controller.models import FullBelief, everything
+from ..controller.models import FullControllerModel, everything
 from ..declare import POSITIVE, Component, Fields, Range, Variable, bundle, group_of
 from ..effects import EffectSet
 from ..hull import inertia_force
@@ -232,8 +232,8 @@ def advanced(
     share = h / (h + p.filter_time)
     slow = low_pass(s.nu, nu, share)
     a, b, c = [(x - y) / p.filter_time for x, y in zip(nu, slow, strict=True)]
-    moved = inertia_force(a, b, c, p.belief.inertia)
-    known = everything(*nu, p.belief)
+    moved = inertia_force(a, b, c, p.controller_model.inertia)
+    known = everything(*nu, p.controller_model)
     rest = low_pass(s.rest, (known[0] + tau[0], known[1] + tau[1], known[2] + tau[2]), share)
     f = low_pass(s.f, forces(tau), share)
     quiet = where(e.frozen > 0.5, 0.0, s.quiet + h)
@@ -272,7 +272,7 @@ def make(effects: EffectSet, ship: Description) -> Component | None:
     params = bundle(
         "Params",
         Settings,
-        belief=FullBelief(),
+        controller_model=FullControllerModel(),
         allocation=bundle("Allocation", None, **known)(),
         attack=Attack(),
     )

@@ -1,7 +1,7 @@
-"""What controllers and observers believe of the plant: the model of a parameter set, by names.
+"""Controller models: the model of the plant that a parameter set gives to controllers and observers.
 
-An FMU believes in a plant if it has parameters of the same names as the plant's (``m``, ``X_u``, ...),
-or parameters from which it learns that its model description annotates as estimates of these
+An FMU has a model of a plant if it has parameters of the plant's names (``m``, ``X_u``, ...), or
+parameters from which it learns that its model description annotates as estimates of these
 (:func:`cosim.formats.outline.read_estimates`). It gets the whole model: of what the file does not name,
 the start value of the plant's FMU. ``delta_NAME`` adds to ``NAME``.
 """
@@ -21,37 +21,37 @@ ADDITION = "delta_"
 Chosen = dict[str, dict[str, tuple[Value, str]]]
 
 
-def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> None:
-    """Give a model to all that believe in it.
+def set_controller_models(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> None:
+    """Give a model of the plant to all FMUs that have one.
 
     Args:
-        system: receives warnings of what nothing can believe.
+        system: receives warnings of values that no FMU takes.
         path: of the parameter set.
         given: its content.
         chosen: start values by instance; is changed.
 
     Raises:
-        InputError: the plant is not here, or nothing believes in it.
+        InputError: the plant is not here, or no FMU has a model of it.
     """
     if not given.values:
         system.warnings.append(f"'{path}' is the nominal model: the controller models do not change")
         return
-    believers, used = set(), set()
+    users, used = set(), set()
     for model_name in given.values:
         plant = next((m for m in system.models.values() if m.name == model_name), None)
         if plant is None:
             raise InputError(
                 f"'{path}' has values for a model '{model_name}', which is not in the scenario"
             )
-        model = _Believed(plant, path, given)
+        model = _PlantModel(plant, path, given)
         for name, fmu in system.models.items():
             if fmu is plant:
                 continue
             for v, value, names in model.of(fmu):
                 chosen[name][v.name] = (value, f"controller model '{path}'")
-                believers.add(name)
+                users.add(name)
                 used.update((model_name, used_name) for used_name in names)
-    if not believers:
+    if not users:
         raise InputError(
             f"'{path}': no controller and no observer of the scenario has parameters of the model "
             f"{', '.join(given.values)}; --parameters sets those of the ship itself"
@@ -63,7 +63,7 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
         )
 
 
-class _Believed:
+class _PlantModel:
     """The model of a parameter set: the plant's start values, and what the set says otherwise."""
 
     def __init__(self, plant: FmuModel, path: Path, given: ParameterSet) -> None:
@@ -76,7 +76,7 @@ class _Believed:
             self._given[name] = given.number(parameter, plant.variables[name].unit, where + name)
 
     def of(self, fmu: FmuModel) -> Iterator[tuple[FmuVariable, float, list[str]]]:
-        """Parameters of an FMU, what it believes of each, and the names of the set that say so."""
+        """Parameters of an FMU, the value of each, and the names of the set that say so."""
         parameters = [v for v in fmu.variables.values() if v.causality == "parameter"]
         estimates = read_estimates(fmu.annotations)
         changing = {estimate.of for estimate in estimates.values() if estimate.change}
