@@ -34,10 +34,8 @@ from .master.simulation import simulate
 from .process.run_state import STATE
 from .process.spawned import mute_started_processes
 from .results.performance import METRICS, table
-from .scenario.load import cut_short, load_scenario, with_settings
-from .scenario.scenario_options import add_scenario_options
+from .scenario.scenario_options import add_scenario_options, chosen_scenario
 from .scenario.schema import Scenario
-from .scenario.setting import parse_assignment
 from .trials.trial_outcome import sheet
 
 EXIT_CODES = {"done": 0, "failed": FAILED, "interrupted": INTERRUPTED}
@@ -143,16 +141,8 @@ def _ensemble(
 
 def _scenario(options: argparse.Namespace) -> Scenario:
     """The scenario with what the options change of it."""
-    chosen = {"step": options.step, "stop": options.stop, "seed": options.seed}
-    scenario = load_scenario(options.scenario, chosen)
-    settings = [parse_assignment(text) for text in options.set]
-    settings += [] if options.log is None else [("log.signals", options.log)]
-    settings += [("log.format", "parquet")] if options.parquet else []
-    settings += [] if options.native is None else [("native", options.native)]
-    settings += [] if options.ship is None else [("ship", options.ship)]
-    if settings:
-        scenario = with_settings(scenario, settings, Path.cwd(), "--set")
-    return scenario if options.stop is None else cut_short(scenario)
+    log = [] if options.log is None else [("log.signals", options.log)]
+    return chosen_scenario(options, *log, *([("log.format", "parquet")] if options.parquet else []))
 
 
 def _no_interrupt() -> None:

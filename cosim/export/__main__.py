@@ -13,8 +13,8 @@ from rich.console import Console
 
 from ..command import BAD_INPUT, command_parser, complain, printable, run_command
 from ..errors import InputError
-from ..scenario.load import load_scenario, with_settings
-from ..scenario.scenario_options import add_scenario_options
+from ..scenario.load import with_settings
+from ..scenario.scenario_options import add_scenario_options, chosen_scenario
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
 from ..system.system import System
@@ -27,9 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
         overrides = list(find_parameters(options.parameters))
-        scenario = load_scenario(options.scenario)
-        if options.ship is not None:
-            scenario = with_settings(scenario, [("ship", options.ship)], Path.cwd(), "--ship")
+        scenario = chosen_scenario(options)
         if scenario.native == "auto":  # FMUs in Python run on every computer, compiled ones on this one
             scenario = with_settings(scenario, [("native", False)], Path.cwd())
         system = prepare(scenario, overrides)

@@ -13,9 +13,7 @@ from rich.console import Console
 
 from ..command import BAD_INPUT, command_parser, complain, printable, run_command
 from ..errors import InputError, SimulationError
-from ..scenario.load import cut_short, load_scenario, with_settings
-from ..scenario.scenario_options import add_scenario_options
-from ..scenario.setting import parse_assignment
+from ..scenario.scenario_options import add_scenario_options, chosen_scenario
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
 from .page_file import write_live_page
@@ -27,12 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
         overrides = list(find_parameters(options.parameters))
-        scenario = load_scenario(options.scenario, {"stop": options.stop, "seed": options.seed})
-        settings = [parse_assignment(text) for text in options.set]
-        settings += [] if options.ship is None else [("ship", options.ship)]
         # The page starts from values of the FMUs in Python, which no compiler has to make.
-        scenario = with_settings(scenario, [*settings, ("native", False)], Path.cwd(), "--set")
-        system = prepare(scenario if options.stop is None else cut_short(scenario), overrides)
+        scenario = chosen_scenario(options, ("native", False))
+        system = prepare(scenario, overrides)
         try:
             out = options.out or Path(f"{scenario.name}.html")
             with console.status("writing the page"):

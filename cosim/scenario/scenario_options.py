@@ -1,10 +1,14 @@
 """Options of commands that run scenarios: which ship, what differs from the file, and how FMUs run."""
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from ..command import positive, whole_number
 from ..compiled.library import NATIVE
+from .load import cut_short, load_scenario, with_settings
+from .schema import Scenario
+from .setting import parse_assignment
 
 OPTIONS: dict[str, dict[str, Any]] = {
     "--stop": {
@@ -51,3 +55,22 @@ def add_scenario_options(parser: argparse.ArgumentParser, *names: str) -> None:
     """Add the options of these names, in their order."""
     for name in names:
         parser.add_argument(name, **OPTIONS[name])
+
+
+def chosen_scenario(options: argparse.Namespace, *more: tuple[str, Any]) -> Scenario:
+    """The scenario that a command is given, with what its options change of it.
+
+    Args:
+        options: of the command line: ``scenario``, and of the options above those that the command has.
+        more: further values by their paths.
+
+    Raises:
+        InputError: no such scenario, or a value that it cannot have.
+    """
+    given = vars(options)
+    scenario = load_scenario(options.scenario, {k: given.get(k) for k in ("step", "stop", "seed")})
+    settings = [*map(parse_assignment, given.get("set", ())), *more]
+    settings += [(k, given[k]) for k in ("native", "ship") if given.get(k) is not None]
+    if settings:
+        scenario = with_settings(scenario, settings, Path.cwd(), "--set" if "set" in given else "--ship")
+    return scenario if given.get("stop") is None else cut_short(scenario)
