@@ -113,7 +113,7 @@ def _sampled(w: WeakWindows) -> np.ndarray:
     s, period = w.smoothed, w.smoothed.track.periods
     rate = w.smooth @ (s.agrees / np.gradient(s.time)[:, None])
     # Weights of samples at uneven distances sum to a little more or less than one.
-    return 1.0 / np.clip(rate, 1.0 / w.width, 1.0 / period)
+    return np.asarray(1.0 / np.clip(rate, 1.0 / w.width, 1.0 / period))
 
 
 def _force_variance(

@@ -63,7 +63,7 @@ class LikelyColumn(NamedTuple):
 def words_of(name: str) -> list[str]:
     """The words of a name, small letters."""
     found = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
-    return [MEANT.get(word, word) for word in found]
+    return [str(MEANT.get(word, word)) for word in found]
 
 
 def unit_in(name: str) -> str:
