@@ -69,7 +69,7 @@ class Filters(NamedTuple):
         return found
 
 
-NO_FILTERS = Filters((0.0,) * 3, (0.0,) * 3)
+NO_FILTERS = Filters((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @lru_cache(maxsize=64)  # runs; a fit asks for the same several times
