@@ -38,21 +38,30 @@ FAR = (
 )  # a position to centimetres beside a good heading: the sway velocity is uncertain
 
 
-@pytest.mark.parametrize("level", in_part([1.0, 4.0, 10.0, FAR], keep=[4.0, FAR]))
-def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level):
-    """With the true model and the same motion under other noise, the model error left is that of the noise."""
+HELD = [(1.0, 1), (4.0, 1), (10.0, 1), (FAR, 1), (4.0, 10)]
+
+
+@pytest.mark.parametrize(("level", "held"), in_part(HELD, keep=[(4.0, 1), (FAR, 1), (4.0, 10)]))
+def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level, held):
+    """With the true model and the same motion under other noise, the model error left is that of the noise.
+
+    The position may be held for some rows, as that of a slow receiver, while each row has a new heading.
+    """
     run, _ = sail(48.0, noise=0.0)
     left, stated = [], []
     for seed in range(6):
         noise = np.multiply(level, NOISE) * np.random.default_rng(seed).standard_normal(run.pose.shape)
         pose = run.pose + noise
         pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
+        pose[:, :2] = pose[np.arange(len(pose)) // held * held, :2]
         w = windows(replace(run, pose=pose))
         left.append(omega(w, Model()))
         stated.append(omega_std(w))
     spread = np.sqrt(np.mean(np.square(left), axis=(0, 1)))
     expected = np.sqrt(np.mean(np.square(stated), axis=(0, 1)))
-    np.testing.assert_allclose(expected, spread, rtol=0.3)
+    np.testing.assert_allclose(expected[2], spread[2], rtol=0.3)
+    # Of a position that is rare a little too much is claimed: the smoother knows the commands.
+    np.testing.assert_allclose(expected[:2], spread[:2], rtol=0.3 if held == 1 else 0.5)
 
 
 def test_a_force_is_as_uncertain_as_its_velocity_whether_a_coefficient_or_given():

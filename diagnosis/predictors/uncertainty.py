@@ -78,13 +78,13 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     """
     model = model or Model()
     filters = model.filters
-    period, sampled = w.smoothed.track.periods, _sampled(w)
+    time, period, sampled = w.scale.time, w.smoothed.track.periods, _sampled(w)
     rounding = np.minimum(w.smoothed.noise, w.smoothed.track.usual_rounding)
     receiver = (w.smoothed.noise**2 - rounding**2) / filters.first_response(period) ** 2
     late = filters.squared_time
     gains = noise_gain()
 
-    def variances(order: int, corner: np.ndarray, time: float) -> np.ndarray:
+    def variances(order: int, corner: np.ndarray) -> np.ndarray:
         gain = _gain(gains, corner, order) / time ** (2 * order + 1)
         rounded = gain
         if filters:
@@ -92,7 +92,7 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         return sampled * (receiver * gain + rounding**2 * rounded)
 
     floor = (FLOOR * w.scale.forces) ** 2
-    return np.sqrt(_force_variance(w, model, variances) + floor)
+    return np.asarray(np.sqrt(_force_variance(w, model, variances) + floor))
 
 
 def undone_variance(w: WeakWindows, model: Model) -> np.ndarray:
@@ -102,9 +102,10 @@ def undone_variance(w: WeakWindows, model: Model) -> np.ndarray:
     undoes a filter has in its error, whether or not there was a filter: undoing a tracker makes a motion
     slower, and noise with it.
     """
-    power, gains = _sampled(w) * w.smoothed.noise**2, noise_gain(model.filters, w.scale.time)
+    time, power = w.scale.time, _sampled(w) * w.smoothed.noise**2
+    gains = noise_gain(model.filters, time)
     return _force_variance(
-        w, model, lambda k, corner, time: power * _gain(gains, corner, k) / time ** (2 * k + 1)
+        w, model, lambda k, corner: power * _gain(gains, corner, k) / time ** (2 * k + 1)
     )
 
 
@@ -117,25 +118,23 @@ def _sampled(w: WeakWindows) -> np.ndarray:
 
 
 def _force_variance(
-    w: WeakWindows, model: Model, variances: Callable[[int, np.ndarray, float], np.ndarray]
+    w: WeakWindows, model: Model, variances: Callable[[int, np.ndarray], np.ndarray]
 ) -> np.ndarray:
     """Variance (K, 3) of the model error [N2, N2, N2 m2] by that of the pose's derivatives.
 
     Args:
         w: windows of a run.
         model: by whose inertia an acceleration is a force.
-        variances: of a derivative's order, w0 (K, 3) and the ship's scale of time (K, 3), averaged
-            over windows.
+        variances: of a derivative's order and w0 (K, 3) that of north, east and heading (K, 3).
     """
-    s, mass, time = w.smoothed, model.reference_mass, w.scale.time
+    s, mass = w.smoothed, model.reference_mass
     smooth = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
-    corner = 3.0 * smooth / (_sampled(w) * s.noise**2) * time
-    # Weights of samples at uneven distances sum to a little more or less than one.
+    corner = 3.0 * smooth / (_sampled(w) * s.noise**2) * w.scale.time
     c2 = np.clip(w.smooth @ np.where(w.known, np.cos(s.eta[:, 2]) ** 2, 0.0), 0.0, 1.0)
 
     def in_axes(order: int) -> np.ndarray:
         """(K, 3), variance of a derivative of the pose in the ship's axes."""
-        x, y, psi = variances(order, corner, time).T
+        x, y, psi = variances(order, corner).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
     pose, velocity, acceleration = map(in_axes, (0, 1, 2))
