@@ -209,15 +209,15 @@ def test_the_page_begins_with_what_others_win(tmp_path):
     answer("nominal", 0.3, 0.02)
     answer("calibrated", 0.1, 0.03)
     answer("learned", 0.2, 0.04)
-    assert [*ships.lost(folder, 0)] == ["in heading calibrated has a larger error than nominal"]
+    assert [*ships.lost(folder, 0)] == [("heading", "calibrated", "nominal")]
     answer("ridge", 0.05, 0.01)
     page = ships.write(tmp_path, ["kvlcc2"]).read_text()
-    told = "in position calibrated has a larger error than ridge; in heading calibrated has a larger"
+    told = "| kvlcc2, 20 s | position | calibrated | ridge |"
     assert page.index(told) < page.index("Errors in windows")
-    assert "has a larger error than nominal and ridge" in page
+    assert "| kvlcc2, 20 s | heading | calibrated | nominal, ridge |" in page
     for name in ("nominal", "ridge"):
         (folder / f"{name}.json").unlink()
-    assert "No other method wins." in ships.write(tmp_path, ["kvlcc2"]).read_text()
+    assert "smaller error" not in ships.write(tmp_path, ["kvlcc2"]).read_text()
 
 
 def test_what_is_not_installed_is_reported_in_one_line(monkeypatch, capsys):
