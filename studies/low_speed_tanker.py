@@ -18,7 +18,6 @@ from cosim import InputError
 from diagnosis import Model, Smoothed, WeakWindows, Windows
 from diagnosis.execution.progress import silent
 from diagnosis.predictors import ship_with
-from diagnosis.predictors.windows import usable_windows
 from fmus.ship import ship
 
 from .ship_folds import read
@@ -135,7 +134,8 @@ def compare_tests(report: Report, runs: Sequence[WeakWindows], before: Errors, a
         runs: the tests.
         before, after: errors of two models on them.
     """
-    counts = [[usable_windows(w.smoothed, h).first_rows.size for h in HORIZONS] for w in runs]
+    together = [diagnosis.Windows([w.smoothed for w in runs], h).run for h in HORIZONS]
+    counts = np.stack([np.bincount(run, minlength=len(runs)) for run in together], axis=1)
     ratios = np.array([after[w.run.name] for w in runs]) / np.array([before[w.run.name] for w in runs])
     quantities = [f"{what}, {h:.0f} s" for h in HORIZONS for what in ("position", "heading")]
     pairs = ratios[..., :2].reshape(len(runs), -1)

@@ -197,6 +197,29 @@ def test_outsider_joins_by_an_entry_point(monkeypatch):
         ships.entry("mind")
 
 
+def test_the_page_begins_with_what_others_win(tmp_path):
+    folder = tmp_path / "kvlcc2"
+    folder.mkdir()
+
+    def answer(name, position, heading):
+        scores = [[position, heading, -1.0, 0.9]]
+        found = {run: {"scores": scores, "seconds": 1.0} for run in ("one", "two")}
+        (folder / f"{name}.json").write_text(json.dumps(found))
+
+    answer("nominal", 0.3, 0.02)
+    answer("calibrated", 0.1, 0.03)
+    answer("learned", 0.2, 0.04)
+    assert [*ships.lost(folder, 0)] == [("heading", "calibrated", "nominal")]
+    answer("ridge", 0.05, 0.01)
+    page = ships.write(tmp_path, ["kvlcc2"]).read_text()
+    told = "| kvlcc2, 20 s | position | calibrated | ridge |"
+    assert page.index(told) < page.index("Errors in windows")
+    assert "| kvlcc2, 20 s | heading | calibrated | nominal, ridge |" in page
+    for name in ("nominal", "ridge"):
+        (folder / f"{name}.json").unlink()
+    assert "smaller error" not in ships.write(tmp_path, ["kvlcc2"]).read_text()
+
+
 def test_what_is_not_installed_is_reported_in_one_line(monkeypatch, capsys):
     def missing(name, package):
         raise ModuleNotFoundError(name)

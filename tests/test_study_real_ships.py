@@ -436,16 +436,17 @@ def test_tests_of_one_log_are_left_out_together():
 
 
 @pytest.mark.slow
-def test_errors_are_compared_test_by_test(tmp_path):
+def test_errors_are_compared_test_by_test(tmp_path, monkeypatch):
+    monkeypatch.setattr(low_speed_tanker, "HORIZONS", (4.0, 8.0))
     w = weak_windows(smoothed(sail()[0]))
     before = {w.run.name: [(1.0, 2.0, np.nan), (4.0, 4.0, np.nan)]}
     after = {w.run.name: [(0.5, 3.0, 0.9), (4.4, 2.0, 0.9)]}
     report = Report(tmp_path, "Tests")
     low_speed_tanker.compare_tests(report, [w], before, after)
     text = report.write().read_text()
-    windows = " | ".join(str(usable_windows(w.smoothed, h).first_rows.size) for h in (20.0, 60.0))
+    windows = " | ".join(str(usable_windows(w.smoothed, h).first_rows.size) for h in (4.0, 8.0))
     assert f"| {w.run.name} | {windows} | 0.50 | 1.50 | 1.10 | 0.50 |" in text
-    assert "0 in position, 20 s; 1 in heading, 20 s; 1 in position, 60 s; 0 in heading, 60 s" in text
+    assert "0 in position, 4 s; 1 in heading, 4 s; 1 in position, 8 s; 0 in heading, 8 s" in text
 
 
 @needs_esso

@@ -43,6 +43,9 @@ OWN = {
 }
 
 
+PROJECT = ("calibrated", "learned")  # methods of this project; nominal is what all begin with
+
+
 def entry(name: str) -> Entry | None:
     """The entry of a name; None: it needs a package that is not installed.
 
@@ -116,9 +119,31 @@ def rows(folder: Path, horizon: int) -> Iterator[list[str]]:
         yield [name, str(len(runs)), *cells, f"{likelihood:.3g}", f"{100 * inside:.0f}", f"{took:.3g}"]
 
 
+def lost(folder: Path, horizon: int) -> Iterator[tuple[str, str, str]]:
+    """Position or heading, this project's best method, and those that have a smaller error."""
+    read = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
+    for k, quantity in enumerate(("position", "heading")):
+        errors = {
+            name: float(np.mean([np.log(r["scores"][horizon][k]) for r in found.values()]))
+            for name, found in read.items()
+            if found and all(len(r["scores"]) > horizon for r in found.values())
+        }
+        own = {name: error for name, error in errors.items() if name in PROJECT}
+        if own:
+            best = min(own, key=lambda name: own[name])
+            better = [n for n, e in errors.items() if n not in PROJECT and e < own[best]]
+            if better:
+                yield quantity, best, ", ".join(better)
+
+
 def write(folder: Path, names: Sequence[str]) -> Path:
     """The report of all answers in a folder; its path."""
     report = Report(folder, "Methods on measured ships", [SEED])
+    horizons = [(name, k, h) for name in names for k, h in enumerate(DATASETS[name].horizons)]
+    told = [[f"{n}, {h:g} s", *each] for n, k, h in horizons for each in lost(folder / n, k)]
+    if told:
+        report.text("Here other methods have a smaller error than the best one of this project.")
+        report.table(["data", "error", "best of this project", "smaller error"], told)
     packages = {p for p in ("sysidentpy", "pysindy", "scikit-learn") if _version(p)}
     report.text(
         """Errors in windows of runs that were left out of the training: geometric means over the runs,
