@@ -32,10 +32,7 @@ WORDS = {
 }
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Short and other words of names -> the words that actuators' names have.
-MEANT = {
-    **dict.fromkeys(("stbd", "stb", "right"), "starboard"),
-    "left": "port",
-}
+MEANT = {"stbd": "starboard", "stb": "starboard", "right": "starboard", "left": "port"}
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
@@ -62,7 +59,7 @@ class LikelyColumn(NamedTuple):
 
 def words_of(name: str) -> list[str]:
     """The words of a name, small letters."""
-    found = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    found: list[str] = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
     return [MEANT.get(word, word) for word in found]
 
 
