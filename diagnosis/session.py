@@ -354,8 +354,8 @@ def begin(
     blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
     if blocks < PARTS:
         raise InputError(
-            f"too little data to learn from: {blocks * block:.3g} s with thrusters at work; at "
-            f"least {PARTS * block:.3g} s are needed"
+            f"too little data to learn from: thrusters are at work in {blocks} stretches of "
+            f"{block:.3g} s; at least {PARTS} are needed"
         )
     first, last = len(train), len(runs) - len(held_out)
     parts = runs[:first], runs[first:last], runs[last:]

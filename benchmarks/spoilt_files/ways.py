@@ -209,7 +209,9 @@ add("drift", lambda table, _: table.assign(x=table.x + 0.01 * table.time), "curr
 
 for name, unit in {"tau_mN": 1e3, "tau_kN": 1e-3, "tau_percent": 1e2}.items():
     add(name, scaled(TAU, unit))
-add("tau_double", scaled(TAU, 2.0), "loss_surge", "loss_sway", "loss_yaw")
+# Half of the commanded force arrives: on each axis, which is the same as of each thruster.
+HALF = ("loss_surge", "loss_sway", "loss_yaw", "loss_vsp", "loss_bow")
+add("tau_double", scaled(TAU, 2.0), *HALF)
 add("tau_N_Nmm", scaled(["tau_N"], 1e3))
 add("const_psi", constant(["psi"], [0.3]))
 add("const_x", constant(["x"], [5.0]))

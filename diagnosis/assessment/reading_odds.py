@@ -57,12 +57,11 @@ class Explanation:
         s, low, high = np.array(self.priors).T
         columns, unit = np.array([*(np.array(self.columns) * s[:, None, None]), e]), np.eye(s.size)
         # (3, s + 1, s + 1), of each axis: as good as its rows, and few.
-        axes = np.asarray(np.linalg.qr(columns.transpose(2, 1, 0), mode="r"))
+        axes = np.linalg.qr(columns.transpose(2, 1, 0)).R
         b, design = np.zeros(s.size), unit
         for _ in range(ROUNDS):
             weight = np.sqrt(windows / len(e)) / _noise(axes, b, len(e), least)
-            rows = (axes * weight[:, None, None]).reshape(-1, s.size + 1)
-            R = np.asarray(np.linalg.qr(rows, mode="r"))
+            R = np.linalg.qr((axes * weight[:, None, None]).reshape(-1, s.size + 1)).R
             design, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
             b = lsq_linear(design, y, (low / s, high / s), method="bvls").x
         noise = _noise(axes, b, len(e), least)

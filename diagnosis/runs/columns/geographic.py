@@ -16,8 +16,10 @@ from .likely_columns import words_of
 from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
+# Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 MOST = {"x": 90.0, "y": 180.0}  # degrees
+# Units of an angle that are not SI.
 DEGREES = {unit for unit, size in UNITS["angle"].items() if size != 1.0}
 
 

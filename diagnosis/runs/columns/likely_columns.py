@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cleaning import SHOWN
-from ..sensors.evidence import FEWEST
 from .unit_check import UNITS, doubts
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -33,14 +32,12 @@ WORDS = {
 }
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Short and other words of names -> the words that actuators' names have.
-MEANT = {
-    **dict.fromkeys(("stbd", "stb", "right"), "starboard"),
-    "left": "port",
-}
+MEANT = {"stbd": "starboard", "stb": "starboard", "right": "starboard", "left": "port"}
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
 SMOOTHED = 1.0  # s, over which speeds are taken (chosen)
+FEWEST = 20  # rows of which a correlation says anything (chosen)
 LIKELY = 0.4  # correlation or likeness of names from which on it counts (chosen)
 # Largest numbers of an angle and of a command in any of their units, with what overshoots (chosen).
 LARGEST = {"angle": 400.0, "command": 105.0}
@@ -62,8 +59,8 @@ class LikelyColumn(NamedTuple):
 
 def words_of(name: str) -> list[str]:
     """The words of a name, small letters."""
-    found = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
-    return [str(MEANT.get(word, word)) for word in found]
+    found: list[str] = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+    return [MEANT.get(word, word) for word in found]
 
 
 def unit_in(name: str) -> str:

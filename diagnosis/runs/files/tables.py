@@ -144,7 +144,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
     if wrong is not None and where is not None:
         raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a time stamp of ISO 8601")
     seconds = np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
-    ends = pd.Series(stamps[leap]).dt.floor("s").unique() + pd.Timedelta(seconds=1)
+    ends = pd.DatetimeIndex(stamps[leap]).floor("s").unique() + pd.Timedelta(seconds=1)
     return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
 
 
