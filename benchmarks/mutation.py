@@ -43,7 +43,7 @@ from benchmarks.line_mutants import PACKAGES, ROOT, Mutant, again, draw
 from benchmarks.near_tests import FARTHEST, FOUND, OURS, Nearness, around
 
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
-KILLED, SURVIVED, SAME = "killed", "survived", "equivalent"
+KILLED, SURVIVED, SAME, OPEN = "killed", "survived", "equivalent", "not judged"
 MEMORY = 8 * 2**30  # bytes of address space of a mutant
 ALONE = 45  # s of processor time of one test, after which it does not end
 # Pages that tests compare with the code, for what stands outside of functions.
@@ -124,7 +124,7 @@ class Judge:
         for n, item in enumerate(self.items):
             file, function = item.nodeid.partition("::")[0], item.nodeid.partition("[")[0]
             near = self.near(m, names, file, self.texts.get(item.nodeid, ""))
-            if near < FARTHEST:
+            if near < FARTHEST or self.options.tests:
                 rank = near + 0.5 * min(cases[function], 5)
                 found.append((rank, self.seconds.get(item.nodeid, 0.3), n, item))
             cases[function] += 1
@@ -137,8 +137,10 @@ class Judge:
         pid = os.fork()
         if not pid:
             os.close(read)
-            with suppress(BaseException):
+            try:
                 self._run(m, order, write)
+            except BaseException as error:
+                os.write(write, f"error\t{error!r}\n".encode())
             os._exit(3)
         os.close(write)
         told, end = b"", time.monotonic() + 100.0 * self.options.cpu
@@ -154,6 +156,8 @@ class Judge:
         passed = {line[1]: float(line[2]) for line in lines if line[0] == "passed"}
         self.seconds |= passed
         fails = [line[1] for line in lines if line[0] == "failed"]
+        if errors := [line[1] for line in lines if line[0] == "error"]:
+            return OPEN, errors[0]
         if fails or not [line for line in lines if line[0] == "end"]:
             return KILLED, fails[0] if fails else "does not end"
         return SURVIVED, str(len(passed))
@@ -249,7 +253,7 @@ def table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
         if fate == SURVIVED:
             yield f"{row['module']}:{row['line']}\n  - {row['before']}\n  + {row['after']}"
     for name in (*(p for p in PACKAGES if p in fates), "all"):
-        killed, made = fates[name][KILLED], fates[name].total() - fates[name][SAME]
+        killed, made = fates[name][KILLED], fates[name].total() - fates[name][SAME] - fates[name][OPEN]
         low, high = binomtest(killed, made).proportion_ci() if made else (0.0, 1.0)
         interval = f"{100 * low:.0f} to {100 * high:.0f} %"
         yield f"{name}: {killed} / {made} ({interval}), {fates[name][SAME]} equivalent"
@@ -281,7 +285,7 @@ def main() -> None:
     rows = [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
     done = {(r["module"], r["before"], r["after"]): r for r in rows}  # the last one of each
     if options.again:
-        alive = [key for key, row in done.items() if row["fate"] == SURVIVED]
+        alive = [key for key, row in done.items() if row["fate"] in (SURVIVED, OPEN)]
         mutants = [m for key in alive if (m := again(*key))]
     else:
         drawn = draw(options.mutants, options.seed, options.packages)

@@ -1,6 +1,5 @@
 """Parameters and inputs of the FMUs as a page: ``python tests/support/fmu_variables.py > docs/fmu_variables.md``."""
 
-import re
 import sys
 from collections.abc import Iterable, Iterator
 
@@ -13,38 +12,35 @@ HEAD = """# Parameters of the FMUs
 
 With this page you can look up the parameters and inputs of each FMU of CyberShip Enterprise 1, with start values, units and ranges, and those that a
 ship file may give. A start value holds where a scenario or a ship file gives none. `python -m fmus.build --list vessel` prints the variables of one
-FMU, its outputs included; `python tests/support/fmu_variables.py` prints this page.
+FMU with their descriptions, its outputs included. `python tests/support/fmu_variables.py` prints this page.
 """
 
 
-def row(v: Variable) -> tuple[str, ...]:
-    """What a table says of a variable after its name."""
+def limits(v: Variable) -> str:
+    """What a table says of the values that a variable may have, and of how well it is known."""
     low, high = v.range.min, v.range.max
-    allowed = [f"≥ {low!r}"] * (low is not None) + [f"≤ {high!r}"] * (high is not None)
-    allowed += ["at initialisation"] * v.fixed
-    known = ""
+    found = [f"≥ {low!r}"] * (low is not None) + [f"≤ {high!r}"] * (high is not None)
+    found += ["at initialisation"] * v.fixed
     if v.known:
-        known = f", known to ± {v.known.std!r}" if v.known.std else f", ± {100.0 * v.known.share:.3g} %"
-    return repr(v.start), v.unit, ", ".join(allowed), v.description + known
+        found.append(f"± {v.known.std!r}" if v.known.std else f"± {100.0 * v.known.share:.3g} %")
+    return ", ".join(found)
 
 
 def table(owners: Iterable[tuple[str, Iterable[Variable]]]) -> Iterator[str]:
-    """Lines of a table: the variables of a series, and equal ones of several owners, share one line."""
-    rows: dict[tuple[str, ...], list[str]] = {}
+    """Lines of a table: variables of the same owners and limits share one line."""
+    of: dict[tuple[str, float, str, str], list[str]] = {}
     for owner, declared in owners:
-        series: dict[tuple[str, ...], list[Variable]] = {}
         for v in declared:
-            *first, text = row(v)
-            key = *(re.sub(r"(?<=[_ ])\d+\b", "K", of) for of in (v.name, text)), *first
-            series.setdefault(key, []).append(v)
-        for members in series.values():
-            names, cells = [v.name for v in members], row(members[0])
-            name = f"`{names[0]}`" + f" … `{names[-1]}` ({len(names)})" * (len(names) > 1)
-            rows.setdefault((name, *(c.replace("|", "\\|") for c in cells)), []).append(owner)
-    yield "| name | start | unit | allowed | description | of |\n|---|--:|---|---|---|---|"
-    for cells, names in rows.items():
+            of.setdefault((v.name, v.start, v.unit, limits(v)), []).append(owner)
+    rows: dict[tuple[str, str], dict[str, list[str]]] = {}
+    for (name, start, unit, allowed), names in of.items():
         more = f" and {len(names) - 2} more" * (len(names) > 3)
-        yield f"| {' | '.join(cells)} | {', '.join(f'`{n}`' for n in names[: 2 if more else 3])}{more} |"
+        owned = ", ".join(f"`{n}`" for n in names[: 2 if more else 3]) + more
+        rows.setdefault((owned, allowed), {}).setdefault(f"{start!r} {unit}", []).append(f"`{name}`")
+    yield "| of | allowed, known to | start values |\n|---|---|---|"
+    for cells, starts in rows.items():
+        told = "; ".join(f"{start}: {', '.join(names)}" for start, names in starts.items())
+        yield f"| {' | '.join(cells)} | {told} |"
 
 
 def page() -> str:
