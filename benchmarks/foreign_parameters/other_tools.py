@@ -90,8 +90,8 @@ SOURCES = {
         "64fa89cb6f8435a57d4026cdaa730dd2015a77c2c51abdbe598a945e223f8dfc", *ASSOCIATION),
 }  # fmt: skip
 # The subsystems export parameters as inputs; their masses are weighed, as only ratios show otherwise.
-# MassSpringSystem integrates by Euler's method, and oscillates to 6 m: a spring that softens by more than
-# 0.01 N/m2 is none there, and its runs diverge.
+# MassSpringSystem integrates by Euler's method, and oscillates to 6 m: with a spring that softens by
+# more its runs diverge.
 # HarmonicOscillator takes ten steps from sample to sample, in Python: its runs are shorter.
 # The last two have no input: their missing force changes a rate, and no map can name it.
 OTHERS = (

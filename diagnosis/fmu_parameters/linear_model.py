@@ -50,7 +50,7 @@ class LinearModel:
         at: variable -> value about which: states and inputs, and what outputs are there.
         x_dot: (n,), rate of the states there.
         A, B, C, D: the matrices.
-        doubt: by how much longer steps change A, as a share of its largest value; 0: no rate is by steps.
+        doubt: change of A by longer steps, as a share of its largest value; 0: no rate is by steps.
     """
 
     states: Sequence[str]

@@ -281,9 +281,7 @@ class WindowResiduals:
         again = np.any(np.array(last) > 2.0 * steps)
         return self._differences(setting, sizes) if again else found
 
-    def _differences(
-        self, setting: Setting, sizes: Sequence[float]
-    ) -> tuple[np.ndarray, list[str]]:
+    def _differences(self, setting: Setting, sizes: Sequence[float]) -> tuple[np.ndarray, list[str]]:
         """The same with the steps that the last slopes ask for."""
         each = [*self._moved(setting, sizes)]
         settings = [s for _, low, high, _, _ in each for s in (low, high)]
