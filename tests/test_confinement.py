@@ -5,15 +5,18 @@ import re
 import signal
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 from support.events import once_there
 from support.foreign import build_lag, needs_compiler
+from support.plain import GAIN
 from support.spy import build_spy, found
 
-from cosim import SimulationError
+from cosim import InputError, SimulationError
 from cosim.fmu import ConfinedFmu, DoubleMemory, FmuModel, Port
+from cosim.fmu.isolation.confinement import needed_folders
 from cosim.fmu.isolation.worker_process import LONGEST_PRINTED, MOST_PRINTED, cleaned
 
 pytestmark = needs_compiler
@@ -246,3 +249,41 @@ def test_processes_end_with_a_master_that_is_killed(tmp_path):
     master.wait()
     master.stdout.close()
     once_there(lambda: not any(Path(f"/proc/{pid}").exists() for pid in pids))
+
+
+def test_installed_packages_of_the_environment_can_be_read_and_no_other_folder(tmp_path, monkeypatch):
+    installed, own = tmp_path / "more" / "site-packages", tmp_path / "work"
+    for folder in (installed, own):
+        folder.mkdir(parents=True)
+        monkeypatch.syspath_prepend(folder)
+    assert str(installed) in needed_folders()
+    assert str(own) not in needed_folders()
+
+
+def test_a_python_fmu_imports_its_own_module_after_a_reset(plain_fmu):
+    late = "if 'pytest' not in __import__('sys').modules: import late_helper; self.y = late_helper.VALUE"
+    fmu = plain_fmu("Late", f"{GAIN}\n{late}\n")
+    with zipfile.ZipFile(fmu, "a") as archive:
+        archive.writestr("resources/late_helper.py", "VALUE = 3.5\n")
+    confined = opened(fmu)
+    try:
+        instance, memory = confined.instance(), DoubleMemory(1)
+        instance.bind([], [Port(confined.model.variables["y"], 0)], memory, 0.1)
+        instance.reset()
+        instance.set_up(1.0)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        assert instance.get_value(confined.model.variables["y"]) == 3.5
+        instance.free()
+    finally:
+        confined.close()
+
+
+def test_a_package_that_a_python_fmu_lacks_is_named(plain_fmu):
+    here = "if 'pytest' not in __import__('sys').modules: import no_such_package"
+    confined = opened(plain_fmu("Lacks", f"{GAIN}\n{here}\n"))
+    try:
+        with pytest.raises(InputError, match="No module named 'no_such_package'"):
+            confined.instance().set_up(1.0)
+    finally:
+        confined.close()

@@ -49,9 +49,9 @@ def truth(s: ForeignSystem, cause: str) -> dict[str, float]:
 
 @contextmanager
 def _opened(
-    path: Path, kind: type[FMU2Model] | type[FMU2Slave], values: Mapping[str, float], stop: float
+    path: Path, kind: type[FMU2Model] | type[FMU2Slave], values: Mapping[str, float]
 ) -> Iterator[tuple[FMU2Model | FMU2Slave, dict[str, int], ModelDescription]]:
-    """An FMU in its initialization mode [until ``stop`` s], its value references, its description."""
+    """An FMU in its initialization mode, its value references, and its description."""
     description = read_model_description(str(path), validate=False)
     mode = description.modelExchange if kind is FMU2Model else description.coSimulation
     assert mode is not None
@@ -66,7 +66,7 @@ def _opened(
         # With another tolerance than its own an FMU is another model, by its solver's errors.
         own = description.defaultExperiment
         tolerance = None if own is None or own.tolerance is None else float(own.tolerance)
-        fmu.setupExperiment(tolerance=tolerance, startTime=0.0, stopTime=stop)
+        fmu.setupExperiment(tolerance=tolerance, startTime=0.0)
         fmu.setReal([place[n] for n in values], [*values.values()])
         fmu.enterInitializationMode()
         yield fmu, place, description
@@ -85,7 +85,7 @@ def _by_steps(
     path: Path, s: ForeignSystem, forced: bool, values: dict[str, float], inputs: dict[str, np.ndarray]
 ) -> np.ndarray:
     """Output of a co-simulation, with the missing force on an input."""
-    with _opened(path, FMU2Slave, values, s.samples * s.step) as (fmu, place, description):
+    with _opened(path, FMU2Slave, values) as (fmu, place, description):
         assert isinstance(fmu, FMU2Slave)
         steps = _own_step(description, s.step)
         h, y, rest = s.step / steps, [], values.get(s.force, 0.0)
@@ -114,7 +114,7 @@ def _by_rates(
 
     By Euler's method and with events at the ends of steps, as the Reference FMUs do in a co-simulation.
     """
-    with _opened(path, FMU2Model, values, s.samples * s.step) as (fmu, place, description):
+    with _opened(path, FMU2Model, values) as (fmu, place, description):
         assert isinstance(fmu, FMU2Model)
         fmu.exitInitializationMode()
         steps = _own_step(description, s.step)

@@ -195,11 +195,11 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
 
 
 def _nearest_key(at: Location) -> str:
-    key = str(at[-1])
+    *within, key = ("", *at)
     table: type[BaseModel] = ParameterFile
-    if len(at) > 1:
-        table = Prior if "prior" in at else CalibratedParameter
-    return nearest(key, table.model_fields)
+    if "parameters" in within:
+        table = Prior if "prior" in within else CalibratedParameter
+    return nearest(str(key), table.model_fields)
 
 
 def write_parameters(path: Path, parameters: Collection[CalibratedParameter]) -> None:

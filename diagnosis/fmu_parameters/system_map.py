@@ -112,12 +112,12 @@ def read_system_map(path: Path) -> SystemMap:
 
 
 def _nearest_key(at: Location) -> str:
-    key = str(at[-1])
     tables: dict[int | str, type[BaseModel]] = {
         "inputs": DrivenInput, "outputs": MeasuredOutput, "start": MappedVariable
     }  # fmt: skip
-    table = tables.get(at[0], SystemMap) if len(at) > 1 else SystemMap
-    return nearest(key, table.model_fields)
+    group, *_, key = at if len(at) > 1 else ("", *at)
+    table = tables.get(group, SystemMap)
+    return nearest(str(key), table.model_fields)
 
 
 def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemMap:

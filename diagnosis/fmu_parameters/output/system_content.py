@@ -289,10 +289,7 @@ class CalibrationReport:
         return Document("Calibration of an FMU", self.sentence, sections, origin)
 
 
-ALONE = (
-    "To identify one of them alone, leave known ones out of the parameter file, or measure a further "
-    "output."
-)
+ALONE = "To identify one of them alone, leave known ones out of the file of parameters."
 PARAMETERS = ("parameter", "start", "value", "95 % interval", "unit", "")
 FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indistinguishable")
 ERRORS = ("run", "output", "rms before", "rms after", "unit")
