@@ -16,7 +16,7 @@ from .system_calibration import TOGETHER
 # it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
 HALVINGS = 5  # of a range that the FMU fails in, to find where it works; chosen: to a thirtieth
-ROUNDING = 1e-9  # of the squared length of a slope, below which a combination changes nothing; chosen
+ROUNDING = 1e-5  # of the squared length of a slope by differences, below which it is not known; chosen
 SHARED = 0.1  # of a direction that two parameters share, as a cosine; chosen
 EXTREME = 3.0  # prior standard deviations, at which a range without an end is tried; chosen
 
@@ -98,7 +98,7 @@ def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
     unit = slopes / np.linalg.norm(slopes, axis=0)
     size, along = np.linalg.eigh(unit.T @ unit)
     inflated = along**2 @ (1.0 / np.maximum(size, ROUNDING))
-    weak = along[:, size < 1.0 - TOGETHER]
+    weak = along[:, size < 1.0 - TOGETHER**2]  # an inflated variance has one at least
     shared = np.abs(weak @ weak.T)
     own = np.sqrt(np.diag(shared))
     inside = inflated > 1.0 / (1.0 - TOGETHER**2)
