@@ -17,7 +17,7 @@ from .system_calibration import TOGETHER
 UNTOLD = 0.9
 HALVINGS = 5  # of a range that the FMU fails in, to find where it works; chosen: to a thirtieth
 ROUNDING = 1e-5  # of the squared length of a slope by differences, below which it is not known; chosen
-SHARED = 0.1  # of a direction that two parameters share, as a cosine; chosen
+SHARED = 0.1  # of a direction: part of a parameter in it, and cosine of two parts; chosen
 EXTREME = 3.0  # prior standard deviations, at which a range without an end is tried; chosen
 
 
@@ -101,7 +101,7 @@ def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
     weak = along[:, size < 1.0 - TOGETHER**2]  # an inflated variance has one at least
     shared = np.abs(weak @ weak.T)
     own = np.sqrt(np.diag(shared))
-    inside = inflated > 1.0 / (1.0 - TOGETHER**2)
+    inside = (inflated > 1.0 / (1.0 - TOGETHER**2)) & (own > SHARED)
     edges = (shared > SHARED * np.outer(own, own)) & np.outer(inside, inside)
     count, group = connected_components(edges, directed=False)
     groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
