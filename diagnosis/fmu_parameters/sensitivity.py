@@ -15,8 +15,8 @@ from .residuals import Setting, WindowResiduals
 # Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
 # it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
-ROUNDING = 1e-9  # of the squared length of a slope, below which a combination changes nothing; chosen
-SHARED = 0.1  # of a direction that two parameters share, as a cosine; chosen
+ROUNDING = 1e-5  # of the squared length of a slope by differences, below which it is not known; chosen
+SHARED = 0.1  # of a direction: part of a parameter in it, and cosine of two parts; chosen
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
     unit = slopes / np.linalg.norm(slopes, axis=0)
     size, along = np.linalg.eigh(unit.T @ unit)
     inflated = along**2 @ (1.0 / np.maximum(size, ROUNDING))
-    weak = along[:, size < 1.0 - TOGETHER]
+    weak = along[:, size < 1.0 - TOGETHER**2]  # an inflated variance has one at least
     shared = np.abs(weak @ weak.T)
     own = np.sqrt(np.diag(shared))
-    inside = inflated > 1.0 / (1.0 - TOGETHER**2)
+    inside = (inflated > 1.0 / (1.0 - TOGETHER**2)) & (own > SHARED)
     edges = (shared > SHARED * np.outer(own, own)) & np.outer(inside, inside)
     count, group = connected_components(edges, directed=False)
     groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
