@@ -148,7 +148,7 @@ def confinement_options(made: argparse.ArgumentParser) -> None:
         "--timeout",
         type=positive,
         metavar="SECONDS",
-        help="longest time of one prediction by the FMU [s] (default: 120)",
+        help="longest time of one prediction by the FMU [s] (default: 120, or 0.1 for each step)",
     )
     made.add_argument(
         "--unconfined",

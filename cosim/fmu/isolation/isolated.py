@@ -43,7 +43,10 @@ START_TIMEOUT = 60.0
 EXIT_TIMEOUT = 5.0
 # Wall time between two looks at a call that is under way [s], at most; chosen: short beside TIMEOUT.
 WATCH_INTERVAL = 0.5
-START = "its instantiation"
+# Wall time of a whole run where none is given [s]: RUN_TIMEOUT, or SLOW_STEP for each step where that is
+# more; chosen: no FMU that is of use takes longer.
+RUN_TIMEOUT, SLOW_STEP = 120.0, 0.1
+START, RUN = "its instantiation", "a run"
 
 
 class IsolatedInstance:
@@ -53,7 +56,8 @@ class IsolatedInstance:
         name: instance name.
         model: what to run.
         on_message: receives the messages that the FMU logs.
-        timeout: longest wall time that one call may take [s]; None: by what a step usually takes.
+        timeout: longest wall time that one call may take [s]; None: by what a step usually takes, and by
+            the number of steps of a whole run.
         start: makes its process.
         printed: receives each line that the FMU prints.
 
@@ -87,6 +91,7 @@ class IsolatedInstance:
         self._in_frame = False  # an exception inside a frame makes the channel unusable
         self._waiting_since: float | None = None
         self._is_late = False
+        self._steps = 0  # of the whole run that is under way
         self._spent, self._answers = 0.0, 0  # on answers but that of the instantiation [s]
         self._closed = threading.Event()
         threading.Thread(target=self._watch, name=f"watch {name}", daemon=True).start()
@@ -104,6 +109,8 @@ class IsolatedInstance:
     def _allowed(self) -> float:
         if self._asked == START:
             return max(self._timeout or 0.0, START_TIMEOUT)
+        if self._asked == RUN:
+            return self._timeout or max(RUN_TIMEOUT, SLOW_STEP * self._steps)
         usual = self._spent / max(1, self._answers)
         return self._timeout or max(TIMEOUT, TIMES_USUAL * usual)
 
@@ -276,15 +283,15 @@ class IsolatedInstance:
         Raises:
             SimulationError: the FMU refuses or fails.
         """
-        what = "a run"
-        told = self._call(what, "whole_run", dict(start), inputs.hex(), [*terms], steps, h)
+        self._steps = steps
+        told = self._call(RUN, "whole_run", dict(start), inputs.hex(), [*terms], steps, h)
         try:
             found = bytes.fromhex(told)
         except (TypeError, ValueError):
             found = b""
         rows, rest = divmod(len(found), self._width)
         if rest or not 0 < rows <= steps + 1:
-            self._asked = what
+            self._asked = RUN
             self._give_up(is_garbled=True)
         return found
 

@@ -29,7 +29,6 @@ from cosim.fmu import (
 from ..predictor import Execution
 
 PROCESSES = 2  # chosen: as everywhere in the diagnosis
-LONGEST = 120.0  # s that one prediction may take; chosen: a window is some thousand steps
 
 
 def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
@@ -40,7 +39,7 @@ def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
     """
     try:
         means = MEANS if execution.confined else ()
-        return ConfinedFmu(model, means, execution.timeout or LONGEST)
+        return ConfinedFmu(model, means, execution.timeout)
     except SimulationError as error:
         raise InputError(str(error)) from None
 
