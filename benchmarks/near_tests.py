@@ -38,7 +38,7 @@ class Nearness:
         files = [path for name in OURS for path in ROOT.glob(f"{name}/**/*.py")]
         graph = {path: list(dict.fromkeys(imported(path))) for path in files}
         self.steps: dict[str, dict[str, int]] = defaultdict(dict)
-        tests = [path for path in files if path.match("tests/**/test_*.py")]
+        tests = [*(ROOT / "tests").rglob("test_*.py")]
         for test in tests:
             for module, steps in distances(test, graph).items():
                 self.steps[module.relative_to(ROOT).as_posix()][test.relative_to(ROOT).as_posix()] = (
