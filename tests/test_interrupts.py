@@ -173,15 +173,16 @@ import signal
 from contextlib import suppress
 from cosim import run
 from cosim.command import run_command
+from cosim.scenario import scenario_options
 
-load = run.load_scenario
+load = scenario_options.load_scenario
 
 def loads(*arguments):
     with suppress(KeyboardInterrupt):  # as where Python runs a callback of C
         signal.raise_signal(signal.SIGTERM)
     return load(*arguments)
 
-run.load_scenario = loads
+scenario_options.load_scenario = loads
 run_command(run.main)
 """
 

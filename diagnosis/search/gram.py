@@ -61,7 +61,7 @@ class Entry(NamedTuple):
         precision: (p, p), their prior precision.
         offset: (q,), offset of the nuisance parameters that belongs to what is given.
         nonlinear: number of parameters that are given, not fitted.
-        quieted: loss that it takes away by the noise alone, see :func:`.candidates.quieted`.
+        quieted: fall of the loss by the noise alone, see :func:`.candidates.quieted`.
     """
 
     given: int
