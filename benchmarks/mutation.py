@@ -84,7 +84,7 @@ class Judge:
         return KILLED, test
 
     def _files(self, m: Mutant) -> list[str]:
-        names, _ = around(m)
+        names = around(m)
         ranked = sorted(
             (self.near(m, names, file), len(text), file) for file, text in self.near.texts.items()
         )

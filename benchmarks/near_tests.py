@@ -75,13 +75,11 @@ def distances(start: Path, graph: dict[Path, list[Path]]) -> dict[Path, int]:
     return steps
 
 
-def around(m: Mutant) -> tuple[list[str], bool]:
-    """Names of the functions and classes around a mutant's line; is it in a function's body?"""
-    names, inside = [], False
-    for node in ast.walk(ast.parse((ROOT / m.module).read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and (
-            node.lineno <= m.line <= (node.end_lineno or 0)
-        ):
-            names.append(node.name)
-            inside |= isinstance(node, ast.FunctionDef) and node.lineno < node.body[0].lineno <= m.line
-    return names, inside
+def around(m: Mutant) -> list[str]:
+    """Names of the functions and classes around a mutant's line."""
+    return [
+        node.name
+        for node in ast.walk(ast.parse((ROOT / m.module).read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and node.lineno <= m.line <= (node.end_lineno or 0)
+    ]

@@ -180,14 +180,14 @@ def linearised(
     suggested = model.description.defaultExperiment
     h = float(suggested.stepSize) if suggested is not None and suggested.stepSize else STEP
     with closing(confined(model, execution)) as fmu:
-        base, J = _by_steps(fmu, states, start, driven, outputs, h)
-        n, exact = len(states), _exact(fmu, states, start, driven, outputs, h)
-        doubt = 0.0
-        if exact is not None:
-            J = exact
-        elif any(s.order for s in states):
-            _, longer = _by_steps(fmu, states, start, driven, outputs, 2.0 * h)
-            doubt = float(np.abs(longer - J)[:n, :n].max() / max(np.abs(J[:n, :n]).max(), 1e-300))
+        n, doubt, every = len(states), 0.0, (*(s.name for s in states), *driven)
+        J = _exact(fmu, states, start, driven, outputs, h)
+        base, slopes = _by_steps(fmu, states, start, driven, outputs, h, every if J is None else ())
+        if J is None:
+            J = slopes
+            if any(s.order for s in states):
+                _, longer = _by_steps(fmu, states, start, driven, outputs, 2.0 * h, every)
+                doubt = float(np.abs(longer - J)[:n, :n].max() / max(np.abs(J[:n, :n]).max(), 1e-300))
     if not (np.isfinite(J).all() and np.isfinite(base).all()):
         raise InputError(f"'{model.path.name}' has no finite derivatives in this state")
     values = {**start, **driven, **dict(zip(outputs, base[n:].tolist(), strict=True))}
@@ -204,8 +204,9 @@ def _by_steps(
     driven: Mapping[str, float],
     outputs: Sequence[str],
     h: float,
+    known: Sequence[str],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rates and outputs at a state, and their slopes by states and inputs, by central differences."""
+    """Rates and outputs at a state, and their slopes by some variables, by central differences."""
     seen = [*outputs, *(s.seen for s in states)]
     with closing(ShortSteps(fmu, [*driven], seen, h, False)) as steps:
 
@@ -219,7 +220,7 @@ def _by_steps(
 
         base = answer(start, driven)
         columns = []
-        for name in (*(s.name for s in states), *driven):
+        for name in known:
             value = {**start, **driven}[name]
             d = SMALL * max(abs(value), 1.0)  # of one unit where the value is less
             sides = []

@@ -8,7 +8,7 @@ import numpy as np
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
 from ..search.most_likely import STEPS
-from ..search.prediction_fit.joint_posterior import TOGETHER
+from ..search.prediction_fit.joint_posterior import TOGETHER, connected
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
 
@@ -89,8 +89,6 @@ def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
         slopes: (n, p), of the predictions by each parameter; none is zero.
         names: of the parameters.
     """
-    from scipy.sparse.csgraph import connected_components
-
     if not names:
         return []
     unit = slopes / np.linalg.norm(slopes, axis=0)
@@ -100,10 +98,7 @@ def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
     shared = np.abs(weak @ weak.T)
     own = np.sqrt(np.diag(shared))
     inside = (inflated > 1.0 / (1.0 - TOGETHER**2)) & (own > SHARED)
-    edges = (shared > SHARED * np.outer(own, own)) & np.outer(inside, inside)
-    count, group = connected_components(edges, directed=False)
-    groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
-    return [members for members in groups if len(members) > 1]
+    return connected(names, (shared > SHARED * np.outer(own, own)) & np.outer(inside, inside))
 
 
 def _working(r: WindowResiduals, start: Setting, k: int) -> tuple[CalibratedParameter, str]:

@@ -107,7 +107,11 @@ def together(names: Sequence[str], covariance: np.ndarray) -> list[list[str]]:
         names: of the values.
         covariance: (q, q), of these.
     """
-    chained = np.abs(correlation(covariance)) > TOGETHER
-    count, group = connected_components(chained, directed=False)
+    return connected(names, np.abs(correlation(covariance)) > TOGETHER)
+
+
+def connected(names: Sequence[str], edges: np.ndarray) -> list[list[str]]:
+    """Groups of several names that edges (n, n) connect, also by others."""
+    count, group = connected_components(edges, directed=False)
     groups = [[n for n, g in zip(names, group, strict=True) if g == k] for k in range(count)]
     return [members for members in groups if len(members) > 1]
