@@ -19,7 +19,8 @@ from fmus.vessel import vessel
 
 from ..runs import Run
 from .prediction import true_motion
-from .prediction_component import START, Ready, solved_pose, with_values
+from .prediction_component import START, solved_pose, with_values
+from .recorded_step import Ready
 from .ship_model import Model
 
 MET = ("met_u", "met_v", "met_r")  # inputs: velocity with which the thrusters meet the water

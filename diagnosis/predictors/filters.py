@@ -4,6 +4,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import get_lapack_funcs
 
 from fmus.ops import wrap
 
@@ -125,11 +126,12 @@ def _tracking(p: np.ndarray, off: np.ndarray, rate: np.ndarray, T: float, h: flo
 
 def _low_passed(time: np.ndarray, x: np.ndarray, T: float) -> np.ndarray:
     """A signal (n,) behind a low-pass filter, steady at the start and after each gap of NaN."""
-    kept = np.exp(-np.diff(time, prepend=time[:1]) / T).tolist()
-    found, y, last = [], np.nan, np.nan
-    for value, keep in zip(x.tolist(), kept, strict=True):
-        mean = 0.5 * (last + value)
-        y = value if y != y else mean + keep * (y - mean)
-        found.append(y)
-        last = value
-    return np.array(found)
+    known = np.isfinite(x)
+    before = np.append(False, known[:-1])
+    kept = np.where(known & before, np.exp(-np.diff(time, prepend=time[:1]) / T), 0.0)
+    mean = np.where(before, 0.5 * (np.append(x[:1], x[:-1]) + x), x)
+    diagonals = np.stack([np.ones_like(x), np.append(-kept[1:], 0.0)])
+    (solved,) = get_lapack_funcs(("tbtrs",), (diagonals,))
+    right = np.where(known, (1.0 - kept) * mean, 0.0)
+    found = solved(diagonals, right[:, None], uplo="L", diag="U")[0][:, 0]
+    return np.where(known, found, np.nan)

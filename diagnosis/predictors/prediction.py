@@ -14,14 +14,15 @@ import numpy as np
 
 from fmus.actuators.response import PreparedThrusters
 from fmus.frames import rotate_to_body
-from fmus.ops import when, wrap
+from fmus.ops import wrap
 from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
 from ..runs.cleaning import DIGITS, WIDTH
+from .recorded_step import Inputs, Ready, recorded_step, thrust_at
 from .ship_model import Model
-from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
+from .thrust import LONGEST_STEP, Integral, Response, drive_of
 
 # Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).
@@ -187,7 +188,7 @@ def _states_of_one(
     values = [*model.vessel.values(), *model.thrusters.values()]
     if sum(rows.size for _, rows in starts.runs) != 1 or any(isinstance(v, np.ndarray) for v in values):
         return []
-    with suppress(ArithmeticError):
+    with suppress(ArithmeticError, ValueError):
         return [*propagate(starts, model, thrust, single=True)]
     return []
 
@@ -210,30 +211,31 @@ def propagate(
         thrust: commands that arrive and shares that act, from :func:`arriving`.
         single: whether there is one model and one window, and states are of numbers.
     """
-    body, drive, h = model.hull, starts.drive(model), starts.h
-    layout = drive.effects.layout
-    power = starts.power(model.clock)
-    thrusters, beside, air = drive, starts.given(model), starts.air(model)
+    ready, h = Ready(model.hull, starts.drive(model)), starts.h
+    power, beside, air = starts.power(model.clock), starts.given(model), starts.air(model)
     # The smoothed motion, seen through the model's measurement effects.
     pose, nu = true_motion(*starts.motion(model), model)
     s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
-    steps: Sequence[Any] = thrust
+    given: list[Any] = [*thrust, power, air]
     if single:
-        s, steps = vessel.State._make([x.item() for x in s]), [x[..., 0, 0].tolist() for x in thrust]
-        air = None if air is None else air[..., 0, 0].tolist()
-        power = None if power is None else power[..., 0].tolist()
+        s = vessel.State._make([x.item() for x in s])
+        given = [None if x is None else x.reshape(*x.shape[:2]).tolist() for x in given]
+    none = [None] * starts.steps
+    each = zip(*(none if x is None else x for x in given), strict=True)
+    steps = [Inputs(*x) for x in each]
     yield s
-    for k, (given, shares) in enumerate(zip(*steps, strict=True)):
+    if beside is None:
+        advance = recorded_step(ready, steps[0], single)
+        for i in steps:
+            with np.errstate(all="ignore"):
+                flat = (x for part in i if part is not None for x in part)
+                s = vessel.State._make(advance(*s, *flat, h))
+            yield s
+        return
+    for k, i in enumerate(steps):
         with np.errstate(all="ignore"):
-            if power is not None:
-                thrusters = layout.powered(drive, power[k])
-            at = body if air is None else vessel.blown(body, s, *air[k])
-            now = layout.running(s.t + h, *inflow(s, at), tuple(given), thrusters)
-            tau = Force(*layout.act(tuple(shares), now, thrusters))
-            if beside is None:
-                s = moved(s, tau, at, h)
-            else:
-                s = vessel.integrate(s, tau, at, h, _with(beside[0][k], beside[1][k]))
+            tau, hull = thrust_at(s, i, ready, h)
+            s = vessel.integrate(s, tau, hull, h, _with(beside[0][k], beside[1][k]))
         yield s
 
 
@@ -278,15 +280,6 @@ def singles(model: Model) -> list[Model]:
     many = {n: v[:, 0].tolist() for n, v in model.thrusters.items() if isinstance(v, np.ndarray)}
     each = [dict(zip(many, values, strict=True)) for values in zip(*many.values(), strict=True)]
     return [replace(model, thrusters={**model.thrusters, **one}) for one in each] or [model]
-
-
-def moved(s: vessel.State, tau: Force, b: vessel.PreparedVessel, h: float) -> vessel.State:
-    """The ship a step later."""
-    return when(
-        b.disturbed,
-        lambda: vessel.integrate(s, tau, b, h, vessel.disturbed),
-        lambda: vessel.integrate(s, tau, b.hull, h),
-    )
 
 
 def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) -> np.ndarray:

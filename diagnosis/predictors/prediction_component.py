@@ -6,29 +6,23 @@ All other parameters are those of a model, so that what does not act costs nothi
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
-from fmus.actuators.response import PreparedThrusters
 from fmus.declare import Component, Fields, Variable, group_of
 from fmus.ops import Number, wrap
 from fmus.signals import Force, Measurement
 from fmus.vessel import vessel
 
 from ..runs import Run
-from .prediction import moved, true_motion
+from .prediction import true_motion
+from .recorded_step import Inputs, Ready
+from .recorded_step import step as one_step
 from .ship_model import Model
 
 SOLVED = 4  # iterations of the pose behind measurement effects; those of the project need two
 
 # What a window starts from: measured pose and its rate [m, m, rad, m/s, m/s, rad/s], and the time [s].
 START = ("x", "y", "psi", "x_dot", "y_dot", "psi_dot", "t")
-
-
-class Ready(NamedTuple):
-    """Hull and thrusters, ready for a step."""
-
-    hull: vessel.PreparedVessel
-    drive: PreparedThrusters
 
 
 def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bool) -> Component:
@@ -65,12 +59,10 @@ def prediction_component(model: Model, names: Sequence[str], run: Run, windy: bo
     def prepared_step(
         s: vessel.State, i: Fields, b: Ready, h: Number
     ) -> tuple[vessel.State, Measurement]:
-        drive = layout.powered(b.drive, i[power]) if settings else b.drive
-        hull = vessel.blown(b.hull, s, *i[wind]) if windy else b.hull
-        u_c, v_c = vessel.water_velocity(s, hull)
-        now = layout.running(s.t + h, s.u - u_c, s.v - v_c, s.r, i[given], drive)
-        tau = Force(*layout.act(i[acting], now, drive))
-        after = moved(s, tau, hull, h)
+        given_now = Inputs(
+            i[given], i[acting], i[power] if settings else None, i[wind] if windy else None
+        )
+        after = one_step(s, given_now, b, h)
         return after, vessel.measured(after, b.hull)
 
     def step(s: vessel.State, i: Fields, p: Fields, h: Number) -> tuple[vessel.State, Measurement]:

@@ -19,7 +19,7 @@ is undone. Rounding comes after the filter, and undoing it adds (w T)^2 to its d
 """
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.special import hyp0f1
@@ -58,12 +58,19 @@ def noise_gain(filters: Filters = NO_FILTERS, time: float = 1.0) -> list[np.ndar
         filters: that are undone, which multiplies a pose by U.
         time: s at the ship's size for one at the size of CyberShip Enterprise 1.
     """
+    U = filters.undoing(FREQUENCIES / time)
+    return [(FREQUENCIES**k * U) ** 2 @ _passed() for k in range(4)]
+
+
+@cache
+def _passed() -> np.ndarray:
+    """(frequencies, w0), share of a density that reaches a window, times the step of the integral."""
     half = WIDTH / 2
     transform = hyp0f1(4.5, -((FREQUENCIES * half / 2) ** 2))  # of (1 - s^2)^3: of its power + 3/2
-    H = 1.0 / (1.0 + (FREQUENCIES / FREQUENCIES[:, None]) ** 6)
-    U = filters.undoing(FREQUENCIES / time)
-    densities = [(FREQUENCIES**k * transform * U) ** 2 / np.pi for k in range(4)]
-    return [np.trapezoid(d[:, None, :] * H, FREQUENCIES) for d in densities]
+    H = 1.0 / (1.0 + (FREQUENCIES[:, None] / FREQUENCIES) ** 6)
+    steps = np.gradient(FREQUENCIES)  # of the trapezoidal rule, but for its ends
+    steps[[0, -1]] *= 0.5
+    return (transform**2 * steps / np.pi)[:, None] * H
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
@@ -155,7 +162,18 @@ def _gain(gains: Sequence[np.ndarray], corner: np.ndarray, order: int) -> np.nda
 
 
 def _slope(w: WeakWindows, model: Model) -> np.ndarray:
-    """Force and moment (K, 3, 3) by u, v, r over steps as large as its error."""
+    """Force and moment (K, 3, 3) by u, v, r over steps as large as its error.
+
+    It is that of the motion as it was measured: models that undo other filters have the same.
+    """
+    if model.given or model.runs:
+        return _by_steps(w, model)
+    values = (tuple(sorted(part.items())) for part in (model.vessel, model.thrusters))
+    return w.recall("slope", (*values, model.clock), lambda: _by_steps(w, model))
+
+
+def _by_steps(w: WeakWindows, model: Model) -> np.ndarray:
+    """See :func:`_slope`."""
     error = np.median(w.smoothed.nu_std[w.known], axis=0)
     steps = np.maximum(error, DIGITS * np.array(w.scale.speeds))
     _, nu = w.motion

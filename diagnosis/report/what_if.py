@@ -215,7 +215,7 @@ class MovableModel:
         balance = component_module(program(self._balance))
         parts = head, module, allocation, balance
         sizes = [len(part).to_bytes(4, "little") for part in parts]
-        return b64encode(zlib.compress(b"".join([*sizes, *parts, *store.parts]), 9)).decode()
+        return b64encode(zlib.compress(b"".join([*sizes, *parts, *store.parts]))).decode()
 
     def _ssv(self) -> str:
         """The learned model as a file, with all that can be moved; empty if no FMU would accept it."""
