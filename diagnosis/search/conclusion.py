@@ -11,7 +11,7 @@ from ..predictors.uncertainty import omega_std
 from .candidates import model_error
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
-from .gram import Nuisance, block_folds, gram_table
+from .gram import OTHER_RUN, WHOLE_RUNS, Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, score
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
@@ -83,9 +83,9 @@ class Selection:
             effects.append(replace(found, set_evidence=together))
         prior, sigma = self.t.prior, np.asarray(self.t.sigma)
         model = self.model if effects else self.at.start
-        folds = self._fold_models()
+        folds, runs = self._fold_models(WHOLE_RUNS), self._fold_models(OTHER_RUN)
         found = Findings(
-            effects, self.ranked, model, [], sigma, None, {}, folds, self.findings, self.at, prior
+            effects, self.ranked, model, [], sigma, None, {}, folds, runs, self.findings, self.at, prior
         )
         if not any(prior.std.values()):
             return found
@@ -96,13 +96,16 @@ class Selection:
             moved=dict(zip(prior.mean, self.at.offset.tolist(), strict=True)),
         )
 
-    def _fold_models(self) -> list[Model]:
-        """The model fitted without each fold of the data, by one step about the fit to all."""
+    def _fold_models(self, least: int) -> list[Model]:
+        """The model fitted without each fold of the data, by one step about the fit to all.
+
+        From ``least`` runs on a fold is a run.
+        """
         t, fitted = self.t, self.at.fitted
         table = gram_table(t.error(self.at), t.blocks, [], self._nuisance, np.asarray(t.sigma))
         all_of_it = regression(table, -1, 0)
         models = []
-        for held in block_folds(t.data):
+        for held in block_folds(t.data, least):
             change = -all_of_it.fitted(table.total - table.grams[held].sum(axis=0)).left[1:]
             step = dict(zip(fitted, change.tolist(), strict=False))
             models.append(self.at.plus(step, change[len(fitted) :]).model(t.prior))
