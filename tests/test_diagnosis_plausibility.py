@@ -8,8 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.cases import in_part
+from support.ccode import stepped
 from support.command import command
-from support.measured import DATA, needs_data, sail, smoothed
+from support.cse1 import VESSEL
+from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, smoothed
 
 import diagnosis
 from benchmarks.ship_effects import causes
@@ -26,8 +28,10 @@ from diagnosis.assessment.plausibility import (
 from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
 from diagnosis.assessment.readings import AS_READ, of_commands, of_pose, reread, swapped
 from diagnosis.predictors import ship_with
+from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs.columns.columns import POSE
 from diagnosis.runs.columns.side_car import ColumnChange
+from fmus.signals import Force
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 
@@ -261,6 +265,31 @@ def test_own_is_the_share_of_a_command_that_follows_from_no_other():
     assert _own(a, []) == pytest.approx(1.0)
     assert _own(7.0 + 3.0 * a + 4.0 * b, [1e6 * a]) == pytest.approx(16.0 / 25.0, rel=0.05)
     assert _own(2.0 * a - b, [a, b]) == pytest.approx(0.0, abs=1e-9)
+
+
+def circling(seconds=110.0, h=0.1, camera=0.1):
+    """A run of the exact ship whose sway force and yaw moment follow from its velocity and a set rate."""
+    body, force, rows = stepped(VESSEL, parameters(VESSEL, {}), Force()), [0.0, 0.0, 0.0], []
+    seen = body.advance(force, 0.0)
+    for t in (np.arange(round(seconds / h)) * h).tolist():
+        v, r = (seen[k] for k in VELOCITY[1:])
+        rate = 0.12 if t % 120.0 < 60.0 else -0.12
+        force = [0.17 + 0.12 * np.sin(t / 9.0), 2.0 * rate - 7.0 * v, 4.9 * rate - 3.0 * r]
+        rows.append([t, *(seen[k] for k in MEASURED), *force])
+        seen = body.advance(force, h)
+    time, pose, tau = np.split(np.array(rows), [1, 4], axis=1)
+    pose += camera * NOISE * np.random.default_rng(3).standard_normal(pose.shape)
+    pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
+    return Run("circling", time[:, 0], pose, tau)
+
+
+def test_feedback_of_the_motion_tells_no_gain_of_its_own():
+    w = weak_windows(smoothed(circling()))
+    g = gains(w, Model())
+    # The smoother's errors of the motion, which the commands contain as well.
+    assert (np.abs(g.value[1:] - 1.0) > 3.0 * g.error[1:]).all()
+    assert not g.told[1:].any()
+    refuse_implausible([w], Model())
 
 
 def test_commands_that_follow_those_of_another_axis_tell_no_gain_of_their_own():

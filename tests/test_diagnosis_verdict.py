@@ -31,6 +31,7 @@ from diagnosis.verdict.confidence import confidence_of, probability
 from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.paired_errors import harm
 from diagnosis.verdict.pruning import prune, without
+from diagnosis.verdict.unproven import proven
 from diagnosis.verdict.validation_data import Fold, Losses, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}
@@ -361,6 +362,41 @@ def test_coefficients_moved_beyond_belief_do_not_take_the_place_of_an_effect(mov
     kept, gone = prune(found, unseen, lambda a, b: False, harm)
     assert [f.id for f in kept.effects] == (["X_u"] if stays else [])
     assert len(gone) == (not stays)
+
+
+def doubted(found, *ids):
+    """The findings with effects that are possibilities."""
+    effects = [replace(f, confidence=0.1, together=0.1) if f.id in ids else f for f in found.effects]
+    return replace(found, effects=effects)
+
+
+def test_possibility_stays_in_the_model_if_data_show_its_gain_and_a_finding_in_any_case():
+    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0}), Model()
+    idle = {"delta_N_uv": 1e-9}  # neither harm nor gain
+    right, other = finding(start, delta_X_u=-3.0), finding(start, **idle)
+    model = start.plus({"delta_X_u": -3.0} | idle)
+    found = Findings([right, replace(other, model=model)], model=model, sigma=np.full(3, 0.01))
+    data = ValidationData(runs[:1], runs[1:], start, found.sigma)
+    assert prune(found, data, lambda a, b: False, harm)[1] == []
+    assert proven(found, data, harm) == (found, [])
+    kept, gone = proven(doubted(found, "X_u", "N_uv"), data, harm)
+    assert [f.id for f in kept.effects] == ["X_u"]
+    assert [f.id for f in gone] == ["N_uv"]
+    assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
+
+
+def test_gain_of_a_possibility_shows_in_the_run_that_it_was_not_fitted_to():
+    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0})[:2], Model()
+    right = finding(start, delta_X_u=-3.0)
+    found = doubted(Findings([right], model=right.model, sigma=np.full(3, 0.01)), "X_u")
+    data = ValidationData(runs, [], start, found.sigma)
+    within = [right.model] * len(block_folds(runs))
+    for of_other_run, stays in ((right.model, True), (start, False)):
+        found = replace(found, fold_models=within, run_models=[of_other_run] * 2)
+        assert prune(found, data, lambda a, b: False, harm)[1] == []
+        kept, gone = proven(found, data, harm)
+        assert bool(kept.effects) == stays
+        assert [f.id for f in gone] == ([] if stays else ["X_u"])
 
 
 def left_on(**significant):

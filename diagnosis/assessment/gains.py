@@ -32,8 +32,8 @@ class ThrustGains:
 
     Attributes:
         value, error: (3,), k and its standard error.
-        told: (3,), whether the commands of that axis explain most of its inertial force, and follow from
-            those of no other axis.
+        told: (3,), whether the commands of that axis explain most of what all else leaves of its
+            inertial force, and follow neither from those of another axis nor from the motion.
     """
 
     value: np.ndarray
@@ -87,11 +87,13 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         inverse = pinv(x / size)
         beta = inverse @ a[:, j]
         left[:, j] = a[:, j] - x / size @ beta
-        free = max(len(a) - len(beta), 1)
-        variance = left[:, j] @ left[:, j] / free * (inverse[0] @ inverse[0])
+        unexplained, own = left[:, j] @ left[:, j], 1.0 / (inverse[0] @ inverse[0])
+        variance = unexplained / max(len(a) - len(beta), 1) / own
         value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
-        # With less explained than all else leaves, it is not T that moves the ship.
-        told[j] = beta[0] ** 2 > free * variance
+        # With less explained than all else leaves, it is not T that moves the ship; with less than a
+        # model lacks that is not exact, T follows from the motion, as under feedback of the velocity.
+        least = max(unexplained, SETTINGS.inexact**2 * (a[:, j] @ a[:, j]))
+        told[j] = beta[0] ** 2 * own > least
     return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), told)
 
 

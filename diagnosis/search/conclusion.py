@@ -11,7 +11,7 @@ from ..predictors.uncertainty import omega_std
 from .candidates import model_error
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
-from .gram import Nuisance, block_folds, gram_table
+from .gram import OTHER_RUN, WHOLE_RUNS, Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, score
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
@@ -83,9 +83,9 @@ class Selection:
             effects.append(replace(found, set_evidence=together))
         prior, sigma = self.t.prior, np.asarray(self.t.sigma)
         model = self.model if effects else self.at.start
-        folds = self._fold_models()
+        folds, runs = self._fold_models()
         found = Findings(
-            effects, self.ranked, model, [], sigma, None, {}, folds, self.findings, self.at, prior
+            effects, self.ranked, model, [], sigma, None, {}, folds, runs, self.findings, self.at, prior
         )
         if not any(prior.std.values()):
             return found
@@ -96,17 +96,25 @@ class Selection:
             moved=dict(zip(prior.mean, self.at.offset.tolist(), strict=True)),
         )
 
-    def _fold_models(self) -> list[Model]:
-        """The model fitted without each fold of the data, by one step about the fit to all."""
+    def _fold_models(self) -> tuple[list[Model], list[Model]]:
+        """The model fitted without each fold of the data, by one step about the fit to all.
+
+        Returns:
+            By folds as they usually are, and by whole runs where there are two.
+        """
         t, fitted = self.t, self.at.fitted
         table = gram_table(t.error(self.at), t.blocks, [], self._nuisance, np.asarray(t.sigma))
         all_of_it = regression(table, -1, 0)
-        models = []
-        for held in block_folds(t.data):
+
+        def without(held: np.ndarray) -> Model:
             change = -all_of_it.fitted(table.total - table.grams[held].sum(axis=0)).left[1:]
             step = dict(zip(fitted, change.tolist(), strict=False))
-            models.append(self.at.plus(step, change[len(fitted) :]).model(t.prior))
-        return models
+            return self.at.plus(step, change[len(fitted) :]).model(t.prior)
+
+        usual, whole = (
+            [without(held) for held in block_folds(t.data, n)] for n in (WHOLE_RUNS, OTHER_RUN)
+        )
+        return usual, whole
 
     def _of(self, at: RefinedModel) -> Nuisance:
         """Nuisance parameters of a part of the effects, by slopes beside all of them."""

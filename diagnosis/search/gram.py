@@ -19,6 +19,7 @@ from .most_likely import ridge
 
 FOLDS = 8  # of cross-validation over blocks
 WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
+OTHER_RUN = 2  # runs, from which on a model can be fitted to other runs than it predicts
 # Least number of parts that are left out in turn: stretches of fewer runs.
 # Each stretch of a single run is as long as the shortest that can be learned from; chosen.
 PARTS = 4
@@ -193,17 +194,18 @@ def block_numbers(data: Sequence[WeakWindows]) -> np.ndarray:
     return np.column_stack([runs, np.concatenate([w.block for w in data])])
 
 
-def run_folds(data: Sequence[WeakWindows]) -> list[tuple[int, np.ndarray]]:
+def run_folds(data: Sequence[WeakWindows], least: int = WHOLE_RUNS) -> list[tuple[int, np.ndarray]]:
     """The parts of some runs that are left out in turn.
 
     Args:
         data: windows of every run.
+        least: number of runs from which on whole ones are left out.
 
     Returns:
         For each fold the number of a run and the numbers of its blocks: all of them where there are
-        WHOLE_RUNS or more runs, else those of a stretch of time.
+        ``least`` or more runs, else those of a stretch of time.
     """
-    stretches = 1 if len(data) >= WHOLE_RUNS else -(-PARTS // len(data))
+    stretches = 1 if len(data) >= least else -(-PARTS // len(data))
     counts = [np.unique(w.block).size for w in data]
     return [
         (run, blocks)
@@ -212,7 +214,7 @@ def run_folds(data: Sequence[WeakWindows]) -> list[tuple[int, np.ndarray]]:
     ]
 
 
-def block_folds(data: Sequence[WeakWindows]) -> list[np.ndarray]:
+def block_folds(data: Sequence[WeakWindows], least: int = WHOLE_RUNS) -> list[np.ndarray]:
     """The same, the blocks counted through all runs."""
     first = np.cumsum([0, *(np.unique(w.block).size for w in data)])
-    return [first[run] + blocks for run, blocks in run_folds(data)]
+    return [first[run] + blocks for run, blocks in run_folds(data, least)]

@@ -27,6 +27,7 @@ from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
 from .paired_errors import harm
 from .pruning import NOTHING, Withdrawn, prune
 from .pruning_criteria import Harm
+from .unproven import proven
 from .validation_data import ValidationData
 
 VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
@@ -41,7 +42,8 @@ class DecidedFindings(ShortRepr):
         withdrawn: effects that were accepted and rejected afterwards.
         remainder: what the learned model leaves; where nothing was learned, the first one.
         refitted: whether the learned model has other nominal coefficients and no effect.
-        dropped: effects that were accepted, where the learned model has other coefficients instead.
+        dropped: effects that were accepted and are not in the learned model: no data prove their gain,
+            or other coefficients do as well.
         shares: for each finding the share of the error's sum of squares that it explains.
         unique: for each the share that nothing else explains; None where that cannot be told.
         posterior: of all fitted values; of none where nothing was learned.
@@ -121,7 +123,9 @@ def judge(
     start, train = data.start, data.train
     advance("effects without which validation data are predicted better")
     kept, withdrawn = prune(found, data, lambda a, b: drives_on(a, b, region), criterion)
-    learned, refitted, dropped = concluded(kept, data, prior)
+    kept, unproven = proven(kept, data, criterion)
+    learned, refitted, replaced = concluded(kept, data, prior)
+    dropped = [*unproven, *replaced]
     advance("fit to predictions")
     changed = bool(learned.effects) or refitted
     fit = to_predictions(learned, train, prior, changed)

@@ -89,7 +89,10 @@ def _alternative(rest: Findings, kept: Findings, start: Model) -> Findings | Mod
     if rest.plausible or not kept.plausible:
         return rest
     first = added(rest, rest.effects, start)
-    return replace(first, fold_models=[first.model] * len(rest.fold_models)) if rest.effects else start
+    if not rest.effects:
+        return start
+    folds, runs = ([first.model] * len(models) for models in (rest.fold_models, rest.run_models))
+    return replace(first, fold_models=folds, run_models=runs)
 
 
 def _at_limit(found: Findings, ids: Collection[str], start: Model) -> Withdrawn | None:

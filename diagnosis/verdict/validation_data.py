@@ -17,7 +17,7 @@ from ..execution.parallel import in_halves
 from ..predictors import Model, WeakWindows, Windows, omega
 from ..predictors.windows import ANY_TIME
 from ..search.findings import Findings
-from ..search.gram import run_folds
+from ..search.gram import OTHER_RUN, WHOLE_RUNS, run_folds
 
 
 class Losses(NamedTuple):
@@ -89,6 +89,7 @@ class ValidationData:
         validate: further runs; where there are any, they decide, else folds of ``train`` do.
         start: the initial model.
         sigma: (3,), what a model error is divided by [N, N, N m].
+        least: number of training runs from which on a fold is a whole one.
     """
 
     def __init__(
@@ -97,8 +98,10 @@ class ValidationData:
         validate: Sequence[WeakWindows],
         start: Model,
         sigma: np.ndarray,
+        least: int = WHOLE_RUNS,
     ) -> None:
         self.train, self.validate, self.start, self.sigma = train, validate, start, sigma
+        self.least = least
         self.where = "validation runs" if validate else "data left out of the fit"
         self._known: dict[int, tuple[Findings | Model, Losses]] = {}
 
@@ -106,7 +109,14 @@ class ValidationData:
     def _folds(self) -> list[Fold]:
         if self.validate:
             return [Fold(w) for w in self.validate]
-        return [Fold(self.train[run], blocks) for run, blocks in run_folds(self.train)]
+        return [Fold(self.train[run], blocks) for run, blocks in run_folds(self.train, self.least)]
+
+    @property
+    def of_other_runs(self) -> "ValidationData":
+        """The same data, each of two runs left out as a whole: what holds in one may not in another."""
+        if self.validate or not OTHER_RUN <= len(self.train) < self.least:
+            return self
+        return ValidationData(self.train, [], self.start, self.sigma, OTHER_RUN)
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -115,7 +125,10 @@ class ValidationData:
 
     def judges(self, found: Findings) -> bool:
         """Whether these data can judge the findings of a method."""
-        return bool(self.validate) or len(found.fold_models) == len(self._folds)
+        return bool(self.validate) or len(self._fold_models(found)) == len(self._folds)
+
+    def _fold_models(self, found: Findings) -> Sequence[Model]:
+        return found.fold_models if self.least == WHOLE_RUNS else found.run_models
 
     def remains(self, model: Model) -> bool:
         """Whether a model leaves a significant residual."""
@@ -143,6 +156,6 @@ class ValidationData:
     def _models(self, found: Findings | Model) -> Sequence[Model]:
         if isinstance(found, Findings):
             if not self.validate:
-                return found.fold_models
+                return self._fold_models(found)
             found = found.model if found.effects else found.refitted or self.start
         return [found] * len(self._folds)
