@@ -11,7 +11,6 @@ from fmus.controller.backstepping import Inputs
 from fmus.signals import Estimate, Target
 
 from ..assessment.closed_loop import LoopPart
-from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.prediction import merged
 from .hypotheses import Space
@@ -129,7 +128,6 @@ def spread(
     basin: Basin,
     outline: np.ndarray,
     seed: int,
-    advance: Advance = silent,
 ) -> Spread:
     """The tracks of a plan under some hypotheses.
 
@@ -139,9 +137,7 @@ def spread(
         motion: the target every ``STEP`` times the time scale.
         basin, outline: walls, and corners of the hull (k, 2) [m].
         seed: of the draws.
-        advance: progress callback.
     """
-    advance(f"closed loop of {len(ids) * MEMBERS} models along the plan")
     rng = np.random.default_rng(seed)
     eta = followed([m for n in ids for m in drawn(space, k, n, rng)], motion)
     eta = eta.reshape(len(ids), MEMBERS, *eta.shape[1:])
