@@ -1,7 +1,8 @@
 """What to run next: the manoeuvre that discriminates the candidates that a diagnosis leaves."""
 
 from .designing import Designer, Limits, ScoredPlan
-from .information import SURE, Knowledge
+from .hypotheses import knowledge
+from .information import CRITERIA, SURE, Knowledge
 from .manoeuvre_library import DIMENSIONS, sequence
 from .next_plan import Question, plan_next, prepared
 from .planned_motion import Basin
@@ -10,6 +11,7 @@ from .run_files import scenario_file, write_run
 from .run_plan import MOST_RUNS, Plan, PlannedRun
 
 __all__ = [
+    "CRITERIA",
     "DIMENSIONS",
     "MOST_RUNS",
     "SURE",
@@ -22,6 +24,7 @@ __all__ = [
     "Question",
     "Rehearsal",
     "ScoredPlan",
+    "knowledge",
     "plan_next",
     "prepared",
     "scenario_file",
