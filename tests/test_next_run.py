@@ -364,6 +364,48 @@ def test_the_planned_motion_is_what_its_thrust_gives():
     assert (s.x, s.y, s.psi) == pytest.approx(motion.eta[1000], abs=0.01)
 
 
+def test_a_faster_motion_has_the_same_track(designer):
+    d, _ = designer
+    slow = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), STEP)
+    fast = slow.faster(1.2)
+    h = float(fast.time[1] - fast.time[0])
+    assert fast.eta == pytest.approx(slow.eta)
+    assert fast.eta_dot == pytest.approx(np.gradient(slow.eta, h, axis=0))
+    assert fast.eta_ddot == pytest.approx(np.gradient(fast.eta_dot, h, axis=0))
+
+
+def test_a_plan_keeps_a_margin_to_the_speed_at_which_a_ship_diverges(designer, monkeypatch):
+    """A ship that is lost at any speed above that of the plan is outside of every basin."""
+    d, k = designer
+    s = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
+    track = d.motion(s.steps, s.size, STEP)
+
+    def lost(models, motion):
+        eta = np.tile(track.eta, (len(models), 1, 1))
+        if motion.time[-1] < 0.99 * track.time[-1]:
+            eta[3, -1, 0] = np.nan
+        return eta
+
+    monkeypatch.setattr(spread_of, "followed", lost)
+    assert np.sort(d.spread(k, s, 0).margin)[0] == -np.inf
+    with pytest.raises(InputError, match="leaves the basin"):
+        d.checked(k, s, 0, tries=1)
+
+
+def test_hidden_ships_of_the_benchmark_have_the_size_that_is_drawn(question):
+    cell = next_run.Cell("cse1", ("X_|u|u",), 0)
+    ship = next_run.hidden_ship(cell, question.data, 1.0)
+    start, name = cell.start, "delta_X_absu_u"
+    off = [ship.value(n) / start.value(n) - 1.0 for n in start.ship.coefficients if start.value(n)]
+    assert 0.05 < np.abs(off).max() <= 0.1 + 1e-9
+    data = question.data
+    with_it = model_error(data, start.plus({name: ship.value(name) - start.value(name)}))
+    share = next_run._rms(model_error(data, start) - with_it) / next_run._rms(commanded(data, start))
+    assert SMALLEST < np.nanmax(share[:1]) < LARGEST
+    half = next_run.hidden_ship(cell, data, 0.5)
+    assert half.value(name) == pytest.approx(0.5 * ship.value(name))
+
+
 def test_the_loop_of_many_models_is_that_of_each_alone(designer):
     d, k = designer
     models = drawn(d.space, k, 0, np.random.default_rng(0))[:3]

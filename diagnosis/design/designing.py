@@ -233,21 +233,29 @@ class Designer:
         )
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
-    def search(self, k: Knowledge, seed: int) -> ScoredPlan:
+    def search(
+        self, k: Knowledge, seed: int, log_points: int = LOG_POINTS, evolved: int = EVOLVED
+    ) -> ScoredPlan:
         """The best plan that is found, by the same seed the same unless time is short.
+
+        Args:
+            k: what is known.
+            seed: of the points.
+            log_points: of the number of Sobol points, to the base 2.
+            evolved: points that evolution tries at the most.
 
         Raises:
             InputError: no plan keeps the limits.
         """
         T, end = self.limits.seconds, time.monotonic() + SECONDS
         pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
-        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(LOG_POINTS)
+        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(log_points)
         found: list[tuple[ScoredPlan, np.ndarray]] = []
 
         def cost(some: np.ndarray) -> np.ndarray | float:
-            if time.monotonic() > end or len(found) >= len(points) + EVOLVED:
+            if time.monotonic() > end or len(found) >= len(points) + evolved:
                 raise _OutOfTimeError
-            self.advance(f"searching a plan: {len(found)} of {len(points) + EVOLVED}")
+            self.advance(f"searching a plan: {len(found)} of {len(points) + evolved}")
             each = np.clip(some.T.reshape(-1, points.shape[1]), 0.0, 1.0 - 1e-9)
             plans = [sequence(point, T, self.library) for point in each]
             found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))

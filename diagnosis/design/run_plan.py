@@ -208,7 +208,7 @@ def page(plan: Plan) -> str:
             "",
             f"![Track of run {n}]({picture_file(n)})",
             "",
-            f"- Simulate it: `python -m cosim.run {scenario_file(n)}`.",
+            f"- Simulate it: `cybership run {scenario_file(n)}`.",
             f"- `{commands_file(n)}` has {r.commands_text}.",
             "- Begin at rest at the first set point. Log pose and commands at "
             f"{1.0 / like.period:.3g} Hz, the rate of the runs so far.",
