@@ -14,6 +14,9 @@ from support.oscillator import build_oscillator
 
 import cosim
 import diagnosis
+import diagnosis.design.spread as spread_of
+from benchmarks import next_run
+from benchmarks.hidden_effects.draw import LARGEST, SMALLEST
 from cosim import InputError
 from cosim.fmu import ConfinedFmu, FmuModel
 from diagnosis import Model, design_run, learn
@@ -48,6 +51,8 @@ from diagnosis.design.rehearsal import Rehearsal, Trial
 from diagnosis.design.spread import STEP, drawn, followed
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest
+from diagnosis.predictors.weak_form import commanded
+from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 
 Q, OWN = 3, 2  # nuisance parameters, and those of each of two hypotheses
