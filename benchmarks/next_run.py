@@ -1,17 +1,20 @@
 """Does a designed run decide what a first run leaves open: ``python -m benchmarks.next_run``.
 
-A cell is a ship with a hidden effect and coefficients up to 10 % wrong (:mod:`.hidden_effects`), after
-one ellipse of 100 s at noise n4. Of the cells in a random order those count in which no cause reaches
-95 %. Each then gets one run of some minutes of each kind, and the diagnosis of both runs judges it.
+A cell is a ship with one or two hidden effects and coefficients up to 10 % wrong, after a usual first
+run at noise n4. Of the cells in a random order those count in which no cause reaches 95 %. Each then
+gets one run of each kind, and the diagnosis of both runs judges it. ``--basin`` simulates designed runs
+with ships that the candidates allow, and counts those that leave the basin; nothing is learned there.
 """
 
 import argparse
 import csv
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +22,7 @@ import cosim
 import diagnosis
 from cosim import InputError
 from cosim.command import BAD_INPUT, command_parser, complain, run_command
+from cosim.scenario import find_scenario
 from diagnosis import Model
 from diagnosis.design import (
     DIMENSIONS,
@@ -27,37 +31,152 @@ from diagnosis.design import (
     Knowledge,
     Limits,
     Question,
+    Rehearsal,
     ScoredPlan,
-    checked,
     prepared,
     scenario_file,
     sequence,
-    sure_of,
     write_run,
 )
+from diagnosis.predictors import ship_with
+from diagnosis.predictors.parameter_set import write_model
+from diagnosis.predictors.weak_form import commanded
+from diagnosis.search.candidates import SMALL, model_error
 from studies.study_command import progress
 
-from .hidden_effects.cells import PAIRS, Cell
-from .hidden_effects.draw import SINGLE, Draw, draw
-from .hidden_effects.manoeuvres import manoeuvres
-from .hidden_effects.problems import pilots, plant
-from .hidden_effects.simulated_runs import NOISE, scenario
+from .hidden_effects.draw import LARGEST, SMALLEST
+from .hidden_effects.simulated_runs import HEADING, MEASURED, NOISE, POSITION
 
-KINDS = ("designed", "eight", "zig-zag", "random", "d-optimal")
-FIRST, PRIOR, NOISY = 100.0, 0.1, "n4"  # s of the first run; as the plants of the benchmark; noise
-COLUMNS = ("cell", "seed", "kind", "result", "confidence", "found", "sure", "half_width", "margin")
+
+@dataclass(frozen=True)
+class FirstRun:
+    """The usual run after which a ship is diagnosed first.
+
+    Attributes:
+        scenario, seconds: of the run.
+        basin: north and east length for all later runs [m].
+    """
+
+    scenario: str
+    seconds: float
+    basin: tuple[float, float]
+
+
+# Basins of ships without a force on all axes hold a turning circle and the way of the second run.
+SHIPS = {
+    "cse1": FirstRun("ellipse", 100.0, (6.0, 6.0)),
+    "cybership2": FirstRun("ellipse", 100.0, (6.0, 6.0)),
+    "otter": FirstRun("otter_zigzag", 100.0, (300.0, 300.0)),
+    "kvlcc2": FirstRun("kvlcc2_zigzag", 150.0, (800.0, 800.0)),
+}
+KINDS = ("designed", "usual", "random", "d-optimal")
+PRIOR, NOISY = 0.1, "n4"  # 1, largest relative error of a coefficient; noise
+PAIRS = 20  # of random effects
+TRIES = 4  # sizes of an effect, each LESS of the one before, until the ship stays on its path
+LESS = 0.6
+PATIENCE = 200  # random plans until one keeps the limits
+BRIEF = 4  # of the plans that are searched, to the base 2, where only the basin counts
+RIVALS = 2  # random candidates next to the true one, where nothing is learned
+NUMBERS = ("confidence", "found", "sure", "half_width", "margin")
+COLUMNS = ("ship", "cell", "seed", "kind", "result", *NUMBERS)
 OPEN, RIGHT, WRONG = "open", "right", "wrong"
 OUT = Path("results") / "next_run"
 
 
-def order(seed: int) -> list[Cell]:
-    """All cells of a seed in a random order."""
-    every = [(e,) for e in SINGLE] + list(PAIRS)
-    mixed = np.random.default_rng(seed).permutation(len(every))
-    return [Cell(tuple(every[k]), NOISY, True, seed) for k in mixed]
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A ship with hidden effects.
+
+    Attributes:
+        ship: name.
+        effects: ids of what is hidden.
+        seed: of all that is drawn.
+    """
+
+    ship: str
+    effects: tuple[str, ...]
+    seed: int
+
+    @property
+    def start(self) -> Model:
+        """The nominal model."""
+        return Model(ship=ship_with([], self.ship))
+
+    @property
+    def name(self) -> str:
+        return " + ".join(self.effects)
+
+    def limits(self, minutes: float) -> Limits:
+        """Of the second run: minutes for a ship of the size of CyberShip Enterprise 1."""
+        return Limits(60.0 * minutes * self.start.ship.scale.time, size=SHIPS[self.ship].basin)
+
+    def rng(self) -> np.random.Generator:
+        """Random numbers of this cell."""
+        return np.random.default_rng([self.seed, *f"{self.ship} {self.name}".encode()])
+
+    def first_run(self, truth: Path, out: Path, noisy: bool = True) -> Path:
+        """The log of the first run.
+
+        Raises:
+            InputError: it failed.
+        """
+        first, ship = SHIPS[self.ship], self.start.ship
+        content = json.loads(find_scenario(first.scenario).read_text(encoding="utf-8"))
+        place, turn = (NOISE[NOISY] * x for x in (POSITION * ship.scale.length, HEADING))
+        noise = {"kind": "noise", "signals": MEASURED, "std": [place, place, turn]}
+        content |= {"stop": first.seconds, "ship": self.ship, "metrics": {}}
+        return simulated(content | ({"faults": [noise]} if noisy else {}), truth, out, self.seed)
 
 
-def simulated(content: dict | Path, truth: Path, out: Path, seed: int) -> Path:
+def order(ship: str, seed: int) -> list[Cell]:
+    """Singles and pairs of a ship in a random order.
+
+    A single one is of what acts as a force by a few values, at any time.
+    """
+    rng, effects = np.random.default_rng(seed), ship_with([], ship).effects
+    singles = [
+        e.id
+        for e in effects.values()
+        if e.search.by == "regression"
+        and e.kind in ("force", "inertia", "actuator", "environment")
+        and e.differentiable
+        and not (e.search.times or e.search.smooth or e.apart or e.memory is not None)
+    ]
+    pairs = [tuple(rng.choice(singles, 2, replace=False)) for _ in range(PAIRS)]
+    every = [*((e,) for e in singles), *pairs]
+    return [Cell(ship, tuple(map(str, every[k])), seed) for k in rng.permutation(len(every))]
+
+
+def hidden_ship(cell: Cell, nominal: Sequence, size: float) -> Model:
+    """The true ship: coefficients up to PRIOR wrong, and effects of a drawn size.
+
+    The size is the RMS of an effect's force over that of the commanded one, on the axis where that is
+    most, log-uniform as in :mod:`.hidden_effects`, along the first run of the nominal ship.
+
+    Args:
+        cell: what is hidden.
+        nominal: that run.
+        size: factor on the size that is drawn.
+    """
+    rng, start = cell.rng(), cell.start
+    base, command = model_error(nominal, start), _rms(commanded(nominal, start))
+    changes = {n: start.value(n) * PRIOR * rng.uniform(-1.0, 1.0) for n in start.ship.coefficients}
+    for name in cell.effects:
+        names = start.ship.effects[name].coefficients
+        steps = {n: SMALL * start.unit(n) * rng.standard_normal() for n in names}
+        force = _rms(base - model_error(nominal, start.plus(steps)))
+        share = np.max(force[command > 0.0] / command[command > 0.0])
+        wanted = size * np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST)))
+        for n, step in steps.items():
+            changes[n] = changes.get(n, 0.0) + step * wanted / max(share, np.finfo(float).tiny)
+    return start.plus({n: x for n, x in changes.items() if x})
+
+
+def _rms(x: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.mean(np.square(x), axis=0))
+
+
+def simulated(content: Any, truth: Path, out: Path, seed: int) -> Path:
     """The log of a run of the true ship.
 
     Raises:
@@ -69,126 +188,204 @@ def simulated(content: dict | Path, truth: Path, out: Path, seed: int) -> Path:
     return out
 
 
-def learned(q: Question, data: Sequence) -> dict:
-    """What ``diagnosis.json`` holds after the runs."""
-    return diagnosis.diagnose(data, prior=q.prior, model=q.start).content
+def first_runs(cell: Cell, work: Path) -> tuple[Path, list]:
+    """The parameters of the true ship, and its first run.
+
+    Raises:
+        InputError: at no size the ship stays on its path.
+    """
+    nominal, truth = work / "nominal.ssv", work / "truth.ssv"
+    write_model(nominal, cell.start)
+    pilot = diagnosis.load(cell.first_run(nominal, work / "pilot", noisy=False), model=cell.start)
+    for tries in range(TRIES):
+        write_model(truth, hidden_ship(cell, pilot, LESS**tries))
+        with suppress(InputError):  # it leaves its path
+            log = cell.first_run(truth, work / f"first_{tries}")
+            return truth, diagnosis.load(log, model=cell.start)
+    raise InputError("the ship leaves its path with effects of any size that was tried")
 
 
-def judged(content: Mapping, hidden: Sequence[Draw]) -> tuple[str, float, str, float]:
+def judged(content: Mapping, hidden: Sequence[str]) -> dict[str, Any]:
     """Right, wrong or open; largest confidence, what was found, half width of the first interval."""
     certain = [e for e in content["effects"] if (e["confidence"] or 0.0) >= SURE]
     first = max((e["confidence"] or 0.0 for e in content["effects"]), default=0.0)
     found = " + ".join(e["id"] for e in content["effects"])
-    allowed = {i for d in hidden for i in (d.effect, *d.right)}
-    wrong = any(e["id"] not in allowed for e in certain)
-    right = sum(any(e["id"] in {d.effect, *d.right} for e in certain) for d in hidden) == len(hidden)
+    ids = {e["id"] for e in certain}
+    result = WRONG if ids - set(hidden) else RIGHT if ids == set(hidden) else OPEN
     spans = [c["ci95"] for e in certain for c in e["coefficients"].values() if c["ci95"]]
     width = 0.5 * (spans[0][1] - spans[0][0]) if spans else float("nan")
-    return WRONG if wrong else RIGHT if right else OPEN, first, found, width
+    return {"result": result, "confidence": first, "found": found, "half_width": width}
 
 
-def chosen(d: Designer, k: Knowledge, kind: str, seed: int) -> ScoredPlan:
-    """The run of a kind.
+def chosen(d: Designer, k: Knowledge, kind: str, seed: int) -> Iterator[tuple[str, ScoredPlan]]:
+    """The runs of a kind, with their names.
 
     Raises:
         InputError: none keeps the limits.
     """
-    if kind in ("eight", "zig-zag"):
-        return d.usual(k, kind)
-    if kind == "random":
+    if kind == "usual":
+        found = {name: d.usual(k, name) for name in d.usual_runs}
+        yield from ((n, s) for n, s in found.items() if n in ("eight", "circle", "zig-zag"))
+    elif kind == "random":
         rng = np.random.default_rng(seed)
-        for _ in range(200):
-            found = d.scored(k, sequence(rng.random(4 * DIMENSIONS), d.limits.seconds))
-            if found.excess == 0.0:
-                return found
-        raise InputError("no random run keeps the limits")
-    return d.search(k, seed)
+        points = rng.random((PATIENCE, 4 * DIMENSIONS))
+        plans = (sequence(point, d.limits.seconds, d.library) for point in points)
+        found = next((s for p in plans if (s := d.scored(k, p)).excess == 0.0), None)
+        if found is None:
+            raise InputError("no random run keeps the limits")
+        yield kind, found
+    else:
+        yield kind, d.search(k, seed)
 
 
-def cell_rows(cell: Cell, folder: Path, kinds: Sequence[str], limits: Limits) -> list[dict]:
+def cell_rows(cell: Cell, kinds: Sequence[str], limits: Limits) -> Iterator[dict]:
     """The rows of a cell: after the first run, and, where that is open, after one of each kind."""
-    pilot = pilots([cell.seed], folder)[cell.seed]
-    rng = cell.rng(1)
-    hidden = [draw(e, rng, pilot, 1.0) for e in cell.effects]
-    ship = plant(cell, hidden)
-    if ship.other or ship.clock:
-        return []
-    parts = {"vessel": ship.vessel, "thrusters": ship.thrusters}
-    values = {p: {n: cosim.Parameter(x) for n, x in v.items()} for p, v in parts.items()}
+    base = {"ship": cell.ship, "cell": cell.name, "seed": cell.seed}
+
+    def row(kind: str, content: Mapping, **more: float) -> dict:
+        return base | {"kind": kind} | judged(content, cell.effects) | more
+
     with TemporaryDirectory() as scratch:
-        work = Path(scratch)
-        truth = work / "truth.ssv"
-        cosim.write_parameters(truth, cosim.ParameterSet(values))
-        ellipse = manoeuvres(cell.seed)[0]
-        nominal = replace(ship, vessel={}, thrusters={}, clock=0.0)
-        content = scenario(ellipse, nominal, NOISE[NOISY], cell.seed, Path()) | {"stop": FIRST}
-        log = simulated(content, truth, work / "first", cell.seed)
-        start = Model()
-        data = diagnosis.load(log, model=start)
-        q = Question(data, {}, start, PRIOR, limits)
-        q = replace(q, content=learned(q, data))
-        result, first, found, width = judged(q.content, hidden)
-        base = {"cell": cell.name, "seed": cell.seed}
-        row = {"result": result, "confidence": first, "found": found, "half_width": width}
-        rows = [base | {"kind": "first"} | row]
-        if first >= SURE or not (q.content["effects"] or q.content["possibilities"]):
-            return rows
+        work, start = Path(scratch), cell.start
+        try:
+            truth, data = first_runs(cell, work)
+            q = Question(data, {}, start, PRIOR, limits, ship=cell.ship)
+            q = replace(q, content=diagnosis.diagnose(data, prior=PRIOR, model=start).content)
+        except InputError as error:
+            yield base | {"kind": "first", "result": f"failed: {error}"}
+            return
+        yield (first := row("first", q.content))
+        if first["confidence"] >= SURE or not (q.content["effects"] or q.content["possibilities"]):
+            return
         for kind in kinds:
-            criterion = kind if kind == "d-optimal" else "certainty"
             try:
+                criterion = kind if kind == "d-optimal" else q.criterion
                 d, k = prepared(replace(q, criterion=criterion))
-                scored = chosen(d, k, kind, cell.seed)
-                run, *_ = checked(d, k, scored, cell.seed)
-                sure = sure_of(k, run.gram, cell.seed)
-                target = work / kind
-                target.mkdir()
-                write_run(d, run, 1, target, None)
-                after = simulated(target / scenario_file(1), truth, target / "log", cell.seed + 1000)
-                both = [*data, *diagnosis.load(after, model=start)]
-                result, best, found, width = judged(learned(q, both), hidden)
-                eta = both[-1].smoothed.eta[both[-1].known]
-                margin = float(d.basin.margin(eta, d.outline).min())
+                rehearsal = Rehearsal(data, d.space, k)
+                plans = [*chosen(d, k, kind, cell.seed)]
             except InputError as error:
-                rows.append(base | {"kind": kind, "result": f"failed: {error}"})
+                yield base | {"kind": kind, "result": f"failed: {error}"}
                 continue
-            row = {"result": result, "confidence": best, "found": found, "sure": sure}
-            rows.append(base | {"kind": kind} | row | {"half_width": width, "margin": margin})
-    return rows
+            for name, plan in plans:
+                try:
+                    # A usual run is the one that is named, or none.
+                    run, _ = d.checked(k, plan, cell.seed, **({"tries": 1} if kind == "usual" else {}))
+                    sure = rehearsal.sure([d.windows(run.motion)], cell.seed)
+                    target = work / name
+                    target.mkdir()
+                    write_run(d, run, 1, target, cell.ship)
+                    log = simulated(target / scenario_file(1), truth, target / "log", cell.seed + 1000)
+                    both = [*data, *diagnosis.load(log, model=start)]
+                    content = diagnosis.diagnose(both, prior=PRIOR, model=start).content
+                    eta = both[-1].smoothed.eta[both[-1].known]
+                    margin = float(d.basin.margin(eta, d.outline).min())
+                    yield row(name, content, sure=sure, margin=margin)
+                except InputError as error:
+                    yield base | {"kind": name, "result": f"failed: {error}"}
 
 
-def summary(rows: Sequence[dict]) -> str:
-    """How many cells each kind of run decides, as a Markdown table."""
-    lines = [
-        "| run | cells | right | wrong | open | failed | least margin [m] |",
-        "|---|--:|--:|--:|--:|--:|--:|",
+def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dict]:
+    """Designs of a ship, each run by fresh ships of every candidate above 5 %, and once with noise.
+
+    The diagnosis that a design begins with is made up: the hidden effects, each with random rivals, at
+    even odds. The ships are drawn from the posterior of each candidate anew.
+    """
+    for cell in order(ship, seed)[:count]:
+        base = {"ship": ship, "cell": cell.name, "seed": seed}
+        with TemporaryDirectory() as scratch:
+            try:
+                _, data = first_runs(cell, Path(scratch))
+                q = Question(data, _made_up(cell), cell.start, PRIOR, cell.limits(minutes), ship=ship)
+                d, k = prepared(q)
+                run, spread = d.checked(k, d.search(k, seed, log_points=BRIEF, evolved=0), seed)
+                fresh = d.spread(k, run, seed + 1)
+            except InputError as error:
+                yield base | {"result": f"no design: {error}"}
+                continue
+            yield base | {"planned": float(spread.margin.min()), "margin": float(fresh.margin.min())}
+
+
+def _made_up(cell: Cell) -> dict:
+    others = [c.name for c in order(cell.ship, cell.seed) if len(c.effects) == 1]
+    rng = cell.rng()
+    effects = [
+        {"id": e, "confidence": 0.5, "indistinguishable": [*map(str, rng.choice(others, RIVALS))]}
+        for e in cell.effects
     ]
-    opened = {(r["cell"], r["seed"]) for r in rows if r["kind"] != "first"}
-    for kind in dict.fromkeys(r["kind"] for r in rows):
-        mine = [r for r in rows if r["kind"] == kind and (r["cell"], r["seed"]) in opened]
+    return {"verdict": "ambiguous", "effects": effects, "possibilities": [], "ranking": []}
+
+
+def summary(rows: Sequence[Mapping]) -> str:
+    """How many cells each kind of run decides, and how often its probability came true, as tables."""
+    lines = [
+        "| ship | run | cells | right | wrong | open | failed | least margin [m] |",
+        "|---|---|--:|--:|--:|--:|--:|--:|",
+    ]
+    opened = {_cell(r) for r in rows if r["kind"] != "first"}
+    for ship, kind in dict.fromkeys((r["ship"], r["kind"]) for r in rows):
+        mine = [r for r in rows if (r["ship"], r["kind"]) == (ship, kind) and _cell(r) in opened]
         counts = [sum(r["result"] == x for r in mine) for x in (RIGHT, WRONG, OPEN)]
-        failed = len(mine) - sum(counts)
         margins = [float(r["margin"]) for r in mine if r.get("margin") not in (None, "")]
         least = f"{min(margins):.2f}" if margins else ""
-        lines.append(f"| {kind} | {len(mine)} | {' | '.join(map(str, counts))} | {failed} | {least} |")
+        numbers = [len(mine), *counts, len(mine) - sum(counts), least]
+        lines.append(f"| {ship} | {kind} | {' | '.join(map(str, numbers))} |")
+    known = [r for r in rows if r.get("sure") not in (None, "")]
+    stated = [(float(r["sure"]), r["result"] == RIGHT) for r in known]
+    lines += ["", "| stated probability | runs | mean stated | right |", "|---|--:|--:|--:|"]
+    for low, high in ((0.0, 0.1), (0.1, 0.5), (0.5, 0.9), (0.9, 1.01)):
+        mine = [x for x in stated if low <= x[0] < high]
+        if mine:
+            mean, right = np.mean(mine, axis=0)
+            span = f"{low:.0%} to {min(high, 1.0):.0%}"
+            lines.append(f"| {span} | {len(mine)} | {mean:.0%} | {right:.0%} |")
     return "\n".join(lines)
+
+
+def _cell(row: Mapping) -> tuple[str, str, int]:
+    return row["ship"], row["cell"], int(row["seed"])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = _parser().parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
-    path = options.out / "cells.csv"
-    rows = list(csv.DictReader(path.open())) if path.is_file() else []
-    done = {(r["cell"], int(r["seed"])) for r in rows}
-    limits = Limits(60.0 * options.minutes, size=(6.0, 6.0))
     try:
-        with progress(options.cells, "cells that the first run leaves open") as advance:
-            for cell in order(options.seed):
-                if len({r["cell"] for r in rows if r["kind"] != "first"}) >= options.cells:
+        return _basin(options) if options.basin else _cells(options)
+    except InputError as error:
+        complain(error)
+        return BAD_INPUT
+
+
+def _basin(options: argparse.Namespace) -> int:
+    found = []
+    with progress(options.cells * len(options.ships), "designs") as advance:
+        for ship in options.ships:
+            for row in basin_rows(ship, options.cells, options.minutes, options.seed):
+                found.append(row)
+                (options.out / "basin.json").write_text(json.dumps(found, indent=1) + "\n")
+                advance()
+    for ship in options.ships:
+        mine = [r for r in found if r["ship"] == ship]
+        made = [r["margin"] for r in mine if "margin" in r]
+        left = sum(m < 0.0 for m in made)
+        least = min(made, default=float("nan"))
+        print(f"{ship}: {len(made)} of {len(mine)} designed, {left} left the basin; least {least:.2f} m")
+    return 0
+
+
+def _cells(options: argparse.Namespace) -> int:
+    path = options.out / "cells.csv"
+    rows: list[dict] = list(csv.DictReader(path.open())) if path.is_file() else []
+    done = {_cell(r) for r in rows}
+    with progress(options.cells * len(options.ships), "cells that the first run leaves open") as advance:
+        for ship in options.ships:
+            for cell in order(ship, options.seed):
+                count = len({_cell(r) for r in rows if r["kind"] != "first" and r["ship"] == ship})
+                if count >= options.cells:
                     break
-                if (cell.name, cell.seed) in done:
+                if (ship, cell.name, cell.seed) in done:
                     continue
-                found = cell_rows(cell, options.out, options.kinds, limits)
+                found = [*cell_rows(cell, options.kinds, cell.limits(options.minutes))]
                 rows += found
                 with path.open("a", newline="") as file:
                     writer = csv.DictWriter(file, COLUMNS)
@@ -197,12 +394,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     writer.writerows(found)
                 if len(found) > 1:
                     advance()
-    except InputError as error:
-        complain(error)
-        return BAD_INPUT
-    text = summary(rows)
-    (options.out / "summary.json").write_text(json.dumps(rows, indent=1, default=str) + "\n")
-    print(text)
+    print(summary(rows))
     return 0
 
 
@@ -210,11 +402,16 @@ def _parser() -> argparse.ArgumentParser:
     parser = command_parser(
         "benchmarks.next_run",
         "Test whether a designed run decides what a first run leaves open.",
-        "example:  python -m benchmarks.next_run --cells 4 --kinds designed eight --seed 0\n"
+        "example:  python -m benchmarks.next_run --ships cse1 --cells 4 --kinds designed usual\n"
+        "          python -m benchmarks.next_run --basin --ships cse1 otter --cells 50\n"
         "Cells that are in DIR/cells.csv are not run again.\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted",
     )
-    parser.add_argument("--cells", type=int, default=40, metavar="N", help="open cells (40)")
+    parser.add_argument("--ships", nargs="+", choices=SHIPS, default=[*SHIPS], help="(all)")
+    parser.add_argument(
+        "--cells", type=int, default=40, metavar="N", help="open cells, or designs, a ship (40)"
+    )
+    parser.add_argument("--basin", action="store_true", help="count designed runs that leave the basin")
     parser.add_argument(
         "--kinds", nargs="+", choices=KINDS, default=KINDS, help="of the second run (all)"
     )

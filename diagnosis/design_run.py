@@ -37,6 +37,8 @@ class Task(BaseModel):
 
     runs: list[Path] = Field(min_length=1)
     model: Path | None = None
+    map: Path | None = None
+    parameters: Path | None = None
     effects: list[str] = []
     ship: str | None = None
     prior: float | dict[str, float] | None = None
@@ -53,9 +55,9 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.diagnosis
     content = _diagnosis(folder / DIAGNOSIS)
-    if "parameters" in content:
-        raise InputError(_of_fmu(folder / DIAGNOSIS, content))
     task = _task(folder / POSTERIOR)
+    if "parameters" in content:
+        return _of_fmu(options, content, task, advance)
     if task is None:
         return _advised(options, content, folder)
     from .assessment.gathering import gather  # only now: it takes a while to import
@@ -106,16 +108,37 @@ def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path)
     return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
 
 
-def _of_fmu(path: Path, content: dict[str, Any]) -> str:
-    """Why no run is designed for parameters of an FMU, and what its diagnosis leaves open."""
-    groups = [" and ".join(group) for group in content["indistinguishable_groups"]]
-    rivals = [[e["id"], *e["indistinguishable"]] for e in content["effects"]]
-    groups += [" and ".join(ids) for ids in rivals if len(ids) > 1]
-    left = f"; indistinguishable: {'; '.join(groups)}" if groups else ""
-    return (
-        f"'{path}' is of the parameters of an FMU{left}: runs are designed for the effects of a ship's "
-        "model. Run with inputs of other levels and rates, and learn from all runs"
-    )
+def _of_fmu(
+    options: argparse.Namespace, content: dict[str, Any], task: Task | None, advance: Advance
+) -> Done:
+    """Inputs over time that determine the parameters of an FMU.
+
+    Raises:
+        InputError: the FMU is of a ship, or the diagnosis does not state its runs.
+    """
+    from .design.fmu_inputs import plan_inputs
+    from .design.limits import limits_of
+    from .fmu_parameters.system_task import is_system, system_task
+
+    path = options.diagnosis / DIAGNOSIS
+    if task is None or task.model is None:
+        raise InputError(f"'{path}' does not state its runs; learn again with this version")
+    if not is_system(task.runs, task.map):
+        raise InputError(
+            f"'{path}' is of the parameters of a ship's FMU: learn without --parameters, and design "
+            "the run for its effects"
+        )
+    runs: dict[str, Sequence[Path]] = {"train": task.runs}
+    system = system_task(task.model, task.map, runs, task.parameters, task.horizon)
+    fitted = {p["name"]: p["z"] for p in content["parameters"]}
+    system.parameters = [p for p in system.parameters if p.name in fitted]
+    if not fitted:
+        raise InputError(f"'{path}' has no parameter that was fitted, so no input is designed")
+    z = [fitted[p.name] for p in system.parameters]
+    seconds = limits_of(options.minutes, None).seconds
+    plan = plan_inputs(system, z, seconds, options.count, options.seed, advance)
+    written = plan.write(options.out)
+    return Done(0, [*plan.lines(), f"{', '.join(written)} in {options.out}"])
 
 
 def _diagnosis(path: Path) -> dict[str, Any]:

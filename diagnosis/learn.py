@@ -92,7 +92,12 @@ def _learned_of_fmu(options: argparse.Namespace, advance: Advance) -> Done:
     from .fmu_parameters.output.learn_fmu import learn_fmu
 
     origin = {name: str(value) for name, value in _origin(options).items()}
-    return Done(0, learn_fmu(options, advance, origin, execution_of(options)).shown(str(options.out)))
+    made_of = _task(options) | {
+        name: None if path is None else str(path.resolve())
+        for name, path in (("map", options.map), ("parameters", options.parameters))
+    }
+    report = learn_fmu(options, advance, origin, execution_of(options), made_of)
+    return Done(0, report.shown(str(options.out)))
 
 
 def _begun(options: argparse.Namespace, advance: Advance) -> "Session":

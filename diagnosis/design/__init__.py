@@ -1,14 +1,17 @@
 """What to run next: the manoeuvre that discriminates the candidates that a diagnosis leaves."""
 
 from .designing import Designer, Limits, ScoredPlan
-from .information import SURE, Knowledge
+from .hypotheses import knowledge
+from .information import CRITERIA, SURE, Knowledge
 from .manoeuvre_library import DIMENSIONS, sequence
-from .next_plan import Question, checked, plan_next, prepared
+from .next_plan import Question, plan_next, prepared
 from .planned_motion import Basin
+from .rehearsal import Rehearsal
 from .run_files import scenario_file, write_run
-from .run_plan import MOST_RUNS, Plan, PlannedRun, sure_of
+from .run_plan import MOST_RUNS, Plan, PlannedRun
 
 __all__ = [
+    "CRITERIA",
     "DIMENSIONS",
     "MOST_RUNS",
     "SURE",
@@ -19,12 +22,12 @@ __all__ = [
     "Plan",
     "PlannedRun",
     "Question",
+    "Rehearsal",
     "ScoredPlan",
-    "checked",
+    "knowledge",
     "plan_next",
     "prepared",
     "scenario_file",
     "sequence",
-    "sure_of",
     "write_run",
 ]

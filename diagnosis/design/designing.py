@@ -21,6 +21,7 @@ from .information import CRITERIA, Knowledge, inseparable
 from .manoeuvre_library import DIMENSIONS, LIBRARY, USUAL, PlanStep, Reach, UsualRuns, sequence, usual
 from .order_library import ORDERS, USUAL_ORDERS, Orders
 from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
+from .spread import MEMBERS, STEP, Spread, spread
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
 LOG_POINTS = 6  # of the number of Sobol points, to the base 2; chosen: a few seconds
@@ -32,6 +33,11 @@ FASTER = 1.5  # times the fastest measured motion: as far as a model is used bey
 FORBIDDEN = 1e3  # of a criterion, for each unit by which a limit is exceeded
 # Shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
+TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
+NO_SPREAD = (
+    "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
+    "basin, fewer minutes or a smaller margin"
+)
 ROUNDED = 1.3  # times the largest speeds, which ramps and turned axes exceed a little (chosen)
 
 
@@ -198,10 +204,9 @@ class Designer:
             left = [n for n in range(len(plans)) if n not in found]
             motions = self._motions([plans[n] for n in left], size, EVERY * self.scale) if left else []
             for n, motion in zip(left, motions, strict=True):
-                tau = motion.thrust(self.model)
-                excess = self.excess(motion, tau)
+                excess = self.excess(motion)
                 if excess == 0.0:
-                    gram = self.space.gram([as_windows(motion, tau, self.data[0].smoothed)])
+                    gram = self.space.gram([self.windows(motion)])
                     score = CRITERIA[self.criterion](k, gram)
                     found[n] = ScoredPlan(plans[n], size, motion, gram, excess, score)
                 elif size == SMALLER[-1]:
@@ -210,31 +215,47 @@ class Designer:
         self.tried += (each := [found[n] for n in range(len(plans))])
         return each
 
-    def excess(self, motion: PlannedMotion, tau: np.ndarray) -> float:
-        """By how much a motion with a force (n, 3) exceeds basin, actuators and speeds [1]."""
+    def windows(self, motion: PlannedMotion) -> WeakWindows:
+        """A motion as a measured run."""
+        return as_windows(motion, motion.thrust(self.model), self.data[0].smoothed)
+
+    def excess(self, motion: PlannedMotion) -> float:
+        """By how much a motion exceeds basin, actuators and speeds [1]."""
         nu = np.abs(motion.nu)
         speed = float(np.hypot(nu[:, 0], nu[:, 1]).max() / self.reach.speed)
         fast = max(speed, float(nu[:, 2].max() / self.reach.rate)) / ROUNDED
         margin = float(self.basin.margin(motion.eta, self.outline).min())
         outside = (self.margin - margin) / float(np.ptp(self.outline[:, 0]))
-        share = load(tau, self.model) / MOST_THRUST if motion.orders is None else 0.0
+        share = (
+            0.0
+            if motion.orders is not None
+            else load(motion.thrust(self.model), self.model) / MOST_THRUST
+        )
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
-    def search(self, k: Knowledge, seed: int) -> ScoredPlan:
+    def search(
+        self, k: Knowledge, seed: int, log_points: int = LOG_POINTS, evolved: int = EVOLVED
+    ) -> ScoredPlan:
         """The best plan that is found, by the same seed the same unless time is short.
+
+        Args:
+            k: what is known.
+            seed: of the points.
+            log_points: of the number of Sobol points, to the base 2.
+            evolved: points that evolution tries at the most.
 
         Raises:
             InputError: no plan keeps the limits.
         """
         T, end = self.limits.seconds, time.monotonic() + SECONDS
         pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
-        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(LOG_POINTS)
+        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(log_points)
         found: list[tuple[ScoredPlan, np.ndarray]] = []
 
         def cost(some: np.ndarray) -> np.ndarray | float:
-            if time.monotonic() > end or len(found) >= len(points) + EVOLVED:
+            if time.monotonic() > end or len(found) >= len(points) + evolved:
                 raise _OutOfTimeError
-            self.advance(f"searching a plan: {len(found)} of {len(points) + EVOLVED}")
+            self.advance(f"searching a plan: {len(found)} of {len(points) + evolved}")
             each = np.clip(some.T.reshape(-1, points.shape[1]), 0.0, 1.0 - 1e-9)
             plans = [sequence(point, T, self.library) for point in each]
             found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))
@@ -262,6 +283,28 @@ class Designer:
         """A usual run of the same length."""
         return self.scored(k, usual(name, self.limits.seconds, self.usual_runs))
 
+    def spread(self, k: Knowledge, s: ScoredPlan, seed: int) -> Spread:
+        """The tracks of a plan under every likely hypothesis."""
+        motion = self.motion(s.steps, s.size, STEP * self.scale)
+        likely = [n for n, w in enumerate(k.weights) if w > LIKELY] or [int(np.argmax(k.weights))]
+        self.advance(f"closed loop of {len(likely) * MEMBERS} models along the plan")
+        return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
+
+    def checked(
+        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = TRIES
+    ) -> tuple[ScoredPlan, Spread]:
+        """The plan, or else the best of those that were tried, that keeps the basin with its spread.
+
+        Raises:
+            InputError: none of so many does.
+        """
+        others = sorted((s for s in self.tried if s.excess == 0.0), key=lambda s: -s.score)
+        for s in [found, *(s for s in others if s is not found)][:tries]:
+            tracks = self.spread(k, s, seed)
+            if tracks.margin.min() > 0.0:
+                return s, tracks
+        raise InputError(NO_SPREAD)
+
     def inseparable(self, k: Knowledge) -> list[tuple[int, int]]:
         """Pairs that no plan tried so far separates, see :func:`.information.inseparable`."""
         return inseparable(k, [s.gram for s in self.tried if s.excess == 0.0])
@@ -269,8 +312,3 @@ class Designer:
 
 class _OutOfTimeError(Exception):
     """The time of a search is over."""
-
-
-def likely(k: Knowledge) -> list[int]:
-    """Numbers of the hypotheses that count for the basin."""
-    return [n for n, w in enumerate(k.weights) if w > LIKELY] or [int(np.argmax(k.weights))]

@@ -6,6 +6,7 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import independent, omega_std
@@ -40,12 +41,14 @@ class EffectParameters:
     Attributes:
         given: values of the effect at the point, as additions to the model.
         names: parameters with a slope there.
-        steps: of their finite differences.
+        steps: of their finite differences, SI; each is the unit of a column.
+        precision: (p, p), of values that follow each other, in these units; None: 0.
     """
 
     given: Mapping[str, float]
     names: tuple[str, ...]
     steps: tuple[float, ...]
+    precision: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +60,14 @@ class Space:
         prior: of the nominal coefficients.
         blocks: effect -> its parameters.
         sigma: (3,), noise of the model error that counts for one window [N, N, N m].
+        lasting: (3,), windows that count as one.
     """
 
     start: Model
     prior: NominalPrior
     blocks: Mapping[str, EffectParameters]
     sigma: np.ndarray
+    lasting: np.ndarray
 
     @property
     def nuisance(self) -> list[str]:
@@ -70,7 +75,7 @@ class Space:
         return [n for n, s in self.prior.std.items() if s > 0.0]
 
     def columns(self, data: Sequence[WeakWindows]) -> np.ndarray:
-        """(3 K, p): change of the model error by one unit of each parameter, in units of the noise.
+        """(K, 3, p): change of the model error by one unit of each parameter, in units of the noise.
 
         Of a nominal coefficient the unit is its prior standard deviation. Each effect has first what it
         gives at its point, then its slopes there by their steps.
@@ -86,11 +91,16 @@ class Space:
             found.append(base - at)
             for n, h in zip(block.names, block.steps, strict=True):
                 found.append((at - model_error(data, model.plus({n: SMALL * h}))) / SMALL)
-        return np.stack([(c / self.sigma).ravel() for c in found], axis=1)
+        return np.stack([c / self.sigma for c in found], axis=2)
+
+    def rows(self, data: Sequence[WeakWindows]) -> np.ndarray:
+        """(3 K, p), the same with a row for each axis of each window."""
+        columns = self.columns(data)
+        return columns.reshape(-1, columns.shape[2])
 
     def gram(self, data: Sequence[WeakWindows]) -> np.ndarray:
         """(p, p), Gram matrix of the columns."""
-        A = self.columns(data)
+        A = self.rows(data)
         return A.T @ A
 
     def places(self) -> dict[str, np.ndarray]:
@@ -151,26 +161,24 @@ def space_of(
     for name in ids:
         shapes = candidate(data, start, base, start.ship.effects[name]).shapes
         if shapes:
-            blocks[name] = _block(start, min(shapes, key=lambda s: _left(s, base / noise, noise)), base)
-    A = Space(start, prior, blocks, noise).columns(data)
+            blocks[name] = block_of(start, shapes, base, noise)
+    A = Space(start, prior, blocks, noise, np.ones(3)).rows(data)
     fit = A @ np.linalg.lstsq(A, (base / noise).ravel(), rcond=1e-8)[0]
     left = base - fit.reshape(base.shape) * noise
     spread = np.maximum(noise, np.sqrt(np.mean(left**2, axis=0)))
-    space = Space(start, prior, blocks, spread * np.sqrt(OVERLAP * independent(data, left)))
+    lasting = OVERLAP * independent(data, left)
+    space = Space(start, prior, blocks, spread * np.sqrt(lasting), lasting)
     size = np.linalg.norm(base / space.sigma)
     precision, mean = [np.eye(len(space.nuisance))], [np.zeros(len(space.nuisance))]
-    columns = space.columns(data)
+    columns = space.rows(data)
     for name, place in space.places().items():
         norms = np.linalg.norm(columns[:, place[1:]], axis=0)
         width = WIDE * size / np.maximum(norms, 1e-6 * max(norms.max(initial=0.0), size))
-        precision.append(np.diag([EXACT, *(1.0 / width**2)]))
+        smooth = blocks[name].precision
+        own = np.diag(1.0 / width**2) + (0.0 if smooth is None else smooth)
+        precision.append(np.asarray(block_diag(EXACT, own)))
         mean.append(np.array([1.0 if blocks[name].given else 0.0, *np.zeros(len(width))]))
-    whole = np.zeros((columns.shape[1],) * 2)
-    first = 0
-    for P in precision:
-        whole[first : first + len(P), first : first + len(P)] = P
-        first += len(P)
-    return space, whole, np.concatenate(mean)
+    return space, np.asarray(block_diag(*precision)), np.concatenate(mean)
 
 
 def _left(s: CandidateShape, y: np.ndarray, noise: np.ndarray) -> float:
@@ -181,12 +189,23 @@ def _left(s: CandidateShape, y: np.ndarray, noise: np.ndarray) -> float:
     return float(np.sum((rest - fit) ** 2))
 
 
-def _block(start: Model, s: CandidateShape, base: np.ndarray) -> EffectParameters:
-    """The parameters of an effect about a shape: those that scale it, and those that make it."""
+def block_of(
+    start: Model, shapes: Sequence[CandidateShape], base: np.ndarray, noise: np.ndarray
+) -> EffectParameters:
+    """The parameters of an effect about its best shape: those that scale it, and those that make it.
+
+    Args:
+        start: the initial model.
+        shapes: of the effect.
+        base: (K, 3), model error.
+        noise: (3,), by which an axis counts.
+    """
+    s = min(shapes, key=lambda s: _left(s, base / noise, noise))
     names = tuple(dict.fromkeys([*s.fitted, *s.given]))
     unit = [start.unit(n) for n in names]
     steps = [abs(s.given[n]) or u if n in s.given else u for n, u in zip(names, unit, strict=True)]
-    return EffectParameters(dict(s.given), names, tuple(steps))
+    smooth = None if s.precision is None else s.precision * np.outer(steps, steps)
+    return EffectParameters(dict(s.given), names, tuple(steps), smooth)
 
 
 def knowledge(
@@ -210,7 +229,7 @@ def knowledge(
         tuple(dict.fromkeys(i for i in each if i in space.blocks))
         for each in product(*[s for s in sets if s])
     ]
-    A, q, places = space.columns(data), len(space.nuisance), space.places()
+    A, q, places = space.rows(data), len(space.nuisance), space.places()
     y = (model_error(data, start) / space.sigma).ravel()
     hypotheses = []
     for names in dict.fromkeys(chosen or [()]):

@@ -17,7 +17,6 @@ from scipy.special import ndtr
 SURE = 0.95  # 1, probability from which on a cause counts as certain; the aim of a design
 ODDS = float(np.log(SURE / (1.0 - SURE)))  # nats, the log odds of that
 SMALLEST = 1e-10  # of the largest eigenvalue: what is less is rounding
-DRAWS = 200  # simulated outcomes for a probability, whose standard error is then at most 0.035
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,26 +242,6 @@ CRITERIA: Mapping[str, Criterion] = {
     "d-optimal": d_optimal,
     "a-optimal": a_optimal,
 }
-
-
-def expected(k: Knowledge, G: np.ndarray, seed: int, draws: int = DRAWS) -> np.ndarray:
-    """(draws, 2): weights of the true hypothesis after simulated outcomes of a run, and of the largest.
-
-    Each outcome is drawn from a hypothesis by its weight, its parameters from their posterior.
-    """
-    p, rng = Prediction.of(k, G), np.random.default_rng(seed)
-    factors = np.linalg.cholesky(p.covariance)
-    logs = np.log(np.maximum(k.weights, SMALLEST)) - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(
-        axis=1
-    )
-    true = rng.choice(len(k.weights), draws, p=k.weights)
-    found = np.empty((draws, 2))
-    for n, i in enumerate(true):
-        y = p.mean[i] + factors[i] @ rng.standard_normal(p.mean.shape[1])
-        off = np.linalg.solve(factors, (y - p.mean)[..., None])[..., 0]
-        w = np.exp((score := logs - 0.5 * np.square(off).sum(axis=1)) - score.max())
-        found[n] = w[i] / w.sum(), w.max() / w.sum()
-    return found
 
 
 def inseparable(k: Knowledge, grams: Sequence[np.ndarray]) -> list[tuple[int, int]]:

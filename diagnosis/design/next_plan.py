@@ -12,18 +12,12 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from ..report.finding_text import discriminating_run
 from ..search import Prior
-from ..search.prior import NominalPrior
-from .designing import Designer, Limits, ScoredPlan, likely
+from ..search.prior import MEASURED, NominalPrior
+from .designing import Designer, Limits, ScoredPlan
 from .hypotheses import knowledge, rivals
 from .information import Knowledge
-from .run_plan import MOST_RUNS, Plan, PlannedRun, sure_of
-from .spread import STEP, spread
-
-TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
-NO_SPREAD = (
-    "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
-    "basin, fewer minutes or a smaller margin"
-)
+from .rehearsal import Rehearsal
+from .run_plan import MOST_RUNS, Plan, PlannedRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +50,7 @@ def prepared(q: Question, advance: Advance = silent) -> tuple[Designer, Knowledg
         InputError: the ship cannot follow a pose, basin or minutes are too small, no such criterion.
     """
     advance("candidates and their weights")
-    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior), rivals(q.content))
+    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior, MEASURED), rivals(q.content))
     used = "d-optimal" if len(k.hypotheses) == 1 else q.criterion
     best = int(np.argmax(k.weights))
     model = space.model(k.hypotheses[best], k.estimates[best].mean)
@@ -81,16 +75,22 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
     decided = len(k.hypotheses) == 1
     planned: list[PlannedRun] = []
     pairs: list[tuple[int, int]] = []
-    now = k
+    now, rehearsal, earlier = k, Rehearsal(q.data, designer.space, k), []
     for n in range(runs):
         found = designer.search(now, seed + n)
         usual = {name: designer.usual(now, name) for name in designer.usual_runs}
         if n == 0:
             pairs = designer.inseparable(k)
-        run = checked(designer, now, found, seed + n)
-        sure = {name: (sure_of(now, s.gram, seed), s) for name, s in usual.items()}
-        planned.append(PlannedRun(designer, *run, sure_of(now, run[0].gram, seed), sure))
-        now = now.plus(run[0].gram)
+        run, tracks = designer.checked(now, found, seed + n)
+        advance("simulated outcomes of the plan and of usual runs")
+
+        def sure(s: ScoredPlan, before: Sequence[WeakWindows] = tuple(earlier)) -> float:
+            return rehearsal.sure([*before, designer.windows(s.motion)], seed)
+
+        others = {name: (sure(s), s) for name, s in usual.items() if s.excess == 0.0}
+        planned.append(PlannedRun(designer, run, now, tracks, sure(run), others))
+        now = now.plus(run.gram)
+        earlier.append(designer.windows(run.motion))
     named = [(k.hypotheses[i].ids, k.hypotheses[j].ids) for i, j in pairs]
     advice = [_advice(q.start, a, b) for a, b in named]
     if decided:
@@ -99,24 +99,6 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
             "all values (D-optimality)."
         )
     return Plan(planned, k, designer.space, named, advice, seed, designer.criterion, q.ship)
-
-
-def checked(
-    designer: Designer, k: Knowledge, found: ScoredPlan, seed: int
-) -> tuple[ScoredPlan, Knowledge, Any]:
-    """The best plan that keeps the basin with the spread of all likely hypotheses.
-
-    Raises:
-        InputError: none does.
-    """
-    of, basin = designer, designer.basin
-    others = sorted((s for s in of.tried if s.excess == 0.0), key=lambda s: -s.score)
-    for s in [found, *(s for s in others if s is not found)][:TRIES]:
-        motion = of.motion(s.steps, s.size, STEP * of.scale)
-        tracks = spread(of.space, k, likely(k), motion, basin, of.outline, seed, of.advance)
-        if tracks.margin.min() > 0.0:
-            return s, k, tracks
-    raise InputError(NO_SPREAD)
 
 
 def _advice(start: Model, a: Sequence[str], b: Sequence[str]) -> str:

@@ -81,6 +81,11 @@ class PlannedMotion:
         first = np.gradient(eta, h, axis=0)
         return cls(h * np.arange(len(eta)), eta, first, np.gradient(first, h, axis=0), orders)
 
+    def faster(self, factor: float) -> "PlannedMotion":
+        """The same track at some times the speed."""
+        rates = factor * self.eta_dot, factor**2 * self.eta_ddot
+        return replace(self, time=self.time / factor, eta_dot=rates[0], eta_ddot=rates[1])
+
     @property
     def nu(self) -> np.ndarray:
         """(n, 3), body-fixed velocity."""

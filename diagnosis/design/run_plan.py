@@ -13,7 +13,7 @@ from ..report.formatting import as_json, finite
 from ..runs.cleaning import Z95
 from .designing import Designer, ScoredPlan
 from .hypotheses import Space
-from .information import CRITERIA, SURE, Knowledge, expected, pairs, projected
+from .information import CRITERIA, SURE, Knowledge, pairs, projected
 from .manoeuvre_library import TEXTS
 from .run_files import commands_file, picture_file, scenario_file, write_run
 from .spread import Spread
@@ -208,7 +208,7 @@ def page(plan: Plan) -> str:
             "",
             f"![Track of run {n}]({picture_file(n)})",
             "",
-            f"- Simulate it: `python -m cosim.run {scenario_file(n)}`.",
+            f"- Simulate it: `cybership run {scenario_file(n)}`.",
             f"- `{commands_file(n)}` has {r.commands_text}.",
             "- Begin at rest at the first set point. Log pose and commands at "
             f"{1.0 / like.period:.3g} Hz, the rate of the runs so far.",
@@ -224,8 +224,3 @@ def page(plan: Plan) -> str:
             parts.append(f"| {row['name']} [{row['unit']}] of {row['hypothesis']} | {cells} |")
         parts.append("")
     return "\n".join(parts)
-
-
-def sure_of(k: Knowledge, gram: np.ndarray, seed: int) -> float:
-    """Probability that the right hypothesis has more than SURE after a run [1]."""
-    return float(np.mean(expected(k, gram, seed)[:, 0] > SURE))

@@ -11,7 +11,6 @@ from fmus.controller.backstepping import Inputs
 from fmus.signals import Estimate, Target
 
 from ..assessment.closed_loop import LoopPart
-from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.prediction import merged
 from .hypotheses import Space
@@ -19,6 +18,9 @@ from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
 STEP = 0.2  # s, times the time scale: of this loop, a tenth of the shortest ramp; chosen
+# Times the speed of a plan at which the ships must keep the basin as well: the controller of a ship that
+# is close to diverging loses control there. Two prior standard deviations of a coefficient of a tenth.
+HASTE = 1.2
 MEMBERS = 20  # drawn from each hypothesis: of these the outermost is the 95 % spread on either side
 
 
@@ -30,7 +32,8 @@ class Spread:
         time: (n,) [s].
         eta: (h, members, n, 3), poses; the first member has the mean parameters.
         ids: numbers of the hypotheses.
-        margin: (h,), least distance of the hull from the walls of the basin over all members [m].
+        margin: (h,), least distance of the hull from the walls of the basin over all members, at the
+            speed of the plan and at HASTE times that [m].
     """
 
     time: np.ndarray
@@ -129,7 +132,6 @@ def spread(
     basin: Basin,
     outline: np.ndarray,
     seed: int,
-    advance: Advance = silent,
 ) -> Spread:
     """The tracks of a plan under some hypotheses.
 
@@ -139,14 +141,14 @@ def spread(
         motion: the target every ``STEP`` times the time scale.
         basin, outline: walls, and corners of the hull (k, 2) [m].
         seed: of the draws.
-        advance: progress callback.
     """
-    advance(f"closed loop of {len(ids) * MEMBERS} models along the plan")
     rng = np.random.default_rng(seed)
-    eta = followed([m for n in ids for m in drawn(space, k, n, rng)], motion)
-    eta = eta.reshape(len(ids), MEMBERS, *eta.shape[1:])
-    margins = [
-        np.nan_to_num([basin.margin(track, outline).min() for track in each], nan=-np.inf).min()
-        for each in eta
-    ]
-    return Spread(motion.time, eta, list(ids), np.array(margins))
+    models = [m for n in ids for m in drawn(space, k, n, rng)]
+    eta = followed(models, motion)
+    # Orders have no speed of their own.
+    every = [eta] if motion.orders is not None else [eta, followed(models, motion.faster(HASTE))]
+    least = [[basin.margin(track, outline).min() for track in each] for each in every]
+    margins = np.nan_to_num(np.min(least, axis=0), nan=-np.inf).reshape(len(ids), MEMBERS)
+    return Spread(
+        motion.time, eta.reshape(len(ids), MEMBERS, *eta.shape[1:]), list(ids), margins.min(axis=1)
+    )

@@ -56,6 +56,9 @@ class SystemTask(CalibrationTask):
         runs: of each use.
         window: length of the windows [s]; None: as the map says.
         execution: how the FMU is run.
+
+    Attributes:
+        length: of the windows [s]; None: whole runs.
     """
 
     def __init__(
@@ -70,7 +73,7 @@ class SystemTask(CalibrationTask):
     ) -> None:
         super().__init__(parameters, notes)
         self.map, self.runs, self._model, self._execution = map, runs, model, execution
-        self._length = window or map.window
+        self.length = window or map.window
         self.driven = [c.name for c in map.inputs.values()]
         self.names = [c.name for c in map.outputs.values()]
         self.units = [unit_of(model.variables[n]) for n in self.names]
@@ -111,7 +114,7 @@ class SystemTask(CalibrationTask):
     def windows(self) -> tuple[dict[str, list[Window]], np.ndarray]:
         noise = noises(self.runs["train"], self.map)
         return {
-            use: [w for r in runs for w in windows_of(r, self.map, self._model, noise, self._length)]
+            use: [w for r in runs for w in windows_of(r, self.map, self._model, noise, self.length)]
             for use, runs in self.runs.items()
         }, noise
 

@@ -23,7 +23,11 @@ OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.
 
 
 def learn_fmu(
-    options: argparse.Namespace, advance: Advance, origin: dict[str, str], execution: Execution
+    options: argparse.Namespace,
+    advance: Advance,
+    origin: dict[str, str],
+    execution: Execution,
+    made_of: Mapping[str, object],
 ) -> CalibrationReport:
     """Calibrate the FMU of a ship or of any other system, and write the result.
 
@@ -34,6 +38,7 @@ def learn_fmu(
         advance: receives the name of each step.
         origin: what the result was made with.
         execution: how the FMU is run.
+        made_of: files and options, for ``cybership next``.
 
     Raises:
         InputError: FMU, map, parameters or runs are not as they should be.
@@ -51,7 +56,7 @@ def learn_fmu(
         if options.parameters is None and task.parameters:
             _only_known(task, parts, advance)
         result = calibrate(parts, task.possible, task.names, task.units, task.usual, advance)
-        report = CalibrationReport(result, task, parts["train"].samples)
+        report = CalibrationReport(result, task, parts["train"].samples, made_of)
         advance("report")
         with together(options.out, [*dict.fromkeys((*FILES, *OTHERS, *WRITTEN))]) as new:
             if result.changed and result.forces:

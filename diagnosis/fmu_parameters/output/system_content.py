@@ -41,12 +41,14 @@ class CalibrationReport:
         result: the calibration.
         task: what was calibrated.
         samples: number of measured values that were learned from.
+        made_of: files and options, for ``cybership next``.
         files: that are written.
     """
 
     result: SystemCalibration
     task: CalibrationTask
     samples: int
+    made_of: Mapping[str, object]
     files: list[str] = field(default_factory=lambda: [*FILES])
 
     @property
@@ -200,7 +202,7 @@ class CalibrationReport:
             folder / "model.ssv",
             cosim.ParameterSet(values={name: values} if values else {}, units=told, name="calibrated"),
         )
-        write_json(folder / "posterior.json", self._posterior())
+        write_json(folder / "posterior.json", self._posterior() | {"task": self.made_of})
         write_document(folder / "report.html", self._document(origin, plots))
 
     def _posterior(self) -> dict[str, Any]:
