@@ -4,27 +4,11 @@ Lenient on purpose: what is malformed reads as None, so that every other rule ca
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from xml.etree.ElementTree import Element
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
-
-# Default of ``initial`` by causality and variability, then what else is allowed (table in 2.2.7).
-INITIAL: dict[tuple[str, str], tuple[str, ...]] = {
-    **{("parameter", v): ("exact",) for v in ("fixed", "tunable")},
-    **{("calculatedParameter", v): ("calculated", "approx") for v in ("fixed", "tunable")},
-    **{("input", v): () for v in ("discrete", "continuous")},
-    **{(c, "constant"): ("exact",) for c in ("output", "local")},
-    **{("local", v): ("calculated", "approx") for v in ("fixed", "tunable")},
-    **{
-        (c, v): ("calculated", "exact", "approx")
-        for c in ("output", "local")
-        for v in ("discrete", "continuous")
-    },
-    ("independent", "continuous"): (),
-}
 
 
 def number(text: str | None) -> float | None:
@@ -55,7 +39,6 @@ class DescribedVariable:
     Attributes:
         index: one-based place among the ScalarVariables.
         initial: as written, else the default of causality and variability; None where there is none.
-        given: attributes of the ScalarVariable element.
         own: attributes of its Real, Integer, ... element.
         all: the same, completed by the declared type.
         items: values of the declared Enumeration.
@@ -68,7 +51,6 @@ class DescribedVariable:
     causality: str
     variability: str
     initial: str | None
-    given: dict[str, str]
     own: dict[str, str]
     all: dict[str, str]
     items: frozenset[int]
@@ -190,6 +172,13 @@ def _items(declared: Element) -> frozenset[int]:
     return frozenset(value for value in values if value is not None)
 
 
+def _default_of_initial(causality: str, variability: str) -> str | None:
+    """Default of ``initial`` (table in 2.2.7); None where there is none."""
+    if causality in ("input", "independent"):
+        return None
+    return "exact" if causality == "parameter" or variability == "constant" else "calculated"
+
+
 def _variable(
     index: int,
     element: Element,
@@ -200,7 +189,6 @@ def _variable(
     own = dict(kinds[0].attrib) if kinds else {}
     causality = element.get("causality", "local")
     variability = element.get("variability", "continuous")
-    defaults: Sequence[str | None] = INITIAL.get((causality, variability)) or (None,)
     return DescribedVariable(
         index,
         element.get("name", ""),
@@ -208,8 +196,7 @@ def _variable(
         kinds[0].tag if kinds else "",
         causality,
         variability,
-        element.get("initial", defaults[0]),
-        dict(element.attrib),
+        element.get("initial", _default_of_initial(causality, variability)),
         own,
         {**declared.get(own.get("declaredType"), {}), **own},
         items.get(own.get("declaredType"), frozenset()),

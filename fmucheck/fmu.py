@@ -32,7 +32,6 @@ class FmuArchive:
 
     Attributes:
         members: entries of the archive.
-        encoding: of the description, as declared.
 
     Raises:
         BadFileError: not there, no FMU, or not one for FMI 2.0 co-simulation.
@@ -41,7 +40,7 @@ class FmuArchive:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.members, text = read_archive(path)
-        root, self.encoding = read_xml(text, path)
+        root = read_xml(text, path)
         version = root.get("fmiVersion")
         if version != "2.0":
             raise BadFileError(f"'{path}' is for FMI {version}; FMI 2.0 is supported")

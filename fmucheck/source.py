@@ -1,6 +1,5 @@
 """Reading archives and XML that nobody vouches for: refused before they fill the memory or the disk."""
 
-import codecs
 import lzma
 import zipfile
 import zlib
@@ -52,8 +51,8 @@ def _limit(path: Path, members: list[zipfile.ZipInfo]) -> None:
         )
 
 
-def read_xml(text: bytes, path: Path) -> tuple[ElementTree.Element, str]:
-    """Root element of a description, and its encoding.
+def read_xml(text: bytes, path: Path) -> ElementTree.Element:
+    """Root element of a description.
 
     Args:
         text: the description.
@@ -63,12 +62,7 @@ def read_xml(text: bytes, path: Path) -> tuple[ElementTree.Element, str]:
         BadFileError: not XML, in an encoding that nobody knows, with entities, or nested too deep.
     """
     where = f"'{path}': its modelDescription.xml"
-    encoding = "UTF-16" if text[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "UTF-8"
     depth = 0
-
-    def declare(_version: str, declared: str | None, _standalone: int) -> None:
-        nonlocal encoding
-        encoding = declared or encoding
 
     def refuse_entity(*_: object) -> None:
         raise BadFileError(f"{where} defines entities, which are not allowed")
@@ -84,10 +78,10 @@ def read_xml(text: bytes, path: Path) -> tuple[ElementTree.Element, str]:
         depth -= 1
 
     parser = expat.ParserCreate()
-    parser.XmlDeclHandler, parser.EntityDeclHandler = declare, refuse_entity
+    parser.EntityDeclHandler = refuse_entity
     parser.StartElementHandler, parser.EndElementHandler = enter, leave
     try:
         parser.Parse(text, True)
-        return ElementTree.fromstring(text), encoding
+        return ElementTree.fromstring(text)
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
         raise BadFileError(f"{where} is not XML: {error}") from None

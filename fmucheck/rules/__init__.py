@@ -3,12 +3,10 @@
 from . import (  # noqa: F401
     archive,
     dependencies,
-    header,
     life,
     state,
     structure,
     tools,
-    types,
     units,
     values,
     variables,

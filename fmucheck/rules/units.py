@@ -1,37 +1,14 @@
 """Units (2.2.2)."""
 
-import math
 from collections.abc import Iterator
-from xml.etree.ElementTree import Element
 
 from fmus.base_units import base_exponents
 
 from ..description import number, whole
 from ..fmu import FmuArchive
 from ..registry import rule
-from .header import twice
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd")  # and rad, which may be left out of an exponent
-
-
-@rule("2.2.2")
-def units(fmu: FmuArchive) -> Iterator[str]:
-    """Units and their display units have unique names, and factors that are not zero."""
-    for name in twice(u.get("name") for u in fmu.description.units):
-        yield f"unit '{name}' is defined twice"
-    for unit in fmu.description.units:
-        for name in twice(d.get("name") for d in unit.iterfind("DisplayUnit")):
-            yield f"display unit '{name}' of '{unit.get('name')}' is defined twice"
-        for element in [*unit.iterfind("BaseUnit"), *unit.iterfind("DisplayUnit")]:
-            yield from _conversion(element, f"{unit.get('name')}/{element.get('name', element.tag)}")
-
-
-def _conversion(element: Element, where: str) -> Iterator[str]:
-    factor, offset = number(element.get("factor", "1")), number(element.get("offset", "0"))
-    if factor is None or factor == 0.0 or not math.isfinite(factor):
-        yield f"{where}: factor is '{element.get('factor')}'"
-    if offset is None or not math.isfinite(offset):
-        yield f"{where}: offset is '{element.get('offset')}'"
 
 
 @rule("2.2.2")
