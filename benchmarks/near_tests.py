@@ -16,9 +16,10 @@ SHARED_NAME = 12  # a name that more test files have tells of none
 
 
 def imported(path: Path) -> Iterator[Path]:
-    """The project's modules that a file imports, also inside of functions."""
+    """The project's modules that a file imports, also inside of functions, and on demand by its stub."""
     package = ".".join(path.relative_to(ROOT).parent.parts)
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    texts = [f.read_text(encoding="utf-8") for f in (path, path.with_suffix(".pyi")) if f.is_file()]
+    for node in (n for text in texts for n in ast.walk(ast.parse(text))):
         names = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]

@@ -1,0 +1,319 @@
+"""Small decisions of assessment, search and verdict, each against its definition by other means."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.stats import norm
+
+from diagnosis.assessment import recurrence as recurrences
+from diagnosis.assessment.gains import ThrustGains, _own
+from diagnosis.assessment.settings import SETTINGS
+from diagnosis.search.conclusion import interval, laplace_std, suspected
+from diagnosis.search.gram import (
+    Nuisance,
+    block_folds,
+    block_numbers,
+    gram_table,
+    noise,
+    run_folds,
+)
+from diagnosis.search.most_likely import Quadratic, beyond, most_likely, ridge, rise
+from diagnosis.verdict.paired_errors import gain, harm, predicts_worse
+from diagnosis.verdict.validation_data import Losses
+
+seeds = st.integers(0, 10**6)
+
+
+# With what an error repeats
+
+
+def windows_of_runs(seed, rows=60):
+    """Places (K, 2), runs (K,), and times (K,) of the windows of two runs."""
+    rng = np.random.default_rng(seed)
+    run = np.repeat([0, 1], [rows - 20, 20])
+    return rng.standard_normal((rows, 2)), run, np.concatenate([np.arange(rows - 20.0), np.arange(20.0)])
+
+
+@given(seeds, st.sampled_from([0.0, 3.0, np.inf]), st.sampled_from([12, 60, 99]))
+def test_neighbours_are_the_nearest_of_another_run_or_time(seed, least, count):
+    x, run, time = windows_of_runs(seed)
+    rows, there = recurrences._neighbours(x, run, time, least, count)
+    for k in range(len(x)):
+        nearest = np.argsort(np.hypot(*(x - x[k]).T), kind="stable")[:count]
+        far = [j for j in nearest if run[j] != run[k] or abs(time[j] - time[k]) >= least]
+        wanted = far[: SETTINGS.neighbours]
+        assert rows[k][there[k]].tolist() == wanted
+        assert there[k].sum() == len(wanted)
+    if least > 0.0:
+        assert not (rows[there] == np.arange(len(x)).repeat(there.sum(axis=1))).any(), "not itself"
+
+
+@given(seeds, st.floats(0.0, 1.0))
+def test_the_share_that_repeats_is_a_squared_correlation_beyond_chance(seed, repeats):
+    """Of an error and the mean of its neighbours; by shifts of the error against them."""
+    rng = np.random.default_rng(seed)
+    x, run, time = windows_of_runs(seed)
+    near = recurrences._neighbours(x, run, time, 2.0, 30)
+    error = repeats * np.sin(2.0 * x[:, 0]) + (1.0 - repeats) * rng.standard_normal(len(x))
+    rows, there = near
+    mean = np.array([error[r[t]].mean() if t.any() else 0.0 for r, t in zip(rows, there, strict=True)])
+    cosine = mean @ error / np.linalg.norm(mean) / np.linalg.norm(error)
+    share = cosine**2 if cosine > 0.0 else 0.0
+    offsets = np.array([7, 19, 31])
+    found = recurrences._share(error, near, offsets)
+    assert found in (0.0, pytest.approx(share))
+    if share < SETTINGS.repeats:
+        assert found == 0.0
+    assert recurrences._share(error, near, np.zeros(0, int)) == pytest.approx(
+        share if share >= SETTINGS.repeats else 0.0
+    )
+    assert recurrences._share(error, near, np.array([0])) == 0.0, "no more than by a shift"
+    assert recurrences._share(0.0 * error, near, offsets) == 0.0
+
+
+@given(seeds, st.sampled_from([0.3, 0.9]))
+def test_a_command_with_an_amplitude_for_each_stretch_is_compared_with_a_force_for_each(seed, always):
+    rng = np.random.default_rng(seed)
+    stretch = np.repeat(np.arange(6), 8)
+    command, error = rng.standard_normal((2, 48))
+    error = error + rng.choice([0.0, 3.0], 6)[stretch] * command
+
+    def explained(x):
+        X = np.where(stretch[:, None] == np.arange(6), x[:, None], 0.0)
+        left = error - X @ np.linalg.lstsq(X, error, rcond=None)[0]
+        return 1.0 - left @ left / (error @ error)
+
+    expected = explained(command) > max(explained(np.ones(48)), always) + SETTINGS.negligible
+    assert recurrences._in_part(error, command, stretch, always) == expected
+    assert not recurrences._in_part(0.0 * error, command, stretch, 0.0)
+
+
+def test_motions_count_by_their_spread_and_one_that_rests_does_not():
+    x = np.column_stack([[1.0, 3.0, 5.0], [2.0, 2.0, 2.0]])
+    scaled = recurrences._scaled(x)
+    assert scaled[:, 0].std() == pytest.approx(1.0)
+    assert scaled[:, 1].tolist() == [2.0, 2.0, 2.0]
+    found = recurrences.Recurrence({"place": SETTINGS.repeats, "motion": 0.1}, 1.0, False)
+    assert found.best == "place"
+    assert found._replace(shares={"place": 0.24, "motion": 0.1}).best is None
+
+
+# Gains of the commands
+
+sizes = st.floats(0.02, 30.0)
+
+
+@given(st.tuples(*[sizes] * 3), st.tuples(*[st.floats(0.001, 0.3)] * 3), st.tuples(*[st.booleans()] * 3))
+def test_a_gain_is_wrong_that_no_ship_has(value, share, told):
+    value, told = np.array(value), np.array(told)
+    error = value * share
+    found = ThrustGains(value, error, told)
+    low, high = value - 3.0 * error, value + 3.0 * error
+    all_weak = all(t and h < 0.4 for t, h in zip(told, high, strict=True))
+    for k in range(3):
+        assert found.wrong[k] == (told[k] and (low[k] > 2.5 or high[k] < 0.1 or all_weak))
+    near = [0.4 < v < 2.5 for v, t in zip(value, told, strict=True) if t]
+    assert found.close == (bool(near) and all(near))
+    wrong = [k for k in range(3) if found.wrong[k]]
+    if not wrong:
+        assert found.mean is None
+    else:
+        weights = [1.0 / share[k] ** 2 for k in wrong]
+        logs = sum(w * np.log(value[k]) for w, k in zip(weights, wrong, strict=True)) / sum(weights)
+        assert found.mean == pytest.approx(np.exp(logs))
+
+
+@given(seeds, st.floats(0.0, 2.0))
+def test_a_command_has_for_its_own_what_a_regression_on_the_others_leaves(seed, follows):
+    rng = np.random.default_rng(seed)
+    others = list(rng.standard_normal((2, 50)) + 3.0)
+    command = follows * others[0] + rng.standard_normal(50)
+    X = np.column_stack([*others, np.ones(50)])
+    left = command - X @ np.linalg.lstsq(X, command, rcond=None)[0]
+    assert _own(command, others) == pytest.approx(left.var() / command.var(), rel=1e-9)
+    assert _own(command, []) == pytest.approx(1.0)
+    assert _own(2.0 * others[0] - 1.0, others) == pytest.approx(0.0, abs=1e-12)
+
+
+# The most likely values
+
+
+@given(seeds)
+def test_a_quadratic_cost_is_at_its_least_after_one_step_and_a_bent_one_never_rises(seed):
+    rng = np.random.default_rng(seed)
+    A, b = rng.standard_normal((8, 3)), rng.standard_normal(8)
+    P = np.diag([1.0, 0.0, 2.0])
+    seen = []
+
+    def cost(x):
+        bent = A @ x + 0.3 * np.sin(x).sum() - b
+        return float(bent @ bent + x @ P @ x)
+
+    def about(x):
+        seen.append(cost(x))
+        J = -(A + 0.3 * np.cos(x))
+        r = A @ x + 0.3 * np.sin(x).sum() - b
+        return Quadratic(J.T @ J + P, J.T @ r - P @ x, cost)
+
+    at, here = most_likely(np.zeros(3), about, lambda x, step: x + step)
+    assert seen == sorted(seen, reverse=True)
+    assert here.cost(at) == seen[-1]
+    exact = Quadratic(A.T @ A + P, A.T @ b, lambda x: float((b - A @ x) @ (b - A @ x) + x @ P @ x))
+
+    def linear(x):
+        return Quadratic(exact.H, A.T @ (b - A @ x) - P @ x, exact.cost)
+
+    at, _ = most_likely(np.zeros(3), linear, lambda x, step: x + step)
+    least = np.linalg.solve(exact.H, A.T @ b)
+    assert exact.cost(at) - exact.cost(least) < 0.02
+
+
+@pytest.mark.parametrize("places", [0, 1, 3, 40])
+def test_limits_of_one_and_of_several_normal_values(places):
+    assert rise() == pytest.approx(norm.ppf(0.975) ** 2)
+    chance = 0.01 / max(places, 1)
+    assert beyond(places) == pytest.approx(norm.ppf(1.0 - chance / 2.0))
+    assert interval(3.0, 0.5) == pytest.approx((3.0 - 0.98, 3.0 + 0.98), abs=1e-3)
+
+
+@given(seeds)
+def test_a_posterior_deviation_is_that_of_the_information_of_the_weighted_rows(seed):
+    rng = np.random.default_rng(seed)
+    columns, weight = rng.standard_normal((30, 3, 4)), np.array([1.0, 2.0, 0.5])
+    precision = np.diag([1.0, 1.0, 0.0, 0.0])
+    nuisance = Nuisance(columns, precision, np.zeros(4), np.ones(4))
+    std = laplace_std(SimpleNamespace(weight=weight), nuisance)
+    H = precision + sum(
+        weight[a] ** 2 * columns[k, a][:, None] * columns[k, a] for k in range(30) for a in range(3)
+    )
+    assert std == pytest.approx(np.sqrt(np.diag(np.linalg.inv(H))), rel=1e-4)
+    assert np.diag(ridge(H, 2.0)) == pytest.approx(1e-6 * (np.diag(H) + 0.25), rel=1.0)
+
+
+def test_coefficients_are_suspects_whose_posterior_excludes_what_is_known_of_them():
+    names = ["a", "b", "c"]
+    prior = SimpleNamespace(
+        std=dict(zip(names, (0.1, 2.0, 1.0), strict=True)),
+        mean=dict(zip(names, (1.0, -3.0, 0.0), strict=True)),
+    )
+    limit = norm.ppf(1.0 - 0.01 / 3.0 / 2.0)
+    std = np.array([0.1, 0.2, 0.3])
+    found = suspected(prior, np.array([limit * 0.1 + 1e-6, -1.5, 0.3 * limit - 1e-6]), std)
+    assert [s.name for s in found] == ["b", "a"]
+    assert found[0].value == pytest.approx(-3.0 - 1.5 * 2.0)
+    assert found[0].z == pytest.approx(-1.5)
+    assert found[1].value == pytest.approx(1.0 + 0.1 * (0.1 * limit), abs=1e-6)
+
+
+# Blocks, folds and Gram matrices
+
+
+def run_of_blocks(count, rows=4):
+    return SimpleNamespace(block=np.repeat(np.arange(count) + 5, rows))
+
+
+@pytest.mark.parametrize(
+    ("counts", "folds"),
+    [([8], 4), ([3], 3), ([8, 8], 4), ([9, 2], 4), ([8, 8, 8], 3), ([2, 1, 5, 4], 4)],
+)
+def test_folds_leave_out_each_block_once_whole_runs_from_three_on(counts, folds):
+    data = [run_of_blocks(n) for n in counts]
+    parts, every = run_folds(data), block_folds(data)
+    assert len(parts) == len(every) == folds
+    assert sorted(np.concatenate(every)) == [*range(sum(counts))]
+    first = np.cumsum([0, *counts])
+    for (run, blocks), whole in zip(parts, every, strict=True):
+        assert whole.tolist() == (first[run] + blocks).tolist()
+        assert np.diff(blocks).tolist() == [1] * (blocks.size - 1), "a stretch of time"
+        if len(counts) >= 3:
+            assert blocks.size == counts[run]
+    numbers = block_numbers(data)
+    assert numbers[:, 0].tolist() == np.repeat(np.arange(len(counts)), np.multiply(counts, 4)).tolist()
+    assert len(np.unique(numbers, axis=0)) == sum(counts)
+
+
+@given(seeds)
+def test_a_gram_table_holds_the_products_of_the_weighted_columns_of_each_block(seed):
+    rng = np.random.default_rng(seed)
+    y, X = rng.standard_normal((24, 3)), rng.standard_normal((24, 3, 2))
+    sigma = np.array([0.5, 1.0, 2.0])
+    blocks = np.column_stack([np.repeat([0, 1], 12), np.repeat(np.arange(6), 4)])
+    nuisance = Nuisance(X, np.eye(2), np.zeros(2), np.array([1.0, 3.0]))
+    table = gram_table(y, blocks, [], nuisance, sigma)
+    from diagnosis.predictors.weak_form import OVERLAP
+
+    A = np.concatenate([y[..., None], X], axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
+    for k in range(6):
+        part = A[4 * k : 4 * k + 4].reshape(-1, 3)
+        assert table.grams[k] == pytest.approx(part.T @ part)
+    assert table.rows.tolist() == [4] * 6
+    assert table.runs.tolist() == [0, 0, 0, 1, 1, 1]
+    assert table.nuisance == [1, 2]
+    assert table.unit.tolist() == [1.0, 1.0, 3.0]
+    assert table.total == pytest.approx(table.grams.sum(axis=0))
+    assert table.per_parameter == pytest.approx(np.log(72.0 / OVERLAP))
+    for folds, number in ((table.by_run, [0, 0, 0, 1, 1, 1]), (table.by_block, [*range(6)])):
+        for held, train in zip(*folds, strict=True):
+            others = [k for k in range(6) if k not in held]
+            assert len({number[k] for k in held}) == 1
+            assert train == pytest.approx(table.grams[others].sum(axis=0))
+
+
+@given(seeds)
+def test_noise_is_what_all_columns_leave_on_each_axis(seed):
+    rng = np.random.default_rng(seed)
+    y, X = rng.standard_normal((50, 3)), rng.standard_normal((50, 3, 4))
+    X[:, 1, 2] = 0.0  # acts on no sway
+    floor = np.array([0.0, 0.0, 5.0])
+    found = noise(y, X, floor)
+    for axis in (0, 1):
+        A = X[:, axis][:, np.abs(X[:, axis]).max(axis=0) > 0.0]
+        left = y[:, axis] - A @ np.linalg.lstsq(A, y[:, axis], rcond=None)[0]
+        assert found[axis] == pytest.approx(np.sqrt(np.mean(left**2)), rel=1e-4)
+    assert found[2] == 5.0
+
+
+# Losses on data that were not fitted
+
+
+def losses(omega=1.0, position=1.0, heading=1.0, seed=0, size=40):
+    """Losses about a common part, each times a factor."""
+    base = 1.0 + 0.1 * np.random.default_rng(seed).random((3, size))
+    return Losses(*(f * x for f, x in zip((omega, position, heading), base, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("now", "words"),
+    [
+        (losses(), ""),
+        (losses(omega=1.2), "the model fits {where} worse"),
+        (losses(omega=0.8), ""),
+        (losses(position=1.2), "predictions of {where} are worse"),
+        (losses(heading=1.2), "predictions of {where} are worse"),
+        (losses(position=1.2, heading=0.9), "predictions of {where} are worse"),
+        (losses(position=1.1, heading=0.8), ""),
+        (losses(position=0.8, heading=1.1), ""),
+        (losses(position=0.5, heading=0.5), ""),
+    ],
+)
+def test_a_model_harms_where_a_loss_is_surely_larger(now, words):
+    """Where it predicts places better and headings worse, their relative changes count together."""
+    assert harm(now, losses()) == words
+    assert predicts_worse(now, losses()) == words.startswith("predictions")
+    assert harm(now, losses(), 5) == words
+    none = np.zeros(0)
+    assert not predicts_worse(now._replace(position=none, heading=none), Losses(none, none, none))
+
+
+@given(st.tuples(*[st.floats(0.2, 5.0)] * 3))
+def test_a_gain_is_the_sum_of_the_logarithms_of_the_losses_ratios(factors):
+    assume(all(f != 1.0 for f in factors))
+    its, others = losses(*factors), losses()
+    assert gain(its, others) == pytest.approx(np.log(np.prod(factors)), abs=1e-9)
+    assert gain(others, its) == pytest.approx(-gain(its, others))
+    none = np.zeros(0)
+    alone = [x._replace(position=none, heading=none) for x in (its, others)]
+    assert gain(*alone) == pytest.approx(np.log(factors[0]))
