@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from support.measured import NOISE, changed, sail
 
 from diagnosis import InputError, clean
-from diagnosis.runs.cleaning import continued, in_order, noise, unwrap
+from diagnosis.runs import prepare
+from diagnosis.runs.cleaning import noise, unwrap
+from diagnosis.runs.row_order import continued, in_order, ordered
 
 N = 1200
 
@@ -85,15 +87,77 @@ def test_a_clock_that_was_set_back_goes_on(seconds):
     assert f"set back by {seconds:.4g} s" in mended.notes[-1]
 
 
-def test_rows_that_come_late_are_no_clock_and_neither_is_another_run():
-    """A packet that came late has times of its own; a second run in the file begins elsewhere."""
+def test_rows_that_come_late_are_no_clock_and_are_sorted():
+    """A packet that came late has times of its own, which tell its place."""
     run = moving()
     order = np.r_[0:500, 520:540, 500:520, 540:N]
     late = run.rows(order)
     assert continued(late) is late
+    mended = ordered(late)
+    np.testing.assert_array_equal(mended.time, run.time)
+    np.testing.assert_array_equal(mended.pose, run.pose)
+    assert "sorted by their stamps" in mended.notes[-1]
+
+
+def test_rows_of_a_shuffled_file_are_all_used():
+    run = base().rows(np.random.default_rng(0).permutation(N))
+    mended = ordered(run)
+    np.testing.assert_array_equal(mended.pose, base().pose)
+    np.testing.assert_array_equal(mended.tau_cmd, base().tau_cmd)
+    assert prepare(run).smoothed.counts.samples == N, "no row is lost on the way to the smoother"
+
+
+def test_a_wrong_stamp_does_not_move_its_row():
+    """Where the ship would jump to its place in time and back, the stamp is at fault."""
+    time = base().time.copy()
+    time[500] = 3.001
+    mended = ordered(replace(base(), time=time))
+    assert mended.left_out == 1
+    np.testing.assert_array_equal(mended.time, np.delete(base().time, 500))
+
+
+def test_a_second_run_in_the_file_follows_after_a_gap():
+    run = moving()
     again = replace(run, time=np.r_[run.time[:700], run.time[: N - 700]])
     elsewhere = replace(again, pose=run.pose + (np.arange(N) >= 700)[:, None] * [5.0, 0.0, 0.0])
-    assert continued(elsewhere) is elsewhere
+    mended = continued(elsewhere)
+    np.testing.assert_array_equal(mended.time[:700], run.time[:700])
+    np.testing.assert_allclose(np.diff(mended.time[700:]), np.diff(run.time[: N - 700]), atol=1e-9)
+    assert mended.time[700] - mended.time[699] > 8.0, "nothing is predicted across"
+    assert "a second run begins in row 701" in mended.notes[-1]
+    assert ordered(elsewhere).left_out == 0
+
+
+def test_samples_of_a_clock_that_is_coarser_than_the_rows_are_all_used():
+    coarse = replace(base(), time=np.floor(base().time / 0.04 + 1e-6) * 0.04)
+    mended = ordered(coarse)
+    np.testing.assert_allclose(mended.time, base().time, atol=1e-9)
+    assert mended.left_out == 0
+    assert prepare(coarse).smoothed.counts.samples == N
+    assert "2 samples each" in mended.notes[-1]
+
+
+def test_messages_of_one_instant_are_one_row():
+    """Position and heading in rows of their own, as logs of messages have them."""
+    run = base()
+    place, heading = run.pose.copy(), run.pose.copy()
+    place[:, 2], heading[:, :2] = np.nan, np.nan
+    both = np.stack([place, heading], axis=1).reshape(-1, 3)
+    messages = replace(run.rows(np.repeat(np.arange(N), 2)), pose=both)
+    mended = ordered(messages)
+    np.testing.assert_array_equal(mended.pose, run.pose)
+    np.testing.assert_array_equal(mended.time, run.time)
+    assert mended.left_out == 0
+
+
+def test_rows_that_are_lost_are_counted_and_too_many_are_refused():
+    """Whatever checks come before the cleaning, it states how many rows it did without."""
+    twice = base().rows(np.repeat(np.arange(N), np.where(np.arange(N) % 20 == 0, 2, 1)))
+    assert prepare(twice).smoothed.counts.dropped == N // 20
+    time = base().time.copy()
+    time[::5] = 0.0
+    with pytest.raises(InputError, match="time does not increase"):
+        prepare(replace(base(), time=time))
 
 
 @pytest.mark.parametrize("every", [2, 3, 4])
@@ -168,7 +232,8 @@ def shuffled(run):
 
 
 def twice(run):
-    return replace(run, time=np.tile(run.time[: N // 2], 2))
+    """Stamps of another log: one stretch of it again and again, while the ship goes on."""
+    return replace(run, time=np.tile(run.time[:4], N // 4))
 
 
 @pytest.mark.parametrize(
@@ -177,7 +242,7 @@ def twice(run):
         (lambda r: r.rows(np.arange(399)), "run 'made' is too short: 7.98 s, at least 8 s"),
         (lambda r: r.rows(np.arange(0)), "too short"),
         (shuffled, "time does not increase"),
-        (twice, "time does not increase in 600 of 1200 rows"),
+        (twice, "time does not increase in 1196 of 1200 rows"),
         (lambda r: replace(r, time=1e3 * r.time), "a sample each 20 s is too rare; is the time in another unit?"),
         (lambda r: changed(r, slice(0, N), (5.0, 2.0, 1.0)), "does not move: its pose is frozen"),
         (lambda r: changed(r, slice(0, N), np.nan), "does not move: its pose is frozen or missing"),

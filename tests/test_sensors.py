@@ -13,7 +13,7 @@ import diagnosis
 from diagnosis import Run
 from diagnosis import repair as command
 from diagnosis.predictors import Model
-from diagnosis.runs import closure, examine
+from diagnosis.runs import closure, examine, prepare
 from diagnosis.runs.files.telegrams import filled
 from diagnosis.runs.sensors import motion
 from diagnosis.runs.sensors.clock_path import integral_of
@@ -340,6 +340,36 @@ def test_rates_count_where_all_that_agree_are_there(monkeypatch):
     assert rates.sigma.tolist() == [np.inf, np.inf, 0.5]
     assert smoother.measured_rates(track, rows, psi, {}, None) is None
     assert smoother.measured_rates(track, np.array([40]), psi, {"r": 0.5}, None) is None
+
+
+def test_a_rate_that_is_held_is_no_further_sample(monkeypatch):
+    """A receiver of 5 Hz in rows of 10 Hz: each value counts once, with the noise that it has."""
+    run = made()
+    noisy = run.measured["r"] + 0.01 * np.random.default_rng(5).standard_normal(run.time.size)
+    held = replace(run, measured={"r": noisy[np.arange(run.time.size) // 2 * 2]})
+    monkeypatch.setattr(smoother, "basis", lambda grid, t, derivative: t)
+    rows, psi = np.arange(run.time.size), run.pose[:, 2]
+    at, rates = smoother.measured_rates(SimpleNamespace(run=held), rows, psi, {"r": 1e-6}, None)
+    assert at.tolist() == rows[::2].tolist()
+    assert (rates.share == [0.0, 0.0, 1.0]).all()
+    assert rates.sigma[2] == pytest.approx(0.01, rel=0.15)
+
+
+def test_a_held_speed_does_not_make_the_motion_surer_than_it_is():
+    """Rough positions at 1 Hz, speed and course at 5 Hz, held in rows of 10 Hz by their receiver."""
+    run, rng = made(), np.random.default_rng(6)
+    row = np.arange(run.time.size)
+    ahead, aside = run.measured["u"], run.measured["v"]
+    north, east = rotate_to_earth(run.pose[:, 2], ahead, aside)
+    speed = np.hypot(north, east) + 0.02 * rng.standard_normal(row.size)
+    course = np.unwrap(np.arctan2(east, north)) + 0.05 * rng.standard_normal(row.size)
+    pose = run.pose.copy()
+    pose[:, :2] = (pose[:, :2] + 0.3 * rng.standard_normal((row.size, 2)))[row // 10 * 10]
+    measured = {"speed": speed[row // 2 * 2], "course": course[row // 2 * 2]}
+    s = prepare(replace(run, pose=pose, measured=measured)).smoothed
+    assert "speed" in s.sensors.agreeing
+    off = (s.nu[50:-50, :2] - np.column_stack([ahead, aside])[50:-50]) / s.nu_std[50:-50, :2]
+    assert np.sqrt((off**2).mean()) < 1.6, "the motion is as sure as it says"
 
 
 def test_the_smoother_is_sharper_with_channels_that_agree():

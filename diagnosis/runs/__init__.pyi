@@ -1,7 +1,6 @@
 from .cleaning import Counts as Counts
 from .cleaning import Track as Track
 from .cleaning import clean as clean
-from .cleaning import in_order as in_order
 from .cleaning import lost as lost
 from .cleaning import repeated as repeated
 from .columns.columns import FOLDER_FILE as FOLDER_FILE
@@ -37,6 +36,7 @@ from .prepared_run import PreparedRun as PreparedRun
 from .prepared_run import examine as examine
 from .prepared_run import prepare as prepare
 from .prepared_run import read_each as read_each
+from .row_order import in_order as in_order
 from .sensors.path_closure import Closure as Closure
 from .sensors.path_closure import closure as closure
 from .sensors.sensor_finding import Examined as Examined

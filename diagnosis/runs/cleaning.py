@@ -1,6 +1,5 @@
 """Which samples of a measured run are usable: faults are counted and reported, never repaired."""
 
-from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -16,23 +15,20 @@ from ..execution.short_text import ShortRepr
 from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
+from .row_order import CHANCE as CHANCE
+from .row_order import HORIZON, LONG, ordered
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-# s, of predictions, and of the shortest run. Chosen: motions of the unstable nominal hull of CyberShip
-# Enterprise 1 grow at up to 0.18 1/s.
-HORIZON = 8.0
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
 EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
-CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
 RESPONSE = 3.0  # time constants, after which 5 % of an unknown earlier command are left
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 # Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
 # which nothing can be differentiated.
 SPARSE = 0.05
-MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
 # s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
 # so that a command that is wrong there hardly counts.
-HELD, LONG = 0.5, 5.0
+HELD = 0.5
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 FEWEST = 4  # samples, without which there is no third difference
@@ -64,7 +60,6 @@ class Track(ShortRepr):
         dropped: (n,), no position: NaN, infinite, or all three zero.
         between: (n,), rows of a log between two measurements of a slower measurement system.
         period: of the measurement [s].
-        out: rows left out, as their time stamp is missing, repeated or goes backwards.
         notes: what was found, a line each.
         scale: of the ship.
     """
@@ -76,7 +71,6 @@ class Track(ShortRepr):
     dropped: np.ndarray
     between: np.ndarray
     period: float
-    out: int
     notes: tuple[str, ...]
     scale: Scale = REFERENCE
 
@@ -134,8 +128,8 @@ class Track(ShortRepr):
 
     def counts(self, spikes: int = 0) -> Counts:
         """Counts of the samples by their use."""
-        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.out
-        samples = int((~self.between).sum()) + self.out
+        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.run.left_out
+        samples = int((~self.between).sum()) + self.run.left_out
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
 
 
@@ -150,15 +144,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     Raises:
         InputError: too short, time not in order, another unit than said, nothing valid, no motion.
     """
-    where = f"run '{run.name}'"
-    kept = in_order(run.time)
-    out = run.time.size - kept.size
-    if out > MOST_WRONG * run.time.size:
-        raise InputError(f"{where}: time does not increase in {out} of {run.time.size} rows")
+    where, run = f"run '{run.name}'", ordered(run, scale)
     notes = list(run.notes)
-    if out:
-        notes.append(f"{out} rows left out: time missing, repeated or decreasing")
-        run = run.rows(kept)
     run = replace(
         run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
     )
@@ -211,7 +198,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         begin = run.time[fresh][steps.argmax()] - run.time[0]
         longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
-    return Track(run, pose, measured, frozen, dropped, between, period, out, tuple(notes), scale)
+    return Track(run, pose, measured, frozen, dropped, between, period, tuple(notes), scale)
 
 
 def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.ndarray:
@@ -245,51 +232,6 @@ def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
             f"run '{run.name}' is too short: {seconds:.3g} s, at least {shortest:.3g} s are needed"
         )
     return row, seconds
-
-
-def continued(run: Run) -> Run:
-    """A run whose clock was set back, as it would be if it had not been: all rows after that are later.
-
-    A clock was set back where the times after it were there before, row by row, while the ship goes on
-    from where it was: rows that only come late have times of their own.
-    """
-    time, notes = np.array(run.time), []
-    with np.errstate(invalid="ignore", over="ignore"):  # false cells are infinite or missing
-        step = np.linalg.norm(np.diff(run.pose[:, :2], axis=0), axis=1)
-        later = np.flatnonzero(np.diff(time) < 0.0) + 1
-        for row in later:
-            ends = np.flatnonzero(~((np.diff(time[row:]) > 0.0) & (time[row + 1 :] <= time[row - 1])))
-            again = time[row : row + 1 + (ends[0] if ends.size else time.size)]
-            there = (time[:row] >= again[0]) & (time[:row] <= again[-1])
-            rows = sorted((int(there.sum()), again.size))
-            if rows[0] < max(LONG, 0.5 * rows[1]):
-                continue
-            usual = step[max(row - 1 - rows[0], 0) : row + rows[0]]
-            usual = usual[np.isfinite(usual)]
-            if usual.size and step[row - 1] <= LONG * np.median(usual):
-                back = time[row - 1] - time[row] + float(np.median(np.diff(again)))
-                notes.append(f"the clock was set back by {back:.4g} s at {time[row - 1]:.4g} s")
-                time[row:] += back
-    return replace(run, time=time, notes=(*run.notes, *notes)) if notes else run
-
-
-def in_order(time: np.ndarray) -> np.ndarray:
-    """Rows of the longest part of some times [s] that grows strictly; non-finite ones are left out."""
-    rows = np.flatnonzero(np.isfinite(time))
-    if (np.diff(time[rows]) > 0.0).all():
-        return rows
-    ends: list[float] = []  # the smallest time at which a part of that length can end
-    last: list[int] = []
-    before = np.full(time.size, -1)
-    for row in rows.tolist():
-        place = bisect_left(ends, time[row])
-        before[row] = last[place - 1] if place else -1
-        ends[place : place + 1] = [float(time[row])]
-        last[place : place + 1] = [row]
-    found = [last[-1]]
-    while before[found[-1]] >= 0:
-        found.append(int(before[found[-1]]))
-    return np.array(found[::-1])
 
 
 def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:

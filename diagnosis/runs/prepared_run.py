@@ -15,9 +15,10 @@ from cosim import InputError
 from fmus.scale import Scale
 from fmus.ship import Ship, ship
 
-from .cleaning import Track, clean, continued, refuse_short
+from .cleaning import Track, clean, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
+from .row_order import ordered
 from .sensors.further_channels import accelerations, receivers, through_water
 from .sensors.motion import motion
 from .sensors.sensor_finding import Examined
@@ -99,7 +100,7 @@ def prepare(
     """
     of = of or ship()
     raw = source if isinstance(source, Run) else read(source, of=of, also=also)
-    sensors = examine(continued(raw), of.scale)
+    sensors = examine(raw, of.scale)
     unrepaired = [finding for finding in sensors.findings if not finding.repaired]
     in_doubt = next((finding for finding in unrepaired if not finding.aside), None)
     if in_doubt and not anyway:
@@ -122,7 +123,7 @@ def examine(run: Run, scale: Scale) -> Examined:
     Returns:
         The run as far as its own channels repair it, and what they say of each other.
     """
-    found = Examined(run)
+    found = Examined(ordered(run, scale))
     # In the order in which one needs what others repair.
     for check in (wraps, units, sway, receivers, motion, accelerations, through_water):
         found = found.plus(check(found.run, scale))

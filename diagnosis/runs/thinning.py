@@ -94,7 +94,6 @@ def thinned(track: Track) -> Track:
         dropped,
         gone & ~frozen & ~dropped,
         max(track.period, width),
-        track.out,
         (*track.notes, note),
         track.scale,
     )

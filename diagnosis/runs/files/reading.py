@@ -70,6 +70,7 @@ class Run(ShortRepr):
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
         resolution: (n, 3), step to which the pose is rounded in the file [m, m, rad]; None: not at all.
         hashes: file that it was read from -> SHA-256 when it was read: the measurement, then side-cars.
+        left_out: number of samples that are left out, as they have no time of their own.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Run(ShortRepr):
     trial: str | None = None
     resolution: np.ndarray | None = None
     hashes: Mapping[Path, str] = field(default_factory=dict)
+    left_out: int = 0
 
     @property
     def coarse(self) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from fmus.frames import rotate_to_earth
 
-from ..cleaning import NORMAL_MAD, in_order, lost, noise, repeated
+from ..cleaning import NORMAL_MAD, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
 
@@ -66,7 +66,6 @@ class Evidence:
 
 def evidence(run: Run) -> Evidence | None:
     """What the channels of a run say; None where hardly anything is measured beside the pose."""
-    run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     fresh = np.flatnonzero(there & ~repeated(run.pose, there))
     # A position that was held while the heading went on is of an earlier instant.

@@ -17,7 +17,7 @@ import numpy as np
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import WIDTH, in_order
+from ..cleaning import WIDTH
 from ..files.reading import Run
 from .constants import LEAST, LEAST_DELAY, Kind, least_place
 from .evidence import FEWEST, SURE, blocked_fit, evidence, integral
@@ -52,7 +52,6 @@ def _findings(
 
 def receivers(run: Run, scale: Scale) -> Examined:
     """Place and delay of a second antenna, and offset of a second heading, against the first."""
-    run = run.rows(in_order(run.time))
     psi, two, repaired = run.pose[:, 2], run.measured, dict(run.measured)
     found: list[SensorFinding] = []
     if {"x_2", "y_2"} <= two.keys():

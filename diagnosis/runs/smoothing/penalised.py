@@ -111,16 +111,18 @@ class Rates(NamedTuple):
         z: (m, 3), measurements [m/s, m/s, rad/s].
         b: first derivative of the spline's basis at them.
         sigma: (3,), standard deviation of their noise; infinite where a channel has none.
+        share: (m, 3), 1 where a channel was updated, 0 where it holds a value.
     """
 
     z: np.ndarray
     b: Basis
     sigma: np.ndarray
+    share: np.ndarray
 
     @classmethod
     def none(cls, grid: Knots) -> "Rates":
         """No measured derivatives."""
-        return cls(np.zeros((0, 3)), basis(grid, np.zeros(0), 1), np.full(3, np.inf))
+        return cls(np.zeros((0, 3)), basis(grid, np.zeros(0), 1), np.full(3, np.inf), np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,15 +184,17 @@ class Problem(NamedTuple):
 
     def equations(self, weights: np.ndarray) -> list[Equations]:
         """Those of each channel, in standard deviations of the pose, for weights (n, 3) of samples."""
-        rates, weights = self.spline.rates, weights * self.share
-        of_rates, found = rates.b.gram(np.ones(len(rates.z))), []
+        rates, weights, found = self.spline.rates, weights * self.share, []
         for k, (matrix, turned, penalty) in enumerate(self.spline.parts):
-            share = float(self.sigma[k] / rates.sigma[k])
+            share = (self.sigma[k] / rates.sigma[k]) * rates.share[:, k]
             rows, rank = len(weights) + len(rates.z), self.spline.grid.rank
-            root = np.concatenate([np.sqrt(weights[:, k]), np.full(len(rates.z), share), np.ones(rank)])
+            root = np.concatenate([np.sqrt(weights[:, k]), share, np.ones(rank)])
             group = np.repeat([POSE, JERK], [rows, rank])
-            normals = np.array([self.spline.b.gram(weights[:, k]) + share**2 * of_rates, penalty])
-            many = np.count_nonzero(weights[:, k]) + (len(rates.z) if share else 0)
+            measured = self.spline.b.gram(weights[:, k])
+            if share.any():
+                measured = measured + rates.b.gram(share**2)
+            normals = np.array([measured, penalty])
+            many = np.count_nonzero(weights[:, k]) + np.count_nonzero(share)
             found.append(Equations(matrix, turned, root, group, normals, np.array([many, rank])))
         return found
 

@@ -20,7 +20,19 @@ from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
 from ...execution.short_text import ShortRepr
-from ..cleaning import BRIEF, CHANCE, HORIZON, LONG, WIDTH, Counts, Track, noise
+from ..cleaning import (
+    BRIEF,
+    CHANCE,
+    HEADING,
+    HORIZON,
+    LONG,
+    PLACE,
+    WIDTH,
+    Counts,
+    Track,
+    noise,
+    repeated,
+)
 from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
 from ..measured_wind import air_along
@@ -278,7 +290,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     rates = measured_rates(track, dense, psi, agreeing, grid)
     if rates is not None:
         at, beside = rates
-        beside = beside._replace(z=beside.z - response.eta_dot[at])
+        beside = beside._replace(z=np.where(beside.share > 0.0, beside.z - response.eta_dot[at], 0.0))
         p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
@@ -342,27 +354,35 @@ def _doubted(track: Track, found: Inliers, even: Problem) -> Iterator[str]:
 def measured_rates(
     track: Track, rows: np.ndarray, psi: np.ndarray, agreeing: Agreeing, grid: Knots
 ) -> tuple[np.ndarray, Rates] | None:
-    """Rows with a pose that have all derivatives that agree with it, and these; None: there are none.
+    """Rows with a pose that have derivatives that agree with it, and these; None: there are none.
 
-    The noise of a channel is no less than that of its third differences.
+    A value that repeats is no sample. The noise of a channel is no less than that of its third
+    differences.
     """
     run = track.run
     by = next((pair for pair in VELOCITIES if pair[0] in agreeing), None)
-    names = [*(by or ()), *(["r"] if "r" in agreeing else [])]
-    if not names:
-        return None
-    at = rows[np.all([np.isfinite(run.measured[name][rows]) for name in names], axis=0)]
+    fresh = np.zeros((run.time.size, 3), bool)
+    for axes, names in ((PLACE, by), (HEADING, ("r",) if "r" in agreeing else None)):
+        if names:
+            values = np.column_stack([run.measured[name] for name in names])
+            there = np.isfinite(values).all(axis=1)
+            fresh[:, axes] = (there & ~repeated(values, there))[:, None]
+    at = rows[fresh[rows].any(axis=1)]
     if not at.size:
         return None
-    z, sigma = np.zeros((at.size, 3)), np.full(3, np.inf)
+    z, sigma, share = np.zeros((at.size, 3)), np.full(3, np.inf), fresh[at].astype(float)
     if by is not None:
         z[:, :2] = velocity_over_ground(run.rows(at), by, psi[at])
         sigma[:2] = max(agreeing[by[0]], run.noise.get(by[0], 0.0))
     if "r" in agreeing:
         z[:, 2] = run.measured["r"][at]
         sigma[2] = max(agreeing["r"], run.noise.get("r", 0.0))
-    sigma = np.maximum(sigma, noise(z))
-    return at, Rates(z, basis(grid, run.time[at] - run.time[0], 1), sigma)
+    scatter = [
+        noise(z[new, k : k + 1])[0] if new.sum() >= OF_CHANNEL else 0.0
+        for k, new in enumerate(share.T > 0.0)
+    ]
+    z = np.where(share > 0.0, z, 0.0)
+    return at, Rates(z, basis(grid, run.time[at] - run.time[0], 1), np.maximum(sigma, scatter), share)
 
 
 def breaks(rows: np.ndarray, track: Track) -> np.ndarray:

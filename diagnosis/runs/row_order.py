@@ -1,0 +1,178 @@
+"""The rows of a log in the order of time, each with a time of its own.
+
+Stamps are explained before rows are left out: rows that were written late, the samples of one instant in
+several rows, stamps that are coarser than the rows, a clock that was set back, a second run.
+"""
+
+from bisect import bisect_left
+from dataclasses import replace
+
+import numpy as np
+
+from cosim import InputError
+from fmus.scale import REFERENCE, Scale
+
+from .files.reading import Run
+
+CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
+# s of CyberShip Enterprise 1, times the scale of the ship: of predictions, and of the shortest run.
+# Chosen: motions of the unstable nominal hull of CyberShip Enterprise 1 grow at up to 0.18 1/s.
+HORIZON = 8.0
+LONG = 5.0  # sampling periods of a gap, if that is longer than HELD seconds
+MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
+
+
+def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
+    """A run whose time grows from row to row.
+
+    Args:
+        run: as it was read.
+        scale: of the ship.
+
+    Returns:
+        The run with the rows that have a time; ``left_out`` counts the others.
+
+    Raises:
+        InputError: more rows than can be wrong by chance have no time of their own.
+    """
+    if np.isfinite(run.time).all() and (np.diff(run.time) > 0.0).all():
+        return run
+    many = run.time.size
+    found = _spread(_merged(continued(_sorted(run), scale)))
+    kept = in_order(found.time)
+    out = found.left_out + found.time.size - kept.size
+    if out > MOST_WRONG * many:
+        raise InputError(f"run '{run.name}': time does not increase in {out} of {many} rows")
+    note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
+    return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
+
+
+def _sorted(run: Run) -> Run:
+    """The rows by their stamps, if the ship's way is likelier then than in the order of the file.
+
+    Steps of the position are compared as ones of a Laplace distribution, which a few spikes do not rule.
+    """
+    rows = np.flatnonzero(np.isfinite(run.time))
+    by_time = rows[np.argsort(run.time[rows], kind="stable")]
+    if (by_time == rows).all():
+        return run
+    steps = [_steps(run.pose[order, :2]) for order in (rows, by_time)]
+    (there, as_written), (_, sorted_way) = ((s.size, float(s.mean()) if s.size else 0.0) for s in steps)
+    if not 0.0 < sorted_way < as_written * np.exp(np.log(CHANCE) / there):
+        return run
+    moved = int((by_time != rows).sum())
+    note = f"rows are not in the order of time, {moved} of {rows.size}: they are sorted by their stamps"
+    # Rows without a stamp come last; they are left out.
+    return replace(
+        run.rows(np.append(by_time, np.flatnonzero(~np.isfinite(run.time)))), notes=(*run.notes, note)
+    )
+
+
+def _steps(position: np.ndarray) -> np.ndarray:
+    """Distances between successive rows of a position (n, 2) that are there."""
+    there = position[np.isfinite(position).all(axis=1) & (np.abs(position) > 0.0).any(axis=1)]
+    return np.linalg.norm(np.diff(there, axis=0), axis=1)
+
+
+def continued(run: Run, scale: Scale = REFERENCE) -> Run:
+    """A run whose clock was set back, as it would be if it had not been: all rows after that are later.
+
+    A clock was set back where the times after it were there before, row by row: rows that only come late
+    have times of their own. If the ship does not go on from where it was, a second run begins there: it
+    follows after a gap.
+    """
+    time, notes = np.array(run.time), []
+    with np.errstate(invalid="ignore", over="ignore"):  # false cells are infinite or missing
+        step = np.linalg.norm(np.diff(run.pose[:, :2], axis=0), axis=1)
+        later = np.flatnonzero(np.diff(time) < 0.0) + 1
+        for row in later:
+            ends = np.flatnonzero(~((np.diff(time[row:]) >= 0.0) & (time[row + 1 :] <= time[row - 1])))
+            again = time[row : row + 1 + (ends[0] if ends.size else time.size)]
+            there = (time[:row] >= again[0]) & (time[:row] <= again[-1])
+            rows = sorted((int(there.sum()), again.size))
+            if rows[0] < max(LONG, 0.5 * rows[1]):
+                continue
+            usual = step[max(row - 1 - rows[0], 0) : row + rows[0]]
+            usual = usual[np.isfinite(usual)]
+            if not usual.size:
+                continue
+            steps = np.diff(again)
+            back = time[row - 1] - time[row] + float(np.median(steps[steps > 0.0]))
+            if step[row - 1] <= LONG * np.median(usual):
+                notes.append(f"the clock was set back by {back:.4g} s at {time[row - 1]:.4g} s")
+            else:
+                back += 2.0 * HORIZON * scale.time
+                notes.append(
+                    f"a second run begins in row {row + 1}: the time is {time[row]:.4g} s again, "
+                    "and the ship is elsewhere; it follows after a gap"
+                )
+            time[row:] += back
+    return replace(run, time=time, notes=(*run.notes, *notes)) if notes else run
+
+
+def _merged(run: Run) -> Run:
+    """Rows of one stamp as one, where no channel has two values: messages of several topics."""
+    first = np.concatenate([[True], np.diff(run.time) != 0.0])
+    if first.all():
+        return run
+    group = np.cumsum(first) - 1
+    channels = np.column_stack([run.pose, *run.measured.values()])
+    there = np.isfinite(channels)
+    row = np.arange(first.size)[:, None]
+    many = group[-1] + 1
+    newest = np.full((many, channels.shape[1]), -1)
+    np.maximum.at(newest, group, np.where(there, row, -1))
+    value = np.where(newest < 0, np.nan, np.take_along_axis(channels, np.maximum(newest, 0), axis=0))
+    clash = np.zeros(many, bool)
+    np.logical_or.at(clash, group, (there & (channels != value[group])).any(axis=1))
+    last = np.append(first[1:], True)
+    keep = clash[group] | last
+    merged = run.rows(keep)
+    one = np.flatnonzero(~clash[group[keep]])
+    filled = np.column_stack([merged.pose, *merged.measured.values()])
+    filled[one] = value[group[keep][one]]
+    # A row of which all is in another one of its stamp is a sample that repeats.
+    twice = ~keep & there[:, :3].any(axis=1) & (there & (newest[group] != row)).any(axis=1)
+    measured = dict(zip(run.measured, filled.T[3:], strict=True))
+    return replace(
+        merged, pose=filled[:, :3], measured=measured, left_out=run.left_out + int(twice.sum())
+    )
+
+
+def _spread(run: Run) -> Run:
+    """Rows that share stamps because these are coarser, evenly over the time to the next stamp."""
+    first = np.flatnonzero(np.concatenate([[True], np.diff(run.time) != 0.0]))
+    if run.time.size - first.size <= MOST_WRONG * run.time.size:
+        return run
+    stamps = run.time[first]
+    step = np.diff(stamps)
+    until = np.append(step, np.median(step) if step.size else 0.0)
+    # A gap after a stamp is no part of it.
+    until = np.where((until > 0.0) & (until < LONG * np.median(until)), until, np.median(until))
+    many = np.diff(np.append(first, run.time.size))
+    within = np.arange(run.time.size) - np.repeat(first, many)
+    time = run.time + np.repeat(until / many, many) * within
+    note = (
+        f"its stamps are {np.median(step):.4g} s apart, with {many.mean():.3g} samples each: "
+        "these are taken as evenly spaced"
+    )
+    return replace(run, time=time, notes=(*run.notes, note))
+
+
+def in_order(time: np.ndarray) -> np.ndarray:
+    """Rows of the longest part of some times [s] that grows strictly; non-finite ones are left out."""
+    rows = np.flatnonzero(np.isfinite(time))
+    if (np.diff(time[rows]) > 0.0).all():
+        return rows
+    ends: list[float] = []  # the smallest time at which a part of that length can end
+    last: list[int] = []
+    before = np.full(time.size, -1)
+    for row in rows.tolist():
+        place = bisect_left(ends, time[row])
+        before[row] = last[place - 1] if place else -1
+        ends[place : place + 1] = [float(time[row])]
+        last[place : place + 1] = [row]
+    found = [last[-1]]
+    while before[found[-1]] >= 0:
+        found.append(int(before[found[-1]]))
+    return np.array(found[::-1])
