@@ -75,7 +75,12 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
     decided = len(k.hypotheses) == 1
     planned: list[PlannedRun] = []
     pairs: list[tuple[int, int]] = []
-    now, rehearsal, earlier = k, Rehearsal(q.data, designer.space, k), []
+    now, rehearsal = k, Rehearsal(q.data, designer.space, k)
+    earlier: list[WeakWindows] = []
+
+    def sure(s: ScoredPlan) -> float:
+        return rehearsal.sure([*earlier, designer.windows(s.motion)], seed)
+
     for n in range(runs):
         found = designer.search(now, seed + n)
         usual = {name: designer.usual(now, name) for name in designer.usual_runs}
@@ -83,16 +88,12 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
             pairs = designer.inseparable(k)
         run, tracks = designer.checked(now, found, seed + n)
         advance("simulated outcomes of the plan and of usual runs")
-
-        def sure(s: ScoredPlan, before: Sequence[WeakWindows] = tuple(earlier)) -> float:
-            return rehearsal.sure([*before, designer.windows(s.motion)], seed)
-
         others = {name: (sure(s), s) for name, s in usual.items() if s.excess == 0.0}
         planned.append(PlannedRun(designer, run, now, tracks, sure(run), others))
         now = now.plus(run.gram)
         earlier.append(designer.windows(run.motion))
     named = [(k.hypotheses[i].ids, k.hypotheses[j].ids) for i, j in pairs]
-    advice = [_advice(q.start, a, b) for a, b in named]
+    advice = [*rehearsal.doubts, *(_advice(q.start, a, b) for a, b in named)]
     if decided:
         advice.append(
             f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of "

@@ -29,6 +29,9 @@ from .hypotheses import Space, block_of
 from .information import SURE, Hypothesis, Knowledge
 
 DRAWS = 60  # simulated outcomes, so that the standard error of a probability is at most 0.065
+CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
+LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
+UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by what the likeliest leaves."
 UNIT = np.full(3, OVERLAP**-0.5)  # noise of overlapping windows where that of one that counts is 1
 
 
@@ -96,6 +99,16 @@ class Rehearsal:
         h, old = self.k.hypotheses[int(np.argmax(self.k.weights))], self.measured
         trials = [Trial.of(self.wide, old, old.y, h, i) for i in h.ids]
         return min((probability(t.judged(old.y)[0]) for t in trials), default=1.0)
+
+    @property
+    def doubts(self) -> list[str]:
+        """What keeps the confidence below SURE after any run, a line each."""
+        effects, text = self.space.start.ship.effects, doubt_of_data(self.data)
+        found = [CAPPED.format(text)] if text else []
+        for h, axes in zip(self.k.hypotheses, self.residual, strict=True):
+            if any(axes & set(effects[i].axis) for i in h.ids):
+                found.append(LEFT.format(h.name, ", ".join(sorted(axes))))
+        return found if self.listed >= SURE else [*found, UNLISTED.format(self.listed)]
 
     def sure(self, planned: Sequence[WeakWindows], seed: int, draws: int = DRAWS) -> float:
         """Probability that the true hypothesis has SURE or more after planned runs [1]."""

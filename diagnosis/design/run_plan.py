@@ -176,6 +176,8 @@ class Plan:
             shown.append(f"  probability that the right candidate is above {SURE:.0%} afterwards")
             each = {"this run": r.sure} | {name: sure for name, (sure, _) in r.usual.items()}
             shown += [f"    {sure:4.0%}  {name}" for name, sure in each.items()]
+            beyond = [name for name in r.designer.usual_runs if name not in r.usual]
+            shown += [f"       -  {name}, which exceeds the limits" for name in beyond]
         return shown
 
     def __repr__(self) -> str:
