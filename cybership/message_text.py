@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 
-TYPE_CHECKING = False  # typing itself takes a while to import, and so does pydantic
+TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import Any
-
-    from pydantic import ValidationError
+    from collections.abc import Iterable
 
 # A value between quotes, which an apostrophe of a word is not.
 VALUE = re.compile(r"(?<!\w)'([^']*)'(?!\w)")
@@ -20,6 +17,10 @@ Location = tuple[int | str, ...]  # the keys and indices that lead to a place in
 LONGEST_VALUE, LONGEST_FAULT = 60, 600
 # Longest word and line of any message [characters]; chosen: longer than any path or name in use.
 LONGEST_WORD, LONGEST_LINE = 400, 4000
+# Similarity (difflib's ratio, 0 to 1) above which a known name is suggested; chosen: lower ones mislead.
+SIMILAR = 0.5
+# Known names that a hint lists where none is similar; chosen: more do not fit on a line.
+LISTED = 8
 
 
 def printable(text: str) -> str:
@@ -55,42 +56,38 @@ def name_of(text: str) -> str:
     return _cut(_one_line(text), LONGEST_VALUE)
 
 
-def first_fault(
-    error: ValidationError,
-    hint: Callable[[Location], str] = lambda _: "",
-    hidden: Callable[[str], bool] = lambda _: False,
-    special: Callable[[str, Location, Any], str] = lambda *_: "",
-    whole: str = "",
-) -> str:
-    """The first fault of a file in one line: where, what, and what may have been meant.
+def most_alike(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is a name but for case, else the one most like it; None if none is similar."""
+    import difflib
 
-    A key that is not known comes before the one that it leaves missing.
+    known = list(known)
+    folded = {each.casefold(): each for each in reversed(known)}
+    if name.casefold() in folded:
+        return folded[name.casefold()]
+    near = difflib.get_close_matches(name, known, 1, SIMILAR)
+    return near[0] if near else None
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint at the known name most like a wrong one, or at what there is.
 
     Args:
-        error: of the file's model.
-        hint: what is said behind a key that is not known, by its place.
-        hidden: whether a part of a place is not of the file, but of the model.
-        special: what is said of a fault by its type, place and value; empty: what pydantic says.
-        whole: what stands for the place of a fault of the whole file.
+        name: what was written.
+        known: what could have been meant.
+
+    Returns:
+        Text to append to a message; empty if nothing is known.
     """
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    kind, loc, text = faults[0]["type"], faults[0]["loc"], faults[0]["msg"]
-    value = faults[0]["input"]
-    if own := special(kind, loc, value):
-        text = own
-    elif kind == "extra_forbidden":
-        text = f"unknown key{hint(loc)}"
-    elif kind == "missing":
-        text = "is missing"
-    elif loc and text.startswith("Input") and isinstance(value, int | float | str):
-        text += f"; got {quoted(value)}"
-    place = "" if loc else whole
-    for part in loc:
-        if isinstance(part, int):
-            place += f"[{part}]"
-        elif not hidden(part):
-            place += ("." if place else "") + name_of(part)
-    return (f"{place}: " if place else "") + brief(text.removeprefix("Value error, "))
+    known = list(known)
+    near = most_alike(name, known)
+    if near is not None:
+        return f"; did you mean '{near}'?"
+    if not known:
+        return ""
+    shown = ", ".join(each[:LONGEST_VALUE] for each in known[:LISTED]) + (
+        ", ..." if len(known) > LISTED else ""
+    )
+    return f"; there is {shown}" if len(known) == 1 else f"; there are {shown}"
 
 
 def _one_line(text: str) -> str:

@@ -11,16 +11,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from cosim import InputError
 from cosim.command import command_parser, positive, run_command
-from cybership.message_text import first_fault
+from cosim.scenario import checked, json_content
 
 from .commands.command_line import Done, out_options, run
 from .execution.progress import Advance
 from .execution.result_folder import together
-from .execution.user_files import json_content
 
 if TYPE_CHECKING:
     from .design import Question
@@ -155,12 +154,9 @@ def _task(path: Path) -> Task | None:
         InputError: it is damaged.
     """
     content = json_content(path, "a posterior") if path.exists() else {}
-    try:
-        return Task.model_validate(content["task"]) if "task" in content else None
-    except ValidationError as error:
-        raise InputError(f"'{path}', task: {first_fault(error)}") from None
-    except TypeError:
-        raise InputError(f"'{path}' is not a posterior of cybership learn") from None
+    if not isinstance(content, dict):
+        raise InputError(f"'{path}' is not a posterior of cybership learn")
+    return checked(Task, content["task"], f"'{path}', task", strict=False) if "task" in content else None
 
 
 def _count(text: str) -> int:

@@ -15,12 +15,12 @@ import numpy as np
 from cosim import InputError
 from cosim.command import renamed_option, run_command
 from cosim.errors import nearest
+from cosim.scenario import json_content
 from cybership.message_text import quoted
 
 from .commands.command_line import Done, execution_of, fmu_parser, out_options, run
 from .execution.progress import Advance
 from .execution.result_folder import together
-from .execution.user_files import json_content
 
 if TYPE_CHECKING:
     from cosim.fmu import FmuModel

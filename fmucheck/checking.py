@@ -1,7 +1,6 @@
 """The command line."""
 
 import argparse
-import difflib
 import json
 import os
 import threading
@@ -11,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from cybership.command_arguments import command_parser, complain, positive, whole_number
+from cybership.message_text import nearest
 from cybership.scratch_folder import sweep
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
@@ -74,9 +74,7 @@ def _path(name: str) -> Path:
 def _chosen(names: Sequence[str]) -> list[Rule]:
     for name in names:
         if name not in RULES:
-            near = difflib.get_close_matches(name, RULES, 1, 0.5)
-            hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(RULES)}"
-            raise BadFileError(f"no rule '{name}'; {hint}")
+            raise BadFileError(f"no rule '{name}'{nearest(name, RULES)}")
     return [rule for rule in in_order() if not names or rule.name in names]
 
 

@@ -328,7 +328,14 @@ def test_modules_import_modules_inside_cosim():
 # What any command shares, whatever it is about.
 SHARED = {
     f"cybership.{n}"
-    for n in ("command_arguments", "message_text", "renamed", "scratch_folder", "user_cache")
+    for n in (
+        "command_arguments",
+        "message_text",
+        "model_fault",
+        "renamed",
+        "scratch_folder",
+        "user_cache",
+    )
 }
 
 

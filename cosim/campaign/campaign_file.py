@@ -1,19 +1,18 @@
 """The content of a campaign file, and its checks that need no FMU."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PositiveInt, ValidationError, field_validator, model_validator
+from pydantic import Field, PositiveInt, field_validator, model_validator
 
-from cybership.message_text import Location, first_fault
+from cybership.message_text import Location
 
-from ..errors import InputError, nearest
+from ..errors import InputError
+from ..scenario.json_files import StrictModel, checked, json_content
 from ..scenario.load import load_scenario
 from ..scenario.schema import Scenario
 from ..scenario.setting import place_of
 from ..scenario.shipped import find_scenario
-from ..scenario.strict import StrictModel
 from ..trials.measures import EVERY
 
 # Columns of the table that are no axes.
@@ -161,13 +160,8 @@ class LoadedCampaign:
     def __init__(self, source: str | Path | dict[str, Any], base: Scenario | None = None) -> None:
         self.folder = Path.cwd() if isinstance(source, dict) else Path(source).resolve().parent
         shown = "campaign" if isinstance(source, dict) else f"'{source}'"
-        content = source if isinstance(source, dict) else _read(Path(source))
-        try:
-            self.campaign = Campaign.model_validate_json(json.dumps(content), strict=True)
-        except ValidationError as error:
-            raise InputError(_message(error, shown)) from None
-        except (TypeError, ValueError, RecursionError) as error:
-            raise InputError(f"{shown} cannot be written as JSON: {error}") from None
+        content = source if isinstance(source, dict) else json_content(Path(source), "a campaign")
+        self.campaign = checked(Campaign, content, shown, _special)
         self.base = base or load_scenario(find_scenario(self.campaign.scenario, self.folder))
         dumped = self.base.model_dump(mode="json", by_alias=True, exclude_unset=True)
         taken: dict[tuple[str, ...], str] = {}
@@ -184,31 +178,8 @@ class LoadedCampaign:
                 taken[place] = name
 
 
-def _read(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
-        raise InputError(f"no such campaign: '{path}'{nearest(path.name, near)}") from None
-    except json.JSONDecodeError as error:
-        raise InputError(f"'{path}' is not JSON: {error}") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' cannot be read: {error}") from None
-
-
-def _message(error: ValidationError, name: str) -> str:
-    """The first error in one line."""
-
-    def hint(location: Location) -> str:
-        return nearest(
-            str(location[-1]), (CampaignAxis if location[0] == "axes" else Campaign).model_fields
-        )
-
-    def special(_: str, location: Location, __: object) -> str:
-        return 'is "grid", "list", {"latin": N} or {"sobol": N}' if location[:1] == ("design",) else ""
-
-    told = first_fault(error, hint, lambda part: part.startswith(("literal", "list[", "dict[")), special)
-    return f"{name}: {told}"
+def _special(_: str, location: Location, __: object) -> str:
+    return 'is "grid", "list", {"latin": N} or {"sobol": N}' if location[:1] == ("design",) else ""
 
 
 def campaign_schema() -> dict[str, Any]:

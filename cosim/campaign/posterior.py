@@ -4,11 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from cybership.message_text import first_fault
-
-from ..errors import InputError
+from ..scenario.json_files import read_model
 
 # Relative rounding of numbers in a file, as that of a covariance written with seven digits.
 ROUNDING = 1e-6
@@ -80,11 +78,4 @@ def read_posterior(path: Path) -> Posterior:
     Raises:
         InputError: no such file, or no mean with a covariance; says what is wrong.
     """
-    try:
-        return Posterior.model_validate_json(path.read_bytes())
-    except FileNotFoundError:
-        raise InputError(f"no such posterior: '{path}'") from None
-    except OSError as error:
-        raise InputError(f"'{path}' cannot be read: {error.strerror}") from None
-    except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error)}") from None
+    return read_model(path, Posterior, "a posterior", strict=False)

@@ -1,3 +1,6 @@
+from .json_files import checked as checked
+from .json_files import json_content as json_content
+from .json_files import read_model as read_model
 from .load import load_scenario as load_scenario
 from .load import with_settings as with_settings
 from .roles import Roles as Roles

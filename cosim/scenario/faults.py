@@ -16,9 +16,9 @@ import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
 from . import operations
+from .json_files import StrictModel
 from .operations import Add, Hold, Replace, Values
 from .plans import TimeSpans, WhiteNoise, Within
-from .strict import StrictModel
 
 Effect = Callable[[Values, float], None]
 Times = Annotated[float, Field(ge=0.0)]

@@ -1,25 +1,19 @@
 """Scenarios from JSON, or from the formats of other tools, with messages for mistakes."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from cybership.message_text import Location
 
-from cybership.message_text import Location, first_fault
-
-from ..errors import InputError, most_alike, nearest, unique_keys
+from ..errors import InputError, nearest
 from ..formats.systems import is_system, read_system
 from . import faults
-from .roles import Roles
-from .schema import Event, FmuEntry, LogOptions, MetricsOptions, Recording, Scenario, Transformation
+from .json_files import checked, json_content
+from .schema import Scenario
 from .setting import set_value
 from .shipped import find_scenario, shipped_names
-
-# Parts of pydantic's error locations that name a validator or a type, not a place in the file.
-INTERNAL = ("function-", "constrained-", "literal[", "bool", "int", "float", "str", "tuple", "list[")
 
 
 def load_scenario(
@@ -48,22 +42,7 @@ def load_scenario(
         scenario = _validate(system.content | chosen, f"'{path}'", system.folder)
         scenario.set_origin(system.folder, system.notes, system.unpacked)
         return scenario
-    try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=unique_keys)
-        json.dumps(content, ensure_ascii=False).encode()
-    except FileNotFoundError:
-        files = path.parent.glob("*.json") if path.parent.is_dir() else []
-        near = [p.name for p in files if not p.name.startswith(".")]
-        shipped = shipped_names() if path.name == str(source) else []
-        meant = most_alike(path.stem, shipped)
-        hint = nearest(path.stem, shipped) if meant or not near else nearest(path.name, near)
-        raise InputError(f"no such scenario: '{path}'{hint}") from None
-    except InputError as error:
-        raise InputError(f"'{path}': {error}") from None
-    except json.JSONDecodeError as error:
-        raise InputError(f"'{path}' is not JSON: {error}") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"'{path}' cannot be read: {error}") from None
+    content = json_content(path, "a scenario", shipped_names() if path.name == str(source) else ())
     if isinstance(content, dict):
         content |= chosen
     return _validate(content, f"'{path}'", path.parent)
@@ -108,26 +87,9 @@ def cut_short(scenario: Scenario) -> Scenario:
 
 
 def _validate(content: Any, name: str, folder: Path) -> Scenario:
-    try:
-        # As JSON, where "0.01" is no number and true no time; in Python a list would be no tuple either.
-        scenario = Scenario.model_validate_json(json.dumps(content), strict=True)
-    except ValidationError as error:
-        raise InputError(_message(error, name)) from None
-    except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"{name} cannot be written as JSON: {error}") from None
+    scenario = checked(Scenario, content, name, _special)
     scenario.set_origin(folder)
     return scenario
-
-
-def _message(error: ValidationError, name: str) -> str:
-    """The first error in one line, with the number of further ones."""
-    told = first_fault(error, _nearest_key, _is_internal, _special, whole="the content")
-    more = f" (and {error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
-    return f"{name}: {told}{more}"
-
-
-def _is_internal(part: str) -> bool:
-    return part in faults.KINDS or part.startswith(INTERNAL)
 
 
 def _special(kind: str, location: Location, value: Any) -> str:
@@ -137,22 +99,3 @@ def _special(kind: str, location: Location, value: Any) -> str:
     if kind == "union_tag_not_found":
         return "needs a 'kind'" + nearest("", faults.KINDS)
     return 'is true, false or "auto"' if location[:1] == ("native",) else ""
-
-
-def _nearest_key(location: Location) -> str:
-    """A hint at the keys that are allowed in the place of an unknown one."""
-    *before, last = location
-    first = before[0] if before else ""
-    classes: dict[int | str, type[BaseModel]] = {
-        "fmus": FmuEntry,
-        "events": Event,
-        "log": LogOptions,
-        "metrics": MetricsOptions,
-        "recordings": Recording,
-        "roles": Roles,
-        "transformations": Transformation,
-        "faults": faults.KINDS.get(str(before[-1]) if before else "", faults.Fault),
-    }
-    fields = classes.get(first, Scenario).model_fields
-    known = [field.alias or name for name, field in fields.items()]
-    return nearest(str(last), known)

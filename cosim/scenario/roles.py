@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import ConfigDict, Field
 
-from .strict import StrictModel
+from .json_files import StrictModel
 
 # Surge, sway and yaw components; or north, east and heading.
 Columns = tuple[str, str, str]

@@ -17,8 +17,8 @@ from pydantic import (
 
 from ..formats.imported import Unpacked
 from . import faults
+from .json_files import StrictModel
 from .roles import Roles
-from .strict import StrictModel
 
 if TYPE_CHECKING:
     AnyFault = faults.Fault

@@ -1,7 +1,5 @@
 """What counts as agreement, written down before anybody looks: the file of ``--criteria``."""
 
-import json
-from collections.abc import Mapping
 from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
@@ -14,14 +12,13 @@ from pydantic import (
     FiniteFloat,
     NonNegativeFloat,
     PositiveFloat,
-    ValidationError,
     model_validator,
 )
 
 from cosim import InputError
-from cosim.errors import nearest, unique_keys
-from cybership.message_text import Location, first_fault, quoted
-from cybership.renamed import with_new_names
+from cosim.errors import nearest
+from cosim.scenario import read_model
+from cybership.message_text import Location, quoted
 
 from ..runs import UNITS
 
@@ -210,23 +207,14 @@ def read_criteria(path: str | Path) -> ReadCriteria:
         InputError: it has none; says what is wrong.
     """
     path = Path(path)
+    what = "criteria (cybership criteria prints a template)"
     try:
-        changed, text = path.stat().st_mtime, path.read_bytes()
-        given = with_new_names(json.loads(text, object_pairs_hook=unique_keys), "criteria", path)
-        # As JSON, where "0.01" is no number and true no metre.
-        content = Criteria.model_validate_json(json.dumps(given), strict=True)
-    except InputError as error:
-        raise InputError(f"'{path}': {error}") from None
-    except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error, _nearest_key, special=_special)}") from None
-    except FileNotFoundError:
-        raise InputError(f"no such criteria: '{path}'; cybership criteria prints a template") from None
-    except RecursionError:
-        raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read as criteria: {error}") from None
+        changed, raw = path.stat().st_mtime, path.read_bytes()
+    except OSError as error:
+        raise InputError(f"no such {what}: '{path}' ({error.strerror})") from None
+    content = read_model(path, Criteria, what, _special, renamed="criteria", raw=raw)
     modified = datetime.fromtimestamp(changed).astimezone()
-    return ReadCriteria(content, str(path), sha256(text).hexdigest(), _stamp(modified), now())
+    return ReadCriteria(content, str(path), sha256(raw).hexdigest(), _stamp(modified), now())
 
 
 def now() -> str:
@@ -236,12 +224,6 @@ def now() -> str:
 
 def _stamp(time: datetime) -> str:
     return time.isoformat(timespec="seconds")
-
-
-def _nearest_key(location: Location) -> str:
-    parts: Mapping[str | int, type[BaseModel]] = {"particulars": Particulars, "input_std": InputStd}
-    model = Criteria if len(location) == 1 else parts.get(location[0], Criterion)
-    return nearest(str(location[-1]), model.model_fields)
 
 
 def _special(kind: str, location: Location, value: object) -> str:

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from cosim import InputError
-from cybership.message_text import first_fault
+from cosim.scenario import read_model
 
 from .designing import Limits
 from .planned_motion import Basin
@@ -46,15 +46,8 @@ def limits_of(minutes: float, basin: str | Path | tuple[float, float] | None) ->
 
 
 def _basin_file(path: Path) -> tuple[tuple[float, float], tuple[float, float]]:
-    try:
-        span = Span.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise InputError(
-            f"basin '{path}' cannot be read: {error.strerror}; give two "
-            "lengths [m] to the north and to the east as in 6x4, or a JSON file"
-        ) from None
-    except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error)}") from None
+    what = "a basin (two lengths [m] to the north and to the east as in 6x4, or a JSON file)"
+    span = read_model(path, Span, what, strict=False)
     for name, (low, high) in (("north", span.north), ("east", span.east)):
         if not low < high:
             raise InputError(f"'{path}': {name} must be the lowest, then the highest value [m]")

@@ -1,6 +1,5 @@
-"""A user's files: JSON, and Python that extends the diagnosis by a method or a criterion."""
+"""Python files of a user that extend the diagnosis by a method or a criterion."""
 
-import json
 import runpy
 from collections.abc import Mapping
 from importlib import import_module
@@ -39,17 +38,3 @@ def from_file(path: Path, name: str, what: str) -> object:
         return runpy.run_path(str(path)).get(name)
     except (Exception, SystemExit) as error:
         raise InputError(f"'{path}' fails when imported: {error!r}") from error
-
-
-def json_content(path: Path, what: str) -> Any:
-    """The content of a JSON file of ``what`` (for messages).
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except RecursionError:
-        raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"'{path}' cannot be read as {what}: {error}") from None

@@ -22,7 +22,6 @@ from pydantic import (
     Field,
     FiniteFloat,
     PositiveFloat,
-    ValidationError,
     model_validator,
 )
 
@@ -30,9 +29,8 @@ import cosim
 from cosim import InputError, Unit
 from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
-from cybership.message_text import Location, first_fault, quoted
-
-from ..execution.user_files import json_content
+from cosim.scenario import read_model
+from cybership.message_text import quoted
 
 Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
@@ -176,11 +174,7 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
     Raises:
         InputError: no such file, a fault of it, or a name that the FMU does not have.
     """
-    content = json_content(path, "parameters")
-    try:
-        found = ParameterFile.model_validate(content).parameters
-    except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
+    found = read_model(path, ParameterFile, "parameters", strict=False).parameters
     possible = {v.name for v in model.variables.values() if can_be_calibrated(v)} - set(mapped)
     for p in found:
         if p.name in mapped:
@@ -192,14 +186,6 @@ def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> lis
             hint = nearest(p.name, possible)
             raise InputError(f"'{path}': {model.path.name} has no parameter {quoted(p.name)}{hint}")
     return found
-
-
-def _nearest_key(at: Location) -> str:
-    *within, key = ("", *at)
-    table: type[BaseModel] = ParameterFile
-    if "parameters" in within:
-        table = Prior if "prior" in within else CalibratedParameter
-    return nearest(str(key), table.model_fields)
 
 
 def write_parameters(path: Path, parameters: Collection[CalibratedParameter]) -> None:

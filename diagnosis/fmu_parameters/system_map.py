@@ -31,9 +31,10 @@ from pydantic import (
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.fmu import FmuModel, FmuVariable
-from cybership.message_text import Location, quoted
+from cosim.scenario import read_model
+from cybership.message_text import quoted
 
-from ..predictors.fmu.variable_map import map_content, with_names_alone
+from ..predictors.fmu.variable_map import with_names_alone
 
 # Units of an input that acts in addition to all else.
 FORCES = ("N", "N.m", "Nm", "m/s2", "rad/s2")
@@ -108,16 +109,7 @@ def read_system_map(path: Path) -> SystemMap:
     Raises:
         InputError: it is none.
     """
-    return map_content(path, SystemMap, _nearest_key)
-
-
-def _nearest_key(at: Location) -> str:
-    tables: dict[int | str, type[BaseModel]] = {
-        "inputs": DrivenInput, "outputs": MeasuredOutput, "start": MappedVariable
-    }  # fmt: skip
-    group, *_, key = at if len(at) > 1 else ("", *at)
-    table = tables.get(group, SystemMap)
-    return nearest(str(key), table.model_fields)
+    return read_model(path, SystemMap, "a map", strict=False, renamed="map")
 
 
 def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemMap:

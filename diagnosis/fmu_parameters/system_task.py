@@ -9,9 +9,9 @@ import numpy as np
 
 from cosim import InputError
 from cosim.fmu import ConfinedFmu, FmuModel
+from cosim.scenario import json_content
 from cybership.message_text import quoted
 
-from ..execution.user_files import json_content
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, POSE
 from ..predictors.fmu.fmu_playback import confined

@@ -15,7 +15,8 @@ from pydantic import (
     ValidationError,
 )
 
-from cybership.message_text import Location, brief, first_fault
+from cybership.message_text import brief
+from cybership.model_fault import first_fault
 from cybership.renamed import with_new_names
 
 from .. import installed
@@ -169,7 +170,7 @@ def _read(path: Path, _changed: int) -> Description:
     try:
         table = ShipTable.model_validate(with_new_names(_toml(path), "ship", path))
     except ValidationError as error:
-        raise DeclarationError(f"'{path}': {_told(error)}") from None
+        raise DeclarationError(f"'{path}': {first_fault(error, ShipTable)}") from None
     except ValueError as error:
         raise DeclarationError(f"'{path}': {brief(str(error))}") from None
     try:
@@ -199,22 +200,6 @@ def _toml(path: Path) -> Any:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError, OSError) as error:  # ValueError also of a number of 5,000 digits
         raise DeclarationError(f"'{path}' cannot be read as TOML: {brief(str(error))}") from None
-
-
-def _told(error: ValidationError) -> str:
-    """A fault of a file in a line, with the nearest right key."""
-    return first_fault(error, _nearest_key, lambda part: part in ("number", "table"))
-
-
-def _nearest_key(at: Location) -> str:
-    table: type[BaseModel] = ShipTable
-    if at[-2:-1] == ("table",):
-        table = Number
-    elif at[:2] == ("hull", "terms"):
-        table = Term
-    elif at[0] == "hull":
-        table = HullTable
-    return nearest(str(at[-1]), table.model_fields)
 
 
 def _description(table: ShipTable) -> Description:
@@ -408,4 +393,4 @@ def _checked(where: str, name: str, given: Any) -> "float | Number":
     try:
         return TypeAdapter(Given).validate_python(given)
     except ValidationError as error:
-        raise DeclarationError(f"{where}: {name}: {_told(error)}") from None
+        raise DeclarationError(f"{where}: {name}: {first_fault(error, Given)}") from None

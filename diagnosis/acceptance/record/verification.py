@@ -1,16 +1,14 @@
 """Check a validation record: ``python -m diagnosis.verify validation.json``."""
 
-import json
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from cosim import InputError
 from cosim.command import printable
-from cosim.errors import unique_keys
-from cybership.message_text import first_fault
+from cosim.scenario import read_model
 
 from ...execution.result_folder import sha256
 from .provenance import code
@@ -110,16 +108,11 @@ def verify_record(
 def _read(path: Path) -> tuple[bytes, Record]:
     try:
         raw = path.read_bytes()
-        json.loads(raw, object_pairs_hook=unique_keys)
-        content = Record.model_validate_json(raw, strict=True)
     except OSError as error:
         raise InputError(
             f"'{path}' cannot be read: {error.strerror or error}; a record is a file validation.json"
         ) from None
-    except ValidationError as error:
-        raise InputError(f"'{path}' is not a validation record: {first_fault(error)}") from None
-    except (ValueError, RecursionError, InputError) as error:
-        raise InputError(f"'{path}' is not a validation record: {error}") from None
+    content = read_model(path, Record, "a validation record", raw=raw)
     if content.form != FORM:
         raise InputError(f"'{path}' has the form '{content.form[:40]}'; '{FORM}' is needed")
     return raw, content

@@ -56,10 +56,6 @@ class CalibrationReport:
         """The FMU."""
         return self.task.confined.model
 
-    @property
-    def _notes(self) -> list[str]:
-        return [*self.result.faults, *self.task.notes, *self.task.confined.sentences()]
-
     def force_unit(self, f: AdditionalForce) -> str:
         """Unit of a force's coefficient."""
         every = self.model.variables
@@ -203,7 +199,9 @@ class CalibrationReport:
             cosim.ParameterSet(values={name: values} if values else {}, units=told, name="calibrated"),
         )
         write_json(folder / "posterior.json", self._posterior() | {"task": self.made_of})
-        write_document(folder / "report.html", self._document(origin, plots))
+        sections = [*self._sections(plots)]
+        page = Document("Calibration of an FMU", self.sentence, sections, origin)
+        write_document(folder / "report.html", page)
 
     def _posterior(self) -> dict[str, Any]:
         r = self.result
@@ -253,42 +251,30 @@ class CalibrationReport:
             for n, (before, after) in each.items():
                 yield [f"{run} ({USES[self.task.use[run]]})", n, *numbers([before, after]), units[n]]
 
-    def shown(self, out: str) -> Iterator[RenderableType]:
-        """The answer on the terminal."""
-        yield Text(self.sentence, "bold")
-        if self.result.values:
-            yield _table(PARAMETERS, self.rows())
-        if self.result.forces:
-            yield _table(FORCES, self.force_rows())
-        for group in self.result.together:
-            yield f"Identifiable only together: {', '.join(group)}."
-        if self.result.together:
-            yield ALONE
-        yield _table(ERRORS, self.error_rows())
-        yield self.result.remainder.sentence
-        for f in self.result.forces:
-            if text := advice(f):
-                yield text
-        yield from self._notes
-        yield f"Files in {out}: {', '.join(self.files)}"
-
-    def _document(self, origin: Mapping[str, str], plots: Sequence[Plot]) -> Document:
+    def _sections(self, plots: Sequence[Plot] = ()) -> Iterator[ReportSection]:
         r = self.result
-        sections = [ReportSection("Parameters", tables=[PageTable(PARAMETERS, [*self.rows()], True)])]
+        if r.values:
+            yield ReportSection("Parameters", tables=[PageTable(PARAMETERS, [*self.rows()], True)])
         if r.forces:
             text = [advice(f) for f in r.forces if advice(f)]
             table = PageTable(FORCES, [*self.force_rows()], True)
-            sections.append(ReportSection("Additional forces", text, [table]))
+            yield ReportSection("Additional forces", text, [table])
         if r.together:
-            lines = [f"Identifiable only together: {', '.join(group)}." for group in r.together]
-            sections.append(ReportSection("Not identifiable alone", [*lines, ALONE]))
-        sections.append(
-            ReportSection(
-                "Errors", [r.remainder.sentence], [PageTable(ERRORS, [*self.error_rows()], True)], plots
-            )
+            groups = [f"Identifiable only together: {', '.join(group)}." for group in r.together]
+            yield ReportSection("Not identifiable alone", [*groups, ALONE])
+        table = PageTable(ERRORS, [*self.error_rows()], True)
+        yield ReportSection("Errors", [r.remainder.sentence], [table], plots)
+        yield ReportSection(
+            "Notes", [*self.result.faults, *self.task.notes, *self.task.confined.sentences()]
         )
-        sections.append(ReportSection("Notes", self._notes))
-        return Document("Calibration of an FMU", self.sentence, sections, origin)
+
+    def shown(self, out: str) -> Iterator[RenderableType]:
+        """The answer on the terminal."""
+        yield Text(self.sentence, "bold")
+        for section in self._sections():
+            yield from map(_table, section.tables)
+            yield from section.text
+        yield f"Files in {out}: {', '.join(self.files)}"
 
 
 ALONE = "To identify one of them alone, leave known ones out of the file of parameters."
@@ -311,10 +297,11 @@ def advice(f: Accepted) -> str:
     return f"{f.force.id} is indistinguishable from {others}: run with more motion."
 
 
-def _table(header: Sequence[str], rows: Iterator[Sequence[str]]) -> Table:
+def _table(of: PageTable) -> Table:
     made = Table(box=None, pad_edge=False, header_style="")
-    for k, name in enumerate(header):
-        made.add_column(name, justify="left" if k in (0, len(header) - 1) else "right", overflow="fold")
-    for row in rows:
+    for k, name in enumerate(of.header):
+        side = "left" if k in (0, len(of.header) - 1) else "right"
+        made.add_column(name, justify=side, overflow="fold")
+    for row in of.rows:
         made.add_row(*map(Text, row))
     return made

@@ -16,7 +16,7 @@ moves ahead alone. A variable whose unit the map does not state is in that of it
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from math import pi
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -27,19 +27,17 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
-    ValidationError,
     field_validator,
 )
 
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import FmuModel, FmuVariable
-from cybership.message_text import Location, first_fault, quoted
-from cybership.renamed import with_new_names
+from cosim.scenario import read_model
+from cybership.message_text import quoted
 from fmus.addition import Line
 from fmus.base_units import base_exponents
 
-from ...execution.user_files import json_content
 from ...runs import QUANTITY, UNITS, Column
 from ...runs.columns.unit_check import SI_UNIT
 from ..black_box import MOTION, POSE, VELOCITY
@@ -120,31 +118,7 @@ def read_map(path: Path) -> VariableMap:
     Raises:
         InputError: it is none.
     """
-    return map_content(path, VariableMap, _nearest_key)
-
-
-def map_content(path: Path, of: type[Map], hint: Callable[[Location], str] = lambda _: "") -> Map:
-    """A map of some form from its file.
-
-    Args:
-        path: of the file.
-        of: the form.
-        hint: text behind the fault at a place of the content.
-
-    Raises:
-        InputError: it is none.
-    """
-    content = json_content(path, "a map")
-    try:
-        return of.model_validate(with_new_names(content, "map", path))
-    except ValidationError as error:
-        raise InputError(f"'{path}': {first_fault(error, hint)}") from None
-    except ValueError as error:
-        raise InputError(f"'{path}' cannot be read as a map: {error}") from None
-
-
-def _nearest_key(location: Location) -> str:
-    return nearest(str(location[0]), VariableMap.model_fields) if len(location) == 1 else ""
+    return read_model(path, VariableMap, "a map", strict=False, renamed="map")
 
 
 def write_map(path: Path, content: Mapping[str, Any]) -> None:

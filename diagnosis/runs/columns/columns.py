@@ -33,18 +33,17 @@ from pydantic import (
     NonNegativeInt,
     PositiveFloat,
     StringConstraints,
-    ValidationError,
     field_validator,
 )
 
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
+from cosim.scenario import checked, read_model
 from cosim.trials import KINDS
-from cybership.message_text import Location, first_fault, name_of, quoted
+from cybership.message_text import name_of, quoted
 from fmus.ship import Ship
 
-from ...execution.user_files import json_content
 from .unit_check import UNITS
 
 FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
@@ -215,10 +214,7 @@ def layout_of(
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
     stated |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
     columns = {s: {"name": name, "unit": unit} for s, (name, unit) in stated.items()}
-    try:
-        return Layout.model_validate({"columns": columns})
-    except ValidationError as error:
-        raise InputError(f"{where}: {first_fault(error)}") from None
+    return checked(Layout, {"columns": columns}, where, strict=False)
 
 
 def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
@@ -277,15 +273,7 @@ def stated_layout(path: Path) -> Layout | None:
 
 
 def _layout_in(beside: Path) -> Layout:
-    try:
-        return Layout.model_validate(json_content(beside, "a side-car"))
-    except ValidationError as error:
-        raise InputError(f"'{beside}': {first_fault(error, _nearest_key)}") from None
-
-
-def _nearest_key(location: Location) -> str:
-    known = Column.model_fields if "columns" in location else Layout.model_fields
-    return nearest(str(location[-1]), known)
+    return read_model(beside, Layout, "a side-car", strict=False)
 
 
 def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[str]:
