@@ -283,8 +283,8 @@ def test_the_loop_of_many_models_is_that_of_each_alone(designer):
 def test_no_simulated_ship_leaves_the_basin(designer):
     """Plans that keep the basin with the spread of their draws keep it with draws of another seed."""
     d, k = designer
-    rng, checked = np.random.default_rng(3), 0
-    while checked < 2:
+    rng = np.random.default_rng(3)
+    while True:
         s = d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), 120.0))
         if s.excess > 0.0:
             continue
@@ -292,10 +292,10 @@ def test_no_simulated_ship_leaves_the_basin(designer):
         known = spread(d.space, k, likely(k), motion, d.basin, d.outline, 0)
         if known.margin.min() <= 0.0:
             continue
-        fresh = [m for n in likely(k) for m in drawn(d.space, k, n, np.random.default_rng(99))]
+        fresh = [m for n in likely(k) for m in drawn(d.space, k, n, np.random.default_rng(99))[::4]]
         for track in followed(fresh, motion):
             assert d.basin.margin(track, d.outline).min() > 0.0
-        checked += 1
+        return
 
 
 @pytest.mark.slow
@@ -451,12 +451,13 @@ def test_steps_of_the_thrust_discriminate_what_one_speed_does_not(steering):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("steering", [("kvlcc2", (9.0, 0.15))], indirect=True)
 def test_orders_of_a_plan_give_its_track(steering, tmp_path):
     d, k = steering
     found = d.scored(k, [PlanStep("swing", (0.5,) * NUMBERS, d.limits.seconds, 0.3)])
     write_run(d, found, 1, tmp_path, d.model.ship.name)
     scenario = tmp_path / "scenario_1.json"
-    stop = 1000 * json.loads(scenario.read_text())["step"]
+    stop = 400 * json.loads(scenario.read_text())["step"]
     result = cosim.simulate(scenario, tmp_path / "run", stop=stop, pictures=False)
     assert result.status == "done"
     track = pd.read_csv(tmp_path / "commands_1.csv")
