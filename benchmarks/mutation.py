@@ -28,7 +28,7 @@ import tomllib
 from scipy.stats import binomtest
 
 from benchmarks.line_mutants import PACKAGES, ROOT, Mutant, again, draw
-from benchmarks.near_tests import FARTHEST, Nearness, around
+from benchmarks.near_tests import FARTHEST, WHOLE, Nearness, around
 
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
 KILLED, SURVIVED, SAME, OPEN = "killed", "survived", "equivalent", "not judged"
@@ -89,7 +89,9 @@ class Judge:
             (self.near(m, names, file), len(text), file) for file, text in self.near.texts.items()
         )
         near = [file for rank, _, file in ranked if rank < FARTHEST or self.wanted]
-        return [file for file in near if re.search(self.wanted, file)][:FILES]
+        found = [file for file in near if re.search(self.wanted, file)][:FILES]
+        whole = WHOLE.get(m.package, "")
+        return found if self.wanted or not whole or whole in found else [*found[: FILES - 1], whole]
 
     def _passes(self, test: str) -> bool:
         """Whether a test, or a file, passes on the unchanged copy."""

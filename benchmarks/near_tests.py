@@ -13,6 +13,13 @@ OURS = (*PACKAGES, "cybership", "benchmarks", "tests")
 FAR, FARTHEST = 9, 7  # steps of imports of a test without any, and from which on a test is not run
 FOUND = 6  # the same of a component, which its folder finds without an import
 SHARED_NAME = 12  # a name that more test files have tells of none
+NAMED = 3  # names of a module that a test file has, as far as they count a step each
+# Of a package the file that runs its commands as a whole, and so most of its lines.
+WHOLE = {
+    "cosim": "tests/test_run.py",
+    "diagnosis": "tests/test_diagnosis_commands.py",
+    "fmucheck": "tests/test_check.py",
+}
 
 
 def imported(path: Path) -> Iterator[Path]:
@@ -46,6 +53,7 @@ class Nearness:
                     steps
                 )
         self.texts = {t.relative_to(ROOT).as_posix(): t.read_text(encoding="utf-8") for t in tests}
+        self._defined: dict[str, list[str]] = {}
         self.known = Counter(w for text in self.texts.values() for w in set(re.findall(r"\w+", text)))
 
     def __call__(self, m: Mutant, names: Sequence[str], file: str, own: str = "") -> float:
@@ -53,11 +61,20 @@ class Nearness:
         place = Path(m.module)
         component = f"{place.parent.name}_{place.stem}"
         telling = [n for n in names if len(n) > 3 and self.known[n] <= SHARED_NAME]
-        steps = self.steps[m.module].get(file, FOUND if m.package == "fmus" else FAR)
+        named = sum(word(n, self.texts[file]) for n in self._telling(m.module))
+        steps = self.steps[m.module].get(file, FOUND if m.package == "fmus" else FAR) - min(named, NAMED)
         by_test = any(word(n, own) for n in (*telling, component))
         by_file = any(word(n, self.texts[file]) for n in (*telling, place.stem, component))
         folders = {*re.split(r"[/_.]", m.module)[1:-1]}
         return steps - 3.0 * by_test - 1.5 * by_file - 2.0 * bool(folders & {*re.split(r"[/_.]", file)})
+
+    def _telling(self, module: str) -> list[str]:
+        """Names that a module defines, and that few test files have."""
+        if module not in self._defined:
+            tree = ast.parse((ROOT / module).read_text(encoding="utf-8"))
+            names = [getattr(n, "name", "") for n in tree.body]
+            self._defined[module] = [n for n in names if len(n) > 3 and self.known[n] <= SHARED_NAME]
+        return self._defined[module]
 
 
 def word(name: str, text: str) -> bool:

@@ -10,6 +10,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import pytest
+from fmpy.fmi2 import FMU2Slave
 from hypothesis import settings
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
@@ -26,7 +27,10 @@ from fmus.build import build
 from fmus.build.platforms import native_targets
 
 # The clock of one example tells what else the machine does, and what traces the test.
-settings.register_profile("by no clock", deadline=None)
+EXAMPLES = (
+    40  # of a property, in place of 100: a mistake that one in ten shows is missed once in seventy
+)
+settings.register_profile("by no clock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("by no clock")
 
 # Reasons to skip that are no matter of what is installed; with CYBERSHIP_REQUIRE=all any other one fails.
@@ -131,10 +135,22 @@ def _session_cache(shared):
 
 @pytest.fixture(autouse=True, scope="session")
 def _first_library(_session_cache):
-    """The first pythonfmu library of a process is one that the master finalises (see Component.free)."""
-    model = FmuModel(build(["vessel"])[0])
-    LocalInstance("first", model, print).free()
-    model.close()
+    """The first pythonfmu library of a process is one that the master finalises (see Component.free).
+
+    It is opened before the first FMU of the process, as most files of tests open none.
+    """
+    opens = FMU2Slave.__init__
+
+    def opened(slave, *arguments, **options):
+        patch.undo()
+        model = FmuModel(build(["vessel"])[0])
+        LocalInstance("first", model, print).free()
+        model.close()
+        opens(slave, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FMU2Slave, "__init__", opened)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -191,11 +191,17 @@ def on_demand(module, node):
         yield f"{module}{name}" if name.startswith(".") else name
 
 
+@cache
+def parsed(path):
+    """The syntax tree of a file, which several tests walk."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def statements(path):
     """All nodes of a file, and of the stub that says what an ``__init__`` imports on demand."""
     for each in (path, path.with_suffix(".pyi")):
         if each.exists():
-            yield from ast.walk(ast.parse(each.read_text()))
+            yield from ast.walk(parsed(each))
 
 
 @cache
@@ -232,12 +238,8 @@ def public_names(module):
     path = sources(module.partition(".")[0])[module]
     stub = path.with_suffix(".pyi")
     if stub.exists():
-        return [
-            alias.asname
-            for node in ast.parse(stub.read_text()).body
-            for alias in getattr(node, "names", [])
-        ]
-    tree = ast.parse(path.read_text())
+        return [alias.asname for node in parsed(stub).body for alias in getattr(node, "names", [])]
+    tree = parsed(path)
     defined = []
     for node in tree.body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
@@ -255,7 +257,7 @@ def public_names(module):
 
 def module_aliases(module, path):
     """Local name -> module of this project that an import statement binds to it."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 if alias.name in known() and (alias.asname or "." not in alias.name):
@@ -270,7 +272,7 @@ def module_aliases(module, path):
 def attributes(module, path):
     """(module, attribute) of each ``module.attribute`` where the module is one of this project."""
     aliases = dict(module_aliases(module, path))
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if (
             isinstance(node, ast.Attribute)
             and isinstance(node.value, ast.Name)
@@ -441,7 +443,7 @@ def test_a_class_name_has_one_meaning():
     homes: dict[str, list[str]] = {}
     for package in ("fmus", "fmucheck", "cosim", "cybership", "diagnosis", "studies", "thesis"):
         for module, path in sources(package).items():
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in ast.walk(parsed(path)):
                 if isinstance(node, ast.ClassDef):
                     homes.setdefault(node.name, []).append(module)
     assert {n: m for n, m in homes.items() if len(m) > 1 and n not in OF_COMPONENTS} == {}
@@ -470,7 +472,7 @@ OF_ONE_SHIP = {"fmus.ships.naming"}
 
 def words(path):
     """Names and texts of a file's code, docstrings left out."""
-    tree = ast.parse(path.read_text())
+    tree = parsed(path)
     docs = {
         node.body[0].value
         for node in ast.walk(tree)

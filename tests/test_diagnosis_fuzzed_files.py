@@ -16,7 +16,7 @@ from diagnosis import InputError
 from diagnosis.runs.columns.columns import TAU
 
 N = 120
-MANY = int(os.environ.get("CYBERSHIP_FILES", "120"))
+MANY = int(os.environ.get("CYBERSHIP_FILES", "60"))
 TIME = np.arange(N) * 0.1
 WILD = [np.nan, np.inf, -np.inf, 0.0, -1.0, 1e308, -1e308, 1e-308, 1e15, 360.0]
 WORDS = ["", "x", "1e400", "0x1", "1,5", '"', "NaN", "9" * 60, "true", "\0", "-", "1e"]
@@ -168,13 +168,13 @@ def judge(folder, seeds):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_broken_file_is_a_result_or_one_message(tmp_path):
-    judge(tmp_path, range(40))
+    judge(tmp_path, range(20))
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_many_broken_files(tmp_path):
-    judge(tmp_path, range(40, MANY))
+    judge(tmp_path, range(20, MANY))
 
 
 def run(tmp_path, **columns):
@@ -261,9 +261,8 @@ def test_runs_of_another_ship_are_refused_or_a_result(tmp_path):
     """The tanker's rudder [deg] as a moment is more than thrusters give; nothing of it fits in any case."""
     columns = {"time": "t", "psi": {"name": "psi_deg", "unit": "deg"}, "tau_N": "rudder_deg"}
     columns |= {"tau_X": "none", "tau_Y": "none"}
-    for name in ("z_05_01", "z_35_05"):
-        table = pd.read_csv(DATA / "kvlcc2_hsva" / f"{name}.csv").assign(none=0.0)
-        table.to_csv(tmp_path / f"{name}.csv", index=False)
-        (tmp_path / f"{name}.csv.json").write_text(json.dumps({"columns": columns}))
-        assert not outcome(tmp_path / f"{name}.csv")
-        assert outcome(tmp_path / f"{name}.csv", anyway=True)
+    table = pd.read_csv(DATA / "kvlcc2_hsva" / "z_35_05.csv").assign(none=0.0)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": columns}))
+    assert not outcome(tmp_path / "a.csv")
+    assert outcome(tmp_path / "a.csv", anyway=True)

@@ -94,14 +94,14 @@ def errors_of_whole(kind):
     return errors(measured(kind), kind)
 
 
-# Each change with two or three kinds, each kind with two or more changes.
+# Each change with one kind, each kind with one change or two.
 CASES = [
     (kind, change)
     for k, kind in enumerate(KINDS)
     for j, change in enumerate(CHANGES)
-    if (k + j) % 5 in (0, 2)
+    if (k + j) % 5 == 0
 ]
-QUICK = [("jumps", "unix"), ("jumps", "freezes"), ("quiet", "drops")]
+QUICK = [("jumps", "unix"), ("swings", "freezes"), ("quiet", "drops")]
 
 
 @pytest.mark.parametrize(("kind", "change"), in_part(CASES, keep=QUICK))

@@ -154,10 +154,9 @@ def test_command_refuses_an_unknown_method_before_any_work(tmp_path, capsys):
 
 @needs_peers
 @pytest.mark.slow
-@pytest.mark.parametrize("name", PEERS)
-def test_command_writes_what_another_method_finds(name, file, tmp_path, capsys):
+def test_command_writes_what_another_method_finds(file, tmp_path, capsys):
     out = tmp_path / "out"
-    assert main([str(file), "--method", name, "--out", str(out)]) == 0
+    assert main([str(file), "--method", "pls", "--out", str(out)]) == 0
     found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     assert found["effects"][0]["id"] == "loss_yaw"
     assert found["effects"][0]["confidence"] is None

@@ -194,7 +194,7 @@ def test_mistakes_of_a_described_ship_are_told_with_odds(columns, read_from, fac
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cause", ["none", "loss", "drag", "wind", "current", "lag"])
+@pytest.mark.parametrize("cause", ["none", "wind", "lag"])
 def test_hidden_cause_of_a_described_ship_is_no_mistake(cause):
     """With every coefficient 10 % wrong."""
     ship = ship_with((), "otter")

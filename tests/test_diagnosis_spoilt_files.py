@@ -164,9 +164,10 @@ SHIPS = [
 LATE = [({}, {"delay": 1.0}), ({}, {"lag": 2.0})]
 CASES = [(*each, (commands, jumps)[k % 2]) for k, each in enumerate(SHIPS)]
 CASES += [(*each, given) for each in LATE for given in (commands, jumps)]
+CASES = [case for k, case in enumerate(CASES) if k % 3]  # two of three: each kind of effect is left
 
 
-@pytest.mark.parametrize(("ship", "thrusters", "given"), in_part(CASES, keep=[CASES[4], CASES[-1]]))
+@pytest.mark.parametrize(("ship", "thrusters", "given"), in_part(CASES, keep=[CASES[2], CASES[-1]]))
 def test_no_hidden_effect_is_refused(ship, thrusters, given):
     run = sail(60.0, 1.0 / RATE, ship=ship, thrusters=thrusters, given=given)[0]
     refuse_implausible([weak_windows(smoothed(run))], Model())

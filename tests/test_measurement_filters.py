@@ -181,10 +181,9 @@ def test_models_that_differ_in_their_filters_are_predicted_each_by_its_own():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("channel", "lag"), [("heading_lag", 1.0), ("position_lag", 0.5)])
-def test_a_filter_is_found_in_addition_to_the_hidden_effect(channel, lag):
+def test_a_filter_is_found_in_addition_to_the_hidden_effect():
     """A filter that is computed once a sample lags half a sample less than its time constant."""
-    h, hidden = 0.1, {"delta_X_u": -2.0}
+    h, hidden, channel, lag = 0.1, {"delta_X_u": -2.0}, "heading_lag", 1.0
     run = behind_filters(sail(120.0, h=h, ship=hidden)[0], **{channel: lag})
     found = {e.id: e for e in diagnose([weak_windows(smoothed(run))]).content.effects}
     assert {*found} == {channel, "X_u"}

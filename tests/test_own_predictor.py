@@ -82,7 +82,7 @@ def test_a_wrong_term_is_the_force_that_the_function_lacks(runs, plain):
 @pytest.mark.slow
 def test_a_wrong_term_of_a_function_is_learned(tmp_path, file):
     """The ship has a damper that the function lacks, by the command."""
-    for k, seconds in enumerate((120.0, 60.0)):
+    for k, seconds in enumerate((64.0, 40.0)):
         run = sail(seconds, ship=DAMPER, seed=k)[0]
         table = np.column_stack([run.time, run.pose, run.tau_cmd])
         header = "time,x,y,psi,tau_X,tau_Y,tau_N"

@@ -274,9 +274,16 @@ def test_parameters_of_own_effects_need_the_fmu_that_has_them(scenario, ellipse,
     assert done.returncode == 2
     assert "python -m fmus.build vessel --effects FILE.py" in done.stderr
     for extra in ([], ["--parameters", tmp_path / "model.ssv"]):
-        built = [sys.executable, "-m", "fmus.build", "vessel", "--effects", tmp_path / "mine.py", *extra]
-        built += ["--overwrite", "--out", tmp_path / "fmu"]
-        assert subprocess.run(built, cwd=ROOT, check=False).returncode == 0
+        built = (
+            "vessel",
+            "--effects",
+            tmp_path / "mine.py",
+            *extra,
+            "--overwrite",
+            "--out",
+            tmp_path / "fmu",
+        )
+        assert run_build(*built).returncode == 0
         ellipse["fmus"]["vessel"]["path"] = "./fmu/vessel.fmu"
         assert command(scenario(), *arguments).returncode == 0
         with_set = (tmp_path / "out" / "log.csv").read_bytes()

@@ -33,9 +33,8 @@ def later(seed, t):
 
 # An actuator with a memory, and the measurement; of a force the next test has what decides.
 @pytest.mark.slow
-@pytest.mark.parametrize("hidden", [({}, {"lag": 0.8}), ({}, {}, OFF)])
-def test_another_test_run_changes_nothing_that_is_learned(tmp_path, hidden):
-    start = Model()
+def test_another_test_run_changes_nothing_that_is_learned(tmp_path):
+    start, hidden = Model(), ({}, {"lag": 0.8}, OFF)
     train = measured(1, *hidden)
     told = []
     # Of the same ship, and of one without the effect whose file has the name of the training run.

@@ -108,7 +108,7 @@ class Response:
     def key(model: Model) -> tuple[Any, ...]:
         """What the response depends on, to be kept while it stays the same."""
         p = model.drive.params
-        return p.dynamics, p.rate, p.allocation, model.clock
+        return model.ship, p.dynamics, p.rate, p.allocation, model.clock
 
     @property
     def between_samples(self) -> np.ndarray:

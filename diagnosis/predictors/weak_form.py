@@ -218,7 +218,9 @@ def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
-    measured = (*((name, model.vessel.get(name, 0.0)) for name in names), model.filters)
+    # The ship is part of each key: two may have effects of one name that are different functions.
+    values = (*((name, model.vessel.get(name, 0.0)) for name in names), model.filters)
+    measured = (model.ship, values)
     ship = (measured, tuple(sorted(model.vessel.items())))
     water = model.hull.params.water
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
