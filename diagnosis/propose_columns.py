@@ -60,13 +60,7 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
     if found.run is None:
         shown = [f"'{path}': no column is known for {', '.join(found.likely)}"]
     else:
-        s = _smoothed(found.run, craft, options.anyway, advance)
-        shown = [
-            f"'{path}': {s.counts.samples} samples in {_seconds(s):.4g} s, one each "
-            f"{s.track.period:.3g} s; {s.counts.frozen} frozen, {s.counts.dropped} dropped, "
-            f"{s.counts.spikes} spikes",
-            *s.track.notes,
-        ]
+        shown = _seen(path, found.run, craft, options.anyway, advance)
     if found.unused:
         shown.append(f"not used: {', '.join(found.unused)}")
     shown = list(map(printable, [*shown, *_blanks([found])]))
@@ -75,6 +69,20 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
     if found.layout == stated_layout(path):
         return Done(0, [*shown, printable(f"the side-car of '{path}' is complete")])
     return Done(0, [*shown, *_stated(target, found.needed, options.write)])
+
+
+def _seen(path: Path, run: "Run", craft: "Ship", anyway: bool, advance: Advance) -> list[str]:
+    """The samples of a measurement, or why it cannot be used as it is proposed."""
+    try:
+        s = _smoothed(run, craft, anyway, advance)
+    except InputError as error:
+        return [f"not usable yet: {error}"]
+    return [
+        f"'{path}': {s.counts.samples} samples in {_seconds(s):.4g} s, one each "
+        f"{s.track.period:.3g} s; {s.counts.frozen} frozen, {s.counts.dropped} dropped, "
+        f"{s.counts.spikes} spikes",
+        *s.track.notes,
+    ]
 
 
 def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Done:

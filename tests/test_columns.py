@@ -11,9 +11,10 @@ from support.command import command
 from cosim import InputError
 from diagnosis import propose_columns
 from diagnosis.predictors import ship_with
-from diagnosis.runs import FOLDER_FILE, propose, read
+from diagnosis.runs import FOLDER_FILE, line_beside, prepare, propose, read
 from diagnosis.runs.columns.columns import quantities
 from diagnosis.runs.columns.likely_columns import meaning_of_words
+from diagnosis.runs.columns.side_car import ColumnChange
 
 TANKER = ship_with((), "kvlcc2")
 NAMES = {
@@ -227,3 +228,132 @@ def test_folders_and_texts_that_differ_are_refused(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "b.csv' differs from that of" in done.stderr
     assert not (tmp_path / FOLDER_FILE).exists()
+
+
+def boat(**columns: object) -> pd.DataFrame:
+    """An Otter that turns to both sides, and backs with its port propeller."""
+    t = np.arange(0.0, 60.0, 0.1)
+    psi = 2.0 * np.sin(2.0 * np.pi * t / 60.0)
+    noise = np.random.default_rng(7).normal(0.0, 0.01, (2, t.size))
+    table = {
+        "time": t,
+        "x": 0.08 * np.cumsum(np.cos(psi)) + noise[0],
+        "y": 0.08 * np.cumsum(np.sin(psi)) + noise[1],
+        "psi": psi,
+        "port.n": 5.0 * np.sin(2.0 * np.pi * t / 30.0),
+        "starboard.n": np.full(t.size, 6.0),
+    }
+    return pd.DataFrame(table | columns)
+
+
+OTTER = ship_with((), "otter")
+
+
+def test_paths_of_messages_are_known_by_their_last_parts(tmp_path: Path) -> None:
+    named = {
+        "x": "/gnss/odom/position/x",
+        "y": "/gnss/odom/position/y",
+        "psi": "/imu/heading",
+        "port.n": "/thrusters/port/n_cmd",
+        "starboard.n": "/thrusters/starboard/n_cmd",
+    }
+    found = propose(written(tmp_path / "a.csv", boat().rename(columns=named)), OTTER)
+    assert found.needed == {"columns": named}
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.commands, boat()[["port.n", "starboard.n"]])
+
+
+def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: Path) -> None:
+    """Position, heading and commands come at times of their own, as a bag of messages has them."""
+    table, parts = boat(), []
+    for late, every, names in (
+        (0.0, 2, ["x", "y"]),
+        (0.013, 1, ["psi"]),
+        (0.031, 1, ["port.n", "starboard.n"]),
+    ):
+        part = table[["time", *names]].iloc[::every]
+        parts.append(part.assign(time=part["time"] + late))
+    path = written(tmp_path / "a.csv", pd.concat(parts).sort_values("time"))
+    s = prepare(path, OTTER).smoothed
+    assert s.counts.used == len(table) / 2
+    inside = (s.time > 2.0) & (s.time < 57.0)
+    true = np.interp(s.time, table["time"], 0.8 * np.ones(len(table)))
+    assert np.sqrt(np.nanmean((s.nu[inside, 0] - true[inside]) ** 2)) < 0.02
+
+
+def test_a_compass_and_one_shaft_are_known(tmp_path: Path) -> None:
+    table = zigzag(psi="compass_deg", **{"propeller.n": "rpm"})
+    table["compass_deg"], table["rpm"] = np.degrees(table["compass_deg"]) % 360.0, 480.0
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.commands[:, 0], 8.0)
+    np.testing.assert_allclose(np.sin(found.run.pose[:, 2]), np.sin(zigzag()[NAMES["psi"]]), atol=1e-9)
+
+
+def test_a_shaft_that_turns_evenly_is_likely_by_its_unit(tmp_path: Path) -> None:
+    table = zigzag(**{"propeller.n": "A [rpm]"})
+    table["B [rpm]"] = table["A [rpm]"] = 480.0
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert {c.name for c in found.likely["propeller.n"]} == {"A [rpm]", "B [rpm]"}
+
+
+def test_a_heading_that_wraps_is_likely_by_the_course(tmp_path: Path) -> None:
+    table = boat().rename(columns={"psi": "a"})
+    table["a"] = np.degrees(table["a"]) % 360.0
+    found = propose(written(tmp_path / "a.csv", table), OTTER)
+    assert found.likely["psi"][0].name == "a"
+
+
+def test_commands_in_percent_are_proposed_so(tmp_path: Path) -> None:
+    table = boat().rename(columns={"port.n": "u_vsp_x", "starboard.n": "u_vsp_y"})
+    table = table.assign(u_vsp_x=table["u_vsp_x"] / 6.0, u_vsp_y=0.4, u_bow=0.1)
+    percent = table.assign(**{n: 100.0 * table[n] for n in ("u_vsp_x", "u_vsp_y", "u_bow")})
+    found = propose(written(tmp_path / "a.csv", percent))
+    assert {c["unit"] for c in found.needed["columns"].values()} == {"%"}
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.commands, table[["u_vsp_x", "u_vsp_y", "u_bow"]])
+    assert "columns" not in propose(written(tmp_path / "b.csv", table)).needed
+
+
+@pytest.mark.parametrize(("astern", "ahead"), [("R", "F"), (-1, 1), ("astern", "ahead")])
+def test_the_sign_of_a_command_may_have_a_column_of_its_own(
+    tmp_path: Path, astern: object, ahead: object
+) -> None:
+    table = boat()
+    table["port_dir"] = np.where(table["port.n"] < 0.0, astern, ahead)
+    table["port.n"] = table["port.n"].abs()
+    path = written(tmp_path / "a.csv", table)
+    found = propose(path, OTTER)
+    assert found.needed["columns"]["port.n"]["sign"] == "port_dir"
+    assert list(found.unused) == []
+    (tmp_path / "a.csv.json").write_text(json.dumps(found.needed))
+    np.testing.assert_allclose(read(path, of=OTTER).commands, boat()[["port.n", "starboard.n"]])
+    wrong = found.needed
+    wrong["columns"]["port.n"]["sign"] = "port_dri"
+    (tmp_path / "a.csv.json").write_text(json.dumps(wrong))
+    with pytest.raises(InputError, match=r"no column 'port_dri' \(for a sign\); .*port_dir"):
+        read(path, of=OTTER)
+
+
+def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
+    table = boat()
+    stamps = pd.Timestamp("2026-05-05 23:59:30.3") + pd.to_timedelta(table["time"], unit="s")
+    path = written(tmp_path / "a.csv", table.assign(time=stamps.dt.strftime("%H:%M:%S.%f")))
+    np.testing.assert_allclose(read(path, of=OTTER).time, table["time"], atol=1e-6)
+
+
+def test_the_line_that_mends_a_column_keeps_the_name_and_unit_it_was_read_by(tmp_path: Path) -> None:
+    """Once there is a side-car, names of columns state no units: the line has them all."""
+    table = boat().rename(columns={"psi": "psi [deg]", "x": "x [mm]"})
+    path = written(tmp_path / "a.csv", table)
+    run = read(path, of=OTTER)
+    mend = {"y": ColumnChange("y", -1.0), "psi": ColumnChange("psi", -1.0)}
+    line = line_beside(path, run.layout, mend)
+    content = json.loads(line.partition("put ")[2].rpartition(" into ")[0])
+    assert content["columns"] == {
+        "psi": {"name": "psi [deg]", "unit": "deg", "flip": True},
+        "x": {"name": "x [mm]", "unit": "mm"},
+        "y": {"name": "y", "flip": True},
+    }
+    (tmp_path / "a.csv.json").write_text(json.dumps(content))
+    np.testing.assert_allclose(read(path, of=OTTER).pose, run.pose * [1.0, -1.0, -1.0])

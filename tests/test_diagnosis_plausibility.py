@@ -16,7 +16,8 @@ from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, 
 import diagnosis
 from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
-from diagnosis import InputError, Model, Run, compare, weak_windows
+from diagnosis import InputError, Model, Run, compare, propose_columns, weak_windows
+from diagnosis.assessment import plausibility
 from diagnosis.assessment.command_check import without_force
 from diagnosis.assessment.gains import ThrustGains, _own, gains
 from diagnosis.assessment.plausibility import (
@@ -368,3 +369,48 @@ def test_tanker_with_a_rudder_is_a_unit_alone():
         w = weak_windows(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
         found = likeliest_mistake(w, Model())
         assert found is None or of_units(found)
+
+
+class SomeOdds:
+    """In place of the odds of readings: one reading is that much likelier than the file as it was read."""
+
+    def __init__(self, better):
+        self.better = better
+
+    def __call__(self, w, model):
+        return self
+
+    def log_density(self, reading):
+        return self.better if reading.mistake == "tau_Y has the wrong sign" else 0.0
+
+
+@pytest.mark.parametrize(("odds", "sure"), [(101.0, False), (1e7, True)])
+def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
+    odds, sure, monkeypatch, tmp_path
+):
+    """Of many readings chance may give one odds of 100 : 1."""
+    monkeypatch.setattr(plausibility, "ReadingOdds", SomeOdds(np.log(odds)))
+    w = weak_windows(smoothed(replace(base(), file=tmp_path / "a.csv")))
+    if sure:
+        with pytest.raises(InputError, match="probably tau_Y has the wrong sign"):
+            refuse_implausible([w], Model())
+        return
+    (found,) = refuse_implausible([w], Model())
+    (line,) = found.smoothed.doubted
+    assert line.startswith("perhaps tau_Y has the wrong sign (odds 10^2 : 1); if so, put {")
+    assert line in found.smoothed.notes
+
+
+def test_the_side_car_of_a_run_that_seems_mirrored_is_written_all_the_same(tmp_path):
+    """What is known of names and units stands then, and the line that mends the rest has it."""
+    run = edited(pose=flipped(1, 1, -1))
+    table = pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
+    table = table.assign(yaw=np.degrees(table["psi"])).drop(columns="psi")
+    table.to_csv(tmp_path / "a.csv", index=False)
+    done = command(propose_columns.main, tmp_path / "a.csv", "--write")
+    assert done.returncode == 0
+    told = " ".join(done.stdout.split())
+    assert "not usable yet: run 'a': probably its heading is mirrored" in told
+    assert '{"name": "yaw", "unit": "deg", "flip": true}' in told
+    side_car = json.loads((tmp_path / "a.csv.json").read_text())
+    assert side_car == {"columns": {"psi": {"name": "yaw", "unit": "deg"}}}

@@ -74,7 +74,7 @@ def without_force(run: Run, model: Model) -> str:
         f"its commands give no force: {', '.join(beyond.values())}, in all rows; check the sign of "
         "the command"
     )
-    return clause + line_beside(run.file, flipped)
+    return clause + line_beside(run.file, run.layout, flipped)
 
 
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:

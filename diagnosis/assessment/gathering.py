@@ -99,9 +99,7 @@ def usable(
             raise InputError(f"run '{name}': too many samples are missing while the thrusters act")
         if s.track.run.trial is not None:
             measured_passage(s, model.ship)  # refuses what is no trial
-    if not anyway:
-        refuse_implausible(windows, model)
-    return windows
+    return windows if anyway else refuse_implausible(windows, model)
 
 
 def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:

@@ -8,7 +8,9 @@ dead actuators, do not do as well.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations, compress
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -32,46 +34,62 @@ TURNS = tuple(k * np.pi / 6.0 for k in range(-5, 6) if k)
 MOST = 6  # power of ten of the odds that are stated; no model is true enough for more
 
 
-def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
+class Doubt(NamedTuple):
+    """What is wrong with a run, how its columns should be read, and the name that one should have."""
+
+    seen: str
+    changes: Mapping[str, ColumnChange] = MappingProxyType({})
+    name: str | None = None
+    sure: bool = True
+
+
+def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWindows]:
     """Refuse runs whose files were read otherwise than meant.
 
     Args:
         runs: windows of the runs.
         model: the initial one.
 
+    Returns:
+        The runs, with a line on a mistake that is likely, but not as sure as a refusal needs.
+
     Raises:
         InputError: with the likeliest mistake, and the line for the file next to the measurement.
     """
+    found = []
     for w in runs:
         with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
-            found = _refusal(w, model)
-        if found:
-            seen, changes, name = found
-            remedy = line_beside(w.run.file, changes, name)
-            raise InputError(f"run '{w.run.name}': {seen}{remedy}; {GO_ON}")
+            doubt = _doubt(w, model)
+        if doubt:
+            remedy = line_beside(w.run.file, w.run.layout, doubt.changes, doubt.name)
+            if doubt.sure:
+                raise InputError(f"run '{w.run.name}': {doubt.seen}{remedy}; {GO_ON}")
+            doubted = (*w.smoothed.doubted, f"{doubt.seen}{remedy.replace('; ', '; if so, ', 1)}")
+            w = replace(w, smoothed=replace(w.smoothed, doubted=doubted))
+        found.append(w)
+    return found
 
 
-def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, ColumnChange], str | None] | None:
-    """What is wrong with a run, how its columns should be read, and the name that one should have."""
+def _doubt(w: WeakWindows, model: Model) -> Doubt | None:
     twice, wrong_one = same_columns(w.run), still_column(w.run)
     seen = f"{wrong_one} is constant in all rows, while the other channels of the pose change"
     if twice:
         wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} have the same values"
     if wrong_one:
-        return seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column"
+        return Doubt(seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column")
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
-        return silent, {}, None
+        return Doubt(silent)
     given = gains(w, model)
     wrong = [f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong)]
     seen = beyond or (
         f"its accelerations follow {', '.join(wrong)}" if wrong else pushed_aside(w, model)
     )
     found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean)
-    if found:
+    if found and (found.sure or not seen):
         clause = f"{beyond}; {found.clause}" if beyond else found.clause
-        return clause, found.readings[0].changes, None
-    return (seen, {}, None) if seen else None
+        return Doubt(clause, found.readings[0].changes, sure=found.sure)
+    return Doubt(seen) if seen else None
 
 
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:
@@ -110,17 +128,22 @@ def still_column(run: Run) -> str | None:
 
 
 class Mistake(NamedTuple):
-    """Readings that are far likelier than the file as it was read, the likeliest first, and the odds."""
+    """Readings that are far likelier than the file as it was read, the likeliest first, and the odds.
+
+    It is sure where chance hardly gives such odds to any of all readings, not only to this one.
+    """
 
     readings: Sequence[Reading]
     log_odds: float
+    sure: bool = True
 
     @property
     def clause(self) -> str:
         """What seems to be wrong, and how sure that is."""
         ten = self.log_odds / np.log(10.0)
         odds = f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
-        return f"probably {', or '.join(r.mistake for r in self.readings)} (odds {odds})"
+        how = "probably" if self.sure else "perhaps"
+        return f"{how} {', or '.join(r.mistake for r in self.readings)} (odds {odds})"
 
 
 def likeliest_mistake(
@@ -142,10 +165,11 @@ def likeliest_mistake(
         named, possible = sum(sound[:named]), [*compress(possible, sound)]
         if not possible:
             return None
-    needed = np.log((1 if doubted else len(possible)) / SETTINGS.chance)
+    asked = -np.log(SETTINGS.chance)
+    needed = asked if doubted else asked + np.log(len(possible))
     found = np.array([odds.log_density(reading) for reading in possible])
     as_read = odds.log_density(AS_READ)
-    if not found.max() > as_read + needed:
+    if not found.max() > as_read + asked:
         return None
     best = possible[int(np.argmax(found))]
     lawful = [Reading("", turn=turn) for turn in TURNS]
@@ -155,10 +179,10 @@ def likeliest_mistake(
         same = (best.commands == np.eye(len(best.commands))).all(axis=1)
         lawful.append(Reading("", commands=np.diag(same.astype(float))))
     better = found.max() - max([as_read, *map(odds.log_density, lawful)])
-    if better < needed:
+    if better < asked:
         return None
     near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
     order = sorted(near, key=lambda k: (k >= named, len(possible[k].changes), -found[k]))
     if order[0] < named:  # a unit with a name is as good as a number
         order = [k for k in order if k < named]
-    return Mistake([possible[k] for k in order], better)
+    return Mistake([possible[k] for k in order], better, bool(better >= needed))

@@ -164,7 +164,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     if between.any() or lined.any():
         notes.append("rows between two measurements were linearly interpolated: they are not counted")
     period = float(np.median(np.diff(run.time[fresh])))
-    refuse_time(row, seconds, where, run.called or {}, scale)
+    refuse_time(row, seconds, where, run.called, scale)
     steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
@@ -187,7 +187,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     of_heading = np.flatnonzero(measured[:, 2])
     turning = np.interp(run.time[fresh], run.time[of_heading], run.pose[of_heading, 2])
     as_read = np.column_stack([run.pose[fresh, :2], turning])
-    refuse_units(run.time[fresh], as_read, where, anyway, run.called or {})
+    refuse_units(run.time[fresh], as_read, where, anyway, run.called)
     pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])

@@ -113,6 +113,8 @@ class Column(BaseModel):
     flip: bool = False  # whether its axis points the other way
     offset: FiniteFloat = 0.0  # what is added, in its unit, after the flip
     noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
+    sign: str | None = None  # another column, which holds the sign
+    negative: str = "-1"  # the cell of that in rows with a negative value
 
 
 class Layout(BaseModel):

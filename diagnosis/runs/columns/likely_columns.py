@@ -16,7 +16,8 @@ FILLERS = frozenset(
         *("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
         *("mid", "midship", "position", "pos", "coordinate", "angle", "dir", "direction"),
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
-        *("order", "command", "cmd", "actual"),
+        *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
+        *("sign", "gear"),
     )
 )
 # Quantity -> word that is left of a name -> signal.
@@ -33,6 +34,9 @@ WORDS = {
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Short and other words of names -> the words that actuators' names have.
 MEANT = {"stbd": "starboard", "stb": "starboard", "right": "starboard", "left": "port"}
+# Words of a column that holds the sign of another one, and its cells of a negative value.
+SIGN = frozenset(("dir", "direction", "sign", "gear"))
+ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
@@ -73,7 +77,7 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
 
     Args:
         name: of the column, without its unit.
-        unit: of the column; without one nothing is told.
+        unit: of the column; without one only an actuator's command is told, as in ``port/n_cmd``.
         quantity: signal -> quantity.
     """
     words = words_of(name)
@@ -84,9 +88,22 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
         if unit in UNITS[q] and len(left) == 1 and signals.get(left[0]) in quantity
     }
     found |= {
-        s for s, q in quantity.items() if "." in s and unit in UNITS[q] and _is_of_actuator(words, s, q)
+        s
+        for s, q in quantity.items()
+        if "." in s
+        and (unit in UNITS[q] or (not unit and s.partition(".")[2] in words))
+        and _is_of_actuator(words, s, q)
     }
     return found.pop() if len(found) == 1 else ""
+
+
+def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:
+    """The command whose sign a column of some name holds, as ``port_dir``; empty if none, or several."""
+    words = words_of(name)
+    found = [
+        s for s, q in quantity.items() if not SIGN.isdisjoint(words) and _is_of_actuator(words, s, q)
+    ]
+    return found[0] if len(found) == 1 else ""
 
 
 def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
@@ -180,7 +197,8 @@ def _evidence(
 ) -> tuple[list[str], float] | None:
     """What speaks for a column, and how much; None where something excludes it, or nothing does."""
     numbers = values[np.isfinite(values)]
-    if numbers.size < 2 or np.ptp(numbers) == 0.0 or unit not in ("", "-", *UNITS[quantity]):
+    moves = quantity in ("time", "length") or signal == "psi"  # a shaft may turn evenly
+    if numbers.size < 2 or (moves and np.ptp(numbers) == 0.0) or unit not in ("", "-", *UNITS[quantity]):
         return None
     if np.abs(numbers).max() > LARGEST.get(quantity, np.inf):
         return None
@@ -196,6 +214,8 @@ def _evidence(
     if unit in UNITS[quantity]:
         reasons, score = [*reasons, f"by its unit {unit}"], score + 0.5
     axes = MOVES.get(signal) or MOVED.get(quantity, ("surge", "sway", "yaw"))
+    if quantity == "angle":  # it may wrap
+        values = _unwrapped(values if np.abs(numbers).max() <= 2.0 * np.pi else np.radians(values))
     pairs = {n: _correlation(values, m) for n, m in motion.items() if n.partition(" ")[0] in axes}
     best = max(pairs, key=lambda name: abs(pairs[name]), default="")
     if best and abs(pairs[best]) >= LIKELY:

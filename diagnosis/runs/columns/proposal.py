@@ -13,7 +13,7 @@ from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..cleaning import lost, repeated
-from ..files.reading import Run, column_names, read
+from ..files.reading import MOST_COMMAND, Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..row_order import in_order
@@ -34,8 +34,17 @@ from .columns import (
     to_si,
 )
 from .geographic import geographic_pair, local_columns
-from .likely_columns import LikelyColumn, likely_columns, meaning_of_words, motion_of, unit_in
-from .side_car import refuse_sentences
+from .likely_columns import (
+    ASTERN,
+    LARGEST,
+    LikelyColumn,
+    likely_columns,
+    meaning_of_words,
+    motion_of,
+    signal_of_sign,
+    unit_in,
+)
+from .side_car import as_json, refuse_sentences
 from .unit_check import OFTENEST, RAREST, doubts, likely_unit
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
@@ -45,7 +54,10 @@ CALLED: dict[str, tuple[str, ...]] = {
     "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
     "x": ("north", "northing", "n", "posx", "positionx", "xn"),
     "y": ("east", "easting", "e", "posy", "positiony", "ye"),
-    "psi": ("heading", "yaw", "hdg", "headingangle", "yawangle"),
+    "psi": (
+        *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
+        *("hdm", "compass", "gyro", "gyrocompass"),
+    ),
     "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
     "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
     "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
@@ -79,12 +91,18 @@ MEANT = (
 def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
     """Which of some signals a name means, and whether its axis points the other way.
 
+    Of a name with a path, as ``/gnss/pose/position/x``, the last two parts or the last one count.
+
     Returns:
         An empty name where it means none of them.
     """
-    known = {_folded(signal): (signal, False) for signal in signals}
-    found = (MEANT | known).get(_folded(name), ("", False))
-    return found if found[0] in signals else ("", False)
+    known = MEANT | {_folded(signal): (signal, False) for signal in signals}
+    parts = name.split("/")
+    for part in (name, "".join(parts[-2:]), parts[-1]):
+        found = known.get(_folded(part), ("", False))
+        if found[0] in signals:
+            return found
+    return "", False
 
 
 class Proposal(NamedTuple):
@@ -109,14 +127,6 @@ class Proposal(NamedTuple):
         if self.layout.column("x") == log_of(()).column("x"):
             return {}
         return as_json(self.layout)
-
-
-def as_json(layout: Layout) -> dict[str, Any]:
-    """The content of the file beside a measurement, without what need not be said."""
-    told = layout.model_dump(exclude_defaults=True)
-    for signal, column in told.get("columns", {}).items():
-        told["columns"][signal] = column["name"] if column.keys() == {"name"} else column
-    return told
 
 
 def propose(path: Path, of: Ship | None = None) -> Proposal:
@@ -163,7 +173,10 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     except InputError as error:
         more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
-    run = read(path, layout, of)
+    columns |= _percent(path, layout, names, of)
+    columns |= _signed(path, layout.model_copy(update={"columns": columns}), unused, quantity)
+    unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
+    run = read(path, layout.model_copy(update={"columns": columns}), of)
     for signal, unit in _seen_units(run):
         if signal not in kept and not layout.column(signal).unit:
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
@@ -274,16 +287,28 @@ def _columns(
             raise InputError(f"'{path}', column '{name}': {no_unit(unit, signal, known)}")
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
+    columns |= _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
+    return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _by_words(
+    free: Sequence[tuple[str, str]], columns: Mapping[str, Column], quantity: Mapping[str, str]
+) -> dict[str, Column]:
+    """Signals that words of names and units tell of columns (name, unit below), where one alone does."""
     found: dict[str, list[Column]] = {}
+    shafts: list[Column] = []
     for name, below in free:
         bare, unit = _bare(name, below)
         unit = unit or unit_in(bare)
-        signal = meaning_of_words(bare, unit, quantity)
-        if name not in _names_of(columns) and signal:
-            is_si = UNITS[quantity[signal]][unit] == 1.0
+        if signal := meaning_of_words(bare, unit, quantity):
+            is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
-    columns |= {s: each[0] for s, each in found.items() if len(each) == 1}
-    return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+        elif unit in ("rpm", "rps"):
+            shafts.append(Column(name=name, unit=unit))
+    turning = [s for s, q in quantity.items() if q == "shaft speed" and s not in {*columns, *found}]
+    if len(turning) == len(shafts) == 1:  # one shaft, and one speed of a shaft
+        found[turning[0]] = shafts
+    return {s: each[0] for s, each in found.items() if len(each) == 1 and s not in columns}
 
 
 def _geographic(
@@ -296,6 +321,38 @@ def _geographic(
         return {}
     table = table_of_file(path, layout, set(pair.values()))
     return local_columns(pair, {signal: _numbers(table[name], signal) for signal, name in pair.items()})
+
+
+def _percent(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
+    """Commands without a unit that reach beyond -1 to 1, in percent."""
+    own = {s for form in of.command_forms for s, unit in form.items() if unit == "1"}
+    named = {s: layout.column(s) for s in sorted(own) if layout.column(s).name in names}
+    if not named or any(column.unit or column.factor != 1.0 for column in named.values()):
+        return {}
+    table = table_of_file(path, layout, _names_of(named))
+    most = max(float(np.nanmax(np.abs(_numbers(table[n], "")), initial=0.0)) for n in _names_of(named))
+    if not MOST_COMMAND < most <= LARGEST["command"]:
+        return {}
+    return {s: column.model_copy(update={"unit": "%"}) for s, column in named.items()}
+
+
+def _signed(
+    path: Path, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
+) -> dict[str, Column]:
+    """Commands whose sign is in a column of its own, as ahead and astern of a shaft."""
+    own = {s: c for s, c in layout.columns.items() if "." in s and not c.sign}
+    named = {n: signal_of_sign(n, {s: quantity[s] for s in own}) for n in unused}
+    found: dict[str, Column] = {}
+    for name, signal in named.items():
+        if not signal:
+            continue
+        table = table_of_file(path, layout, {name, own[signal].name})
+        cells = table[name].dropna().astype("string").str.strip().unique().tolist()
+        negative = [cell for cell in cells if cell.casefold() in ASTERN]
+        values = _numbers(table[own[signal].name], "")
+        if len(cells) <= 3 and len(negative) == 1 and np.nanmin(values, initial=0.0) >= 0.0:
+            found[signal] = own[signal].model_copy(update={"sign": name, "negative": negative[0]})
+    return found
 
 
 def _names_of(columns: Mapping[str, Column]) -> set[str]:

@@ -13,7 +13,7 @@ from cosim import InputError
 from cybership.message_text import quoted
 
 from ..files.text_layout import text_layout
-from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, read_layout
+from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, stated_layout
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,")  # how one of NMEA 0183 begins
@@ -33,11 +33,17 @@ class ColumnChange(NamedTuple):
     offset: float = 0.0
 
 
-def line_beside(path: Path | None, changes: Mapping[str, ColumnChange], name: str | None = None) -> str:
+def line_beside(
+    path: Path | None,
+    read_as: Layout,
+    changes: Mapping[str, ColumnChange],
+    name: str | None = None,
+) -> str:
     """What to put into the file beside a measurement so that columns are read otherwise.
 
     Args:
         path: of the measurement; None if it is in no file.
+        read_as: how it was read, by that file, by units in its names, or by a proposal.
         changes: signal -> what it should be read as.
         name: of the column; None: as it is.
 
@@ -46,10 +52,12 @@ def line_beside(path: Path | None, changes: Mapping[str, ColumnChange], name: st
     """
     if path is None or path.is_dir() or path.suffix == ".mat" or not changes:
         return ""
-    layout = read_layout(path) or Layout()
-    columns = {}
+    # What that file does not state yet has to be there, too: with it names tell no units.
+    told = stated_layout(path) == read_as
+    text = Layout() if told else read_as
+    columns = {} if told else as_json(read_as).get("columns", {})
     for signal, (source, signed, offset) in changes.items():
-        column, sign, factor = layout.column(source), math.copysign(1.0, signed), abs(signed)
+        column, sign, factor = read_as.column(source), math.copysign(1.0, signed), abs(signed)
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if math.isclose(size, wanted)), None)
@@ -64,7 +72,15 @@ def line_beside(path: Path | None, changes: Mapping[str, ColumnChange], name: st
         )
         if units.get(columns[signal].get("unit", "")) == 1.0:  # SI need not be said
             del columns[signal]["unit"]
-    return f"; {_changed(path, Layout(), columns=columns)}"
+    return f"; {_changed(path, text, columns=columns)}"
+
+
+def as_json(layout: Layout) -> dict[str, Any]:
+    """The content of the file beside a measurement, without what need not be said."""
+    told = layout.model_dump(exclude_defaults=True)
+    for signal, column in told.get("columns", {}).items():
+        told["columns"][signal] = column["name"] if column.keys() == {"name"} else column
+    return told
 
 
 def _changed(path: Path, layout: Layout, **changes: Any) -> str:

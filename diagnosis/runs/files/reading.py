@@ -39,7 +39,7 @@ from ..columns.columns import (
 from ..columns.unit_check import LARGEST, UNITS, remedy
 from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
-from .tables import as_table, column_names, date_stamps, numbers, table_of_file
+from .tables import as_table, column_names, date_stamps, is_cell, numbers, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
@@ -60,7 +60,7 @@ class Run(ShortRepr):
         power: (n, m), force of thrusters as shares of that at full power; None if full.
         notes: what was found that is not as it should be, a line each.
         held: (n,), rows whose commands are missing in the file, and held; None if none is.
-        called: signal -> its column in the file, of those with another name; None if there is none.
+        layout: how it was read: the side-car, units in names, or a proposal.
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
         signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
@@ -81,7 +81,7 @@ class Run(ShortRepr):
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     held: np.ndarray | None = None
-    called: Mapping[str, str] | None = None
+    layout: Layout = field(default_factory=Layout)
     file: Path | None = None
     absent: tuple[str, ...] = ()
     signals: tuple[str, ...] = field(default_factory=lambda: ship().layout.commands)
@@ -92,6 +92,11 @@ class Run(ShortRepr):
     resolution: np.ndarray | None = None
     hashes: Mapping[Path, str] = field(default_factory=dict)
     left_out: int = 0
+
+    @property
+    def called(self) -> dict[str, str]:
+        """Signal -> its column in the file, of those with another name."""
+        return {s: c.name for s, c in self.layout.columns.items() if c.name != s}
 
     @property
     def coarse(self) -> np.ndarray:
@@ -188,13 +193,16 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
     with as_table(path):
         names = column_names(path, given or Layout())
         layout = given or layout_of(names, {}, f"'{path}'", of, path.parent)
-        wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of)}
+        used = [layout.column(s) for s in signals(layout, names, f"'{path}'", of)]
+        wanted = {name for column in used for name in (column.name, column.sign) if name}
+        if absent := next((c.sign for c in used if c.sign and c.sign not in names), None):
+            raise InputError(f"'{path}' has no column '{absent}' (for a sign){nearest(absent, names)}")
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
 
 
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
-    columns, noise, called, quantity = {}, {}, {}, quantities(of)
+    columns, noise, quantity = {}, {}, quantities(of)
     steps: dict[str, np.ndarray] = {}
     for signal in signals(layout, list(table.columns), where, of):
         column = layout.column(signal)
@@ -202,6 +210,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         values = date_stamps(cells, f"'{path}'") if signal == "time" else None
         if values is None:
             read = numbers(cells, path, layout)
+            if column.sign:
+                read = np.where(is_cell(table[column.sign], column.negative), -read, read)
             values = to_si(read, signal, column, quantity[signal])
             if signal in POSE:
                 unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
@@ -209,11 +219,9 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         columns[signal] = values
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
-        if column.name != signal:
-            called[signal] = column.name
     run = _run(name, columns, where, of)
     rounded = np.column_stack([steps[name] for name in POSE])
-    return replace(run, called=called or None, noise=noise, trial=layout.trial, resolution=rounded)
+    return replace(run, layout=layout, noise=noise, trial=layout.trial, resolution=rounded)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:

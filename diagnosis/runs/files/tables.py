@@ -24,6 +24,9 @@ from ..columns.side_car import (
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 DAY_FIRST = re.compile(r"^(\d\d)\.(\d\d)\.(\d{4})[ T]")
+TIME_OF_DAY = re.compile(r"^(?=\d\d:\d\d:\d\d)")
+DAY = 86_400.0  # s
+ANY_DAY = "2000-01-01 "  # of times without a date
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 
@@ -115,7 +118,8 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
 def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None:
     """Seconds since the first of a column of date stamps, NaN where empty; None: numbers.
 
-    Stamps are of ISO 8601, or have a date such as 31.12.2026. A leap second of UTC is a second.
+    Stamps are of ISO 8601, or have a date such as 31.12.2026, or none: then a day begins where the time
+    falls by more than half a day. A leap second of UTC is a second.
 
     Args:
         cells: the column.
@@ -124,7 +128,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
     Raises:
         InputError: a cell is not a stamp.
     """
-    leap = np.zeros(len(cells), bool)
+    leap, without_date = np.zeros(len(cells), bool), False
     if not pd.api.types.is_datetime64_any_dtype(cells):
         try:
             if not np.isnan(np.asarray(pd.to_numeric(cells, errors="coerce"), float)).all():
@@ -133,6 +137,8 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
             return None
         cells = cells.astype("string").str.strip().str.replace(",", ".")
         given = cells.str.replace(DAY_FIRST, r"\3-\2-\1 ", regex=True)
+        without_date = bool(cells.dropna().str.contains(TIME_OF_DAY).all())
+        given = given.str.replace(TIME_OF_DAY, ANY_DAY, regex=True) if without_date else given
         leap = np.asarray(given.str.contains(LEAP_SECOND).fillna(False), bool)
         stamps = given.mask(leap, given.str.replace(LEAP_SECOND, ":59", regex=True))
     else:
@@ -143,7 +149,10 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
     wrong = _first(cells, stamps.isna())
     if wrong is not None and where is not None:
         raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a time stamp of ISO 8601")
-    seconds = np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+    seconds = np.array((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+    if without_date:
+        there = np.isfinite(seconds)
+        seconds[there] = np.unwrap(seconds[there], period=DAY)
     ends = pd.DatetimeIndex(stamps[leap]).floor("s").unique() + pd.Timedelta(seconds=1)
     return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
 
@@ -161,6 +170,15 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
             hint = hint or " or a time stamp of ISO 8601, such as 2026-12-31T23:59:59.5Z"
         raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
     return found
+
+
+def is_cell(cells: pd.Series, text: str) -> np.ndarray:
+    """(n,), rows whose cell is a text or the number that it is."""
+    same = cells.astype("string").str.strip() == text
+    number = pd.to_numeric(pd.Series([text]), errors="coerce")[0]
+    return np.asarray(same.fillna(False), bool) | np.asarray(
+        pd.to_numeric(cells, errors="coerce") == number
+    )
 
 
 def _first(cells: pd.Series, unreadable: Any) -> str | None:

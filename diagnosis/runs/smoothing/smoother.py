@@ -399,7 +399,9 @@ def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
     time = track.run.time[rows] - track.run.time[0]
     cut = np.flatnonzero(breaks(rows, track))
     first, last = np.concatenate([[0], cut + 1]), np.concatenate([cut, [time.size - 1]])
-    of_channel = np.add.reduceat(track.fresh[rows], first, dtype=int).min(axis=1)
+    # A heading may be measured in rows of its own.
+    until = np.vstack([np.zeros((1, 3), int), np.cumsum(track.fresh, axis=0)])
+    of_channel = (until[rows[last] + 1] - until[rows[first]]).min(axis=1)
     enough = (last - first + 1 >= FEWEST) & (of_channel >= OF_CHANNEL)
     if not enough.any():
         raise InputError(f"run '{track.run.name}': fewer than {FEWEST} samples between long gaps")
