@@ -158,6 +158,16 @@ def test_remainder_is_dropped():
     np.testing.assert_allclose(part.start, 8.0 * np.arange(7))
 
 
+@pytest.mark.parametrize(("rows", "begins"), [(3199, 0.2), (3200, 0.0)], ids=["remainder", "none"])
+def test_the_first_window_begins_in_the_remainder_where_the_velocity_is_known(rows, begins):
+    run = smoothed(base().rows(np.arange(rows)))
+    std = run.nu_std.copy()
+    std[:10, 0] = 0.1  # m/s, 0.8 m in a window
+    unsure = Windows([replace(run, nu_std=std)])
+    assert unsure.start[0] == pytest.approx(begins)
+    assert unsure.start.size == Windows([run]).start.size
+
+
 def test_windows_without_first_sample_or_half_of_them_are_skipped():
     run = changed(base(), 400, np.nan)  # the first of the second window
     run = changed(run, slice(801, 1000), np.nan)  # 199 of 400

@@ -27,6 +27,11 @@ from .weak_form import BLOCK, BLOCKS, HORIZON
 FREE_STEP = BRIEF  # the mean of the commands acts in it
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 ANY_TIME = (-np.inf, np.inf)  # s
+# A velocity is known where predictions begin if over a window its standard deviation moves the ship by
+# no more than this (m times its scale, about a tenth of its length; rad), or is no more than SETTLED
+# times the median of its run. Chosen: at the ends of a run it is three to four times that.
+DISPLACED = 0.1
+SETTLED = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,10 +239,14 @@ def usable_windows(
     """The windows of a length [s] of a run that have their first sample and at least half of all.
 
     They follow each other from the first sample that is used, and at which actuators that lag hardly
-    follow commands from before the run any more. Those count that begin in a span [s].
+    follow commands from before the run any more. If whole windows leave a remainder, the first begins
+    within it where the velocity is known: at the beginning of a run the smoothed motion follows few
+    samples. Those count that begin in a span [s].
     """
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
     begin = max(first_time(smoothed), track.responded)
+    left = (smoothed.time[-1] + 1.25 * period - begin) % length - 0.25 * period
+    begin = min(settled_time(smoothed, begin, length), begin + max(left, 0.0))
     since = smoothed.time - begin + 0.25 * period
     number = np.floor(since / length).astype(int)
     complete = int((since[-1] + period) // length)
@@ -257,6 +266,20 @@ def usable_windows(
 def first_time(smoothed: Smoothed) -> float:
     """Time of the first sample that is used, which an outlier is not [s]; else that of the first row."""
     return float(smoothed.time[smoothed.used.argmax()])
+
+
+def settled_time(smoothed: Smoothed, begin: float, length: float) -> float:
+    """Time [s] of the first sample from ``begin`` on whose velocity is known; else that.
+
+    ``length`` is that of the windows [s].
+    """
+    size = np.array([smoothed.scale.length, smoothed.scale.length, 1.0])
+    used = smoothed.used & (smoothed.time >= begin)
+    usual = np.median(smoothed.nu_std[smoothed.used], axis=0)
+    most = np.maximum(SETTLED * usual, DISPLACED * size / length)
+    rows = np.flatnonzero(used)
+    known = (smoothed.nu_std[rows] <= most).all(axis=1)
+    return float(smoothed.time[rows[known.argmax()]]) if known.any() else begin
 
 
 def first_row(smoothed: Smoothed, begin: float) -> int:
