@@ -22,7 +22,12 @@ from cosim.command import (
 
 
 def study_parser(
-    module: str, description: str, examples: str, seeds: int | None = 10, jobs: bool = True
+    module: str,
+    description: str,
+    examples: str,
+    seeds: int | None = 10,
+    jobs: bool = True,
+    again: bool = False,
 ) -> argparse.ArgumentParser:
     """A parser with the options that studies share: ``--out``, ``--seeds``, ``--jobs``, ``--quick``.
 
@@ -32,6 +37,7 @@ def study_parser(
         examples: lines for the end of the help.
         seeds: how many by default; None where there is nothing to repeat.
         jobs: whether several runs go on at a time.
+        again: whether the words of the report can be written anew from its results.
     """
     parser = command_parser(
         module,
@@ -56,6 +62,12 @@ def study_parser(
             type=whole_number(1),
             metavar="N",
             help="number of runs at a time (default: one for each core)",
+        )
+    if again:
+        parser.add_argument(
+            "--again",
+            action="store_true",
+            help="write the report anew from the results.json of --out; nothing runs, pictures stay",
         )
     parser.add_argument(
         "--quick", action="store_true", help="few seeds and short runs, for a first look"

@@ -1,15 +1,17 @@
 """The report of a study: Markdown with tables and figures, and all numbers as JSON beside it."""
 
+import json
 import math
 import os
 import platform
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cosim import InputError, atomic_write
+from cosim import InputError, atomic_write, read_log
+from cosim.results import draw, read_options
 from diagnosis.report import as_json, finite
 
 if TYPE_CHECKING:
@@ -49,36 +51,91 @@ def cell(value: Any) -> str:
     return str(value).replace("|", "\\|")
 
 
+Answer = bool | None | Mapping[str, bool | None]
+WORDS = {True: "holds", False: "does not hold", None: "undecided"}
+
+
+MANY = 8  # settings, of which more are counted and not named; chosen
+
+
+def said(answer: Answer) -> str:
+    """An answer in words: one word where all settings agree, else each word with its settings."""
+    if not isinstance(answer, Mapping):
+        return WORDS[answer]
+    grouped: dict[str, list[str]] = {}
+    for setting, each in sorted(answer.items(), key=lambda pair: [*WORDS].index(pair[1])):
+        grouped.setdefault(WORDS[each], []).append(setting.replace(",", ""))
+    if len(grouped) == 1:
+        return next(iter(grouped))
+    if len(answer) > MANY:
+        return "; ".join(f"{word} in {len(each)} of {len(answer)}" for word, each in grouped.items())
+    return "; ".join(f"{word}: {', '.join(each)}" for word, each in grouped.items())
+
+
 class Verdict(NamedTuple):
-    """A statement of the thesis, its verdict, and the numbers or the reason.
+    """A statement of the thesis, whether it holds, and the numbers or the reason.
 
     Attributes:
         thesis: the statement.
-        here: the verdict on today's algorithms; its words decide :attr:`holds`.
-        numbers: on which it rests.
-        printed: the verdict on the algorithms as printed; empty where there is one form alone.
+        here: whether it holds for today's algorithms, as one answer or setting by setting; None: the
+            runs do not decide.
+        numbers: on which it rests, with their limits.
+        printed: the same for the algorithms as printed; empty where there is one form alone.
     """
 
     thesis: str
-    here: str
+    here: Answer
     numbers: str
-    printed: str = ""
+    printed: Answer = MappingProxyType({})
 
     @property
     def holds(self) -> bool | None:
         """Whether the statement holds in every setting, or in none; None: in part, or undecided."""
-        said = {bool(HOLDS.fullmatch(word)) for word in DECIDES.findall(self.here)}
-        return said.pop() if len(said) == 1 and not OPEN.search(self.here) else None
+        return overall(self.here)
+
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """Both answers in words, and the numbers."""
+        return said(self.here), said(self.printed) if self.printed != {} else "–", self.numbers
 
 
-# Words of a verdict: those that decide, those of them by which it holds, and those that leave it open.
-DECIDES = re.compile(r"not reproduced|not reached|reproduced|reversed|reached|\byes\b|\bno\b(?! run)")
-HOLDS = re.compile("reproduced|reached|yes")
-OPEN = re.compile("undecided|no run|in part|not by all")
+def overall(answer: Answer) -> bool | None:
+    """The answer of all settings; None where they differ, or do not decide."""
+    each = answer.values() if isinstance(answer, Mapping) else [answer]
+    answers = {x if x is None else bool(x) for x in each}
+    return answers.pop() if len(answers) == 1 else None
+
+
+def stored(folder: Path) -> dict[str, Any]:
+    """The results of an earlier run of a study.
+
+    Raises:
+        InputError: there are none.
+    """
+    try:
+        return json.loads((folder / RESULTS).read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read '{folder / RESULTS}': {error}; run the study first") from None
+
+
+def records(kind: type[Any], value: Any) -> Any:
+    """What ``results.json`` has of nested mappings and lists of a named tuple; null is NaN."""
+    if isinstance(value, list):
+        return [records(kind, x) for x in value]
+    if list(value) != list(kind._fields):
+        return {k: records(kind, x) for k, x in value.items()}
+    numbers = {k: float("nan") if x is None else x for k, x in value.items()}
+    return kind(**{k: tuple(x) if isinstance(x, list) else x for k, x in numbers.items()})
 
 
 def _listed(statements: Sequence[str]) -> str:
     return f": {'; '.join(statements)}" if statements else ""
+
+
+def _as_printed(rows: Sequence[Verdict]) -> str:
+    """How many statements hold for the algorithms as printed, where these are judged."""
+    answers = [overall(row.printed) for row in rows if row.printed != {}]
+    return f" (as printed {sum(x is True for x in answers)} of {len(answers)})" if answers else ""
 
 
 class Report:
@@ -87,22 +144,32 @@ class Report:
     Args:
         folder: where the report goes, made when missing.
         title: heading of the report.
-        seeds: of the runs; empty where nothing is random.
+        seeds: of the runs, those of the results if there are any; empty where nothing is random.
+        again: results of an earlier run, of which only the words are written anew; its pictures stay.
     """
 
-    def __init__(self, folder: Path, title: str, seeds: Sequence[int] = ()) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        title: str,
+        seeds: Sequence[int] = (),
+        again: Mapping[str, Any] | None = None,
+    ) -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
-        self.folder = folder
+        self.folder, self.draws, made = folder, again is None, machine()
+        if again is not None:
+            made, seeds = str(again["machine"]), list(again["seeds"])
+        self.seeds = seeds
         self._pieces = [f"# {title}"]
         self._tables: list[dict[str, Any]] = []
         self._verdicts: list[Verdict] = []
         self._why = ""
-        self._results: dict[str, Any] = {"title": title, "seeds": list(seeds), "machine": machine()}
+        self._results: dict[str, Any] = {"title": title, "seeds": list(seeds), "machine": made}
         ran = f"{seeds_line(seeds).capitalize()}. " if seeds else ""
-        self.text(f"{ran}{machine()}.")
+        self.text(f"{ran}{made}.")
 
     def heading(self, text: str) -> None:
         self._pieces.append(f"## {text}")
@@ -130,11 +197,10 @@ class Report:
             rows: the verdicts.
             numbers: heading of the last column.
         """
-        if any(row.printed for row in rows):
-            header = ["thesis", "today", "as printed", numbers]
-            cells = [[r.thesis, r.here, r.printed or "–", r.numbers] for r in rows]
-        else:
-            header, cells = ["thesis", "here", numbers], [r[:3] for r in rows]
+        header = ["thesis", "today", "as printed", numbers]
+        cells = [[row.thesis, *row.cells] for row in rows]
+        if all(row.printed == {} for row in rows):
+            header, cells = ["thesis", "here", numbers], [[x, here, z] for x, here, _, z in cells]
         self.table(header, cells, words=True)
         self._verdicts += rows
         self.result(name, rows)
@@ -148,25 +214,38 @@ class Report:
         by = {h: [v.thesis for v in self._verdicts if v.holds is h] for h in (True, False, None)}
         count = len(self._verdicts)
         lines = [
-            f"{len(by[True])} of {count} statements held{_listed(by[True])}.",
-            f"{len(by[False])} did not hold{_listed(by[False])}; "
-            f"{len(by[None])} hold in part or are undecided{_listed(by[None])}.",
+            f"Hold, {len(by[True])} of {count}{_as_printed(self._verdicts)}{_listed(by[True])}.",
+            f"Do not hold, {len(by[False])}{_listed(by[False])}; in part or undecided, "
+            f"{len(by[None])}{_listed(by[None])}.",
             *([f"Reason: {self._why}"] if self._why else []),
         ]
         return ["\n".join(f"- {line}" for line in lines)] if count else []
 
-    def figure(self, name: str, figure: "Figure", caption: str) -> None:
-        """Write ``<name>.png`` and embed it."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
+    def figure(self, name: str, figure: "Figure | Callable[[], Figure]", caption: str) -> None:
+        """Write ``<name>.png`` and embed it; a function draws only where figures are drawn."""
+        if self.draws:
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-        FigureCanvasAgg(figure)
-        with atomic_write(self.folder / f"{name}.png") as scratch:
-            figure.savefig(scratch, format="png", dpi=DPI)
+            shown = figure() if callable(figure) else figure
+            FigureCanvasAgg(shown)
+            with atomic_write(self.folder / f"{name}.png") as scratch:
+                shown.savefig(scratch, format="png", dpi=DPI)
         self.picture(f"{name}.png", caption)
 
     def picture(self, path: str, caption: str) -> None:
         """Embed a picture that lies in the report's folder already."""
         self._pieces.append(f"![{caption}]({path})\n\n*{caption}*")
+
+    def draw(self, name: str, runs: Mapping[str, Path]) -> None:
+        """Draw the pictures of ``cosim.results.draw`` of some runs, which :meth:`picture` embeds.
+
+        Args:
+            name: folder of the pictures, within the report's.
+            runs: label -> folder of the log; read only where figures are drawn.
+        """
+        if self.draws:
+            told = {label: read_options(log) for label, log in runs.items()}
+            draw({k: dict(read_log(log)) for k, log in runs.items()}, self.folder / name, told)
 
     def result(self, name: str, value: Any) -> None:
         """Numbers for ``results.json``: nested mappings, sequences, named tuples, arrays."""

@@ -174,7 +174,7 @@ def test_report_holds_what_was_put_in(tmp_path):
     report.heading("Part")
     report.table(["name", "|e| [m]"], [["x|y", 0.123456], ["none", float("nan")]])
     report.figure("picture", Figure(), "What is seen")
-    report.verdicts("claims", [Verdict("said", "reproduced", "1 to 2")], "numbers and cause")
+    report.verdicts("claims", [Verdict("said", {"a": True, "b": False}, "1 to 2")], "numbers and cause")
     report.result("error", {"x": SampleMean(1.0, 0.5, 1.5), "y": np.array([1.0, np.nan])})
     text = report.write().read_text()
     assert "Seeds 0-2." in text
@@ -183,9 +183,9 @@ def test_report_holds_what_was_put_in(tmp_path):
     assert "![What is seen](picture.png)" in text
     results = json.loads((tmp_path / "new" / "results.json").read_text())
     assert "| thesis | here | numbers and cause |" in text
-    assert "| said | reproduced | 1 to 2 |" in text
+    assert "| said | holds: a; does not hold: b | 1 to 2 |" in text
     assert results["claims"] == [
-        {"thesis": "said", "here": "reproduced", "numbers": "1 to 2", "printed": ""}
+        {"thesis": "said", "here": {"a": True, "b": False}, "numbers": "1 to 2", "printed": {}}
     ]
     assert results["error"] == {"x": {"mean": 1.0, "low": 0.5, "high": 1.5}, "y": [1.0, None]}
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [

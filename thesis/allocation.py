@@ -118,7 +118,7 @@ def tuned(found: Mapping[float, Sequence[float]], offset: float) -> Verdict:
     worst = max(abs(x - dx - offset) for dx, each in found.items() for x in each)
     return Verdict(
         "Sway pushes tune the point of attack (6.3.4, Fig. 6.7)",
-        "reproduced" if worst < NEAR else "not reproduced",
+        worst < NEAR,
         f"largest error of the shift {1e3 * worst:.2g} mm, near below {1e3 * NEAR:g} mm",
     )
 

@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 
 import cosim
 from cosim.dispatch import FinishedRun
-from cosim.results import draw, read_options
 from studies.study_command import progress, run_study, study_parser
-from studies.study_report import Report
+from studies.study_report import Report, records, stored
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
 from .tracking.outcome import LEARNED_FROM, PHI, TrackingOutcome, columns, outcome, true_states
@@ -49,6 +48,7 @@ FIRST_FIGURE = {
     ("ellipse", "against"): 8,
     ("eight", "against"): 11,
 }
+GROUPS = {"variants": FOUR, "against": OLD}
 UNTOLD: Content = {"optional_connections": []}
 STALE = {"controller.stale": 1.0}
 FOOTNOTE = {"controller.store_weight": 0.1}
@@ -158,29 +158,24 @@ def pictures(report: Report, seconds: float | None, jobs: int | None) -> None:
     With noise and the thesis' observer, and as printed: no noise, stale errors with the weight 0.1.
     """
     logs = report.folder / "logs"
-    contents = {}
-    for path in PATHS:
-        by = variants(path, seconds)
-        for kind, runs in (("today", by["mdf"]), ("printed", {**by["true"], **by[PRINTED]})):
-            for name, content in runs.items():
-                contents[f"{path}/{kind}/{name}"] = vary(content, log={"signals": "all"})
-    run_all(contents, [0], done, logs, jobs)
-    for kind in ("today", "printed"):
-        singular: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    if report.draws:
+        contents = {}
         for path in PATHS:
-            read = {name: cosim.read_log(logs / path / kind / name / "0") for name in CONTROLLERS}
-            for group, names in (("variants", FOUR), ("against", OLD)):
-                folder = report.folder / f"{path}_{group}_{kind}"
-                told = {short(n): read_options(logs / path / kind / n / "0") for n in names}
-                draw({short(name): dict(read[name]) for name in names}, folder, told)
-                for file, number in numbered(FIRST_FIGURE[path, group]).items():
-                    caption = f"{path}, {group}, {kind}: {file.replace('_', ' ')} (seed 0, {number})"
-                    report.picture(f"{folder.name}/{file}.png", caption)
-            for name in FOUR:
-                series = (read[name]["time"], read[name]["controller.sigma_min"])
-                singular[f"{short(name)}, {path}"] = series
-        caption = f"Smallest singular value, {kind} (Fig. 5.7)"
-        report.figure(f"singular_values_{kind}", singular_values(singular), caption)
+            by = variants(path, seconds)
+            for kind, runs in (("today", by["mdf"]), ("printed", {**by["true"], **by[PRINTED]})):
+                for name, content in runs.items():
+                    contents[f"{path}/{kind}/{name}"] = vary(content, log={"signals": "all"})
+        run_all(contents, [0], done, logs, jobs)
+    for kind in ("today", "printed"):
+        for (path, group), number in FIRST_FIGURE.items():
+            runs = {short(n): logs / path / kind / n / "0" for n in GROUPS[group]}
+            folder = f"{path}_{group}_{kind}"
+            report.draw(folder, runs)
+            for file, figure in numbered(number).items():
+                caption = f"{path}, {group}, {kind}: {file.replace('_', ' ')} (seed 0, {figure})"
+                report.picture(f"{folder}/{file}.png", caption)
+        caption = f"Smallest singular value, {kind} (seed 0, Fig. 5.7)"
+        report.figure(f"singular_values_{kind}", partial(singular_values, logs, kind), caption)
 
 
 def numbered(first: int) -> dict[str, str]:
@@ -195,22 +190,35 @@ def done(run: FinishedRun) -> bool:
     return run.status == "done"
 
 
-def singular_values(runs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
-    """Smallest singular value of the store over time."""
+def singular_values(logs: Path, kind: str) -> Figure:
+    """Smallest singular value of the store over time, the ellipse dash-dotted as in the thesis."""
     figure = Figure(figsize=(8.0, 4.0), layout="constrained")
     axes = figure.subplots()
-    for label, (t, sigma) in runs.items():
-        axes.semilogy(t, np.maximum(sigma, 1e-7), "-" if "eight" in label else "-.", label=label)
+    for path, style in zip(PATHS, ("-.", "-"), strict=True):
+        for name, colour in zip(FOUR, ("blue", "green", "red", "magenta"), strict=True):
+            log = cosim.read_log(logs / path / kind / name / "0")
+            sigma = np.maximum(log["controller.sigma_min"], 1e-7)
+            label = f"{short(name)}, {path}"
+            axes.semilogy(log["time"], sigma, style, color=colour, linewidth=1.0, label=label)
     axes.set(xlabel="time [s]", ylabel="smallest singular value")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=7, ncols=2)
+    figure.legend(loc="outside upper center", fontsize=7, ncols=4)
     return figure
 
 
-def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | None) -> Path:
-    """Run everything and write the report; returns its path."""
-    by_path = run(seeds, seconds, jobs)
-    report = Report(out, "Chapter 5: which learning method tracks best?", seeds)
+def study(
+    out: Path,
+    seeds: Sequence[int],
+    seconds: float | None,
+    jobs: int | None,
+    again: bool = False,
+) -> Path:
+    """Run everything, or take the outcomes of an earlier run, and write the report; returns its path."""
+    earlier = stored(out) if again else None
+    by_path = (
+        run(seeds, seconds, jobs) if earlier is None else records(TrackingOutcome, earlier["outcomes"])
+    )
+    report = Report(out, "Chapter 5: which learning method tracks best?", seeds, earlier)
     report.text(
         "Plant: Table 2.1, corrected; controllers: gains of Table 5.1, without the damping by the "
         "yaw rate in their model. Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s; "
@@ -249,11 +257,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "thesis.chapter5",
         "Compare backstepping, adaptive backstepping and concurrent learning as chapter 5 does.",
         "  python -m thesis.chapter5\n  python -m thesis.chapter5 --seeds 3 --out results/first_look",
+        again=True,
     )
     options = parser.parse_args(arguments)
     seeds = range(2 if options.quick else options.seeds)
     seconds = 60.0 if options.quick else None
-    run_study(partial(study, options.out, seeds, seconds, options.jobs))
+    run_study(partial(study, options.out, seeds, seconds, options.jobs, options.again))
 
 
 if __name__ == "__main__":

@@ -6,22 +6,25 @@ real ship (SYSID4 of Table 7.1), or with ``--model`` what ``diagnosis.learn`` fo
 of 6.5 and each observation of 6.4.4 is held against the result.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
 
 import cosim
-from cosim.results import draw, read_options
 from diagnosis.predictors import read_model
 from studies.study_command import run_study, study_parser
-from studies.study_report import Report, Verdict
+from studies.study_report import Report, Verdict, records, stored
 
 from .basin_trials import sysid4
 from .basin_trials.chapter6_runs import FEW, Plant, folder, run
-from .basin_trials.found import FAULTY, Runs, label, lost, mean
+from .basin_trials.found import FAULTY, Runs, TrialRuns, label, lost, mean
 from .basin_trials.lessons import lessons
 from .basin_trials.observations import observations, other_sections
-from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS, path_swing
+from .basin_trials.store_contents import StoreContents
+from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS, Sailed, path_swing
 from .error_models.lap_pictures import errors_picture
 from .error_models.model_loops import parameters_of
 
@@ -42,20 +45,24 @@ def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
     report.table(header, rows)
 
 
-def pictures(report: Report, seed: int) -> None:
+def pictures(report: Report) -> None:
     """The pictures of 6.4 for every trial, with the fault as in the basin (Figs. 6.10 to 6.25)."""
     for trial in TRIALS:
         name, place = label(trial.name, FAULTY), folder((trial.name, FAULTY))
-        logs = report.folder / "logs" / place
-        shown = {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS}
-        told = {LABELS[c]: read_options(logs / c / str(seed)) for c in CONTROLLERS}
-        draw(shown, report.folder / place, told)
+        logs, seed = report.folder / "logs" / place, report.seeds[0]
+        runs = {LABELS[c]: logs / c / str(seed) for c in CONTROLLERS}
+        report.draw(place, runs)
         for file, number in numbered(FIRST_FIGURE[trial.name]).items():
             caption = f"{name}: {file.replace('_', ' ')} (seed {seed}, {number})"
             if file == "z1":
-                report.figure(f"{place}_{file}", errors_picture(shown), caption)
+                report.figure(f"{place}_z1", partial(errors_of, runs), caption)
             else:
                 report.picture(f"{place}/{file}.png", caption)
+
+
+def errors_of(runs: Mapping[str, Path]) -> Figure:
+    """z1 of logs."""
+    return errors_picture({name: cosim.read_log(log) for name, log in runs.items()})
 
 
 def numbered(first: int) -> dict[str, str]:
@@ -90,6 +97,23 @@ def hidden(model: Path | None) -> tuple[str, Plant]:
     return f"Table 2.1 (corrected) with the additions of `{model.name}`: {listed}.", values
 
 
+def read(results: Mapping[str, Any]) -> TrialRuns:
+    """The runs of an earlier study."""
+
+    def group(name: str, kind: Callable[[str], Any]) -> dict[tuple[str, Any], Runs]:
+        keys = {key: key.rpartition(", ")[::2] for key in results[name]}
+        found = records(Sailed, results[name])
+        return {(first, kind(last)): found[key] for key, (first, last) in keys.items()}
+
+    return TrialRuns(
+        group("trials", "True".__eq__),
+        group("spiked", "True".__eq__),
+        group("eight", "True".__eq__),
+        group("delayed", float),
+        records(StoreContents, results["stores"]),
+    )
+
+
 def study(
     out: Path,
     seeds: Sequence[int],
@@ -97,12 +121,16 @@ def study(
     jobs: int | None,
     model: Path | None = None,
     causes: bool = True,
+    again: bool = False,
 ) -> Path:
-    """Run everything and write the report; returns its path."""
+    """Run everything, or take the runs of an earlier study, and write the report; returns its path."""
     text, plant = hidden(model)
-    found = run(out, seeds, shorter, jobs, plant, causes)
+    earlier = stored(out) if again else None
+    found = run(out, seeds, shorter, jobs, plant, causes) if earlier is None else read(earlier)
     name = "SYSID4" if model is None else "the ship that was learned"
-    report = Report(out, f"Chapter 6 in simulation, {name}: which lessons are reproduced?", seeds)
+    report = Report(
+        out, f"Chapter 6 in simulation, {name}: which lessons are reproduced?", seeds, earlier
+    )
     report.text(
         f"Plant: {text} Controllers: gains of Table 6.4, without these additions in their model. "
         "Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s, and once a minute a "
@@ -110,7 +138,7 @@ def study(
         "speed, and called four times as often. The eight at 0.16 and 0.32 is 0.01-0.03 and "
         "0.02-0.067 m/s. Concurrent learning computes stored errors anew, except where it is `as "
         "printed`. "
-        + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else LEFT_OUT)
+        + (f"Experiments on delay and stores: {FEW} seeds at most." if found.spiked else LEFT_OUT)
     )
     report.why(
         "the thesis' measurements are not public, and another ship is hidden here; with the guidance "
@@ -137,7 +165,7 @@ def study(
     for key, runs in found.trials.items():
         table(report, key, runs)
     report.heading("Pictures")
-    pictures(report, seeds[0])
+    pictures(report)
     for name, group in found._asdict().items():
         flat = {str(k) if isinstance(k, str) else f"{k[0]}, {k[1]}": v for k, v in group.items()}
         report.result(name, flat)
@@ -152,6 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "  python -m thesis.chapter6 --seeds 3\n"
         "  python -m thesis.chapter6 --model results/learn/model.ssv --out results/chapter6_learned\n"
         "  python -m thesis.chapter6 --quick --out results/first_look",
+        again=True,
     )
     parser.add_argument(
         "--model",
@@ -164,8 +193,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     options = parser.parse_args(arguments)
     seeds, shorter = range(2 if options.quick else options.seeds), 0.25 if options.quick else 1.0
+    causes = not options.trials
     run_study(
-        partial(study, options.out, seeds, shorter, options.jobs, options.model, not options.trials)
+        partial(study, options.out, seeds, shorter, options.jobs, options.model, causes, options.again)
     )
 
 

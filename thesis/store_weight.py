@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from studies.study_command import progress, run_study, study_parser
-from studies.study_report import Report, Verdict
+from studies.study_report import Report, Verdict, records, stored
 
 from .chapter5 import PATHS, UNGATED, needed
 from .monte_carlo import Content, run_all, shipped, vary
@@ -29,6 +29,8 @@ FORMS = {
 # Forms of which the controller is not told the clipped force, as printed.
 UNTOLD = {f"{form}, request": changes for form, changes in FORMS.items() if "ungated" in form}
 PLAIN = "as it is"
+
+Found = Mapping[str, Mapping[str, Sequence[TrackingOutcome]]]
 
 
 def variants(path: str, seconds: float | None) -> dict[str, Content]:
@@ -84,20 +86,32 @@ def stable(path: str, found: Mapping[str, Sequence[TrackingOutcome]]) -> Verdict
     form = "stale, ungated, request"
     errors = {short(n): found[f"{n}|{form}|0.1"][0].position for n in FOUR}
     plain = found[f"controller_bs|{PLAIN}|1"][0].position
-    kept = [n for n, x in errors.items() if x < plain]
-    here = "reproduced" if len(kept) == len(errors) else f"in part: {', '.join(kept)}"
     return Verdict(
         f"ρ = 0.1 makes the adaptation stable (footnote 1 of 4.1.4): {path}",
-        here if kept else "not reproduced",
+        {n: x < plain for n, x in errors.items()},
         f"position error below that of backstepping, {plain:.4f} m: "
         + ", ".join(f"{n} {x:.4f} m" for n, x in errors.items()),
     )
 
 
-def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | None) -> Path:
-    """Run everything and write the report; returns its path."""
+def run(paths: Sequence[str], seconds: float | None, jobs: int | None) -> Found:
+    """Path -> ``controller|form|weight`` -> its one outcome."""
     todo = {path: variants(path, seconds) for path in paths}
-    report = Report(out, "The weight of the stored sums")
+    with progress(sum(map(len, todo.values())), "store weight") as advance:
+        return {p: run_all(c, [0], outcome, None, jobs, advance) for p, c in todo.items()}
+
+
+def study(
+    out: Path, paths: Sequence[str], seconds: float | None, jobs: int | None, again: bool = False
+) -> Path:
+    """Run, or take the outcomes of an earlier run, and write the report; returns its path."""
+    earlier = stored(out) if again else None
+    by_path = (
+        run(paths, seconds, jobs)
+        if earlier is None
+        else {p: records(TrackingOutcome, earlier[p]) for p in PATHS if p in earlier}
+    )
+    report = Report(out, "The weight of the stored sums", (), earlier)
     report.text(
         "Footnote 1 of 4.1.4 reduces the stored part of the adaptation by ρ = 0.1: a weight of "
         "every stored sum. True states, no noise, one run each. `stale`: stored errors as "
@@ -109,12 +123,10 @@ def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | No
         "on the eight the thrusters saturate, and samples with a requested force that did not act are "
         "stored."
     )
-    with progress(sum(map(len, todo.values())), "store weight") as advance:
-        for path, contents in todo.items():
-            found = run_all(contents, [0], outcome, None, jobs, advance)
-            tables(report, path, found)
-            report.verdicts(f"claims_{path}", [stable(path, found)])
-            report.result(path, found)
+    for path, found in by_path.items():
+        tables(report, path, found)
+        report.verdicts(f"claims_{path}", [stable(path, found)])
+        report.result(path, found)
     return report.write()
 
 
@@ -125,11 +137,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "Compare weights of the stored sums (footnote 1 of 4.1.4).",
         "  python -m thesis.store_weight\n  python -m thesis.store_weight --quick",
         seeds=None,
+        again=True,
     )
     parser.add_argument("--path", choices=PATHS, help="only this path (default: both)")
     options = parser.parse_args(arguments)
     paths = (options.path,) if options.path else PATHS
-    run_study(partial(study, options.out, paths, 60.0 if options.quick else None, options.jobs))
+    seconds = 60.0 if options.quick else None
+    run_study(partial(study, options.out, paths, seconds, options.jobs, options.again))
 
 
 if __name__ == "__main__":

@@ -204,28 +204,31 @@ def test_lost_runs_are_left_out_of_pairs():
 
 def test_fault_that_costs_nothing_is_no_lesson():
     worse = {c: {"position": 0.5, "lag": -0.49} for c in trials.CONTROLLERS}
-    assert lessons.guidance(made_up(faulty=worse)).here == "reproduced"
+    assert lessons.guidance(made_up(faulty=worse)).holds is True
     better = {c: {"position": 0.1} for c in trials.CONTROLLERS}
-    assert lessons.guidance(made_up(faulty=better)).here == "reversed"
-    assert lessons.guidance(made_up()).here == "undecided"
+    assert lessons.guidance(made_up(faulty=better)).holds is False
+    assert lessons.guidance(made_up()).holds is None
 
 
 def test_adaptation_in_surge_would_be_seen():
-    assert lessons.no_surge(made_up()).here == "reproduced"
+    assert lessons.no_surge(made_up()).holds is True
     learning = made_up({trials.CLE: {"omega_hat_X": 0.2}})
-    assert lessons.no_surge(learning).here == "not reproduced"
+    assert lessons.no_surge(learning).holds is False
     falling = made_up({trials.CLZ: {"lag": -0.1}})
-    assert lessons.no_surge(falling).here == "not reproduced"
+    assert lessons.no_surge(falling).holds is False
 
 
 def test_adaptive_backstepping_that_is_far_better_would_be_seen():
-    assert lessons.adaptive(made_up()).here.startswith("reproduced")
+    assert lessons.adaptive(made_up()).holds is True
     better = {trials.ABS: {"position": 0.1}}
-    assert lessons.adaptive(made_up(better, better)).here.startswith("in 0 of 8")
+    assert lessons.adaptive(made_up(better, better)).holds is False
     assert "Fell behind for good: none." in lessons.adaptive(made_up()).numbers
     fell = lessons.adaptive(made_up(faulty={trials.RBS: {"lost": 1.0}}))
     assert "ellipse 0.08, fault: 5 of RBS and 0 of ABS" in fell.numbers
-    assert fell.here.startswith("in 4 of 8"), "a controller that is lost is not as good as the other"
+    lost = [setting for setting, same in fell.here.items() if not same]
+    assert lost == [f"{t.name}, fault" for t in trials.TRIALS], (
+        "a controller that is lost is not as good"
+    )
 
 
 @pytest.mark.parametrize(
@@ -245,17 +248,15 @@ def test_controllers_are_alike_by_their_ratio_or_its_interval(ratio, same):
 
 def test_those_who_fall_behind_are_told():
     fast = {c: {"lost": 1.0} for c in (trials.CLZ, trials.CLE)}
-    assert lessons.fallen(made_up(faulty=fast)).here == "reproduced"
-    assert lessons.fallen(made_up(fast)).here == "not reproduced", (
-        "in the basin the guidance had its fault"
-    )
-    assert lessons.fallen(made_up(fast, {**fast, trials.RBS: {"lost": 1.0}})).here == "not reproduced"
+    assert lessons.fallen(made_up(faulty=fast)).holds is True
+    assert lessons.fallen(made_up(fast)).holds is False, "in the basin the guidance had its fault"
+    assert lessons.fallen(made_up(fast, {**fast, trials.RBS: {"lost": 1.0}})).holds is False
 
 
 def test_observations_of_the_swift_ellipse():
     worse, swings, failing, improving, *_ = observations.observations(made_up())
     for calm in (worse, swings, failing, improving):
-        assert calm.here.endswith("without: no"), calm.thesis
+        assert calm.holds is (None if calm is improving else False), calm.thesis
     fast = trials.TRIALS[2].name
     found = made_up({trials.ABS: {"position": 0.2}})
     runs = {
@@ -264,10 +265,13 @@ def test_observations_of_the_swift_ellipse():
     }
     found.trials[fast, REGULAR].update(runs)
     _, _, failing, improving, *_ = observations.observations(found)
-    assert failing.here.endswith("without: yes")
-    assert improving.here.endswith("without: yes")
+    assert failing.here["without"] is True
+    assert improving.here["without"] is True
     found.trials[fast, FAULTY].update({trials.RBS: [sailed(lost=1.0)] * 5})
-    assert "with the fault: no run kept up" in observations.observations(found)[3].here
+    worse, swings, _, improving, *_ = observations.observations(found)
+    assert improving.here["with the fault"] is None
+    assert worse.here["with the fault, RBS"] is True, "a ship that is lost tracks worse"
+    assert swings.here["with the fault, RBS"] is None, "and its oscillation is not known"
 
 
 def test_oscillations_have_increased_where_they_grow_more_than_those_of_the_path():
@@ -275,14 +279,14 @@ def test_oscillations_have_increased_where_they_grow_more_than_those_of_the_path
     grown = trials.path_swing(fast) / trials.path_swing(slow)
     assert 10.0 < grown < 40.0, "its harmonics move up into the band"
     found = made_up()
-    for factor, said in ((0.9, "no"), (2.0, "yes")):
+    for factor, said in ((0.9, False), (2.0, True)):
         for each in (REGULAR, FAULTY):
             for name, swing in ((slow.name, 0.001), (fast.name, factor * grown * 0.001)):
                 runs = found.trials[name, each]
                 runs.update({c: [r._replace(swing=swing) for r in runs[c]] for c in runs})
         swings = observations.observations(found)[1]
-        assert swings.here == f"with the fault: {said}; without: {said}"
-        assert swings.numbers.endswith(f"that of the path itself ×{grown:.2g}")
+        assert swings.holds is said
+        assert f"that of the path itself ×{grown:.2g}; limit ×" in swings.numbers
 
 
 def test_any_ship_may_be_hidden(tmp_path):
@@ -309,9 +313,9 @@ def test_spikes_are_the_cause_where_they_are():
         )
         return causes.eight(found)
 
-    assert verdict(30.0, 3.0).here == "reproduced"
+    assert verdict(30.0, 3.0).holds is True
     assert "CLE 0.3 [0.3, 0.3] without spikes" in verdict(30.0, 3.0).numbers
-    assert verdict(3.0, 3.0).here == "reversed"
+    assert verdict(3.0, 3.0).holds is False
 
 
 def test_experiments_differ_by_what_they_are_about():
@@ -353,12 +357,13 @@ def test_experiments_differ_by_what_they_are_about():
 @pytest.mark.parametrize(
     ("hard", "soft", "twice", "here"),
     [
-        (0.3, None, 0.1, "reproduced"),
-        (0.5, 1.0, 0.3, "reproduced"),
-        (1.0, None, 0.5, "only with more than the gains of Table 6.4"),
-        (0.3, 0.5, 0.5, "only with more than the gains of Table 6.4"),
-        (0.3, 0.3, 1.0, "not reproduced"),
-        (None, None, None, "not reproduced"),
+        (0.3, None, 0.1, (True, True)),
+        (0.5, 1.0, 0.3, (True, True)),
+        (0.0, None, 0.0, (True, True)),
+        (1.0, None, 0.5, (False, True)),
+        (0.3, 0.5, 0.5, (False, False)),
+        (0.3, 0.3, 1.0, (False, False)),
+        (None, None, None, (False, False)),
     ],
 )
 def test_swift_gains_oscillate_from_a_delay_on(hard, soft, twice, here):
@@ -376,9 +381,9 @@ def test_swift_gains_oscillate_from_a_delay_on(hard, soft, twice, here):
         for delay in causes.DELAYS
     }
     found = causes.oscillation(TrialRuns({}, {}, {}, delayed, {}))
-    assert found.here == here
+    assert tuple(found.here.values()) == here
     assert "Table 5.1, ABS: 0 s ×1 (0.20 Hz)" in found.numbers
-    if twice is not None:
+    if twice:
         assert f"{twice:g} s ×4 (0.20 Hz)" in found.numbers
         assert f"{twice:g} s ×nan (nan Hz)" in found.numbers
 
@@ -391,14 +396,14 @@ def test_swift_gains_oscillate_from_a_delay_on(hard, soft, twice, here):
             0.1,
             0.2,
             5.0,
-            ("reproduced; SVD keeps them longer than", "hurt 2 of 2", "and 0 of 2 with it"),
+            [True, True, True, True],
         ),
         (
             0.1,
             0.3,
             0.02,
             50.0,
-            ("not reproduced; SVD keeps them no longer", "hurt 0 of 2", "and 2 of 2 with it"),
+            [False, False, None, False],
         ),
     ],
 )
@@ -417,16 +422,16 @@ def test_spikes_are_stored_and_hurt_or_not(with_spikes, blocked, stored, window,
     spiked |= {(PRINTED, True): {c: runs(1.0, lost=1.0) for c in names}}
     kept = store_contents.StoreContents(spikes=2.0, time=0.01, stored=stored, oldest=40.0, gained=0.5)
     stores = {names[0]: [kept, kept._replace(oldest=20.0)], names[1]: [kept._replace(oldest=window)] * 2}
-    storing, spoiling = causes.spikes(TrialRuns({}, spiked, {}, {}, stores))
-    assert storing.here.startswith(said[0])
-    assert "which is 1.0 % of the time" in storing.numbers
+    storing, keeping, spoiling, cured, stale = causes.spikes(TrialRuns({}, spiked, {}, {}, stores))
+    assert [v.holds for v in (storing, keeping, spoiling, cured)] == said
+    assert "part of the time, 1.0 %" in storing.numbers
     assert (
         f"svd_eps: {100 * stored:.0f} % of the samples, the oldest of them 30 s, and 50 %"
         in storing.numbers
     )
-    assert said[1] in spoiling.here
-    assert said[2] in spoiling.here
-    assert "7 to 12 times that with errors formed anew" in spoiling.numbers
+    assert spoiling.printed == {"svd_eps": True, "win_eps": False}, "over 0.7 and 1.2"
+    assert stale.holds is True
+    assert "svd_eps: 7 [7, 7]; win_eps: 12 [12, 12]" in stale.numbers
     assert f"win_eps {with_spikes / 0.1:.3g} [" in spoiling.numbers
     assert f"({0.101:.3f}→{1.01 * with_spikes:.3f} m)" in spoiling.numbers
     assert "lost 0→1)" in spoiling.numbers

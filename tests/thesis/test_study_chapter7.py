@@ -99,10 +99,10 @@ def test_surge_force_by_unit_of_force_is_told(found):
 
 def test_findings_have_their_numbers(found):
     three, products, sway = analysis_tables.findings(found)
-    assert sway[1] == "no", "sway is as systematic as the others"
+    assert sway.holds is False, "sway is as systematic as the others"
     q2 = found["PLS4"].by_axis("q2")
-    assert sway[2].endswith(", ".join(f"{q2[a]:.3f}" for a in AXES))
-    assert products[1] == "yes", "there are none in the truth"
+    assert f"X, Y, N: {', '.join(f'{q2[a]:.3f}' for a in AXES)}; limits" in sway.numbers
+    assert products.holds is True, "there are none in the truth"
     assert products[2].split(" ")[2] == "12"
     best = analysis.regressed(
         found["PLS2"].samples, analysis_tables.replace(analysis.recipe("PLS2"), factors=analysis_tables.MOST)
@@ -120,15 +120,13 @@ def test_products_with_sway_are_significant_where_they_act():
     signs = np.column_stack([abs(a) * b for a in (u, v, r) for b in (v, r)])
     s.omega[:] += 5.0 * signs @ np.ones((6, 3))
     _, products, _ = analysis_tables.findings(analysis_tables.regressions(s))
-    assert products[1].startswith("no: ")
+    assert products.holds is False
 
 
-@pytest.mark.parametrize(
-    ("significant", "said"), [(0, "yes"), (1, "yes"), (3, "no: 3 of 12 are significant")]
-)
-def test_products_are_insignificant_if_no_more_are_significant_than_by_chance(significant, said):
+@pytest.mark.parametrize(("significant", "chance"), [(0, True), (1, True), (3, False)])
+def test_products_are_insignificant_if_no_more_are_significant_than_by_chance(significant, chance):
     unsure = np.arange(12).reshape(3, 4) >= significant
-    assert analysis_tables.insignificance(unsure) == said
+    assert (analysis_tables.by_chance(unsure) > analysis_tables.CHANCE) is chance
 
 
 def test_pictures_of_the_regressions(found, tmp_path, drawn):
@@ -322,9 +320,9 @@ def test_table_of_the_loops_has_what_is_lost(found, tmp_path, monkeypatch, drawn
     assert row.startswith(f"| PLS2 | {model_loops.eigenvalues(found['PLS2'])} | {check} |")
     assert "| With PLS3 (SYSMV3; SYSMV4 in the caption)" in text
     assert "runs lost: PLS2 1 of 5, PLS3 0 of 5, PLS4 0 of 5. Force in X" in text
-    assert json.loads((tmp_path / "results.json").read_text("utf-8"))["loops"][-1]["here"].startswith(
-        "not reproduced; PLS2 does"
-    )
+    loses, predicted = json.loads((tmp_path / "results.json").read_text("utf-8"))["loops"][-2:]
+    assert loses["here"] is False
+    assert predicted["here"] is (not analysis.thrust_of(found["PLS2"]).holds)
     assert set(drawn) == {
         *(f"loop_RBS_ellipse_fault_{what}" for what in ("tracks", "errors", "model_error")),
         *(f"loop_CLE_ellipse_{what}" for what in ("tracks", "errors", "model_error_and_estimate")),
@@ -348,6 +346,7 @@ def test_identification_stands_beside_what_is_hidden(tmp_path, monkeypatch):
             condition=np.array([10.0, 20.0, 30.0]) * k,
             passes=k,
             settled=True,
+            least_squares=np.arange(14.0) * k,
         )
 
     monkeypatch.setattr(analysis, "identify", identify)
@@ -357,15 +356,16 @@ def test_identification_stands_beside_what_is_hidden(tmp_path, monkeypatch):
     s, e = linear(), linear(0.01)
     text = told(tmp_path, chapter7.identification, [("true states", s), ("eight", e)])
     assert asked == [[s], [e]]
-    assert "| SysID has the main dynamics of the model error (7.2.4) | no |" in text
-    assert "here the eight (7.2.4) | no |" in text
+    assert "| SysID has the main dynamics of the model error (7.2.4) | does not hold |" in text
+    assert "here the eight (7.2.4) | does not hold |" in text
     assert "| coefficient | hidden | true states | eight |" in text
     assert "| N_r | -1.8 | -1.8 | -3.6 |" in text
     assert "| R² of ω Y |  | 0.2500 | 0.2500 |" in text
     assert "| R² of ω N |  | 1.0000 | 2.0000 |" in text
     assert "| condition number N |  | 30 | 60 |" in text
-    assert "true states: 1 passes, eight: 2 passes. The eight" in text
-    assert "its largest condition number is 60; the ellipse's: true states 30." in text
+    assert "| delta_N, least squares | 0.31 | 13 | 26 |" in text
+    assert "true states: 1 passes, eight: 2 passes." in text
+    assert "largest condition number 60, of the ellipse true states 30 |" in text
 
 
 def test_simulated_runs_have_every_part(found, tmp_path, monkeypatch, drawn):

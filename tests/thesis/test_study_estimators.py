@@ -434,10 +434,10 @@ def replayed(variant, **measures):
 @pytest.mark.parametrize(
     ("slow", "noisy", "here"),
     [
-        (True, True, "reproduced"),
-        (True, False, "in part: the lag, not less noise"),
-        (False, True, "in part: less noise, not the lag"),
-        (False, False, "not reproduced"),
+        (True, True, True),
+        (True, False, None),
+        (False, True, None),
+        (False, False, False),
     ],
 )
 def test_claim_of_lag_and_of_noise(slow, noisy, here):
@@ -448,48 +448,53 @@ def test_claim_of_lag_and_of_noise(slow, noisy, here):
             noise_u=lambda o: 0.002 if (o == "mdf") == loud else 0.009,
         )
 
-    said, verdict, numbers, _ = claims.lag_and_noise(runs(slow, noisy))
-    assert "lags" in said
-    assert verdict == here
-    assert "luenberger: lag" in numbers
+    verdict = claims.lag_and_noise(runs(slow, noisy))
+    assert "lags" in verdict.thesis
+    assert verdict.holds is here
+    assert verdict.here == {
+        f"{what}, {o}": yes
+        for what, yes in (("lag", slow), ("noise", noisy))
+        for o in ("nonlinear", "luenberger")
+    }
+    assert "luenberger: lag" in verdict.numbers
 
 
 def test_claim_needs_to_be_sure_in_every_seed():
     found = replayed("rich", after_freeze_u=lambda o: {"mdf": 0.1, "df": 0.2}.get(o, 0.3))
-    assert claims.spikes(found)[1] == claims.robust(found)[1] == "reproduced"
+    assert claims.spikes(found).holds is claims.robust(found).holds is True
     found["rich"][0]["mdf"]["after_freeze_u"] = 0.3
-    assert claims.spikes(found)[1] == "not reproduced", "the difference is no longer sure"
+    assert claims.spikes(found).holds is False, "the difference is no longer sure"
     found["rich"][1]["df"]["after_freeze_u"] = 0.4
-    assert claims.robust(found)[1] == "not reproduced"
+    assert claims.robust(found).holds is False
     found["rich"][0]["df"]["after_freeze_u"] = float("nan")
-    assert claims.spikes(found)[1] == "not reproduced", "one run has no such time"
+    assert claims.spikes(found).holds is False, "one run has no such time"
 
 
 @pytest.mark.parametrize(
     ("mdf", "df", "here"),
     [
-        (1.0, 0.1, "reproduced"),
-        (0.9, 0.1, "not reproduced"),
-        (1.1, 0.1, "not reproduced"),
-        (1.0, 0.6, "not reproduced"),
-        (1.0, -0.6, "not reproduced"),
+        (1.0, 0.1, True),
+        (0.9, 0.1, False),
+        (1.1, 0.1, False),
+        (1.0, 0.6, False),
+        (1.0, -0.6, False),
     ],
 )
 def test_claim_of_the_velocity_that_is_held(mdf, df, here):
-    assert claims.held(replayed("rich", held=lambda o: mdf if o == "mdf" else df))[1] == here
+    assert claims.held(replayed("rich", held=lambda o: mdf if o == "mdf" else df)).holds is here
 
 
 @pytest.mark.parametrize(
     ("df", "mdf", "here"),
     [
-        (5.0, 0.01, "reproduced"),
-        (0.5, 0.01, "not reproduced"),
-        (5.0, 0.2, "not reproduced"),
+        (5.0, 0.01, True),
+        (0.5, 0.01, False),
+        (5.0, 0.2, False),
     ],
 )
 def test_claim_of_the_wrap_of_the_heading(df, mdf, here):
     runs = replayed("ellipse", after_wrap_r=lambda o: df if o == "df" else mdf)
-    assert claims.wrap(runs)[1] == here
+    assert claims.wrap(runs).holds is here
 
 
 def test_the_least_error_of_each_signal_is_bold(tmp_path):
@@ -509,9 +514,9 @@ def test_claim_of_the_observers_that_get_stuck():
     def runs(*names):
         return replayed("ellipse, upsets", stuck=lambda o: float(o in names))
 
-    assert claims.stuck(runs())[1].startswith("mended")
-    assert claims.stuck(runs("luenberger"))[1] == "reproduced for luenberger"
-    assert claims.stuck(runs("nonlinear", "luenberger"))[1] == "reproduced for nonlinear and luenberger"
+    assert claims.stuck(runs()).holds is False
+    assert claims.stuck(runs("luenberger")).here == {"nonlinear": False, "luenberger": True}
+    assert claims.stuck(runs("nonlinear", "luenberger")).holds is True
     assert "of 3 runs" in claims.stuck(runs())[2]
     assert "nonlinear 3" in claims.stuck(runs("nonlinear"))[2]
-    assert claims.stuck(runs("df"))[1].startswith("mended"), "the thesis says it of two"
+    assert claims.stuck(runs("df")).holds is False, "the thesis says it of two"

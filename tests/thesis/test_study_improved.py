@@ -39,19 +39,19 @@ def found(own, other, alone=-0.002):
 @pytest.mark.parametrize(
     ("own", "other", "verdicts"),
     [
-        (-0.002, -0.3, ["reproduced", "reached"]),
-        (-0.05, -0.3, ["not reproduced", "reached"]),
-        (-0.002, -0.004, ["not reproduced", "not reached"]),
+        (-0.002, -0.3, [True, True]),
+        (-0.05, -0.3, [False, True]),
+        (-0.002, -0.004, [False, False]),
     ],
 )
 def test_verdicts_follow_the_numbers(own, other, verdicts):
-    assert [claim.here for claim in claims(found(own, other))[:2]] == verdicts
+    assert [claim.holds for claim in claims(found(own, other))[:2]] == verdicts
 
 
-@pytest.mark.parametrize(("alone", "here"), [(-0.002, "yes"), (-0.2, "no")])
+@pytest.mark.parametrize(("alone", "here"), [(-0.002, True), (-0.2, False)])
 def test_damping_in_surge_alone_takes_the_lag_or_not(alone, here):
     (claim,) = [c for c in claims(found(-0.002, -0.3, alone)) if c.thesis.startswith("(7.1) alone")]
-    assert claim.here == here
+    assert claim.holds is here
 
 
 @pytest.mark.slow

@@ -113,6 +113,7 @@ def model_error_over_time(
         for colour, (name, values) in zip(cycle(COLOURS), models.items(), strict=False):
             panel.plot(rows, values[rows, k], color=colour, linewidth=1.0, label=name)
         panel.set_ylabel(f"ω {label}")
-    panels[0].legend(ncols=4)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5)
     panels[-1].set_xlabel("sample")
     return figure

@@ -12,6 +12,7 @@ from .trials import Sailed
 Runs = Mapping[str, Sequence[Sailed]]
 REGULAR, FAULTY = False, True
 PRINTED, FRESH = "as printed", "errors formed anew"
+SAME = 0.05  # 1, difference of two errors that is none; chosen
 OPENED, BLOCKED = "no blocker", "blocker"
 
 
@@ -51,6 +52,11 @@ def mean(runs: Sequence[Sailed], name: str) -> SampleMean:
 def share(a: Sequence[Sailed], b: Sequence[Sailed], name: str = "position") -> SampleMean:
     """A number of runs a over that of b, seed by seed where both kept up with the target."""
     return finite_ratio(values(a, name), values(b, name))
+
+
+def alike(ratio: SampleMean) -> bool:
+    """Whether two controllers do not differ: not where one of them is lost, or where one seed is all."""
+    return abs(ratio.mean - 1.0) < SAME or (isfinite(ratio.high) and ratio.low <= 1.0 <= ratio.high)
 
 
 def lost(runs: Sequence[Sailed]) -> int:

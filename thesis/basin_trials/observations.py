@@ -1,49 +1,37 @@
 """The observations of 6.4.2 to 6.4.5 on the basin trials, each with what our runs show."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isnan
 
 from studies.study_report import Verdict
 
 from ..monte_carlo import SampleMean
+from ..tracking.verdict import below as below_one
 from ..tracking.verdict import listed
 from .found import FAULTY, REGULAR, Runs, TrialRuns, lost, mean, share
-from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS, path_swing
+from .trials import ABS, CLE, CLZ, LABELS, RBS, SLOW, TRIALS, path_swing
 
 MUCH = 1.5  # times that count as "substantially"; chosen
 HIDDEN = 0.5  # 1, share of an error below which a signal does not show it; chosen
 LITTLE = 0.5  # 1, share of the model error below which an estimate explains little; chosen
 
 
-def answered(answers: Mapping[str, str | bool | None]) -> str:
-    """One word for each setting; None: no run kept up."""
-    words = {True: "yes", False: "no", None: "no run kept up"}
-    said = {setting: a if isinstance(a, str) else words[a] for setting, a in answers.items()}
-    return "; ".join(f"{setting}: {a}" for setting, a in said.items())
+def surely_below(ratios: Sequence[SampleMean]) -> bool | None:
+    """Whether all ratios are surely below 1; no where one surely is not; None: open, or no run."""
+    answers = [below_one(s) for s in ratios]
+    return False if False in answers else True if all(answers) else None
 
 
-def surely_below(ratios: Sequence[SampleMean]) -> str:
-    """Whether all ratios are below 1, surely; "no" where one surely is not."""
-    if any(isnan(s.mean) for s in ratios):
-        return "no run kept up"
-    if any(s.low > 1.0 for s in ratios):
-        return "no"
-    return "yes" if all(s.high < 1.0 for s in ratios) else "undecided"
-
-
-def surely_between(m: SampleMean, low: float, high: float) -> str:
-    """Whether a mean lies between two limits with its whole interval; "no" if none of it does."""
+def surely_between(m: SampleMean, low: float, high: float) -> bool | None:
+    """Whether a mean lies between two limits with its whole interval; no if none of it does."""
     if low < m.low and m.high < high:
-        return "yes"
-    return "no" if m.high <= low or m.low >= high else "undecided"
+        return True
+    return False if m.high <= low or m.low >= high else None
 
 
-def by_controller(words: Mapping[str, str]) -> str:
-    """The word of all controllers, or each word with its controllers."""
-    if len(set(words.values())) == 1:
-        return next(iter(words.values()))
-    grouped = {word: [c for c, w in words.items() if w == word] for word in words.values()}
-    return ", ".join(f"{word} ({', '.join(each)})" for word, each in grouped.items())
+def no_run(answer: bool, ratio: SampleMean) -> bool | None:
+    """The answer, or None where no run kept up."""
+    return None if isnan(ratio.mean) else bool(answer)
 
 
 def as_in_the_basin(found: TrialRuns, trial: int) -> dict[str, Runs]:
@@ -59,18 +47,20 @@ def below(found: TrialRuns, thesis: str, trial: int, number: str, *pairs: tuple[
         ratios = {f"{LABELS[a]}/{LABELS[b]}": share(runs[a], runs[b], number) for a, b in pairs}
         here[name] = surely_below(list(ratios.values()))
         rows.append(f"{name}: {listed(ratios)}")
-    return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
+    return Verdict(thesis, here, f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
 
 
-def held(found: TrialRuns, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
+def held(
+    found: TrialRuns, thesis: str, trial: int, number: str, low: float, high: float, note: str = ""
+) -> Verdict:
     """Whether the mean of a number surely lies between two limits, for each controller that kept up."""
     here, rows = {}, []
     for name, runs in as_in_the_basin(found, trial).items():
         means = {LABELS[c]: mean(each, number) for c, each in runs.items()}
-        known = {c: surely_between(m, low, high) for c, m in means.items() if m.mean == m.mean}
-        here[name] = by_controller(known) if known else None
+        here |= {f"{name}, {c}": surely_between(m, low, high) for c, m in means.items()}
         rows.append(f"{name}: {listed(means)}")
-    return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
+    limits = f"between {low:g} and {high:g} with its interval"
+    return Verdict(thesis, here, f"{number}, {TRIALS[trial].name}, {limits}{note}; {'; '.join(rows)}")
 
 
 def follow(found: TrialRuns, trial: int) -> Verdict:
@@ -79,7 +69,7 @@ def follow(found: TrialRuns, trial: int) -> Verdict:
     fell = {name: {LABELS[c]: lost(r) for c, r in each.items()} for name, each in runs.items()}
     return Verdict(
         "The controllers are able to follow the figure-eight",
-        answered({name: not any(each.values()) for name, each in fell.items()}),
+        {name: not any(each.values()) for name, each in fell.items()},
         f"{TRIALS[trial].name}, runs lost, "
         + "; ".join(f"{n}: {', '.join(f'{c} {k}' for c, k in e.items())}" for n, e in fell.items()),
     )
@@ -112,7 +102,15 @@ def other_sections(found: TrialRuns) -> dict[str, Sequence[Verdict]]:
             follow(found, 3),
             below(found, "ABS and CLZ oscillate more than RBS and CLE", 3, "swing", *crossed),
             below(found, "So IAEWWT of ABS surpasses that of RBS, CLZ's CLE's", 3, "iaewwt", *crossed),
-            held(found, "The period of the oscillation is near 0.1 s", 3, "frequency", 5.0, 20.0),
+            held(
+                found,
+                "The period of the oscillation is near 0.1 s",
+                3,
+                "frequency",
+                5.0,
+                20.0,
+                f" [Hz]; near {SLOW:g} Hz, the filter's edge, it is a harmonic of the path",
+            ),
         ),
     }
 
@@ -131,16 +129,15 @@ def sway_error(found: TrialRuns) -> list[Verdict]:
         }
         here[name] = surely_below(list(pairs.values()))
         bias, z1 = ({c: mean(size[c], n).mean for c in (CLZ, CLE)} for n in ("bias", "z1_y"))
-        known = {LABELS[c]: "yes" if z1[c] < HIDDEN * bias[c] else "no" for c in bias if bias[c] > 0.0}
-        shown[name] = by_controller(known) if known else None
+        shown |= {
+            f"{name}, {LABELS[c]}": z1[c] < HIDDEN * bias[c] if bias[c] > 0.0 else None for c in bias
+        }
         means = ", ".join(f"{LABELS[c]} {bias[c]:.3g} and {z1[c]:.3g}" for c in bias)
         rows.append(f"{name}: {listed(pairs)}; e and z1_y [m]: {means}")
     numbers = f"magnitude of the mean of e, {TRIALS[1].name}, {'; '.join(rows)}"
     return [
-        Verdict(
-            "CLZ and CLE keep a constant error in sway, more than RBS and ABS", answered(here), numbers
-        ),
-        Verdict("z1 does not show that error", answered(shown), f"z1_y below {HIDDEN:g} of e; as above"),
+        Verdict("CLZ and CLE keep a constant error in sway, more than RBS and ABS", here, numbers),
+        Verdict("z1 does not show that error", shown, f"z1_y below {HIDDEN:g} of e; as above"),
     ]
 
 
@@ -149,14 +146,11 @@ def struggling(found: TrialRuns) -> Verdict:
     here, rows = {}, []
     for name, runs in as_in_the_basin(found, 1).items():
         known = {LABELS[c]: [mean(runs[c], f"known_{a}").mean for a in "YN"] for c in (ABS, CLZ, CLE)}
-        here[name] = by_controller(
-            {c: "yes" if max(x) < LITTLE else "no" for c, x in known.items() if x[0] == x[0]}
-            or {"": "no run kept up"}
-        )
+        here |= {f"{name}, {c}": None if isnan(x[0]) else max(x) < LITTLE for c, x in known.items()}
         rows.append(f"{name}: " + ", ".join(f"{c} {y:.2f}, {n:.2f}" for c, (y, n) in known.items()))
     return Verdict(
         "The adaptive controllers struggle to estimate the model error",
-        answered(here),
+        here,
         f"share of the mean square of ω in sway and yaw that ω̂ explains, little below {LITTLE:g}: "
         f"{'; '.join(rows)}",
     )
@@ -168,19 +162,27 @@ def settings(found: TrialRuns) -> dict[str, tuple[Runs, Runs]]:
     return {name: (slow[name], fast[name]) for name in slow}
 
 
-def grown(found: TrialRuns, thesis: str, number: str, unit: str, path: float = 1.0) -> Verdict:
-    """Whether a number of every controller grows much more than that of the path with the speed."""
+def grown(
+    found: TrialRuns, thesis: str, number: str, unit: str, gone: bool | None, path: float = 1.0
+) -> Verdict:
+    """Whether a number of every controller grows much more than that of the path with the speed.
+
+    ``gone`` is the answer where no run of a controller kept up.
+    """
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
         ratios = {c: share(fast[c], slow[c], number) for c in (RBS, ABS, CLZ, CLE)}
-        alive = [r.mean > MUCH * path for r in ratios.values() if r.mean == r.mean]
-        here[name] = all(alive) if alive else None
+        here |= {
+            f"{name}, {LABELS[c]}": gone if isnan(r.mean) else r.mean > MUCH * path
+            for c, r in ratios.items()
+        }
         for c, r in ratios.items():
             size = f"{mean(slow[c], number).mean:.3g}→{mean(fast[c], number).mean:.3g} {unit}"
             fell = f", lost {lost(fast[c])} of {len(fast[c])}" if lost(fast[c]) else ""
             rows.append(f"{LABELS[c]} {name} {size} (×{r.mean:.2g}{fell})")
     rows += [f"that of the path itself ×{path:.2g}"] if path != 1.0 else []
-    return Verdict(thesis, answered(here), "; ".join(rows))
+    rows += [f"limit ×{MUCH * path:.2g}"]
+    return Verdict(thesis, here, "; ".join(rows))
 
 
 def failing(found: TrialRuns) -> Verdict:
@@ -195,7 +197,12 @@ def failing(found: TrialRuns) -> Verdict:
         each = ", ".join(f"{LABELS[c]} {n} of {len(fast[c])}" for c, n in fell.items())
         ratios = ", ".join(f"{LABELS[c]} {s}" for c, s in worse.items())
         rows.append(f"{name}: lost {each}; cross-track error over that of RBS: {ratios}")
-    return Verdict("CLZ and CLE fail compared with RBS and ABS", answered(here), "; ".join(rows))
+    return Verdict(
+        "CLZ and CLE fail compared with RBS and ABS",
+        here,
+        f"more runs lost, or a cross-track error surely above {MUCH:g} times that of RBS: "
+        f"{'; '.join(rows)}",
+    )
 
 
 def improving(found: TrialRuns) -> Verdict:
@@ -203,12 +210,12 @@ def improving(found: TrialRuns) -> Verdict:
     here, rows = {}, []
     for name, (_, fast) in settings(found).items():
         ratio = share(fast[ABS], fast[RBS])
-        here[name] = ratio.high < 1.0 if ratio.mean == ratio.mean else None
+        here[name] = below_one(ratio)
         aside = share(fast[ABS], fast[RBS], "cross_track")
         rows.append(f"{name}: position {ratio}, cross-track {aside}")
     return Verdict(
         "ABS still manages to show improved performance compared to RBS",
-        answered(here),
+        here,
         f"ABS over RBS, {'; '.join(rows)}",
     )
 
@@ -218,13 +225,13 @@ def surge(found: TrialRuns) -> Verdict:
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
         ratio = share(fast[RBS], slow[RBS], "omega_X")
-        here[name] = ratio.mean < MUCH if ratio.mean == ratio.mean else None
+        here[name] = no_run(ratio.mean < MUCH, ratio)
         a, b = mean(slow[RBS], "omega_X").mean, mean(fast[RBS], "omega_X").mean
         rows.append(f"{name}: {a:.2f}→{b:.2f} N (×{ratio.mean:.2f})")
     return Verdict(
         "The error in surge has not increased that much (0.4 N to 0.5 N)",
-        answered(here),
-        f"RBS, {'; '.join(rows)}",
+        here,
+        f"RBS, limit ×{MUCH:g}, {'; '.join(rows)}",
     )
 
 
@@ -233,13 +240,13 @@ def sway(found: TrialRuns) -> Verdict:
     here, rows = {}, []
     for name, (slow, fast) in settings(found).items():
         a, b = (mean(runs[RBS], "omega_Y") for runs in (slow, fast))
-        here[name] = abs(b.mean) > MUCH * abs(a.mean) if b.mean == b.mean else None
+        here[name] = no_run(abs(b.mean) > MUCH * abs(a.mean), b)
         rows.append(f"{name}: {a.mean:.3f}→{b.mean:.3f} N")
     return Verdict(
         "The error in sway has drifted to the side",
-        answered(here),
-        f"its mean, RBS, {'; '.join(rows)}. The thesis suspects the bow thruster above 0.15 m/s; "
-        "rotational damping alone makes a mean error on a path that turns one way",
+        here,
+        f"its mean, RBS, limit ×{MUCH:g}, {'; '.join(rows)}. The thesis suspects the bow thruster above "
+        "0.15 m/s; rotational damping alone makes a mean error on a path that turns one way",
     )
 
 
@@ -247,8 +254,8 @@ def observations(found: TrialRuns) -> list[Verdict]:
     """The observations in the order of 6.4.4."""
     path = path_swing(TRIALS[2]) / path_swing(TRIALS[0])
     return [
-        grown(found, "Tracking is substantially decreased", "position", "m"),
-        grown(found, "The oscillations have increased", "swing", "rad/s", path),
+        grown(found, "Tracking is substantially decreased", "position", "m", gone=True),
+        grown(found, "The oscillations have increased", "swing", "rad/s", None, path),
         failing(found),
         improving(found),
         surge(found),

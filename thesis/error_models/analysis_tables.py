@@ -83,13 +83,12 @@ def write_regressions(report: Report, found: Mapping[str, Regressed], name: str)
     report.figure(f"{name}_PLS", shown, "ω and its prediction by the regressions (Fig. 7.10).")
 
 
-def suffice(some: np.ndarray, best: np.ndarray) -> str:
-    """Whether Q² (3,) by some factors is as good as the best of more, in words for each axis."""
-    words = [
-        "nothing to explain" if b < NOTHING else "yes" if a >= SUFFICES * b else "no"
-        for a, b in zip(some, best, strict=True)
-    ]
-    return words[0] if len(set(words)) == 1 else ", ".join(map("{}: {}".format, AXES, words))
+def suffice(some: np.ndarray, best: np.ndarray) -> dict[str, bool | None]:
+    """Whether Q² (3,) by some factors is as good as the best of more; None: nothing to explain."""
+    return {
+        axis: None if b < NOTHING else bool(a >= SUFFICES * b)
+        for axis, a, b in zip(AXES, some, best, strict=True)
+    }
 
 
 def insignificant(B: np.ndarray, std: np.ndarray, sign_changes: np.ndarray) -> np.ndarray:
@@ -97,18 +96,15 @@ def insignificant(B: np.ndarray, std: np.ndarray, sign_changes: np.ndarray) -> n
     return (np.abs(B) < 2.0 * std) | (sign_changes > 0)
 
 
-def insignificance(unsure: np.ndarray) -> str:
-    """Whether no more coefficients are significant than chance gives, at two standard deviations."""
+def by_chance(unsure: np.ndarray) -> float:
+    """Probability of as many significant coefficients as these by chance, at two standard deviations."""
     count = int((~unsure).sum())
-    by_chance = float(binom.sf(count - 1, unsure.size, 2.0 * norm.sf(2.0)))
-    return "yes" if by_chance > CHANCE else f"no: {count} of {unsure.size} are significant"
+    return float(binom.sf(count - 1, unsure.size, 2.0 * norm.sf(2.0)))
 
 
-def unsystematic(q2: np.ndarray) -> str:
+def unsystematic(q2: np.ndarray) -> bool:
     """Whether Q² in sway is less than half of that in surge and in yaw, which have a model."""
-    if min(q2[0], q2[2]) < NOTHING:
-        return "no: surge and yaw are not systematic either"
-    return "yes" if q2[1] < 0.5 * min(q2[0], q2[2]) else "no"
+    return bool(min(q2[0], q2[2]) >= NOTHING and q2[1] < 0.5 * min(q2[0], q2[2]))
 
 
 def findings(found: Mapping[str, Regressed]) -> list[Verdict]:
@@ -132,14 +128,15 @@ def findings(found: Mapping[str, Regressed]) -> list[Verdict]:
         ),
         Verdict(
             "Products with v are insignificant (Fig. 7.7)",
-            insignificance(unsure),
-            f"{int(unsure.sum())} of {unsure.size} coefficients within two of their standard deviations "
-            "over the folds, or of changing sign",
+            by_chance(unsure) > CHANCE,
+            f"{int((~unsure).sum())} of {unsure.size} coefficients beyond two standard deviations over "
+            f"the folds, and of one sign; as many by chance: {by_chance(unsure):.2g}, limit {CHANCE:g}",
         ),
         Verdict(
             "ω in sway is unsystematic, in surge and yaw it is systematic (7.3, Fig. 7.9)",
             unsystematic(q2),
-            f"Q² of PLS4 in X, Y, N: {cells(f'{x:.3f}' for x in q2)}",
+            f"Q² of PLS4 in X, Y, N: {cells(f'{x:.3f}' for x in q2)}; limits: sway below half of both "
+            f"others, these from {NOTHING:g}",
         ),
     ]
 

@@ -37,8 +37,8 @@ def came_back(whole: Log, found: dict[str, np.ndarray]) -> Verdict:
     off = {name: float(np.abs(found[name] - whole[name]).max()) for name in Z1}
     return Verdict(
         "A replay gives the signals that were lost (7.1, Fig. 7.1)",
-        "reproduced" if max(off.values()) < EXACT else "not reproduced",
-        "largest difference of z1 to the run before the loss: "
+        max(off.values()) < EXACT,
+        f"largest difference of z1 to the run before the loss, limit {EXACT:g}: "
         + ", ".join(f"{x:.2g} {unit}" for x, unit in zip(off.values(), UNITS, strict=True)),
     )
 

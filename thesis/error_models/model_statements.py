@@ -53,14 +53,6 @@ class LoopResult(NamedTuple):
         return 1.0 - (rms((true - estimate)[self.late]) / max(rms(true[self.late]), 1e-9)) ** 2
 
 
-def each(answers: Mapping[str, bool]) -> str:
-    """One word if all answers are alike, else one for each."""
-    words = {name: "yes" if yes else "no" for name, yes in answers.items()}
-    if len(set(words.values())) == 1:
-        return next(iter(words.values()))
-    return "; ".join(f"{name}: {word}" for name, word in words.items())
-
-
 def by_axis(values: np.ndarray) -> str:
     return ", ".join(f"{a} {x:.3f}" for a, x in zip(AXES, values, strict=True))
 
@@ -71,7 +63,7 @@ def listed(values: Mapping[str, np.ndarray]) -> str:
 
 def explaining(thesis: str, r2: Mapping[str, np.ndarray]) -> Verdict:
     """Whether models explain the main part of the model error on all axes: name -> R² (3,)."""
-    here = each({name: bool((x >= MAIN).all()) for name, x in r2.items()})
+    here = {name: bool((x >= MAIN).all()) for name, x in r2.items()}
     return Verdict(thesis, here, f"R² of ω, main part from {MAIN:g}: {listed(r2)}")
 
 
@@ -87,17 +79,16 @@ def linear(shares: Mapping[str, np.ndarray]) -> Verdict:
     """Whether the linear coefficients make more of the force than all others: name -> share (3,)."""
     return Verdict(
         "Linear coefficients dominate the identified models (Table 7.1)",
-        each({name: bool((x > MAIN).all()) for name, x in shares.items()}),
-        f"share of X_u, Y_r, N_r in the RMS of the damping force: {listed(shares)}",
+        {name: bool((x > MAIN).all()) for name, x in shares.items()},
+        f"more than {MAIN:g}: share of X_u, Y_r, N_r in the RMS of the damping force: {listed(shares)}",
     )
 
 
 def systematic(eight: np.ndarray, ellipse: np.ndarray) -> Verdict:
     """Whether regressions explain less of the model error of the eight, by Q² (3,)."""
-    below = dict(zip(AXES, (eight < ellipse).tolist(), strict=True))
     return Verdict(
         "The model error of the eight is not as systematic as that of the ellipse (6.4.3)",
-        each(below),
+        dict(zip(AXES, (eight < ellipse).tolist(), strict=True)),
         f"Q² of PLS2: eight {by_axis(eight)}; ellipse {by_axis(ellipse)}",
     )
 
@@ -114,13 +105,8 @@ def alike(measured: LoopResult, model: LoopResult) -> Verdict:
     pairs = ((measured.position, model.position), (measured.lag, model.lag))
     off = [abs(b / a - 1.0) for a, b in pairs]
     omega = difference(measured, model)
-    here = each(
-        {
-            "position": off[0] < SIMILAR,
-            "z1_x": off[1] < SIMILAR,
-            **{f"ω {a}": bool(x < SIMILAR) for a, x in zip(AXES, omega, strict=True)},
-        }
-    )
+    here = dict(zip(("position", "z1_x"), (bool(x < SIMILAR) for x in off), strict=True))
+    here |= {f"ω {a}": bool(x < SIMILAR) for a, x in zip(AXES, omega, strict=True)}
     return Verdict(
         "PLS3 in the ship gives trajectory, z1 and ω of the run it was made of (7.4, Figs. 7.11, 7.12)",
         here,
@@ -142,17 +128,17 @@ def controlled(plain: Mapping[str, LoopResult], learning: Mapping[str, LoopResul
     return [
         Verdict(
             "CLE minimises the error across the path (7.4, Fig. 7.14a)",
-            each({n: x < REMOVES for n, x in across.items()}),
+            {n: x < REMOVES for n, x in across.items()},
             f"z1_y, RMS of the second half over that of RBS, below {REMOVES:g}: {numbers(across)}",
         ),
         Verdict(
             "CLE cannot remove the deviation in surge (7.4, Fig. 7.14a)",
-            each({n: x > KEEPS for n, x in along.items()}),
+            {n: x > KEEPS for n, x in along.items()},
             f"mean z1_x over that of RBS, above {KEEPS:g}: {numbers(along)}",
         ),
         Verdict(
             "The controllers adapt to the model error in sway (7.4, Figs. 7.14, 7.15)",
-            each({n: x >= MAIN for n, x in known.items()}),
+            {n: x >= MAIN for n, x in known.items()},
             f"share of the mean square of ω in sway that ω̂ explains, from {MAIN:g}: {numbers(known)}",
         ),
     ]
@@ -162,9 +148,9 @@ def reacting(reference: LoopResult, others: Mapping[str, LoopResult], apart: str
     """Whether the model errors are similar but for one model's, whose yaw differs most."""
     off = {n: difference(reference, r) for n, r in others.items()}
     least = min(float(x[2]) for n, x in off.items() if n != apart)
-    here = "reproduced" if off[apart][2] > max(least, SIMILAR) else "not reproduced"
     return Verdict(
         f"ω of the models reacts similarly, but {apart} differs, above all in yaw (7.4, Fig. 7.15)",
-        here,
-        f"RMS of the difference to ω with SYSID4 over that of it: {listed(off)}",
+        bool(off[apart][2] > max(least, SIMILAR)),
+        f"RMS of the difference to ω with SYSID4 over that of it, in yaw more than the others and "
+        f"{SIMILAR:g}: {listed(off)}",
     )

@@ -9,12 +9,11 @@ from studies.study_report import Verdict
 
 from ..monte_carlo import interval
 from .outcome import TrackingOutcome, columns
-from .verdict import PRINTED, Paths, Table, short
+from .verdict import PRINTED, RELATED, Paths, Table, short
 
 Run = Mapping[str, TrackingOutcome]  # controllers of one seed
 SUBSTANTIALLY = 1.25  # times an error that is "substantially" larger; chosen
 LEAVES = 0.2  # m, position error over the last tenth of a run that left its path; chosen
-RELATED = 0.5  # 1, rank correlation over the controllers from which two numbers are related; chosen
 EPS, Z2 = ("svd_eps", "win_eps"), ("svd_z2", "win_z2")
 VARIANTS = (*EPS, *Z2)
 EVERY = ("bs", "abs", *VARIANTS)
@@ -189,25 +188,27 @@ def runs_of(table: Table, condition: str) -> Mapping[str, Sequence[TrackingOutco
     return {short(c): each for c, each in runs.items()}
 
 
-def in_seeds(runs: Mapping[str, Sequence[TrackingOutcome]], holds: Callable[[Run], bool]) -> str:
-    """Reproduced where every seed's runs satisfy a statement, not where none does."""
-    count = len(next(iter(runs.values())))
-    good = sum(holds({name: each[k] for name, each in runs.items()}) for k in range(count))
-    if 0 < good < count:
-        return f"undecided: in {good} of {count} seeds"
-    return "reproduced" if good else "not reproduced"
+def in_seeds(
+    runs: Mapping[str, Sequence[TrackingOutcome]], holds: Callable[[Run], bool]
+) -> tuple[bool | None, str]:
+    """Whether every seed's runs satisfy a statement, or none does; None: some do. And their count."""
+    seeds = [dict(zip(runs, each, strict=True)) for each in zip(*runs.values(), strict=True)]
+    good = sum(holds(run) for run in seeds)
+    return {0: False, len(seeds): True}.get(good), f"{good} of {len(seeds)}"
 
 
 def judged_statement(statement: Statement, by_path: Paths) -> Verdict:
     """The verdict on a statement, of today's controllers with noise and of those as printed."""
-    said, numbers = {}, []
+    answers, counts, numbers = {}, [], []
     for condition in ("mdf", PRINTED):
         runs = runs_of(by_path[statement.path], condition)
-        said[condition] = in_seeds(runs, statement.holds)
+        answers[condition], count = in_seeds(runs, statement.holds)
+        counts.append(f"{condition} {count}")
         for key in statement.numbers:
             values = [f"{n} {interval(columns(runs[n], key)).mean:.3g}" for n in statement.names]
             numbers.append(f"{key}, {condition}: {', '.join(values)}")
-    return Verdict(statement.text, said["mdf"], "; ".join(numbers), said[PRINTED])
+    said = f"seeds in which it holds: {', '.join(counts)}. {'; '.join(numbers)}"
+    return Verdict(statement.text, answers["mdf"], said, answers[PRINTED])
 
 
 def statements(by_path: Paths) -> list[Verdict]:

@@ -1,0 +1,39 @@
+"""Reports beside the studies are what today's code makes of the results beside them."""
+
+import shutil
+
+import pytest
+from support.project import ROOT
+
+from cosim import InputError
+from studies.study_report import stored
+from thesis import chapter5, chapter6, improved, observer_gains, store_weight
+
+STUDIES = ROOT / "docs" / "studies"
+LEARNED = STUDIES / "chapter6_learned" / "model.ssv"
+AGAIN = {
+    "chapter5": lambda out: chapter5.study(out, (), None, None, again=True),
+    "chapter6": lambda out: chapter6.study(out, (), 1.0, None, again=True),
+    "chapter6_learned": lambda out: chapter6.study(out, (), 1.0, None, LEARNED, again=True),
+    "improved": lambda out: improved.study(out, (), 0.0, None, again=True),
+    "observer_gains": lambda out: observer_gains.study(out, (), 120.0, None, again=True),
+    "store_weight": lambda out: store_weight.study(out, (), None, None, again=True),
+}
+
+
+@pytest.mark.parametrize("name", AGAIN)
+def test_report_is_what_todays_code_makes_of_its_results(name, tmp_path):
+    """Tables, verdicts, sentences and captions; a changed rule or a changed number shows here."""
+    shutil.copy(STUDIES / name / "results.json", tmp_path)
+    AGAIN[name](tmp_path)
+    for file in ("report.md", "results.json"):
+        told = f"python -m thesis.… --again --out docs/studies/{name}"
+        assert (tmp_path / file).read_text("utf-8") == (STUDIES / name / file).read_text("utf-8"), told
+
+
+def test_report_without_results_is_not_written_anew(tmp_path):
+    with pytest.raises(InputError, match=r"results\.json.*run the study first"):
+        improved.study(tmp_path / "none", (), 0.0, None, again=True)
+    (tmp_path / "results.json").write_text("{")
+    with pytest.raises(InputError, match="cannot read"):
+        stored(tmp_path)
