@@ -66,7 +66,7 @@ def test_what_a_model_leaves_out_is_zero_give_or_take_its_size():
 
 @pytest.mark.slow
 def test_the_drag_is_found_beside_constants_of_each_run():
-    problem, fitted = fit()
+    _, fitted = fit()
     model = fitted.estimate.model(PRIOR)
     still = {"delta_X_u": DRAG}
     predicted = Windows([w.smoothed for w in runs()])
@@ -75,7 +75,7 @@ def test_the_drag_is_found_beside_constants_of_each_run():
     )
     assert after - true < 0.3 * (before - true)
     assert [model.value(n) for n in CONSTANTS] == [0.0, 0.0]
-    assert len(problem.without_each_fold(fitted.estimate)) == 4
+    assert len(fitted.fold_models) == 4
 
 
 @pytest.mark.slow

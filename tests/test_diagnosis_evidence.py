@@ -252,6 +252,7 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
         remains=lambda m: case["left_at_first" if m is START else "left_with"],
         losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
     )
+    data.of_other_runs = data
     c = concluded(found, data, NominalPrior.of(START))
     assert c.refitted == refitted
     if refitted:

@@ -85,7 +85,7 @@ class Selection:
         model = self.model if effects else self.at.start
         folds, runs = self._fold_models()
         found = Findings(
-            effects, self.ranked, model, [], sigma, None, {}, folds, runs, self.findings, self.at, prior
+            effects, self.ranked, model, [], sigma, None, {}, folds, self.findings, self.at, prior, runs
         )
         if not any(prior.std.values()):
             return found

@@ -113,12 +113,12 @@ class Findings(ShortRepr):
         moved: nominal coefficient -> by how many prior standard deviations the fit moved it.
         fold_models: the model fitted without each fold of the training runs, see
             :func:`.gram.block_folds`; empty where a method has none.
-        run_models: the same without each run, where there are two or more.
         refit: the findings with some of the effects only, everything else fitted anew; None where a
             method cannot.
         estimate: the most likely parameters, from which a fit to predictions begins; None where a method
             has no such.
         searched: the prior of the coefficients in which its offsets are.
+        run_models: as ``fold_models``, but each of two runs is a fold, and by the last fit.
     """
 
     effects: Sequence[Finding] = field(default_factory=list)
@@ -129,10 +129,10 @@ class Findings(ShortRepr):
     refitted: Model | None = None
     moved: Mapping[str, float] = field(default_factory=dict)
     fold_models: Sequence[Model] = ()
-    run_models: Sequence[Model] = ()
     refit: "Callable[[Sequence[str]], Findings] | None" = None
     estimate: "RefinedModel | None" = None
     searched: NominalPrior | None = None
+    run_models: Sequence[Model] = ()
 
     @property
     def plausible(self) -> bool:

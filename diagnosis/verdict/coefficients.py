@@ -39,23 +39,23 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     """The model that the findings amount to.
 
     Coefficients alone explain the data if something was missing, nothing is with them, none is further
-    than FAR_OFF from its prior, by where its value is from, and the data that decide are not worse
-    than without. They then take the place of effects of which none is a finding, if the data that decide
-    are not worse either.
+    than FAR_OFF from its prior, by where its value is from, and the data that decide (each of two runs
+    left out as a whole) are not worse than without. They then take the place of effects of which none
+    is a finding, if these data are not worse either.
 
     Args:
         found: the findings that pruning left.
         data: the data that decide.
         prior: of the nominal coefficients, by where their values are from.
     """
-    start = data.start
+    start, unseen = data.start, data.of_other_runs
     if any_finding(found, start) or (found.effects and found.refit is None):
         return Conclusion(found, False, [])
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
-    judged = alone.plausible_by(prior) and data.judges(alone)
+    judged = alone.plausible_by(prior) and unseen.judges(alone)
     if other is not None and judged and data.remains(start) and not data.remains(other):
-        now, *others = data.losses(alone, *([found, start] if found.effects else [start]))
+        now, *others = unseen.losses(alone, *([found, start] if found.effects else [start]))
         if not any(harm(now, each) for each in others):
             return Conclusion(replace(alone, model=other), True, found.effects)
     if found.effects:

@@ -27,7 +27,7 @@ from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
 from .paired_errors import harm
 from .pruning import NOTHING, Withdrawn, prune
 from .pruning_criteria import Harm
-from .unproven import proven
+from .unproven import overfits, proven
 from .validation_data import ValidationData
 
 VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
@@ -133,6 +133,8 @@ def judge(
         its, others = data.losses(fit.findings.model, start)
         if harm(its, others):  # the fit by the model error was compared with these runs already
             fit = fit.about(learned)
+    elif changed and overfits(fit.findings, learned, data, criterion):
+        fit = fit.about(learned)
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (changed and not left)

@@ -7,7 +7,7 @@ validation runs, other training runs, or stretches of a single one.
 
 from ..search.findings import Finding, Findings
 from .confidence import confidence_of
-from .paired_errors import gain
+from .paired_errors import gain, predicts_worse
 from .pruning import without
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
@@ -51,3 +51,21 @@ def proven(found: Findings, data: ValidationData, harm: Harm) -> tuple[Findings,
         kept = rests[k]
         gone.append(doubted.pop(k))
     return kept, gone
+
+
+def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) -> bool:
+    """Whether a fit to predictions is worse on runs that it has not seen than what it began with.
+
+    Its priors are wider than those of the search, and a coefficient that one run determines may be false
+    in another one.
+
+    Args:
+        fit, before: the same findings, fitted to predictions and to the model error.
+        data: the training runs; validation runs judge the fit by themselves.
+        harm: the criterion of pruning.
+    """
+    data = data.of_other_runs
+    if not (data.judges(fit) and data.judges(before)):
+        return False
+    its, others, first = data.losses(fit, before, data.start)
+    return predicts_worse(its, others) or bool(harm(its, first, 0))

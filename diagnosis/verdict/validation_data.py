@@ -114,7 +114,7 @@ class ValidationData:
     @property
     def of_other_runs(self) -> "ValidationData":
         """The same data, each of two runs left out as a whole: what holds in one may not in another."""
-        if self.validate or not OTHER_RUN <= len(self.train) < self.least:
+        if self.validate:
             return self
         return ValidationData(self.train, [], self.start, self.sigma, OTHER_RUN)
 

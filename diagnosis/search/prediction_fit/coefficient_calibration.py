@@ -20,7 +20,7 @@ from ...predictors.shooting import Shooting
 from ...predictors.uncertainty import NEGLIGIBLE
 from ..candidates import SMALL, model_error
 from ..findings import Findings
-from ..gram import run_folds
+from ..gram import WHOLE_RUNS
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance_summary import unrecorded
@@ -46,23 +46,10 @@ class Calibration(PredictionFit):
     """The fit: coefficients of all runs, with constants of each fold of the runs integrated out.
 
     Attributes:
-        of_folds: (folds, q, q) and (folds, q), what each fold says, as H and g of the last information.
         constant: of each group of windows, by fold its rows, slopes of the constants and covariance.
     """
 
-    @cached_property
-    def _folds(self) -> list[np.ndarray]:
-        """Of each group of windows the fold (w,) in which each begins, a number of ``run_folds``."""
-        folds, begins = run_folds(self.runs), [w.middle[np.unique(w.block, True)[1]] for w in self.runs]
-        found = []
-        for s in self.windows:
-            of = np.array([self._place[id(run)] for run in s.runs])[s.run]
-            place = np.zeros(of.size, int)
-            for k, (run, blocks) in enumerate(folds):
-                first = -np.inf if blocks[0] == 0 else begins[run][blocks[0]]
-                place[(of == run) & (s.start >= first)] = k
-            found.append(place)
-        return found
+    least = WHOLE_RUNS
 
     def information(self, at: RefinedModel) -> Information:
         model, q = at.model(self.prior), self.unit.size
@@ -70,10 +57,10 @@ class Calibration(PredictionFit):
         self.assumed = replace(whole, size=np.median([p.size for p in pushes], axis=0))
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
         unit = np.concatenate([self.unit, self.assumed.size[1:]])
-        folds = len(run_folds(self.runs))
+        folds = len(self.folds)
         H, g = np.zeros((folds, q, q)), np.zeros((folds, q))
         weights, self.constant = [], []
-        for s, of in zip(self.windows, self._folds, strict=True):
+        for s, of in zip(self.windows, self.fold_of_window, strict=True):
             around = s.around(model, steps)
             W = self.whitening(s, around)
             A, r = whitened(W, around.slopes * unit), whitened(W, around.residuals)
@@ -89,9 +76,8 @@ class Calibration(PredictionFit):
                 constant.append((rows, U, K))
             weights.append(W)
             self.constant.append(constant)
-        self.of_folds = H, g
         whole_H = H.sum(axis=0)
-        return Information(whole_H, whole_H, g.sum(axis=0), weights, self.assumed)
+        return Information(whole_H, whole_H, g.sum(axis=0), weights, self.assumed, H, g)
 
     def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
         pooled = squares.sum(axis=(0, 1)) / max(seen.sum(), 1)
@@ -105,15 +91,6 @@ class Calibration(PredictionFit):
             along = U.T @ left
             total += float(left @ left - along @ K @ along)
         return total
-
-    def without_each_fold(self, at: RefinedModel) -> list[Model]:
-        """The model fitted without each fold, by one step about the fit to all, which ended last."""
-        P, (H, g) = self.precision, self.of_folds
-        whole_H, whole_g, prior = H.sum(axis=0), g.sum(axis=0), P @ self.theta(at)
-        return [
-            self.moved(at, np.linalg.solve(whole_H - h + P, whole_g - v - prior)).model(self.prior)
-            for h, v in zip(H, g, strict=True)
-        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +131,7 @@ class Calibrator:
         problem = Calibration(self.train, self.windows, at, self.prior)
         fitted = fit_to(problem, at)
         at = fitted.estimate
-        model, folds = at.model(self.prior), problem.without_each_fold(at)
+        model, folds = at.model(self.prior), fitted.fold_models
         moved = dict(zip(self.prior.mean, at.offset.tolist(), strict=True))
         f = self.found
         learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)

@@ -22,6 +22,7 @@ S the covariance at hand, and the posterior has the covariance
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -32,6 +33,7 @@ from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
 from ...runs.cleaning import DIGITS
 from ..candidates import SMALL, model_error
+from ..gram import OTHER_RUN, run_folds
 from ..most_likely import STEPS, Quadratic, most_likely, ridge
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
@@ -49,12 +51,14 @@ class Fitted:
         names: of all fitted parameters.
         covariance: (q, q), of them, SI.
         push: the unrecorded force.
+        fold_models: the model fitted without each fold of the runs, by one step about the fit to all.
     """
 
     estimate: RefinedModel
     names: Sequence[str]
     covariance: np.ndarray
     push: ForceDisturbance
+    fold_models: Sequence[Model]
 
 
 def shootings(runs: Sequence[WeakWindows], lengths: Sequence[float] = LENGTHS) -> list[Shooting]:
@@ -88,6 +92,7 @@ class Information:
         g: (q,), J^T W r.
         weights: of each length the factor (w, 3T, 3T) of W.
         push: the unrecorded force.
+        fold_H, fold_g: (folds, q, q) and (folds, q), what each fold says; their sums are H and g.
     """
 
     H: np.ndarray
@@ -95,6 +100,8 @@ class Information:
     g: np.ndarray
     weights: Sequence[np.ndarray]
     push: ForceDisturbance
+    fold_H: np.ndarray
+    fold_g: np.ndarray
 
     def power(self, P: np.ndarray) -> float:
         """k, for a prior precision P (q, q)."""
@@ -115,7 +122,10 @@ class PredictionFit:
 
     Attributes:
         assumed: the unrecorded force that counts where windows are weighed.
+        least: number of runs from which on a fold is a whole one.
     """
+
+    least = OTHER_RUN
 
     def __init__(
         self,
@@ -143,6 +153,35 @@ class PredictionFit:
         self._columns = [[*self._steps].index(n) for n in self.names]
         P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
         self.precision = P[np.ix_(self._kept, self._kept)]
+
+    @cached_property
+    def folds(self) -> list[tuple[int, np.ndarray]]:
+        """The folds of the runs, see :func:`.gram.run_folds`."""
+        return run_folds(self.runs, self.least)
+
+    @cached_property
+    def fold_of_window(self) -> list[np.ndarray]:
+        """Of each group of windows the number of the fold (w,) in which each begins."""
+        begins = [w.middle[np.unique(w.block, True)[1]] for w in self.runs]
+        found = []
+        for s in self.windows:
+            of = np.array([self._place[id(run)] for run in s.runs])[s.run]
+            place = np.zeros(of.size, int)
+            for k, (run, blocks) in enumerate(self.folds):
+                first = -np.inf if blocks[0] == 0 else begins[run][blocks[0]]
+                place[(of == run) & (s.start >= first)] = k
+            found.append(place)
+        return found
+
+    def without_each_fold(self, at: RefinedModel, known: Information, power: float) -> list[Model]:
+        """The model fitted without each fold, by one step about the fit to all."""
+        right = power * known.g - self.precision @ self.theta(at)
+        H = power * known.H + self.precision
+        H += ridge(H)
+        return [
+            self.moved(at, np.linalg.solve(H - power * h, right - power * v)).model(self.prior)
+            for h, v in zip(known.fold_H, known.fold_g, strict=True)
+        ]
 
     def theta(self, at: RefinedModel) -> np.ndarray:
         """(q,), fitted parameters about their prior means, in units of the ship's size; coefficients in
@@ -203,23 +242,28 @@ class PredictionFit:
     def information(self, at: RefinedModel) -> Information:
         """What the windows say, by the slopes at an estimate and the push that it leaves in each run."""
         push, pushes = push_of(self.runs, model_error(self.runs, at.model(self.prior)), self.std)
-        model, q = at.model(self.prior), self.unit.size
+        model, q, folds = at.model(self.prior), self.unit.size, len(self.folds)
 
-        def of_windows(s: Shooting) -> tuple[np.ndarray, ...]:
+        def of_windows(group: tuple[Shooting, np.ndarray]) -> tuple[np.ndarray, ...]:
+            s, of = group
             around = self.around(s, model)
             W = self.whitening(s, around)
             A = whitened(W, around.slopes)
-            flat = A.reshape(-1, q)
             fine = running(W)
             sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]
             V = covariance(around.motion[fine], s.at_start[fine], ForceDisturbance(sizes, push.time))
             back = W[fine].transpose(0, 2, 1) @ A[fine]
             pushed = (_square(V, s.noise[fine]) @ back).reshape(-1, q)
-            g = flat.T @ whitened(W, around.residuals[..., None]).ravel()
-            return flat.T @ flat, back.reshape(-1, q).T @ pushed, g, W
+            r = whitened(W, around.residuals)
+            parts = [(A[of == k].reshape(-1, q), r[of == k].ravel()) for k in range(folds)]
+            H = np.array([J.T @ J for J, _ in parts])
+            g = np.array([J.T @ left for J, left in parts])
+            return H, back.reshape(-1, q).T @ pushed, g, W
 
-        H, G, g, weights = zip(*for_each(of_windows, self.windows), strict=True)
-        return Information(np.mean(H, axis=0), np.mean(G, axis=0), np.mean(g, axis=0), weights, push)
+        groups = [*zip(self.windows, self.fold_of_window, strict=True)]
+        Hs, Gs, gs, weights = zip(*for_each(of_windows, groups), strict=True)
+        H, G, g = (np.mean(each, axis=0) for each in (Hs, Gs, gs))
+        return Information(H.sum(axis=0), G, g.sum(axis=0), weights, push, H, g)
 
 
 def _square(V: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -265,4 +309,5 @@ def fit_to(problem: PredictionFit, at: RefinedModel) -> Fitted:
     at, here = most_likely(at, about, problem.moved)
     S = np.linalg.inv(here.H)
     covariance = S @ (here.power**2 * here.known.G + P) @ S * np.outer(problem.unit, problem.unit)
-    return Fitted(at, problem.names, covariance, here.known.push)
+    folds = problem.without_each_fold(at, here.known, here.power)
+    return Fitted(at, problem.names, covariance, here.known.push, folds)

@@ -90,6 +90,7 @@ def to_predictions(
         suspects=suspected(prior, at.offset, share),
         moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
         estimate=at,
+        run_models=fitted.fold_models,
     )
     return RefitOutcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
 
