@@ -2,8 +2,8 @@
 
 Of a pool of measured runs some are kept out. The coefficients are calibrated on one run, then on more,
 in the order that a precision criterion of ``cybership next`` chooses, and in random orders that begin
-with the same runs. Counted are the runs until the error of the runs kept out is, and stays for all
-larger numbers that are tried, within 10 % of that after all runs of the pool.
+with the same runs. Counted are the runs until the error of the runs kept out is within 10 % of that
+after all runs of the pool, at first, and for all larger numbers.
 """
 
 import argparse
@@ -72,11 +72,6 @@ class Pool:
             left.remove(order[-1])
         return order
 
-    def needed(self, order: Sequence[int]) -> int:
-        """Number of runs from which on the error stays near that after all."""
-        far = [n for n in range(1, len(order)) if self.error(order[:n]) > NEAR * self.error(order)]
-        return max(far, default=0) + 1
-
 
 def rows(pool: Pool, count: int, seed: int, advance: Callable[[], object]) -> Iterator[dict]:
     """For each of some first runs the runs that are needed in each order."""
@@ -88,7 +83,11 @@ def rows(pool: Pool, count: int, seed: int, advance: Callable[[], object]) -> It
         for name, order in orders.items():
             names = [pool.runs[n].run.name for n in order]
             errors = [pool.error(order[: n + 1]) for n in range(len(order))]
-            yield {"order": name, "needed": pool.needed(order), "runs": names, "errors": errors}
+            near = np.array(errors) <= NEAR * errors[-1]
+            first_near = int(np.argmax(near)) + 1
+            stays = len(near) - int(np.argmin(near[::-1])) + 1 if not near.all() else 1
+            counts = {"first_near": first_near, "stays_near": stays}
+            yield {"order": name} | counts | {"runs": names, "errors": errors}
             advance()
 
 
@@ -106,10 +105,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for row in rows(pool, options.orders, options.seed, advance):
             found.append(row)
             (options.out / f"{options.ship}.json").write_text(json.dumps(found, indent=1) + "\n")
-    print(f"{options.ship}: {len(pool.runs)} runs, {options.keep} kept out; runs needed:")
+    print(f"{options.ship}: {len(pool.runs)} runs, {options.keep} kept out; median of runs needed:")
     for name in ("d-optimal", "a-optimal", "random"):
-        needed = [r["needed"] for r in found if r["order"] == name]
-        print(f"  {name}: median {np.median(needed):g}, {min(needed)} to {max(needed)}")
+        mine = [(r["first_near"], r["stays_near"]) for r in found if r["order"] == name]
+        once, stays = np.median(mine, axis=0)
+        print(f"  {name}: {once:g} until the error is near at first, {stays:g} until it stays so")
     return 0
 
 

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -15,7 +16,7 @@ from support.oscillator import build_oscillator
 import cosim
 import diagnosis
 import diagnosis.design.spread as spread_of
-from benchmarks import next_run
+from benchmarks import next_pool, next_run
 from benchmarks.hidden_effects.draw import LARGEST, SMALLEST
 from cosim import InputError
 from cosim.fmu import ConfinedFmu, FmuModel
@@ -409,6 +410,23 @@ def test_hidden_ships_of_the_benchmark_have_the_size_that_is_drawn(question):
     assert SMALLEST < np.nanmax(share[:1]) < LARGEST
     half = next_run.hidden_ship(cell, data, 0.5)
     assert half.value(name) == pytest.approx(0.5 * ship.value(name))
+
+
+def test_runs_needed_are_counted_at_first_and_for_all_larger_numbers():
+    class FourRuns(next_pool.Pool):
+        def __init__(self):
+            self.runs = [SimpleNamespace(run=SimpleNamespace(name=n)) for n in "abcd"]
+
+        def by(self, criterion, first):
+            return [first, *(n for n in range(4) if n != first)]
+
+        def error(self, chosen):
+            return [3.0, 1.05, 1.2, 1.0][len(chosen) - 1]
+
+    found = [*next_pool.rows(FourRuns(), 1, 0, lambda: None)]
+    assert [r["order"] for r in found] == ["d-optimal", "a-optimal", "random"]
+    assert {(r["first_near"], r["stays_near"]) for r in found} == {(2, 4)}
+    assert {r["runs"][0] for r in found} == {found[0]["runs"][0]}
 
 
 def test_the_loop_of_many_models_is_that_of_each_alone(designer):
