@@ -227,7 +227,7 @@ def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
         ({"columns": {"x": {"unit": "m"}}}, "columns.x.name: is missing"),
         ({"columns": {"x": {"name": "x", "faktor": 2}}}, "columns.x.faktor: unknown key; did you mean 'factor'?"),
         ({"columns": {"x": {"name": "x", "factor": 0}}}, "x.factor is 0; give another number"),
-        ([1], "valid dictionary"),
+        ([1], "should be an object"),
     ],
 )  # fmt: skip
 def test_wrong_layout_is_refused_with_one_line(tmp_path, layout, message):
