@@ -85,7 +85,7 @@ def test_the_energy_that_controllers_report_is_that_of_the_thesis(seed):
     assert tracking_energy(z, Inertia()) == pytest.approx(lyapunov(i, bs.Params().gains))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_lyapunov_function_decays_with_perfect_knowledge(seed):
     rng = np.random.default_rng(seed)
     start = vessel.State(*map(float, rng.uniform(-0.5, 0.5, 6)))

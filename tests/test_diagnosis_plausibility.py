@@ -176,9 +176,6 @@ def doubt(table):
 OF_ACTUATORS = [
     (["port.n", "starboard.n"], ["starboard.n", "port.n"], 1.0, "port.n and starboard.n are swapped"),
     (["port.n"], ["port.n"], -1.0, "port.n has the wrong sign"),
-    (["x", "y"], ["y", "x"], 1.0, "x and y are swapped"),
-    (["psi"], ["psi"], -1.0, "heading is mirrored"),
-    (["x", "y"], ["x", "y"], 1.0 / 0.3048, "position is in ft"),
     (["port.n", "starboard.n"], ["port.n", "starboard.n"], 60.0, "port.n and starboard.n are in rpm"),
 ]
 

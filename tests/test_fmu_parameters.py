@@ -22,7 +22,6 @@ from cosim import InputError, Unit
 from cosim.fmu import ConfinedFmu, FmuModel
 from diagnosis import learn, linearise, parameters
 from diagnosis.fmu_parameters.additional_force import AdditionalForce
-from diagnosis.fmu_parameters.force_search import candidates
 from diagnosis.fmu_parameters.linear_model import linearised, states_of
 from diagnosis.fmu_parameters.measured_system import (
     MeasuredRun,
@@ -39,7 +38,7 @@ from diagnosis.fmu_parameters.parameter_file import (
     proposed,
     read_parameters,
 )
-from diagnosis.fmu_parameters.residuals import Setting, Whitening, WindowResiduals
+from diagnosis.fmu_parameters.residuals import Setting, WindowResiduals
 from diagnosis.fmu_parameters.sensitivity import confounded
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 from diagnosis.fmu_parameters.system_remainder import (
@@ -260,13 +259,6 @@ def test_groups_are_those_that_the_predictions_do_not_discriminate():
         assert ["".join(g) for g in confounded(slopes, names)] == groups
 
 
-def test_whitening_is_the_inverse_root_of_the_covariance():
-    S = np.random.default_rng(2).standard_normal((12, 2)) * [3.0, 0.1]
-    U, size, _ = np.linalg.svd(S, full_matrices=False)
-    W = Whitening(U, 1.0 / np.sqrt(1.0 + size**2), {}, np.zeros(12))(np.eye(12))
-    assert np.allclose(W @ (np.eye(12) + S @ S.T) @ W.T, np.eye(12))
-
-
 def windows(*measured, runs=None, angles=()):
     """What the remainder looks at: windows of some outputs, a second from sample to sample."""
     each = [
@@ -330,12 +322,6 @@ def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():
     moved = laid(track[..., None], np.zeros(1), onto)[..., 0]
     assert moved[0] == pytest.approx([2.0, 3.0, np.pi / 2])
     assert moved[4] == pytest.approx([2.0, 7.0, np.pi / 2])
-
-
-def test_candidates_have_different_names():
-    ids = [f.id for f in candidates(["f", "g"], ["x", "v"], ["x"])]
-    assert len(ids) == len(set(ids))
-    assert {"f:1", "f:v", "f:|v|v", "f:v³", "g:der(x)"} <= set(ids)
 
 
 def test_start_values_are_those_of_the_motion(fmu):

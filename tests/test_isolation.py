@@ -8,7 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from support.events import once_there
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
@@ -107,8 +106,8 @@ CRASHES = {
     "os._exit(7)": "its process died in the step from t = 0.5 s (exit code 7)",
     "os.kill(os.getpid(), 11)": "its process died in the step from t = 0.5 s (signal 11, SIGSEGV)",
     "import ctypes; ctypes.string_at(0)": "its process died in the step from t = 0.5 s (signal 11, SIGSEGV)",
-    "[0 for _ in iter(int, 1)]": "the step from t = 0.5 s took longer than 1 s; its process was ended",
-    "time.sleep(1000)": "the step from t = 0.5 s took longer than 1 s; its process was ended",
+    "[0 for _ in iter(int, 1)]": "the step from t = 0.5 s took longer than 3 s; its process was ended",
+    "time.sleep(1000)": "the step from t = 0.5 s took longer than 3 s; its process was ended",
     "raise ValueError('boom')": "the step from t = 0.5 s returned fatal",
 }
 
@@ -116,7 +115,7 @@ CRASHES = {
 @pytest.mark.parametrize("what", CRASHES)
 def test_crash_or_hang_ends_in_one_message_with_the_log_kept(plain_fmu, tmp_path, what):
     fmu = plain_fmu(f"Crash{abs(hash(what))}", GAIN, f"if t > 0.45: {what}\nself.y = t\nreturn True")
-    content = one(fmu, timeout=1.0)
+    content = one(fmu, timeout=3.0)
     content["fmus"]["b"] = content["fmus"]["a"] | {"isolate": False, "path": "guidance_ellipse.fmu"}
     del content["fmus"]["b"]["timeout"]
     result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
@@ -131,10 +130,10 @@ def test_crash_or_hang_ends_in_one_message_with_the_log_kept(plain_fmu, tmp_path
     [
         ("os._exit(3)", "its process died in its instantiation"),
         ("self.enter_initialization_mode = lambda: os._exit(3)", "died in fmi2EnterInitializationMode"),
-        ("self.exit_initialization_mode = lambda: time.sleep(99)", "took longer than 1 s"),
+        ("self.exit_initialization_mode = lambda: time.sleep(99)", "took longer than 3 s"),
         (
             "self.setup_experiment = lambda *_: time.sleep(99)",
-            "fmi2SetupExperiment took longer than 1 s",
+            "fmi2SetupExperiment took longer than 3 s",
         ),
     ],
 )
@@ -142,7 +141,7 @@ def test_crash_before_the_first_step_is_one_message_too(plain_fmu, tmp_path, ini
     # The instance that pythonfmu makes to write the description must survive.
     survive = f"if 'pytest' not in __import__('sys').modules: {init}"
     fmu = plain_fmu(f"Early{abs(hash(init))}", f"{GAIN}\n{survive}\n")
-    result = cosim.simulate(cosim.load_scenario(one(fmu, timeout=1.0)), tmp_path / "out")
+    result = cosim.simulate(cosim.load_scenario(one(fmu, timeout=3.0)), tmp_path / "out")
     assert result.status == "failed"
     assert message in result.message
 
@@ -158,10 +157,10 @@ def test_crash_at_the_end_does_not_spoil_the_run(plain_fmu, tmp_path):
 def test_a_hang_at_the_end_does_not_spoil_the_run(plain_fmu, tmp_path):
     fmu = plain_fmu("Stays", f"{GAIN}\nself.terminate = lambda: time.sleep(99)\n")
     shown = []
-    scenario = cosim.load_scenario(one(fmu, timeout=1.0))
+    scenario = cosim.load_scenario(one(fmu, timeout=3.0))
     result = cosim.simulate(scenario, tmp_path / "out", show=shown.append)
     assert result.status == "done"
-    assert any("fmi2Terminate took longer than 1 s" in line for line in shown)
+    assert any("fmi2Terminate took longer than 3 s" in line for line in shown)
 
 
 def test_refused_instantiation_is_bad_input(plain_fmu, tmp_path, capfd):
@@ -189,17 +188,19 @@ def test_two_versions_that_share_module_names_run_side_by_side(plain_fmu, tmp_pa
 
 
 def test_simultaneous_steps_are_taken_at_the_same_time(plain_fmu, tmp_path):
-    """Sleeping needs no processor, so this holds on a busy machine."""
-    fmu = str(plain_fmu("Sleeper", GAIN, "time.sleep(0.1)\nreturn True"))
+    """Each FMU waits in its step until all four are in theirs."""
+    (marks := tmp_path / "marks").mkdir()
+    step = f"""
+        open({str(marks)!r} + f"/{{t:.1f}}_{{os.getpid()}}", "w").close()
+        while len([name for name in os.listdir({str(marks)!r}) if name.startswith(f"{{t:.1f}}_")]) < 4:
+            time.sleep(0.01)
+        return True
+    """
+    fmu = str(plain_fmu("Meets", GAIN, step))
     content = one(fmu) | {"algorithm": "jacobi"}
     content["fmus"] = {name: {"path": fmu, "isolate": True} for name in "abcd"}
-    marks = []
-    cosim.simulate(
-        cosim.load_scenario(content), tmp_path / "out", progress=lambda t: marks.append(time.monotonic())
-    )
-    spans = np.diff(marks)
-    assert marks
-    assert spans.sum() < 4 * 1.0
+    result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
+    assert (result.status, len(list(marks.iterdir()))) == ("done", 40)
 
 
 def test_what_it_prints_goes_to_standard_error(plain_fmu, tmp_path):

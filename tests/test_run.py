@@ -238,19 +238,16 @@ def test_interrupted_run_keeps_its_log_and_says_so(scenario, tmp_path, number):
     assert sidecar["rows"] == len(log["time"]) > 10
 
 
-def test_killed_run_leaves_a_log_readable_up_to_the_last_second(scenario, tmp_path):
+def test_killed_run_leaves_a_log_readable_up_to_its_last_block(scenario, tmp_path):
     out = tmp_path / "out"
     process = start(scenario(stop=10000.0), out, "--realtime", "4")
-    begun = time.monotonic()
-    first = cosim.read_log(out)["time"][-1]
-    time.sleep(1.5)
+    first, size = cosim.read_log(out)["time"][-1], (out / "log.csv").stat().st_size
+    once_there(lambda: (out / "log.csv").stat().st_size > size)
     process.kill()
     process.communicate()
-    elapsed = time.monotonic() - begun
     log = cosim.read_log(out)
     assert np.allclose(np.diff(log["time"]), 0.01)
-    # At 4 simulated seconds a second, one second of wall time is 4 s of log.
-    assert log["time"][-1] - first > 4.0 * (elapsed - 1.0)
+    assert log["time"][-1] > first
     assert json.loads((out / "log.json").read_text())["status"] == "running"
 
 

@@ -6,9 +6,10 @@ import os
 import re
 import shutil
 import subprocess
-import time
 
 import pytest
+
+from .events import once_there
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 BROWSER = next(filter(None, map(shutil.which, NAMES)), None)
@@ -47,7 +48,7 @@ def opened(page, folder, *options, milliseconds=5000):
         *options,
         page.as_uri(),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert not re.findall(r".*CONSOLE.*", done.stderr)
     return done.stdout
@@ -127,12 +128,9 @@ class Tab:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def wait(self, condition, seconds=120.0):
+    def wait(self, condition):
         """Wait until a condition of the page is true."""
-        end = time.monotonic() + seconds
-        while not self.evaluate(condition):
-            assert time.monotonic() < end, condition
-            time.sleep(0.05)
+        once_there(lambda: self.evaluate(condition), 0.05)
 
     def press(self, key):
         """Press a key of one sign."""
