@@ -70,6 +70,17 @@ def search(effects: int) -> list[tuple[str, float]]:
     return [(what, t * n) for what, t, n in zip(steps, took, many, strict=True)]
 
 
+@pytest.mark.parametrize("effects", [0, 1, 2, 3])
+def test_of_few_effects_it_is_right_from_the_first_round_on(effects):
+    clock, steps = Clock(), search(effects)
+    left, whole = RemainingTime(clock), sum(t for _, t in steps)
+    for what, took in steps:
+        left.begin(what)
+        if left.seconds is not None:
+            assert 0.5 * (whole - clock.time) < left.seconds < 2.0 * (whole - clock.time), what
+        clock.time += took
+
+
 @pytest.mark.parametrize("effects", [1, 2, 3, 6])
 def test_in_the_second_half_it_is_right_whatever_is_found(effects):
     clock, steps = Clock(), search(effects)

@@ -174,11 +174,12 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
 
 def is_cell(cells: pd.Series, text: str) -> np.ndarray:
     """(n,), rows whose cell is a text or the number that it is."""
-    same = cells.astype("string").str.strip() == text
-    number = pd.to_numeric(pd.Series([text]), errors="coerce")[0]
-    return np.asarray(same.fillna(False), bool) | np.asarray(
-        pd.to_numeric(cells, errors="coerce") == number
-    )
+    same = np.asarray((cells.astype("string").str.strip() == text).fillna(False), bool)
+    try:
+        number = float(text)
+    except ValueError:
+        return same
+    return same | np.asarray(pd.to_numeric(cells, errors="coerce") == number)
 
 
 def _first(cells: pd.Series, unreadable: Any) -> str | None:

@@ -365,7 +365,7 @@ def measured_rates(
     for axes, names in ((PLACE, by), (HEADING, ("r",) if "r" in agreeing else None)):
         if names:
             values = np.column_stack([run.measured[name] for name in names])
-            there = np.isfinite(values).all(axis=1)
+            there = np.asarray(np.isfinite(values).all(axis=1))
             fresh[:, axes] = (there & ~repeated(values, there))[:, None]
     at = rows[fresh[rows].any(axis=1)]
     if not at.size:
