@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import cosim
 from cosim.process import scratch_folder
 from studies.study_command import progress, run_study, study_parser
-from studies.study_report import Report, Verdict
+from studies.study_report import Report, Verdict, records, stored
 
 from .monte_carlo import Content, SampleMean, interval
 
@@ -135,31 +135,58 @@ def picture(runs: dict[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
     return figure
 
 
-def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) -> Path:
-    """Tune every hidden ship with every seed and write the report; returns its path."""
-    found: dict[float, list[float]] = {dx: [] for dx in hidden}
-    steps: list[int] = []
+class Tuned(NamedTuple):
+    """Estimated points of attack by seed [m], and how many pairs of pushes each took."""
+
+    points: tuple[float, ...]
+    pairs: tuple[int, ...]
+
+
+def run(seeds: Sequence[int], push: Push, hidden: Sequence[float]) -> dict[float, Tuned]:
+    """True point of attack -> what the tuning found."""
+    found: dict[float, Tuned] = {}
     with progress(len(hidden) * len(seeds), "tuning") as advance:
         for dx in hidden:
+            each = []
             for seed in seeds:
-                p_x, tried = tune(dx, push, seed)
-                found[dx].append(p_x)
-                steps.append(len(tried))
+                each.append(tune(dx, push, seed))
                 advance()
-    report = Report(out, "Tuning the thrust allocation (6.3.4)", seeds)
+            found[dx] = Tuned(tuple(p for p, _ in each), tuple(len(tried) for _, tried in each))
+    return found
+
+
+def before_and_after(hidden: float, tuned_: float, push: Push, seed: int) -> Figure:
+    """Headings of a push before and after tuning."""
+    pushes = {"p_o = 0": 0.0, f"p_o = {tuned_:.3f} m": tuned_}
+    return picture({n: headings(scenario(p, hidden, push, seed)) for n, p in pushes.items()})
+
+
+def study(
+    out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float], again: bool = False
+) -> Path:
+    """Tune every hidden ship with every seed, or take earlier results, and write the report."""
+    earlier = stored(out) if again else None
+    if earlier is None:
+        every = run(seeds, push, hidden)
+    else:
+        every = {float(dx): t for dx, t in records(Tuned, earlier["found"]).items()}
+        push = records(Push, earlier["push"])
+    found = {dx: t.points for dx, t in every.items()}
+    steps = [n for t in every.values() for n in t.pairs]
+    report = Report(out, "Tuning the thrust allocation (6.3.4)", seeds, earlier)
     report.text(
         f"A ship at rest is commanded {push.force:g} N to starboard and to port for "
         f"{push.seconds:g} s. The assumed point of attack p_o is moved until neither force turns "
         f"the ship. It took {np.mean(steps):.1f} pairs of forces on average. The heading is "
         f"measured with {push.noise:g} rad of noise."
     )
-    zero = min(hidden, key=abs)
+    zero = min(found, key=abs)
     offset = interval(found[zero])
     report.why("the turn of a pushed ship is linear in the assumed point of attack.")
     report.verdicts("claims", [tuned(found, offset.mean - zero)])
     rows = []
-    for dx in hidden:
-        each = interval(found[dx])
+    for dx, points in found.items():
+        each = interval(points)
         error = SampleMean(*(1000.0 * (x - dx - offset.mean + zero) for x in each))
         rows.append([f"{dx:+.3f}", str(each), str(error)])
     header = ["true point of attack [m]", "estimated p_o [m]", "error of the shift [mm]"]
@@ -170,12 +197,13 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
         "added mass), so a force at the origin turns the ship slightly. The tuned value is the "
         "sum of both, as in the basin, where (6.2) gave 0.18 m."
     )
-    worst = max(hidden, key=abs)
-    before = headings(scenario(0.0, worst, push, seeds[0]))
-    after = headings(scenario(found[worst][0], worst, push, seeds[0]))
-    shown = {"p_o = 0": before, f"p_o = {found[worst][0]:.3f} m": after}
-    report.figure("heading", picture(shown), f"A sway force with the thrust acting {worst:+g} m away.")
-    report.result("found", {f"{dx:+.3f}": values for dx, values in found.items()})
+    worst = max(found, key=abs)
+    report.figure(
+        "heading",
+        partial(before_and_after, worst, found[worst][0], push, report.seeds[0]),
+        f"A sway force with the thrust acting {worst:+g} m away (Fig. 6.7).",
+    )
+    report.result("found", {f"{dx:+.3f}": t for dx, t in every.items()})
     report.result("push", push)
     return report.write()
 
@@ -188,6 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "  python -m thesis.allocation\n  python -m thesis.allocation --hidden 0.18 --seeds 1",
         seeds=3,
         jobs=False,
+        again=True,
     )
     parser.add_argument(
         "--hidden", type=float, nargs="+", default=list(HIDDEN), metavar="M", help="hidden offsets [m]"
@@ -198,7 +227,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     seeds = range(1 if options.quick else options.seeds)
     push = Push(force=options.force)
-    run_study(partial(study, options.out, seeds, push, options.hidden))
+    run_study(partial(study, options.out, seeds, push, options.hidden, options.again))
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ def seen(losses: Failure) -> list[Verdict]:
     )
     return [
         Verdict(
-            "After the bow thruster's failure δ̂ in sway and yaw rises by 30-40 % in seconds (7.2.5)",
+            "When the bow thruster fails, δ̂ in sway and yaw rises by 30 % or more in seconds (7.2.5)",
             {a: after - before >= RISE for a, (before, after) in axes.items()},
             f"by {RISE:g} or more; {numbers}",
         ),

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.study_report import said
+from studies.study_report import Verdict, overall, said
 
 from .tracking.verdict import FOUR, PRINTED
 
@@ -23,6 +23,19 @@ STUDIES = Path(__file__).parent.parent / "docs" / "studies"
 SIX = ("win_eps", "svd_eps", "win_z2", "svd_z2", "abs", "bs")
 TEMPLATE = "thesis_results.txt"
 STALE = "stale, ungated, request"
+JUDGED = {  # study -> section of the thesis
+    "chapter5": "5",
+    "store_weight": "4.1.4",
+    "chapter6": "6.4, 6.5",
+    "chapter6_learned": "6.4, 6.5, learned ship",
+    "estimators": "6.3.3",
+    "observer_gains": "6.3.3, K_1 and K_2",
+    "allocation": "6.3.4",
+    "realtime": "6.3.2",
+    "chapter7": "7.1 to 7.4",
+    "lost_thrust": "7.2.5",
+    "improved": "7.5",
+}
 PATHS, SENSES = ("ellipse", "eight"), ("mdf", "kalman")
 
 Results = Mapping[str, Any]
@@ -44,6 +57,63 @@ def cells(results: Results, first: str) -> list[list[Any]]:
 def verdict(results: Results, key: str, begin: str) -> Mapping[str, Any]:
     """The verdict on the statement that begins so."""
     return next(v for v in results[key] if v["thesis"].startswith(begin))
+
+
+def judged(results: Results) -> list[Verdict]:
+    """Every verdict of a study."""
+    lists = (x for x in results.values() if isinstance(x, list))
+    return [
+        Verdict(**row) for rows in lists for row in rows if isinstance(row, dict) and "thesis" in row
+    ]
+
+
+def summary(found: Mapping[str, Results]) -> Numbers:
+    """How many statements hold, study by study."""
+    rows = []
+    for name, section in JUDGED.items():
+        verdicts = judged(found[name])
+        answers = [v.holds for v in verdicts]
+        printed = [overall(v.printed) for v in verdicts if v.printed != {}]
+        rows.append(
+            f"| {section} | [report](studies/{name}/report.md) | {answers.count(True)} | "
+            f"{answers.count(False)} | {answers.count(None)} | "
+            f"{f'{printed.count(True)} of {len(printed)}' if printed else '–'} |"
+        )
+    return {"summary": "\n".join(rows)}
+
+
+def lost_thrust(r: Results, analysis: Results) -> Numbers:
+    """Estimates of the loss of thrust by passes, least squares, estimates of motion, and gains."""
+    columns = next(t["header"] for t in analysis["tables"] if t["header"][0] == "coefficient")
+    sysid = {row[0]: dict(zip(columns, row, strict=True)) for row in cells(analysis, "coefficient")}
+
+    def delta(estimates: str, ending: str = "", axes: str = "XYN") -> str:
+        return ", ".join(f"{sysid[f'delta_{a}{ending}'][estimates]:.3f}".replace("-", "−") for a in axes)
+
+    r2 = [float(sysid[f"R² of ω {a}"][e]) for a in "XYN" for e in ("true states", "smoothed", "mdf")]
+    rows = {row[0]: row for row in cells(analysis, "model")}
+    spikes = next(row for name, row in rows.items() if name.startswith("identified"))
+    places = r["places"]
+    every = [p["r2"] for each in places.values() for p in each]
+    slope, offset = r["line"]
+
+    def place(name: str, k: int) -> str:
+        return f"{places[name][k]['delta_N']:.3f}"
+
+    return {
+        "delta_true": delta("true states"),
+        "delta_smoothed": delta("smoothed"),
+        "delta_mdf": delta("mdf"),
+        "delta_least": delta("mdf", ", least squares"),
+        "delta_r2": f"{min(r2):.2f}",
+        "delta_condition": ", ".join(sysid[f"condition number {a}"]["mdf"] for a in "XYN"),
+        "delta_spikes": ", ".join(f"{x:.2f}" for x in spikes[-3:]),
+        "line": f"N_r = {offset:.2f} + {slope:.2f} δ_N".replace("-", "−"),
+        "line_r2": f"{min(every):.3f} to {max(every):.4f}",
+        "delta_gain": place("MDF, 1", 1),
+        "delta_quarter": place("MDF, 0.25", 1),
+        "delta_four": place("true states, 1", 1),
+    }
 
 
 def failing(found: Mapping[str, Any]) -> str:
@@ -87,6 +157,9 @@ def chapter5(r: Results) -> Numbers:
     few = verdict(r, "claims", "Only a few")["numbers"]
     return {
         "c5_seeds": str(len(r["seeds"])),
+        "conclusions": "\n".join(
+            f"| {v.thesis} | {v.cells[0]} | {v.cells[1]} |" for v in judged(r) if v.printed != {}
+        ),
         "abs_ellipse": f"{100.0 * (1.0 - ratio('ellipse', 'mdf', 'abs', 'bs')):.0f}",
         "abs_eight": f"{100.0 * (1.0 - ratio('eight', 'mdf', 'abs', 'bs')):.0f}",
         "cl_mdf": less("mdf"),
@@ -252,6 +325,8 @@ def numbers(folder: Path = STUDIES) -> Numbers:
         return json.loads((folder / name / "results.json").read_text("utf-8"))
 
     return {
+        **summary({name: of(name) for name in JUDGED}),
+        **lost_thrust(of("lost_thrust"), of("chapter7")),
         **chapter5(of("chapter5")),
         **store_weight(of("store_weight")),
         **chapter6(of("chapter6"), of("chapter6_learned")),

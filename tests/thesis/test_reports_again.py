@@ -7,15 +7,27 @@ from support.project import ROOT
 
 from cosim import InputError
 from studies.study_report import stored
-from thesis import chapter5, chapter6, improved, observer_gains, store_weight
+from thesis import (
+    allocation,
+    chapter5,
+    chapter6,
+    improved,
+    lost_thrust,
+    observer_gains,
+    realtime,
+    store_weight,
+)
 
 STUDIES = ROOT / "docs" / "studies"
 LEARNED = STUDIES / "chapter6_learned" / "model.ssv"
 AGAIN = {
+    "allocation": lambda out: allocation.study(out, (), allocation.Push(), (), again=True),
     "chapter5": lambda out: chapter5.study(out, (), None, None, again=True),
     "chapter6": lambda out: chapter6.study(out, (), 1.0, None, again=True),
     "chapter6_learned": lambda out: chapter6.study(out, (), 1.0, None, LEARNED, again=True),
     "improved": lambda out: improved.study(out, (), 0.0, None, again=True),
+    "lost_thrust": lambda out: lost_thrust.study(out, again=True),
+    "realtime": lambda out: realtime.study(out, 20.0, realtime.FACTORS, (), again=True),
     "observer_gains": lambda out: observer_gains.study(out, (), 120.0, None, again=True),
     "store_weight": lambda out: store_weight.study(out, (), None, None, again=True),
 }

@@ -88,23 +88,29 @@ def test_report_has_the_error_against_the_shift(tmp_path, pushed, monkeypatch):
     monkeypatch.setattr(
         allocation.Report,
         "figure",
-        lambda self, name, figure, caption: drawn.update({name: (figure, caption)}),
+        lambda self, name, figure, caption: (
+            drawn.update({name: (figure, caption)}) if self.draws else None
+        ),
     )
     text = allocation.study(tmp_path, range(2), Push(), (-0.05, 0.0, 0.18)).read_text("utf-8")
     found = json.loads((tmp_path / "results.json").read_text("utf-8"))["found"]
-    assert {dx: len(each) for dx, each in found.items()} == {"-0.050": 2, "+0.000": 2, "+0.180": 2}
+    assert {dx: len(t["points"]) for dx, t in found.items()} == dict.fromkeys(
+        ("-0.050", "+0.000", "+0.180"), 2
+    )
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith(("| -0.", "| +0."))]
     assert [row[0] for row in rows] == ["| -0.050", "| +0.000", "| +0.180"]
     assert all(abs(float(row[2].split()[0])) < 0.2 for row in rows), "millimetres, the bias taken off"
     assert "p_o = 0.0200 m" in text
-    pairs = sum(content["events"][0]["value"] > 0.0 for content in pushed[:-2])
+    pairs = sum(content["events"][0]["value"] > 0.0 for content in pushed)
     assert f"It took {pairs / 6:.1f} pairs" in text
     figure, caption = drawn["heading"]
-    before, after = figure.axes[0].get_lines()
+    before, after = figure().axes[0].get_lines()
     assert (before.get_label(), after.get_label()) == ("p_o = 0", "p_o = 0.200 m")
     assert before.get_ydata()[-1] == pytest.approx(np.degrees(0.7 + 0.1 * 0.3 * 0.2 * 9.0))
     assert after.get_ydata()[-1] == pytest.approx(np.degrees(0.7), abs=0.01)
-    assert "+0.18 m away" in caption
+    assert "+0.18 m away (Fig. 6.7)" in caption
+    again = allocation.study(tmp_path, (), Push(force=9.0), (), again=True)
+    assert "commanded 0.3 N" in again.read_text("utf-8").replace("\n", " "), "the push of the results"
 
 
 def test_command_asks_for_its_pushes(tmp_path, monkeypatch):
@@ -113,8 +119,8 @@ def test_command_asks_for_its_pushes(tmp_path, monkeypatch):
     for arguments in ([], ["--quick", "--force", "0.5", "--hidden", "0.1", "0.2"], ["--seeds", "5"]):
         allocation.main(["--out", str(tmp_path), *arguments])
     assert [[*work.args] for work in asked] == [
-        [tmp_path, range(3), Push(), list(allocation.HIDDEN)],
-        [tmp_path, range(1), Push(force=0.5), [0.1, 0.2]],
-        [tmp_path, range(5), Push(), list(allocation.HIDDEN)],
+        [tmp_path, range(3), Push(), list(allocation.HIDDEN), False],
+        [tmp_path, range(1), Push(force=0.5), [0.1, 0.2], False],
+        [tmp_path, range(5), Push(), list(allocation.HIDDEN), False],
     ]
     assert asked[0].func is allocation.study

@@ -580,7 +580,7 @@ def test_report_of_the_lost_thrust(tmp_path, monkeypatch, figures):
     assert "The largest distance from it is 0.00 in N_r." in text
     assert len(results["places"]) == len(lost_thrust.ESTIMATES) * len(lost_thrust.PACES)
     assert results["places"]["MDF, 1"][0] == {"delta_N": 0.1, "N_r": -1.2, "r2": 0.9}
-    assert results["failure"][0]["thesis"].startswith("After the bow thruster's failure")
+    assert results["failure"][0]["thesis"].startswith("When the bow thruster fails")
     assert lost_thrust.study(tmp_path, again=True).read_text("utf-8") == text
     assert "| MDF, force 0.45 s late | 0.25 | 0.100, -1.20, 0.9000 |" in text
     assert set(figures) == {"failure"}
@@ -784,6 +784,7 @@ def test_report_of_the_paced_runs(tmp_path, monkeypatch, figures):
     assert lines(right)["controller_bs"].get_ydata() == pytest.approx([2.0, 20.0])
     assert lines(left)["deadline: one step"].get_ydata() == pytest.approx([10.0, 1.0])
     assert left.get_shared_y_axes().joined(left, right)
+    assert realtime.study(tmp_path, 2.0, (), (), again=True).read_text("utf-8") == text
 
 
 # The real ship
@@ -910,8 +911,12 @@ def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
         (lost_thrust, [], [False]),
         (observer_gains, [], [range(3), estimators.STOP, None, False]),
         (observer_gains, ["--quick"], [range(1), estimators.QUICK_STOP, None, False]),
-        (realtime, ["--factor", "2", "5", "--seconds", "3"], [3.0, [2.0, 5.0], realtime.CONTROLLERS]),
-        (realtime, ["--quick"], [2.0, [100.0], realtime.CONTROLLERS]),
+        (
+            realtime,
+            ["--factor", "2", "5", "--seconds", "3"],
+            [3.0, [2.0, 5.0], realtime.CONTROLLERS, False],
+        ),
+        (realtime, ["--quick"], [2.0, [100.0], realtime.CONTROLLERS, False]),
     ],
 )
 def test_command_asks_for_its_study(module, arguments, given, monkeypatch, tmp_path, capsys):

@@ -114,6 +114,6 @@ def model_error_over_time(
             panel.plot(rows, values[rows, k], color=colour, linewidth=1.0, label=name)
         panel.set_ylabel(f"ω {label}")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=5)
+    figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=7.5, columnspacing=1.0)
     panels[-1].set_xlabel("sample")
     return figure

@@ -194,10 +194,14 @@ def write_table_7_1(report: Report, s: Samples, name: str) -> None:
     r2 = {n: analysis.explained(runs, found.phi) for n, found in own.items()}
     statement = "The identified model has the main dynamics of the model error (7.2.4, Fig. 7.2)"
     report.verdicts(f"{name}_table_7_1", named([explaining(statement, r2)], name))
-    one = runs[0]
-    predicted = {n: analysis.regressors(one) @ phi for n, phi in table.items()}
-    shown = analysis.model_error_over_time(one.omega, predicted, one.time)
-    report.figure(f"{name}_table_7_1", shown, f"ω of {one.names[0]} and Table 7.1 (Fig. 7.2).")
+    caption = f"ω of {runs[0].names[0]} and Table 7.1 (Fig. 7.2)."
+    report.figure(f"{name}_table_7_1", table_picture(runs[0]), caption)
+
+
+def table_picture(s: Samples) -> Figure:
+    """The model error of a run and the rows of Table 7.1 (Fig. 7.2)."""
+    predicted = {n: analysis.regressors(s) @ analysis.row(n) for n in analysis.TABLE_7_1}
+    return analysis.model_error_over_time(s.omega, predicted, s.time)
 
 
 def write_shapes(report: Report, s: Samples, log: Log) -> None:
