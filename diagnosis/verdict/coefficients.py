@@ -4,7 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ..predictors import Model
+from ..predictors.evaluation import quantile
+from ..runs.cleaning import CHANCE
 from ..search.findings import Finding, Findings
 from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
@@ -67,7 +71,7 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
     No effect follows from it. Each training run is predicted without it; a current is in it where that
-    shows beyond chance. Validation runs can reject it.
+    shows beyond chance, and is beyond its own uncertainty. Validation runs can reject it.
 
     Args:
         found: what was found, of which nothing is a finding.
@@ -85,7 +89,7 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
     other, first = runs.losses(found if found.effects else start, start)
     flowing = calibrator.flowing(best)
     still, now = runs.losses(best.findings, flowing.findings)
-    if harm(still, now) and gain(still, now) > 0.0:
+    if harm(still, now) and gain(still, now) > 0.0 and _flows(flowing):
         best = flowing
     else:
         now = still
@@ -93,3 +97,14 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         return None
     its, others = data.losses(best.findings.model, start)
     return None if data.validate and harm(its, others) else best
+
+
+def _flows(fit: RefitOutcome) -> bool:
+    """Whether the current of a fit differs from zero by more than its uncertainty gives by chance."""
+    known, effects = fit.posterior, fit.findings.model.ship.effects
+    names = [f"vessel.{n}" for n in effects["current"].coefficients] if "current" in effects else []
+    at = [k for k, name in enumerate(known.names) if name in names]
+    if not at:
+        return False
+    V, C = known.mean[at], known.covariance[np.ix_(at, at)]
+    return float(V @ np.linalg.solve(C, V)) > quantile(1.0 - CHANCE, len(at))

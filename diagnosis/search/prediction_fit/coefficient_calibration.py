@@ -2,11 +2,12 @@
 
 In addition to the nominal coefficients, each with the prior of where its value is from, those that
 simple models leave out are fitted (lift of the hull by sway and yaw, drag in turns, resistance that is
-not quadratic), and the axis of the heading. The windows are weighed by the covariance of initial state,
-noise and disturbance of the usual run, and in each run a constant sway force and a constant yaw moment
-of that size act, integrated out: the angle of an actuator that nobody recorded is no coefficient. So a
-run counts as what it is, hardly more than one sample of what lasts, and many of what changes with its
-motion.
+not quadratic), and the axis of the heading. The windows are weighed as in :mod:`.fit`, by what the model
+misses in the run of each: errors of slow runs count as much as those of quick ones. In each run a
+constant sway force and a constant yaw moment of the size of the usual disturbance act, integrated out:
+the angle of an actuator that nobody recorded is no coefficient. So a run counts as hardly more than one
+sample of what lasts, and as many of what changes with its motion. The disturbance that the model error
+shows is scaled to what the windows miss: a part of the error does not add up over a window.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,14 +18,21 @@ import numpy as np
 
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import Shooting
-from ...predictors.uncertainty import NEGLIGIBLE
 from ..candidates import SMALL, model_error
 from ..findings import Findings
 from ..gram import WHOLE_RUNS
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance_summary import unrecorded
-from .fit import Information, PredictionFit, fit_to, push_of, shootings, whitened
+from .fit import (
+    Information,
+    PredictionFit,
+    fit_to,
+    information_of,
+    push_of,
+    shootings,
+    whitened,
+)
 from .joint_posterior import JointPosterior
 from .refit import RefitOutcome
 
@@ -54,35 +62,39 @@ class Calibration(PredictionFit):
     def information(self, at: RefinedModel) -> Information:
         model, q = at.model(self.prior), self.unit.size
         whole, pushes = push_of(self.runs, model_error(self.runs, model), self.std)
-        self.assumed = replace(whole, size=np.median([p.size for p in pushes], axis=0))
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
-        unit = np.concatenate([self.unit, self.assumed.size[1:]])
+        usual = np.median([p.size for p in pushes], axis=0)
+        unit = np.concatenate([self.unit, usual[1:]])
         folds = len(self.folds)
-        H, g = np.zeros((folds, q, q)), np.zeros((folds, q))
+        H, G, g = np.zeros((folds, q, q)), np.zeros((q, q)), np.zeros((folds, q))
+        by_constants, missed, expected = np.zeros((q, q)), 0.0, 0.0
         weights, self.constant = [], []
         for s, of in zip(self.windows, self.fold_of_window, strict=True):
             around = s.around(model, steps)
             W = self.whitening(s, around)
             A, r = whitened(W, around.slopes * unit), whitened(W, around.residuals)
+            V = self.scatter(s, around, W, pushes)
+            missed += float(np.sum(r**2))
+            expected += float(np.einsum("wii->", V))
             constant = []
             for place in np.unique(of):
                 rows = of == place
                 both, left = A[rows].reshape(-1, unit.size), r[rows].ravel()
                 J, U = both[:, :q], both[:, q:]
                 K = np.linalg.inv(U.T @ U + np.eye(len(CONSTANTS)))
-                J_U = J.T @ U @ K
-                H[place] += J.T @ J - J_U @ U.T @ J
-                g[place] += J.T @ left - J_U @ (U.T @ left)
+                free = J - U @ K @ (U.T @ J)
+                H[place] += J.T @ free
+                g[place] += free.T @ left
+                scores, along = free.reshape(*A[rows].shape[:2], q), U.T @ free
+                G += information_of(scores, V[rows])
+                by_constants += along.T @ along
                 constant.append((rows, U, K))
             weights.append(W)
             self.constant.append(constant)
-        whole_H = H.sum(axis=0)
-        return Information(whole_H, whole_H, g.sum(axis=0), weights, self.assumed, H, g)
-
-    def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        pooled = squares.sum(axis=(0, 1)) / max(seen.sum(), 1)
-        pooled[:2] = pooled[:2].mean()  # a part of it is not linear
-        return np.broadcast_to(NEGLIGIBLE * pooled, (len(squares), 3))
+        share = missed / expected if expected > 0.0 else 1.0
+        G = share * G + by_constants
+        push = replace(whole, size=np.sqrt(share) * whole.size)
+        return Information(H.sum(axis=0), G, g.sum(axis=0), weights, push, H, g)
 
     def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
         r, total = whitened(weights, self.windows[k].residuals(model)), 0.0

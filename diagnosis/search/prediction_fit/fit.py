@@ -40,6 +40,7 @@ from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
+NO_PUSH = ForceDisturbance(np.zeros(3), np.ones(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,6 @@ class PredictionFit:
         prior: of the nominal coefficients.
 
     Attributes:
-        assumed: the unrecorded force that counts where windows are weighed.
         least: number of runs from which on a fold is a whole one.
     """
 
@@ -135,9 +135,6 @@ class PredictionFit:
         prior: NominalPrior,
     ) -> None:
         self.runs, self.prior, self.windows = runs, prior, windows
-        self.assumed = ForceDisturbance(
-            np.zeros_like(runs[0].smoothed.noise), np.ones_like(runs[0].smoothed.noise)
-        )
         self._place = {id(w.smoothed): k for k, w in enumerate(runs)}
         self.std = np.concatenate([omega_std(w, at.start) for w in runs])
         names, believed = at.fitted, [*prior.std.values()]
@@ -207,7 +204,7 @@ class PredictionFit:
         r = around.residuals
         fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
         seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
-        V = covariance(around.motion[fine], s.at_start[fine], self.assumed)
+        V = covariance(around.motion[fine], s.at_start[fine], NO_PUSH)
         missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
         found = np.zeros((len(r), r[0].size, r[0].size))
         whole = _square(V, s.noise[fine] + missed[fine, None])
@@ -215,6 +212,22 @@ class PredictionFit:
         diagonal = np.einsum("wii->wi", whole)
         diagonal += DIGITS * diagonal.max(axis=1, keepdims=True)
         found[fine] = np.linalg.inv(np.linalg.cholesky(whole))
+        return found
+
+    def scatter(
+        self, s: Shooting, around: Around, W: np.ndarray, pushes: Sequence[ForceDisturbance]
+    ) -> np.ndarray:
+        """Covariance (w, 3T, 3T) of whitened residuals by initial state, noise and the push of each run.
+
+        Args:
+            s, around, W: windows, predictions in them, and what whitens these.
+            pushes: of each run.
+        """
+        fine, found = running(W), np.zeros_like(W)
+        each = [pushes[self._place[id(run)]] for run in s.runs]
+        push = ForceDisturbance(np.array([p.size for p in each])[s.run[fine]], each[0].time)
+        V = covariance(around.motion[fine], s.at_start[fine], push)
+        found[fine] = W[fine] @ _square(V, s.noise[fine]) @ W[fine].transpose(0, 2, 1)
         return found
 
     def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -249,16 +262,11 @@ class PredictionFit:
             around = self.around(s, model)
             W = self.whitening(s, around)
             A = whitened(W, around.slopes)
-            fine = running(W)
-            sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]
-            V = covariance(around.motion[fine], s.at_start[fine], ForceDisturbance(sizes, push.time))
-            back = W[fine].transpose(0, 2, 1) @ A[fine]
-            pushed = (_square(V, s.noise[fine]) @ back).reshape(-1, q)
             r = whitened(W, around.residuals)
             parts = [(A[of == k].reshape(-1, q), r[of == k].ravel()) for k in range(folds)]
             H = np.array([J.T @ J for J, _ in parts])
             g = np.array([J.T @ left for J, left in parts])
-            return H, back.reshape(-1, q).T @ pushed, g, W
+            return H, information_of(A, self.scatter(s, around, W, pushes)), g, W
 
         groups = [*zip(self.windows, self.fold_of_window, strict=True)]
         Hs, Gs, gs, weights = zip(*for_each(of_windows, groups), strict=True)
@@ -272,6 +280,11 @@ def _square(V: np.ndarray, own: np.ndarray) -> np.ndarray:
     flat = V.reshape(len(V), size, size)
     flat[:, range(size), range(size)] += own.reshape(len(V), size)
     return flat
+
+
+def information_of(A: np.ndarray, V: np.ndarray) -> np.ndarray:
+    """G (q, q), the covariance of the scores of whitened slopes A (w, 3T, q) by that of residuals V."""
+    return np.einsum("wia,wib->ab", A, V @ A)
 
 
 def running(W: np.ndarray) -> np.ndarray:
