@@ -25,7 +25,6 @@ from pydantic import (
     FiniteFloat,
     NonNegativeFloat,
     PositiveFloat,
-    field_validator,
 )
 
 from cosim import InputError
@@ -34,7 +33,7 @@ from cosim.fmu import FmuModel, FmuVariable
 from cosim.scenario import read_model
 from cybership.message_text import quoted
 
-from ..predictors.fmu.variable_map import with_names_alone
+from ..runs import Named
 
 # Units of an input that acts in addition to all else.
 FORCES = ("N", "N.m", "Nm", "m/s2", "rad/s2")
@@ -42,12 +41,9 @@ TIME = "time"
 Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
 
-class MappedVariable(BaseModel):
-    """A column in terms of a variable: variable = factor * column + offset."""
+class MappedVariable(Named):
+    """A column in terms of a variable of the FMU: variable = factor * column + offset."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: str = Field(description="variable of the FMU")
     factor: FiniteFloat = Field(
         default=1.0, description="factor from the unit of the column to that of the variable"
     )
@@ -90,11 +86,6 @@ class SystemMap(BaseModel):
     run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] = Field(
         default=0.0, description="time before a prediction is compared [s]"
     )
-
-    @field_validator("inputs", "outputs", "start", mode="before")
-    @classmethod
-    def _names_alone(cls, value: Any) -> Any:
-        return with_names_alone(value)
 
     @property
     def variables(self) -> set[str]:

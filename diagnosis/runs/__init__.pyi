@@ -8,6 +8,7 @@ from .columns.columns import OF_UNIT as OF_UNIT
 from .columns.columns import QUANTITY as QUANTITY
 from .columns.columns import Column as Column
 from .columns.columns import Layout as Layout
+from .columns.columns import Named as Named
 from .columns.columns import beside as beside
 from .columns.columns import side_cars as side_cars
 from .columns.columns import stated_layout as stated_layout

@@ -27,7 +27,6 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
-    field_validator,
 )
 
 from cosim import BASE_UNITS, InputError, Unit
@@ -76,11 +75,6 @@ class VariableMap(BaseModel):
         default=None, description="time before the comparison of a whole run begins [s]"
     )
 
-    @field_validator(*GROUPS, mode="before")
-    @classmethod
-    def _names_alone(cls, value: Any) -> Any:
-        return with_names_alone(value)
-
     def told(self, group: str) -> dict[str, Column]:
         """The signals of a group that have a variable."""
         every: Mapping[str, Column | float | None] = getattr(self, group)
@@ -104,12 +98,6 @@ class VariableMap(BaseModel):
                 if isinstance(column, dict) and column.keys() == {"name"}:
                     told[group][signal] = column["name"]
         return told
-
-
-def with_names_alone(group: Any) -> Any:
-    """A group of a map's entries, in which a text is the name of a variable."""
-    given = group.items() if isinstance(group, dict) else ()
-    return {key: {"name": x} if isinstance(x, str) else x for key, x in given} or group
 
 
 def read_map(path: Path) -> VariableMap:

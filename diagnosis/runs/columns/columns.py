@@ -34,6 +34,7 @@ from pydantic import (
     PositiveFloat,
     StringConstraints,
     field_validator,
+    model_validator,
 )
 
 from cosim import InputError
@@ -102,12 +103,22 @@ def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
 Mark = Annotated[str, StringConstraints(min_length=1, max_length=1)]  # a character
 
 
-class Column(BaseModel):
-    """One column of a file."""
+class Named(BaseModel):
+    """What a file says of a column or a variable; a text is its name alone."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str  # in the file
+    name: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, value: object) -> object:
+        return {"name": value} if isinstance(value, str) else value
+
+
+class Column(Named):
+    """One column of a file, with its name there."""
+
     unit: str | None = None  # SI if not said
     factor: FiniteFloat = 1.0  # by which its numbers are multiplied to be in that unit
     flip: bool = False  # whether its axis points the other way
@@ -147,13 +158,6 @@ class Layout(BaseModel):
         except (LookupError, UnicodeError):
             text = f"{quoted(value)} is not an encoding; there are utf-8, latin-1, ..."
             raise ValueError(text) from None
-
-    @field_validator("columns", mode="before")
-    @classmethod
-    def _names_alone(cls, value: Any) -> Any:
-        if not isinstance(value, dict):
-            return value
-        return {key: {"name": c} if isinstance(c, str) else c for key, c in value.items()}
 
     @field_validator("columns")
     @classmethod
