@@ -174,6 +174,24 @@ def test_the_most_likely_value_is_that_of_scipy_and_each_step_is_downhill(start)
     assert last.cost(found) == seen[-1] == cost(found)
 
 
+@pytest.mark.parametrize(
+    ("cost", "count", "first"), [(lambda x: x**2 + x, 2, 0.0), (lambda x: (x - 1.0) ** 2, 4, 1.25)]
+)
+def test_a_step_is_halved_unless_the_cost_rises_from_the_start(cost, count, first):
+    tried = []
+
+    def about(x):
+        slope = 10.0 if x == 0.0 else 0.0  # wrong in the first case; it ends after a step in the other
+        return Quadratic(np.array([[1.0]]), np.array([slope]), cost)
+
+    def moved(x, step):
+        tried.append(x + float(step[0]))
+        return tried[-1]
+
+    assert most_likely(0.0, about, moved)[0] == first
+    assert tried == [10.0, 5.0, 2.5, 1.25][:count]
+
+
 def test_noise_is_what_all_columns_together_leave_on_each_axis():
     X = np.concatenate([PLAIN.columns, np.zeros((K, 3, 1))], axis=2)
     expected = [np.std(y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) for y, A in zip(Y.T, PLAIN.columns.transpose(1, 0, 2), strict=True)]  # fmt: skip

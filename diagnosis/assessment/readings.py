@@ -10,7 +10,7 @@ from fmus.declare import variables
 
 from ..predictors import Model, WeakWindows
 from ..predictors.thrust import full_thrust
-from ..predictors.weak_form import needed_force
+from ..predictors.weak_form import OF_MOTION, needed_force
 from ..runs import Run
 from ..runs.columns.columns import OF_UNIT, POSE, TAU
 from ..runs.columns.side_car import ColumnChange
@@ -152,13 +152,14 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
 
 def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
     """The windows of a run of a model's ship by another reading."""
-    s, run, memory = w.smoothed, w.run, {}
-    if reading.commands is None:
-        if reading.pace == 1.0:
-            memory["response"] = w.memory.setdefault("response", {})
-    elif run.commands is None:
+    s, run = w.smoothed, w.run
+    same = ["response"] if reading.commands is None and reading.pace == 1.0 else []
+    if reading.pace == 1.0 and reading.turn == 0.0 and (reading.motion == np.eye(3)).all():
+        same += OF_MOTION
+    memory = {part: w.memory.setdefault(part, {}) for part in same}
+    if reading.commands is not None and run.commands is None:
         run = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T)
-    else:
+    elif reading.commands is not None and run.commands is not None:
         commands = run.commands @ reading.commands.T
         run = replace(run, commands=commands, tau_cmd=model.ship.commanded_force(commands, run.power))
     meant = replace(

@@ -5,6 +5,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from itertools import count
 from pathlib import Path
 
@@ -84,9 +85,15 @@ def sha256(path: Path) -> str:
     if path.is_dir():
         path = next((path / name for name in LOGS if (path / name).is_file()), path)
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        stat = path.stat()
+        return _hash(path, stat.st_size, stat.st_mtime_ns)
     except OSError:
         return ""
+
+
+@lru_cache  # of a run it is asked for when it is read, and when the result is written
+def _hash(path: Path, size: int, changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def default_folder(usual: Path, inputs: Mapping[str, str], overwrite: bool = False) -> Path:

@@ -35,6 +35,7 @@ SMALL = 1e-3  # of its usual size: step of a finite difference where nothing is 
 # Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.
 ROOM = 4e7
+OF_MOTION = ("motion", "change", "free", "met")  # parts that do not depend on commands
 
 
 def kernel(s: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ coefficients has one shape; any other has several, one for each value tried of w
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -252,17 +253,40 @@ def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Ef
     return Candidate(e, shapes)
 
 
+def lasts(e: Effect, model: Model) -> bool:
+    """Whether what an effect adds is nearly the same in a model with other effects and coefficients.
+
+    It is so of forces. What an inertia, a current or a filter adds follows from the model's own motion,
+    and the shapes of some effects from the model error.
+    """
+    tried = e.differentiable or bool(e.search.values(model.values))
+    by_error = e.search.smooth or e.search.intervals or spread(e) or not tried
+    return e.kind in ("force", "actuator") and not by_error
+
+
 def candidates(
-    data: Sequence[WeakWindows], model: Model, base: np.ndarray, known: Set[str] = frozenset()
+    data: Sequence[WeakWindows],
+    model: Model,
+    base: np.ndarray,
+    known: Set[str] = frozenset(),
+    earlier: Mapping[str, Candidate] = MappingProxyType({}),
 ) -> list[Candidate]:
     """All effects that the ship can have and that a regression can find, but those that are known.
 
     Those of one actuator of several with one command only where each has commands of its own.
+
+    Args:
+        data: windows of every run.
+        model, base: the model so far and its error (K, 3).
+        known: ids of the effects in it.
+        earlier: candidates by id that stay as they are, see :func:`lasts`.
     """
     ship = model.ship
     apart = ship.layouts[-1]
     each = any(ship.layout_of(w.run.commands) is apart for w in data)
     effects = [ship.effects[name] for name in ship.candidates if name not in known]
     possible = [e for e in effects if e.search.by == "regression" and (each or not e.apart)]
-    found = for_each(lambda e: candidate(data, model, base, e), possible, possible)
-    return [c for c in found if c.shapes]
+    new = [e for e in possible if e.id not in earlier]
+    found = for_each(lambda e: candidate(data, model, base, e), new, new)
+    made = {**earlier, **dict(zip([e.id for e in new], found, strict=True))}
+    return [c for c in (made[e.id] for e in possible) if c.shapes]

@@ -25,7 +25,7 @@ from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
 from .refinement import RefinedModel, TrainingSet, nuisance_of, refit
-from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
+from .shortlist import MadeCandidates, Ranking, Shortlist, leads, rank, reweighted, scored_alone
 from .significance import better, beyond_chance, harmful, matters
 
 
@@ -71,7 +71,8 @@ def search(
     belief = NominalPrior.of(start, prior, MEASURED)
     t, at = TrainingSet(data, None, belief), RefinedModel.at(start, belief)
     advance("every effect as a candidate")
-    ranking = rank(t, at, set())
+    made: MadeCandidates = {}
+    ranking = rank(t, at, set(), made)
     lacking, command = ranking.base, commanded(data, start)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
@@ -102,9 +103,9 @@ def search(
         at = best.winner
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
-            at, accepted = searched_again(t, at, accepted, advance, rng)
+            at, accepted = searched_again(t, at, accepted, made, advance, rng)
         advance(f"effect {len(accepted) + 1}: every effect as a candidate")
-        ranking = rank(t, at, {p.id for p in accepted})
+        ranking = rank(t, at, {p.id for p in accepted}, made)
     if before is not None:
         t, at = before
         del accepted[-1]
@@ -119,6 +120,7 @@ def searched_again(
     t: TrainingSet,
     at: RefinedModel,
     accepted: Sequence[AcceptedEffect],
+    made: MadeCandidates,
     advance: Advance,
     rng: np.random.Generator,
 ) -> tuple[RefinedModel, list[AcceptedEffect]]:
@@ -137,8 +139,13 @@ def searched_again(
         advance(f"effect {k + 1}: its place searched again")
         others = [p for p in found if p is not found[k]]
         beside = at.without(found[k].names)
-        beside = refit(t, beside, nuisance_of(t, beside, t.error(beside))).estimate
-        ranking = rank(t, beside, {p.id for p in others})
+        nuisance = nuisance_of(t, beside, t.error(beside))
+        beside = refit(t, beside, nuisance).estimate
+        theta = [*[beside.values[n] for n in beside.fitted], *beside.offset]
+        nuisance = replace(nuisance, offset=np.array(theta))
+        ranking = rank(t, beside, {p.id for p in others}, made, nuisance)
+        if leads(t, ranking, found[k].id):
+            continue
         weighed = reweighted(t, beside, ranking)
         chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
         if weighed is not None and chosen is not None:

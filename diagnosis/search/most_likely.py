@@ -74,10 +74,28 @@ def most_likely(
         step = np.linalg.solve(here.H, here.right)
         if here.right @ step < ENOUGH:
             break
-        least = here.cost(at)
-        tried = (moved(at, step / 2**k) for k in range(STEPS))
-        further = next((t for t in tried if here.cost(t) < least), None)
+        further = _further(here, at, step, moved)
         if further is None:
             break
         at, here = further, about(further)
     return at, here
+
+
+def _further(
+    here: Quadratic[At], at: At, step: np.ndarray, moved: Callable[[At, np.ndarray], At]
+) -> At | None:
+    """The first of a step and its halves at which the cost is less; None: at none.
+
+    Where the parabola through the cost at both ends and the middle rises from the start, the slopes do
+    not hold there, and shorter steps are not tried.
+    """
+    least, whole = here.cost(at), np.inf
+    for k in range(STEPS):
+        tried = moved(at, step / 2**k)
+        cost = here.cost(tried)
+        if cost < least:
+            return tried
+        if k == 1 and 4.0 * cost - whole >= 3.0 * least:
+            return None
+        whole = cost
+    return None

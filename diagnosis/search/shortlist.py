@@ -12,7 +12,8 @@ from scipy.linalg import block_diag
 
 from ..execution.parallel import for_each
 from ..predictors.uncertainty import independent
-from .candidates import SLIGHT, Candidate, candidates, model_error
+from ..predictors.weak_form import ROOM
+from .candidates import SLIGHT, Candidate, candidates, lasts, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
 from .map_regression import Scored, regression, score
 from .most_likely import STEPS, ridge
@@ -35,6 +36,9 @@ CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined a
 # fall among some fifty candidates (2 log 50 = 7.8).
 NEW = 10.0
 TIE = 2.0  # paired standard errors within which two candidates are indistinguishable
+
+# By the effects of the measurement in the model, the candidates by id.
+MadeCandidates = dict[frozenset[str], dict[str, Candidate]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +65,33 @@ class Ranking:
         return float(self.table.total[0, 0])
 
 
-def rank(t: TrainingSet, at: RefinedModel, known: Set[str]) -> Ranking:
-    """Score every effect that is not known yet."""
+def rank(
+    t: TrainingSet,
+    at: RefinedModel,
+    known: Set[str],
+    made: MadeCandidates | None = None,
+    nuisance: Nuisance | None = None,
+) -> Ranking:
+    """Score every effect that is not known yet.
+
+    Args:
+        t: what is fitted to.
+        at: the model so far.
+        known: ids of the effects in it.
+        made: candidates of earlier rankings, which serve where the measurement is the same; receives
+            those of this one. None: there are none.
+        nuisance: what is fitted along, by slopes nearby; None: not known.
+    """
     model = at.model(t.prior)
     base = model_error(t.data, model)
-    found = candidates(t.data, model, base, known)
-    nuisance = nuisance_of(t, at, base)
+    measured = frozenset(i for i in known if model.ship.effects[i].kind == "measurement")
+    made = {} if made is None else made
+    earlier = made.get(measured, {})
+    found = candidates(t.data, model, base, known, earlier)
+    if sum(s.columns.nbytes for c in found for s in c.shapes) > ROOM * len(t.data):
+        made.clear()  # of a long run there is no room for two
+    made[measured] = earlier | {c.effect.id: c for c in found if lasts(c.effect, model)}
+    nuisance = nuisance_of(t, at, base) if nuisance is None else nuisance
     linear = [s.columns for c in found for s in c.shapes[:1]]
     floor = FLOOR * model.ship.scale.forces
     sigma = noise(base, np.concatenate([*linear, nuisance.columns], axis=2), floor)
@@ -157,6 +182,19 @@ def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking) -> Shortlist:
     table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)
     scored = in_order([score(table, k, 1) for k in range(len(best))])
     return Shortlist([e.id for e in effects], starts, refined, table, scored)
+
+
+def leads(t: TrainingSet, ranking: Ranking, present: str) -> bool:
+    """Whether an effect explains more than every other does, before any is refined.
+
+    By the noise of the training set; by as much as an effect must bring, and without being a free curve,
+    to which a simple law that is hardly worse is preferred.
+    """
+    order = weighted(t, np.asarray(t.sigma), ranking.base, ranking.nuisance, ranking.candidates).order
+    if not order or ranking.candidates[order[0].candidate].effect.search.smooth:
+        return False
+    first = ranking.candidates[order[0].candidate].effect.id == present
+    return first and (len(order) < 2 or order[0].score < order[1].score - NEW)
 
 
 def reweighted(
