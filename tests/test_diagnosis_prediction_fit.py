@@ -19,6 +19,7 @@ from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
 from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.gram import block_folds
 from diagnosis.search.prediction_fit import disturbance as pushes
 from diagnosis.search.prediction_fit.disturbance import ForceDisturbance, covariance, estimate
 from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
@@ -136,6 +137,14 @@ def fitted():
     prior = NominalPrior.of(Model(), {"damping": 0.1})
     at = RefinedModel(Model(), np.zeros(prior.size), {"delta_X_u": -0.5}, np.zeros((1, 1)))
     return fit_to(PredictionFit([hidden()], shootings([hidden()]), at, prior), at), prior
+
+
+def test_model_without_a_stretch_is_fitted_to_the_others():
+    fit, _ = fitted()
+    drags = [m.value("delta_X_u") for m in fit.fold_models]
+    assert len(drags) == len(block_folds([hidden()]))
+    assert 0.0 < np.ptp(drags) < 0.2 * abs(DRAG)
+    assert drags == pytest.approx([fit.estimate.values["delta_X_u"]] * len(drags), rel=0.2)
 
 
 def test_slopes_are_those_of_one_model_after_the_other():

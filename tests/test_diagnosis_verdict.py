@@ -31,7 +31,7 @@ from diagnosis.verdict.confidence import confidence_of, probability
 from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.paired_errors import harm
 from diagnosis.verdict.pruning import prune, without
-from diagnosis.verdict.unproven import proven
+from diagnosis.verdict.unproven import overfits, proven
 from diagnosis.verdict.validation_data import Fold, Losses, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}
@@ -397,6 +397,22 @@ def test_gain_of_a_possibility_shows_in_the_run_that_it_was_not_fitted_to():
         kept, gone = proven(found, data, harm)
         assert bool(kept.effects) == stays
         assert [f.id for f in gone] == ([] if stays else ["X_u"])
+
+
+@pytest.mark.parametrize(
+    ("fitted", "before", "over"),
+    [
+        ({"delta_X_u": -3.0}, {"delta_X_u": -2.5}, False),
+        ({"delta_X_u": -2.5}, {"delta_X_u": -3.0}, True),  # worse than the fit by the model error
+        ({"delta_N_r": 1.0}, {"delta_N_r": 1.5}, True),  # better than that, but not than the first model
+    ],
+)
+def test_fit_to_predictions_is_judged_by_the_run_that_it_has_not_seen(fitted, before, over):
+    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0})[:2], Model()
+    data = ValidationData(runs, [], start, np.full(3, 0.01))
+    both = [Findings(model=start, run_models=[start.plus(v)] * 2) for v in (fitted, before)]
+    assert overfits(*both, data, harm) == over
+    assert not overfits(replace(both[0], run_models=[]), both[1], data, harm)
 
 
 def left_on(**significant):
