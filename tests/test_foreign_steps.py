@@ -2,6 +2,8 @@
 
 import json
 import re
+from functools import partial
+from types import SimpleNamespace
 from zipfile import ZipFile
 
 import numpy as np
@@ -12,6 +14,7 @@ from support.measured import sail
 import diagnosis
 from cosim import InputError
 from diagnosis import Fmu, Run
+from diagnosis.predictors.black_box import BlackBox
 from diagnosis.predictors.fmu.fmu_playback import Playback
 from diagnosis.predictors.predictor import Execution
 from fmus.build import build, native_targets
@@ -283,3 +286,22 @@ def test_a_run_that_is_not_of_the_default_ship_asks_for_the_ship(made, tmp_path,
     told = " ".join(capsys.readouterr().err.split())
     assert "of 1.105 m? --ship NAME|FILE.toml selects it" in told
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("wait", [0.0, 2.0])
+def test_a_whole_run_is_laid_on_the_sample_at_the_end_of_its_run_in(wait):
+    """A straight track from the origin at 1 m/s, turned to the heading that is measured there."""
+    h, time = 0.1, 10.0 + 0.1 * np.arange(200)
+    eta = np.column_stack([3.0 + 0.7 * (time - 10.0), -2.0 + 0.0 * time, 0.4 + 0.01 * (time - 10.0)])
+    motion = np.zeros((41, 6, 2))
+    motion[:, 0], motion[:, 3] = h * np.arange(41.0)[:, None], 1.0
+    box = SimpleNamespace(placed=True, run_in=lambda _: wait, motion=lambda *_: motion)
+    box._placed_at = partial(BlackBox._placed_at, box)
+    runs = [(SimpleNamespace(time=time, eta=eta), np.array([0, 50]))]
+    found = BlackBox._poses(box, SimpleNamespace(h=h, steps=40, runs=runs))
+    assert found.shape == (41, 3, 1, 2)
+    for k, row in enumerate((0, 50)):
+        x, y, psi = eta[row + round(wait / h)]
+        along = h * np.arange(41.0) - wait
+        expected = np.column_stack([x + along * np.cos(psi), y + along * np.sin(psi), psi + 0.0 * along])
+        assert found[:, :, 0, k] == pytest.approx(expected, abs=1e-9)

@@ -12,6 +12,7 @@ import diagnosis
 from diagnosis import Model
 from diagnosis.predictors import write_model
 from diagnosis.report import diagnosis_content
+from diagnosis.report.formatting import as_json
 
 SECONDS = 60.0  # at the size of CyberShip Enterprise 1: a few blocks
 DRAG = {"delta_X_absu_u": -6.0}  # for a ship of unit scale
@@ -43,7 +44,7 @@ def test_another_test_run_changes_nothing_that_is_learned(tmp_path):
         found = diagnosis.diagnose(runs[:1], runs[1:], 0.1, start)
         write_model(tmp_path / "model.ssv", found.learned.model)
         found.posterior.write(tmp_path / "posterior.json")
-        said = json.loads(diagnosis_content(found, None, []).model_dump_json())
+        said = json.loads(as_json(diagnosis_content(found, None, [])))
         assert [e["held_out"] for e in said["errors"]] == [False, True]
         files = [(tmp_path / n).read_bytes() for n in ("model.ssv", "posterior.json")]
         told.append((files, {k: v for k, v in said.items() if k not in OF_RUNS}))

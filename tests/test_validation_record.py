@@ -4,6 +4,7 @@ import json
 import time
 from dataclasses import replace
 from datetime import datetime
+from hashlib import sha256
 from types import SimpleNamespace
 
 import numpy as np
@@ -144,6 +145,22 @@ def test_what_decides_is_hashed_and_a_change_since_is_refused(folder, tmp_path):
     data.write_bytes(data.read_bytes() + b"\n")
     with pytest.raises(InputError, match=r"a\.csv' has changed since"):
         validated(c, tmp_path, {})
+
+
+def test_further_files_are_hashed_once_whether_one_or_several(monkeypatch, tmp_path):
+    paths = [tmp_path / name for name in ("a.py", "b.py", "criteria.json")]
+    for path in paths:
+        path.write_text(path.name)
+    for part in ("_data", "_model"):
+        monkeypatch.setattr(f"diagnosis.acceptance.record.provenance.{part}", lambda _: [])
+    further = {"effects": [*paths[:2], tmp_path / "installed"], "ship": None, "criteria": str(paths[2])}
+    found = files_of(SimpleNamespace(evaluations=[]), further | {"again": paths[0]})
+    assert [(f["role"], f["path"]) for f in found] == [
+        ("effects", str(paths[0])), ("effects", str(paths[1])), ("criteria", str(paths[2])),
+    ]  # fmt: skip
+    assert [f["sha256"] for f in found] == [sha256(p.name.encode()).hexdigest() for p in paths]
+    with pytest.raises(InputError, match="missing"):
+        files_of(SimpleNamespace(evaluations=[]), {"criteria": tmp_path / "missing"})
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """PCA, PLS and the organisation of data, chapter 3: identities, scikit-learn, brute force."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from thesis.analysis import organisation as org
 from thesis.analysis import partial_least_squares as pls
 from thesis.analysis import principal_components as pc
 from thesis.analysis.outlier_report import analyse, sentences
+from thesis.analysis.page_figure import SVG, figure_of
 from thesis.analysis.recipes import RECIPES, recipe
 from thesis.analysis.samples import NU, TAU, Samples, model_error
 
@@ -435,3 +437,26 @@ def test_model_error_of_the_control_model_is_the_rotational_damping():
     nu_dot = np.array([motion(*n, Force(*f), hull) for n, f in zip(nu, tau, strict=True)])
     expected = [rotational_damping_force(v, r, RotationalDamping()) for _, v, r in nu]
     assert model_error(nu, nu_dot, tau) == pytest.approx(np.array(expected), abs=1e-9)
+
+
+def test_a_figure_of_a_page_refers_to_its_own_parts_alone():
+    """Clips and markers by ids with its key; two figures of a page have no id in common."""
+    ids = []
+    for key in ("one", "two"):
+        figure = figure_of(2.0)
+        figure.subplots().plot([0.0, 1.0, 2.0], [0.123456, 1.0, 3.0], marker="o")
+        text = figure.svg(key, "a line")
+        there = set(re.findall(r' id="([^"]+)"', text))
+        asked = {*re.findall(r"url\(#([^)]+)\)", text), *re.findall(r'href="#([^"]+)"', text)}
+        assert asked == there
+        assert len(asked) > 1
+        assert all(name.startswith(f"{key}-") for name in there)
+        assert text.startswith(f'<svg xmlns="{SVG}"')
+        assert (' role="img"' in text, ' aria-label="a line"' in text, "metadata" in text) == (
+            True,
+            True,
+            False,
+        )
+        assert not re.search(r' d="[^"]*\.\d{3}', text), "two digits of a point"
+        ids.append(there)
+    assert not ids[0] & ids[1]
