@@ -34,7 +34,7 @@ TURNS = tuple(k * np.pi / 6.0 for k in range(-5, 6) if k)
 MOST = 6  # power of ten of the odds that are stated; no model is true enough for more
 
 
-class Doubt(NamedTuple):
+class Misreading(NamedTuple):
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
 
     seen: str
@@ -70,16 +70,16 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWi
     return found
 
 
-def _doubt(w: WeakWindows, model: Model) -> Doubt | None:
+def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
     twice, wrong_one = same_columns(w.run), still_column(w.run)
     seen = f"{wrong_one} is constant in all rows, while the other channels of the pose change"
     if twice:
         wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} have the same values"
     if wrong_one:
-        return Doubt(seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column")
+        return Misreading(seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column")
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
-        return Doubt(silent)
+        return Misreading(silent)
     given = gains(w, model)
     wrong = [f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong)]
     seen = beyond or (
@@ -88,8 +88,8 @@ def _doubt(w: WeakWindows, model: Model) -> Doubt | None:
     found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean)
     if found and (found.sure or not seen):
         clause = f"{beyond}; {found.clause}" if beyond else found.clause
-        return Doubt(clause, found.readings[0].changes, sure=found.sure)
-    return Doubt(seen) if seen else None
+        return Misreading(clause, found.readings[0].changes, sure=found.sure)
+    return Misreading(seen) if seen else None
 
 
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:

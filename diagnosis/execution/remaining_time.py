@@ -3,8 +3,8 @@
 The number of effects is known only in the end. The time that is left if no further one is found is the
 least that is possible; :data:`MORE` times that is stated. The true time is at least 0.6 of it then, and
 more than twice it only where it is 3.2 times the least. Where no effect was found, none is validated
-and fitted. A kind of step that has ended takes what it took. Any other one takes its usual time, scaled
-by what the steps so far took.
+and fitted. A kind of step that has ended takes what it took; any other one its usual time, scaled by
+what the steps so far took.
 """
 
 import re
