@@ -132,10 +132,18 @@ def _listed(statements: Sequence[str]) -> str:
     return f": {'; '.join(statements)}" if statements else ""
 
 
-def _as_printed(rows: Sequence[Verdict]) -> str:
-    """How many statements hold for the algorithms as printed, where these are judged."""
-    answers = [overall(row.printed) for row in rows if row.printed != {}]
-    return f" (as printed {sum(x is True for x in answers)} of {len(answers)})" if answers else ""
+def opening(rows: Sequence[Verdict], why: str) -> list[str]:
+    """What held, what did not, and why; nothing where no statement was judged."""
+    by = {h: [v.thesis for v in rows if v.holds is h] for h in (True, False, None)}
+    printed = [overall(v.printed) for v in rows if v.printed != {}]
+    forms = f" (as printed {printed.count(True)} of {len(printed)})" if printed else ""
+    lines = [
+        f"Hold, {len(by[True])} of {len(rows)}{forms}{_listed(by[True])}.",
+        f"Do not hold, {len(by[False])}{_listed(by[False])}; in part or undecided, "
+        f"{len(by[None])}{_listed(by[None])}.",
+        *([f"Reason: {why}"] if why else []),
+    ]
+    return ["\n".join(f"- {line}" for line in lines)] if rows else []
 
 
 class Report:
@@ -209,18 +217,6 @@ class Report:
         """The reason for what did not hold, for the head of the report."""
         self._why = reason
 
-    def _opening(self) -> list[str]:
-        """What held, what did not, and why; nothing where no statement was judged."""
-        by = {h: [v.thesis for v in self._verdicts if v.holds is h] for h in (True, False, None)}
-        count = len(self._verdicts)
-        lines = [
-            f"Hold, {len(by[True])} of {count}{_as_printed(self._verdicts)}{_listed(by[True])}.",
-            f"Do not hold, {len(by[False])}{_listed(by[False])}; in part or undecided, "
-            f"{len(by[None])}{_listed(by[None])}.",
-            *([f"Reason: {self._why}"] if self._why else []),
-        ]
-        return ["\n".join(f"- {line}" for line in lines)] if count else []
-
     def figure(self, name: str, figure: "Figure | Callable[[], Figure]", caption: str) -> None:
         """Write ``<name>.png`` and embed it; a function draws only where figures are drawn."""
         if self.draws:
@@ -255,7 +251,7 @@ class Report:
         """Write ``results.json``, then ``report.md``; returns the latter's path."""
         text = as_json({**self._results, "tables": self._tables})
         title, *rest = self._pieces
-        page = "\n\n".join([title, *self._opening(), *rest])
+        page = "\n\n".join([title, *opening(self._verdicts, self._why), *rest])
         for name, content in ((RESULTS, text), (REPORT, page)):
             with atomic_write(self.folder / name) as scratch:
                 scratch.write_text(content + "\n", encoding="utf-8")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.project import ROOT
 
-from studies.study_report import cell
+from studies.study_report import cell, opening
 from thesis import results_page
 
 STUDIES = ROOT / "docs" / "studies"
@@ -115,6 +115,19 @@ def test_tables_of_a_report_are_those_of_its_results(folder):
     assert len(tables) == rules, "each table of the report is in the results"
 
 
+@pytest.mark.parametrize("name", results_page.JUDGED)
+def test_report_opens_with_the_verdicts_of_its_results(name):
+    content = json.loads((STUDIES / name / "results.json").read_text("utf-8"))
+    text = (STUDIES / name / "report.md").read_text("utf-8")
+    (why,) = re.findall(r"^- Reason: (.*)$", text, re.MULTILINE)
+    rows = results_page.judged(content)
+    assert opening(rows, why)[0] in text
+    for row in rows:
+        here, _, numbers = (cell(x) for x in row.cells)
+        assert f"| {cell(row.thesis)} | {here} | " in text
+        assert f" | {numbers} |" in text
+
+
 def test_page_of_the_thesis_has_the_numbers_of_its_results():
     given = (ROOT / "docs" / "thesis_results.md").read_text("utf-8")
     assert results_page.page() == given, "python -m thesis.results_page > docs/thesis_results.md"
@@ -147,6 +160,8 @@ def test_template_has_every_number_once_and_no_other():
         "9",
         "95",
         "7.1",
+        "0.3",
+        "0.31",
     }
     assert typed <= chosen
 

@@ -4,20 +4,18 @@ Every observer runs open loop over the same logs: simulated ones, where the trut
 ones where ``--data`` gives them.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 import cosim
-from cosim.command import BAD_INPUT, FAILED, run_command
 from cosim.dispatch import FinishedRun
 from cosim.process import scratch_folder
 from studies.measured.data_folder import measured_files
-from studies.study_command import progress, study_parser
+from studies.study_command import progress, run_study, study_parser
 from studies.study_report import Report
 
 from .monte_carlo import SampleMean, interval, run_all, shipped, vary, without
@@ -165,51 +163,13 @@ def measured(report: Report, files: Sequence[Path]) -> dict[str, Any]:
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line; returns the exit code."""
-    parser = study_parser(
-        "thesis.estimators",
-        "Run the observers open loop on the same logs: errors, lags, freezes, wraps.",
-        "  python -m thesis.estimators\n"
-        "  python -m thesis.estimators --quick --out /tmp/estimators\n"
-        "  python -m thesis.estimators --data ~/cse1",
-    )
-    parser.add_argument("--data", type=Path, metavar="DIR", help="measured runs, *.mat (default: none)")
-    options = parser.parse_args(arguments)
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    try:
-        files = measured_files(options.data) if options.data else []
-        written = study(options.out, options.seeds, options.jobs, options.quick, files)
-    except cosim.InputError as error:
-        console.print(f"error: {error}", markup=False)
-        return BAD_INPUT
-    except cosim.SimulationError as error:
-        console.print(f"error: {error}", markup=False)
-        return FAILED
-    sys.stdout.write(f"{written}\n")
-    return 0
-
-
-def study(out: Path, seeds: int, jobs: int | None, quick: bool, files: Sequence[Path]) -> Path:
-    """Run everything and write the report.
-
-    Args:
-        out: folder of the report.
-        seeds: how many.
-        jobs: runs at a time.
-        quick: fewer seeds and shorter runs.
-        files: measured runs.
-
-    Returns:
-        Path of the report.
-    """
+def study(out: Path, seeds: int, jobs: int | None, quick: bool, data: Path | None) -> Path:
+    """Run everything, and the observers on the measured runs of a folder; write the report."""
+    files = measured_files(data) if data else []
     chosen = list(range(min(seeds, QUICK_SEEDS) if quick else seeds))
     stop = QUICK_STOP if quick else STOP
     runs = variants(stop)
-    try:
-        report = Report(out, "Estimator tests, 6.3.3", chosen)
-    except OSError as error:
-        raise cosim.InputError(f"cannot write to '{out}': {error.strerror}") from None
+    report = Report(out, "Estimator tests, 6.3.3", chosen)
     with progress(len(runs) * len(chosen), "runs") as advance:
         found = run_all(runs, chosen, analyse, processes=jobs, advance=advance)
     tables = {name: over_seeds(values) for name, values in found.items()}
@@ -226,5 +186,19 @@ def study(out: Path, seeds: int, jobs: int | None, quick: bool, files: Sequence[
     return report.write()
 
 
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Command line."""
+    parser = study_parser(
+        "thesis.estimators",
+        "Run the observers open loop on the same logs: errors, lags, freezes, wraps.",
+        "  python -m thesis.estimators\n"
+        "  python -m thesis.estimators --quick --out /tmp/estimators\n"
+        "  python -m thesis.estimators --data ~/cse1",
+    )
+    parser.add_argument("--data", type=Path, metavar="DIR", help="measured runs, *.mat (default: none)")
+    options = parser.parse_args(arguments)
+    run_study(partial(study, options.out, options.seeds, options.jobs, options.quick, options.data))
+
+
 if __name__ == "__main__":
-    run_command(main)
+    main()

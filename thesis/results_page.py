@@ -87,12 +87,13 @@ def lost_thrust(r: Results, analysis: Results) -> Numbers:
     columns = next(t["header"] for t in analysis["tables"] if t["header"][0] == "coefficient")
     sysid = {row[0]: dict(zip(columns, row, strict=True)) for row in cells(analysis, "coefficient")}
 
-    def delta(estimates: str, ending: str = "", axes: str = "XYN") -> str:
-        return ", ".join(f"{sysid[f'delta_{a}{ending}'][estimates]:.3f}".replace("-", "−") for a in axes)
+    def delta(estimates: str, ending: str = "") -> str:
+        values = [round(sysid[f"delta_{a}{ending}"][estimates], 3) + 0.0 for a in "XYN"]
+        return ", ".join(f"{x:.3f}".replace("-", "−") for x in values)
 
     r2 = [float(sysid[f"R² of ω {a}"][e]) for a in "XYN" for e in ("true states", "smoothed", "mdf")]
-    rows = {row[0]: row for row in cells(analysis, "model")}
-    spikes = next(row for name, row in rows.items() if name.startswith("identified"))
+    # Of the simulated runs, whose table is the first.
+    spikes = next(row for row in cells(analysis, "model") if row[0].startswith("identified"))
     places = r["places"]
     every = [p["r2"] for each in places.values() for p in each]
     slope, offset = r["line"]

@@ -629,7 +629,7 @@ def test_report_of_the_estimators(tmp_path, monkeypatch, figures):
     )
     monkeypatch.setattr(estimators, "run_all", lambda runs, *_, **__: dict.fromkeys(runs, made))
     monkeypatch.setattr(estimators, "examples", lambda *_: None)
-    text, results = written(estimators.study(tmp_path, 3, None, False, []), tmp_path)
+    text, results = written(estimators.study(tmp_path, 3, None, False, None), tmp_path)
     assert [Verdict(**row).holds for row in results["claims"]] == [True] * 6
     assert text.count("| **0.01") == len(results["simulated"]), "the least of each column is bold"
     assert len(results["simulated"]) == 7 + 2 * len(estimators.HIDDEN)
