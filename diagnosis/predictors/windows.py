@@ -27,11 +27,10 @@ from .weak_form import BLOCK, BLOCKS, HORIZON
 FREE_STEP = BRIEF  # the mean of the commands acts in it
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 ANY_TIME = (-np.inf, np.inf)  # s
-# A velocity is known where predictions begin if over a window its standard deviation moves the ship by
-# no more than this (m times its scale, about a tenth of its length; rad), or is no more than SETTLED
-# times the median of its run. Chosen: at the ends of a run it is three to four times that.
+# m, times the scale of the ship, and rad; where predictions begin a velocity is known if its standard
+# deviation displaces the ship by no more over a window. Chosen: a tenth of its length.
 DISPLACED = 0.1
-SETTLED = 2.0
+SETTLED = 2.0  # times the median of a run, or so well; chosen: at its ends it is three to four
 
 
 @dataclass(frozen=True, eq=False, repr=False)

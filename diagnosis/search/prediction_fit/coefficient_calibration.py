@@ -6,12 +6,13 @@ not quadratic), and the axis of the heading. The windows are weighed as in :mod:
 misses in the run of each: errors of slow runs count as much as those of quick ones. In each run a
 constant sway force and a constant yaw moment of the size of the usual disturbance act, integrated out:
 the angle of an actuator that nobody recorded is no coefficient. So a run counts as hardly more than one
-sample of what lasts, and as many of what changes with its motion. The disturbance that the model error
-shows is scaled to what the windows miss: a part of the error does not add up over a window.
+sample of what lasts, and as many of what changes with its motion. Where the information is counted, the
+disturbance that the model error shows is scaled to what the windows miss: a part of that error does not
+add up over a window.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -93,8 +94,7 @@ class Calibration(PredictionFit):
             self.constant.append(constant)
         share = missed / expected if expected > 0.0 else 1.0
         G = share * G + by_constants
-        push = replace(whole, size=np.sqrt(share) * whole.size)
-        return Information(H.sum(axis=0), G, g.sum(axis=0), weights, push, H, g)
+        return Information(H.sum(axis=0), G, g.sum(axis=0), weights, whole, H, g)
 
     def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
         r, total = whitened(weights, self.windows[k].residuals(model)), 0.0

@@ -40,7 +40,6 @@ from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
-NO_PUSH = ForceDisturbance(np.zeros(3), np.ones(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +203,8 @@ class PredictionFit:
         r = around.residuals
         fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
         seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
-        V = covariance(around.motion[fine], s.at_start[fine], NO_PUSH)
+        none = ForceDisturbance(np.zeros(3), np.ones(3))
+        V = covariance(around.motion[fine], s.at_start[fine], none)
         missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
         found = np.zeros((len(r), r[0].size, r[0].size))
         whole = _square(V, s.noise[fine] + missed[fine, None])
