@@ -310,6 +310,7 @@ def rehearsed(question, designer):
     return Rehearsal(question.data, d.space, k), *(d.windows(s.motion) for s in plans)
 
 
+@pytest.mark.slow
 def test_the_stated_probability_is_that_of_scores_and_caps_of_learn(rehearsed, monkeypatch):
     r, astern, around = rehearsed
     assert r.sure([astern], 0, 20) > 0.9 > 0.1 > r.sure([around], 0, 20)
@@ -331,6 +332,7 @@ def test_a_cause_outside_the_candidates_makes_no_outcome_certain(rehearsed):
     assert other.sure([astern], 0, 2) < 0.5
 
 
+@pytest.mark.slow
 def test_the_trial_of_an_effect_is_that_of_the_search(question, rehearsed):
     """On the old runs alone a trial has the score differences and the evidence of the diagnosis."""
     r, *_ = rehearsed
@@ -441,17 +443,12 @@ def test_the_loop_of_many_models_is_that_of_each_alone(designer):
 
 @pytest.mark.slow
 def test_no_simulated_ship_leaves_the_basin(designer):
-    """Plans that keep the basin with the spread of their draws keep it with draws of another seed."""
+    """A plan that keeps the basin with the spread of its draws keeps it with draws of another seed."""
     d, k = designer
     rng = np.random.default_rng(3)
-    while True:
-        s = d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), 120.0))
-        if s.excess > 0.0:
-            continue
-        if d.spread(k, s, 0).margin.min() <= 0.0:
-            continue
-        assert d.spread(k, s, 99).margin.min() > 0.0
-        return
+    plans = (d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), 120.0)) for _ in range(50))
+    kept = next(s for s in plans if s.excess == 0.0 and d.spread(k, s, 0).margin.min() > 0.0)
+    assert d.spread(k, kept, 99).margin.min() > 0.0
 
 
 @pytest.mark.slow
@@ -517,6 +514,7 @@ def test_parameters_of_an_fmu_without_its_runs_are_refused(tmp_path):
     assert not (tmp_path / "plan").exists()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_inputs_of_an_fmu_are_designed_for_its_parameters(tmp_path):
     """A run at one level does not determine mass and damper, the designed run does."""
