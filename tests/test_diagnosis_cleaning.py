@@ -107,6 +107,18 @@ def test_rows_of_a_shuffled_file_are_all_used():
     assert prepare(run).smoothed.counts.samples == N, "no row is lost on the way to the smoother"
 
 
+def test_a_file_with_the_newest_row_first_is_read():
+    mended = ordered(base().rows(np.arange(N)[::-1]))
+    np.testing.assert_array_equal(mended.time, base().time)
+    np.testing.assert_array_equal(mended.pose, base().pose)
+
+
+def test_rows_that_are_all_there_twice_are_left_out_once():
+    mended = ordered(base().rows(np.repeat(np.arange(N), 2)))
+    np.testing.assert_array_equal(mended.pose, base().pose)
+    assert mended.left_out == N
+
+
 def test_a_wrong_stamp_does_not_move_its_row():
     """Where the ship would jump to its place in time and back, the stamp is at fault."""
     time = base().time.copy()

@@ -40,9 +40,10 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     many = run.time.size
     found = _spread(_merged(continued(_sorted(run), scale)))
     kept = in_order(found.time)
-    out = found.left_out + found.time.size - kept.size
-    if out > MOST_WRONG * many:
-        raise InputError(f"run '{run.name}': time does not increase in {out} of {many} rows")
+    lost = found.time.size - kept.size  # a sample that is there again is none
+    if lost > MOST_WRONG * many:
+        raise InputError(f"run '{run.name}': time does not increase in {lost} of {many} rows")
+    out = found.left_out + lost
     note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
 
@@ -56,10 +57,11 @@ def _sorted(run: Run) -> Run:
     by_time = rows[np.argsort(run.time[rows], kind="stable")]
     if (by_time == rows).all():
         return run
-    steps = [_steps(run.pose[order, :2]) for order in (rows, by_time)]
-    (there, as_written), (_, sorted_way) = ((s.size, float(s.mean()) if s.size else 0.0) for s in steps)
-    if not 0.0 < sorted_way < as_written * np.exp(np.log(CHANCE) / there):
-        return run
+    as_written, way = (_steps(run.pose[order, :2], run.time[order]) for order in (rows, by_time))
+    if as_written.size:  # else the newest row comes first
+        chance = np.exp(np.log(CHANCE) / as_written.size)
+        if not (way.size and 0.0 < way.mean() < as_written.mean() * chance):
+            return run
     moved = int((by_time != rows).sum())
     note = f"rows are not in the order of time, {moved} of {rows.size}: they are sorted by their stamps"
     # Rows without a stamp come last; they are left out.
@@ -68,10 +70,11 @@ def _sorted(run: Run) -> Run:
     )
 
 
-def _steps(position: np.ndarray) -> np.ndarray:
-    """Distances between successive rows of a position (n, 2) that are there."""
-    there = position[np.isfinite(position).all(axis=1) & (np.abs(position) > 0.0).any(axis=1)]
-    return np.linalg.norm(np.diff(there, axis=0), axis=1)
+def _steps(position: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Distances of a position (n, 2) between successive rows that have one, if the time (n,) grows."""
+    there = np.isfinite(position).all(axis=1) & (np.abs(position) > 0.0).any(axis=1)
+    steps = np.linalg.norm(np.diff(position[there], axis=0), axis=1)
+    return steps[np.diff(time[there]) > 0.0]
 
 
 def continued(run: Run, scale: Scale = REFERENCE) -> Run:
