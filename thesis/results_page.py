@@ -35,6 +35,7 @@ JUDGED = {  # study -> section of the thesis
     "chapter7": "7.1 to 7.4",
     "lost_thrust": "7.2.5",
     "improved": "7.5",
+    "stored_samples": "8.1",
 }
 PATHS, SENSES = ("ellipse", "eight"), ("mdf", "kalman")
 

@@ -16,6 +16,7 @@ from thesis import (
     observer_gains,
     realtime,
     store_weight,
+    stored_samples,
 )
 
 STUDIES = ROOT / "docs" / "studies"
@@ -29,6 +30,7 @@ AGAIN = {
     "lost_thrust": lambda out: lost_thrust.study(out, again=True),
     "realtime": lambda out: realtime.study(out, 20.0, realtime.FACTORS, (), again=True),
     "observer_gains": lambda out: observer_gains.study(out, (), 120.0, None, again=True),
+    "stored_samples": lambda out: stored_samples.study(out, (), 198.0, None, again=True),
     "store_weight": lambda out: store_weight.study(out, (), None, None, again=True),
 }
 

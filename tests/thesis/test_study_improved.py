@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fmus.controller.models import SURGE
-from thesis import improved
+from thesis import improved, stored_samples
 from thesis.basin_trials import sysid4
 from thesis.improved import IMPROVED, SURGE_ONLY, Lap, claims, surge_parts
 from thesis.monte_carlo import vary
@@ -52,6 +52,40 @@ def test_verdicts_follow_the_numbers(own, other, verdicts):
 def test_damping_in_surge_alone_takes_the_lag_or_not(alone, here):
     (claim,) = [c for c in claims(found(-0.002, -0.3, alone)) if c.thesis.startswith("(7.1) alone")]
     assert claim.holds is here
+
+
+def test_smoothing_of_stored_samples_is_judged_by_the_axis_of_its_controller(tmp_path, monkeypatch):
+    def laps(better):
+        errors = {"none": 0.04, "smoothing 2": 0.02, "fixed_point 1": 0.02 if better else 0.06}
+        return {
+            key: [
+                Lap(
+                    0.0, 0.0, 0.0, tuple(errors[key.partition("|")[2]] * (1.0 + 0.01 * k) for _ in "XYN")
+                )
+                for k in range(3)
+            ]
+            for key in stored_samples.variants(60.0)
+        }
+
+    assert stored_samples.claims(laps(better=True))[0].holds is True
+    worse = stored_samples.claims(laps(better=False))[0].here
+    assert worse == {
+        "cl_win_eps, fixed_point 1": False,
+        "cl_improved, smoothing 2": True,
+        "cl_improved, fixed_point 1": False,
+    }
+    one = {key: [Lap(0.0, 0.0, 0.0, (1.0, 2.0, 3.0))] for key in laps(better=True)}
+    assert stored_samples.errors(one, stored_samples.WIN, "none") == [2.0], "sway"
+    assert stored_samples.errors(one, stored_samples.IMPROVED, "none") == [1.0], "surge"
+    made = stored_samples.variants(60.0)
+    smoothed = made["controller_cl_improved|fixed_point 1"]["fmus"]["controller"]["parameters"]
+    assert smoothed == {"smoothing": 0.0, "fixed_point": 1.0}
+    assert "delta_X_u" in made["controller_cl_improved|none"]["fmus"]["vessel"]["parameters"]
+    assert "delta_X_u" not in made["controller_cl_win_eps|none"]["fmus"]["vessel"]["parameters"]
+    monkeypatch.setattr(stored_samples, "run_all", lambda *_: laps(better=True))
+    text = stored_samples.study(tmp_path, range(3), 60.0, None).read_text("utf-8")
+    assert "| controller_cl_improved | smoothing 2 | X | 0.0202 [" in text
+    assert stored_samples.study(tmp_path, (), 60.0, None, again=True).read_text("utf-8") == text
 
 
 @pytest.mark.slow
