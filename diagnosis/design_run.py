@@ -115,8 +115,8 @@ def _of_fmu(
     Raises:
         InputError: the FMU is of a ship, or the diagnosis does not state its runs.
     """
-    from .design.fmu_inputs import plan_inputs
     from .design.limits import limits_of
+    from .fmu_parameters.planned_inputs import plan_inputs
     from .fmu_parameters.system_task import is_system, system_task
 
     path = options.diagnosis / DIAGNOSIS

@@ -225,7 +225,7 @@ def test_every_manoeuvre_goes_from_rest_to_rest_within_its_speeds(name):
     h, T = 0.05, 90.0
     t = np.arange(0.0, T + h, h)
     for seed in range(5):
-        numbers = np.random.default_rng(seed).random(NUMBERS)
+        numbers = np.random.default_rng(seed).random(NUMBERS).tolist()
         pose = LIBRARY[name](t, T, numbers, REACH)
         assert pose.shape == (t.size, 3)
         assert np.isfinite(pose).all()

@@ -17,17 +17,17 @@ from scipy.stats import qmc
 
 from cosim import InputError
 
+from ..design.designing import SECONDS
+from ..design.information import Hypothesis, Knowledge, a_optimal, d_optimal
+from ..design.run_files import commands_file
 from ..execution.progress import Advance, silent
 from ..execution.result_folder import together
-from ..fmu_parameters.measured_system import MeasuredRun, windows_of
-from ..fmu_parameters.residuals import Setting, WindowResiduals
-from ..fmu_parameters.sensitivity import confounded
-from ..fmu_parameters.system_task import SystemTask
 from ..report.formatting import as_json, finite
 from ..runs.cleaning import Z95
-from .designing import SECONDS
-from .information import Hypothesis, Knowledge, a_optimal, d_optimal
-from .run_files import commands_file
+from .measured_system import MeasuredRun, windows_of
+from .residuals import Setting, WindowResiduals
+from .sensitivity import confounded
+from .system_task import SystemTask
 
 LOG_COURSES = 5  # of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
 NUMBERS = 4  # of an input: form, least and largest value, period
