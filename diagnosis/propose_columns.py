@@ -198,7 +198,7 @@ def _parser() -> argparse.ArgumentParser:
         "Inspect measurements, and propose their side-car. This is a JSON file next to the CSV file,\n"
         "which states how to read it: names of columns, units, separator, decimal mark, encoding.\n"
         "Entries of an existing side-car are kept. A signal without a column gets a blank name, and\n"
-        "likely columns are listed.",
+        "likely columns are listed. A run that cannot be used so is stated, with the reason.",
         "examples:  %(prog)s my.csv\n"
         "           %(prog)s my.csv --ship otter --write\n"
         "           %(prog)s folder/* --ship my_ship.toml --write\n"
