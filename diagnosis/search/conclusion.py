@@ -8,7 +8,9 @@ import numpy as np
 
 from ..predictors import Model
 from ..predictors.uncertainty import omega_std
+from ..predictors.weak_form import OVERLAP
 from .candidates import model_error
+from .coefficient_rival import LinearProblem, probability_beside_coefficients
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import OTHER_RUN, WHOLE_RUNS, Nuisance, block_folds, gram_table
@@ -45,6 +47,7 @@ class Selection:
         accepted: the effects found, in the order of acceptance.
         ranked: candidates of the first step.
         lacking: (K, 3), the first model error.
+        stated: prior of the nominal coefficients as the ship's description states it.
     """
 
     t: TrainingSet
@@ -52,6 +55,7 @@ class Selection:
     accepted: Sequence[AcceptedEffect]
     ranked: Sequence[Ranked]
     lacking: np.ndarray
+    stated: NominalPrior
 
     @property
     def model(self) -> Model:
@@ -77,7 +81,8 @@ class Selection:
             values = {n: self.at.values[n] for n in p.names}
             own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
             seen, alike = self._evidence(p), credible(p.id, p.weights)
-            together = seen._replace(bagged=p.weights[p.id] + sum(p.weights[i] for i in alike))
+            of_set = p.weights[p.id] + sum(p.weights[i] for i in alike)
+            together = seen._replace(bagged=of_set * self._beside_coefficients(p, 1 + len(alike)))
             q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
             found = Finding(p.id, values, ci95, np.nan, alike, q2, shares[k], nested[k], seen)
             effects.append(replace(found, set_evidence=together))
@@ -156,7 +161,45 @@ class Selection:
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
         std = np.concatenate([omega_std(w, model) for w in data])
-        return evidence(p.weights[p.id], without - left, left, std, self.t.blocks)
+        bagged = p.weights[p.id] * self._beside_coefficients(p, 1)
+        return evidence(bagged, without - left, left, std, self.t.blocks)
+
+    def _beside_coefficients(self, p: AcceptedEffect, ids: int) -> float:
+        """Probability of an effect, or of so many ids, beside coefficients as uncertain as stated."""
+        every = {n for each in self.accepted for n in each.names}
+        absent = {1: [self._rival(frozenset(p.names))]}
+        if len(self.accepted) > 1:
+            absent[len(self.accepted)] = [self._rival(frozenset(every))]
+        return probability_beside_coefficients(self._with_all, absent, ids / max(len(self.ranked), ids))
+
+    @cached_property
+    def _with_all(self) -> list[float]:
+        """Log evidences with all effects, coefficients known to a tenth and as stated."""
+        problem, charged = self._linear(frozenset())
+        ones = np.ones(problem.offset.size)
+        return [problem.log_evidence(wider, charged) for wider in (ones, self._wider)]
+
+    def _rival(self, gone: frozenset[str]) -> float:
+        """Log evidence without some parameters, coefficients as stated."""
+        problem, charged = self._linear(gone)
+        return problem.log_evidence(self._wider, charged)
+
+    @cached_property
+    def _wider(self) -> np.ndarray:
+        """(q,), stated standard deviation of each coefficient over that of the search; 1: it is 0."""
+        pairs = [(self.stated.std[n], std) for n, std in self.t.prior.std.items()]
+        return np.array([stated / std if std and stated else 1.0 for stated, std in pairs])
+
+    def _linear(self, gone: frozenset[str]) -> tuple[LinearProblem, int]:
+        """The model error without some parameters, and the number of those that are left."""
+        t, at = self.t, self.at.without(gone)
+        kept = [k for k, n in enumerate(self.at.fitted) if n not in gone]
+        first = len(self.at.fitted)
+        columns = weighted_rows(self._nuisance.columns, t.weight)
+        y = (t.error(at) * t.weight).ravel()
+        n = np.log(y.size / OVERLAP)
+        problem = LinearProblem(y, columns[:, kept], columns[:, first:], at.offset, float(n))
+        return problem, len(at.values)
 
 
 def laplace_std(t: TrainingSet, nuisance: Nuisance) -> np.ndarray:

@@ -113,7 +113,7 @@ def search(
     for k, p in enumerate(accepted):
         at, intervals = profiled(t, at, p)
         accepted[k] = replace(p, intervals={**p.intervals, **intervals})
-    return Selection(t, at, accepted, ranked, lacking)
+    return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
 
 
 def searched_again(
