@@ -376,6 +376,8 @@ MEASURE_PARTS = (
     "benchmarks.fit_drivers",
     "benchmarks.foreign_parameters.coverage",
     "benchmarks.learning_time",
+    "benchmarks.next_pool",
+    "benchmarks.next_run",
     "benchmarks.sensitivity.on_evidence",
 )
 

@@ -48,7 +48,7 @@ from diagnosis.design.information import (
 from diagnosis.design.limits import limits_of
 from diagnosis.design.manoeuvre_library import LIBRARY, NUMBERS, PlanStep, Reach, poses, sequence, usual
 from diagnosis.design.planned_motion import EVERY, PlannedMotion
-from diagnosis.design.rehearsal import Rehearsal, Trial
+from diagnosis.design.rehearsal import Rehearsal, RehearsedEffect
 from diagnosis.design.spread import STEP, drawn, followed
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest
@@ -338,7 +338,7 @@ def test_the_trial_of_an_effect_is_that_of_the_search(question, rehearsed):
     r, *_ = rehearsed
     found = diagnosis.diagnose(question.data, prior=question.prior).learned.effects[0]
     h = next(h for h in r.k.hypotheses if h.ids == (found.id,))
-    trial = Trial.of(r.wide, r.measured, r.measured.y, h, found.id)
+    trial = RehearsedEffect.of(r.wide, r.measured, r.measured.y, h, found.id)
     mine = trial.finding(r.measured.y, np.random.default_rng(0))
     assert mine.evidence is not None
     assert found.evidence is not None
@@ -359,7 +359,6 @@ def test_what_the_actuators_cannot_do_is_not_proposed(designer):
 
 def test_the_planned_motion_is_what_its_thrust_gives():
     """A ship that is pushed by the computed force alone follows the target."""
-    from diagnosis.predictors.prediction import moved
     from fmus.signals import Force
     from fmus.vessel import vessel
 
@@ -368,7 +367,7 @@ def test_the_planned_motion_is_what_its_thrust_gives():
     tau = motion.thrust(model)
     s = vessel.State._make([*map(float, motion.eta[0]), 0.0, 0.0, 0.0, 0.0])
     for row in tau[:1000]:
-        s = moved(s, Force(*map(float, row)), model.hull, h)
+        s = vessel.integrate(s, Force(*map(float, row)), model.hull.hull, h)
     assert (s.x, s.y, s.psi) == pytest.approx(motion.eta[1000], abs=0.01)
 
 

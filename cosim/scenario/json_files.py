@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from cybership.model_fault import Special, first_fault, no_special
 from cybership.renamed import with_new_names
 
-from ..errors import InputError, nearest, unique_keys
+from ..errors import InputError, most_alike, nearest, unique_keys
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -39,7 +39,9 @@ def json_content(path: Path, what: str, known: Iterable[str] = (), raw: bytes | 
         json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
         files = path.parent.glob("*.json") if path.parent.is_dir() else []
-        hint = nearest(path.name, [*known, *(p.name for p in files if not p.name.startswith("."))])
+        near, shipped = [p.name for p in files if not p.name.startswith(".")], [*known]
+        by_name = most_alike(path.stem, shipped) or not near
+        hint = nearest(path.stem, shipped) if by_name else nearest(path.name, near)
         raise InputError(f"no such {what.removeprefix('a ')}: '{path}'{hint}") from None
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None

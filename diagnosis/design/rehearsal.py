@@ -35,7 +35,7 @@ UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by wha
 UNIT = np.full(3, OVERLAP**-0.5)  # noise of overlapping windows where that of one that counts is 1
 
 
-class Rows(NamedTuple):
+class RowsOfRuns(NamedTuple):
     """Windows of runs, forces in units of the noise that counts for one window.
 
     Attributes:
@@ -76,15 +76,15 @@ class Rehearsal:
         return replace(self.space, blocks=known)
 
     @cached_property
-    def measured(self) -> Rows:
+    def measured(self) -> RowsOfRuns:
         """The old runs."""
         return self.rows(self.data)
 
-    def rows(self, data: Sequence[WeakWindows]) -> Rows:
+    def rows(self, data: Sequence[WeakWindows]) -> RowsOfRuns:
         """Runs in units of the noise."""
         start, sigma = self.space.start, self.space.sigma
         y, std = model_error(data, start), np.concatenate([omega_std(w, start) for w in data])
-        return Rows(y / sigma, self.wide.columns(data), std / sigma, block_numbers(data))
+        return RowsOfRuns(y / sigma, self.wide.columns(data), std / sigma, block_numbers(data))
 
     @cached_property
     def residual(self) -> list[set[str]]:
@@ -97,7 +97,7 @@ class Rehearsal:
     def listed(self) -> float:
         """Probability that a candidate is the true cause, by what the likeliest leaves [1]."""
         h, old = self.k.hypotheses[int(np.argmax(self.k.weights))], self.measured
-        trials = [Trial.of(self.wide, old, old.y, h, i) for i in h.ids]
+        trials = [RehearsedEffect.of(self.wide, old, old.y, h, i) for i in h.ids]
         return min((probability(t.judged(old.y)[0]) for t in trials), default=1.0)
 
     @property
@@ -117,7 +117,7 @@ class Rehearsal:
     def confidences(self, planned: Sequence[WeakWindows], seed: int, draws: int = DRAWS) -> np.ndarray:
         """(draws,), least confidence in an effect of the true hypothesis after planned runs [1]."""
         old, new = self.measured, self.rows(planned)
-        both = Rows(*(np.concatenate(pair) for pair in zip(old, new, strict=True)))
+        both = RowsOfRuns(*(np.concatenate(pair) for pair in zip(old, new, strict=True)))
         both.blocks[len(old.y) :, 0] += len(self.data)
         rng, doubt, start = np.random.default_rng(seed), doubt_of_data(self.data), self.space.start
         drawn = rng.choice(len(self.k.weights), draws, p=self.k.weights)
@@ -126,7 +126,7 @@ class Rehearsal:
             h, e = self.k.hypotheses[n], self.k.estimates[n]
             X, mean = new.X[..., h.columns], e.mean[h.columns]
             like = np.concatenate([old.y, X @ mean])
-            trials = [Trial.of(self.wide, both, like, h, i) for i in h.ids]
+            trials = [RehearsedEffect.of(self.wide, both, like, h, i) for i in h.ids]
             count = int(np.sum(drawn == n))
             for z in rng.multivariate_normal(mean, e.covariance, count, method="eigh"):
                 y = np.concatenate([old.y, X @ z + self._noise(len(X), rng)])
@@ -145,7 +145,7 @@ class Rehearsal:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class RehearsedEffect:
     """An effect of a hypothesis next to its nearest rivals.
 
     Attributes:
@@ -159,11 +159,13 @@ class Trial:
     rivals: Sequence[Candidate]
     nuisance: Nuisance
     known: np.ndarray
-    rows: Rows
+    rows: RowsOfRuns
     steps: Sequence[float]
 
     @classmethod
-    def of(cls, s: Space, rows: Rows, like: np.ndarray, h: Hypothesis, effect: str) -> "Trial":
+    def of(
+        cls, s: Space, rows: RowsOfRuns, like: np.ndarray, h: Hypothesis, effect: str
+    ) -> "RehearsedEffect":
         """Choose the rivals of one effect of a hypothesis by a model error (K, 3) that is expected."""
         q, places = len(s.nuisance), s.places()
         others = [i for i in h.ids if i != effect]

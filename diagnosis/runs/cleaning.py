@@ -60,6 +60,7 @@ class Track(ShortRepr):
         dropped: (n,), no position: NaN, infinite, or all three zero.
         between: (n,), rows of a log between two measurements of a slower measurement system.
         period: of the measurement [s].
+        out: number of samples that are left out, as they have no time of their own.
         notes: what was found, a line each.
         scale: of the ship.
     """
@@ -71,6 +72,7 @@ class Track(ShortRepr):
     dropped: np.ndarray
     between: np.ndarray
     period: float
+    out: int
     notes: tuple[str, ...]
     scale: Scale = REFERENCE
 
@@ -128,8 +130,8 @@ class Track(ShortRepr):
 
     def counts(self, spikes: int = 0) -> Counts:
         """Counts of the samples by their use."""
-        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.run.left_out
-        samples = int((~self.between).sum()) + self.run.left_out
+        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.out
+        samples = int((~self.between).sum()) + self.out
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
 
 
@@ -164,7 +166,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     if between.any() or lined.any():
         notes.append("rows between two measurements were linearly interpolated: they are not counted")
     period = float(np.median(np.diff(run.time[fresh])))
-    refuse_time(row, seconds, where, run.called, scale)
+    refuse_time(row, seconds, where, run.called or {}, scale)
     steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
@@ -187,7 +189,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     of_heading = np.flatnonzero(measured[:, 2])
     turning = np.interp(run.time[fresh], run.time[of_heading], run.pose[of_heading, 2])
     as_read = np.column_stack([run.pose[fresh, :2], turning])
-    refuse_units(run.time[fresh], as_read, where, anyway, run.called)
+    refuse_units(run.time[fresh], as_read, where, anyway, run.called or {})
     pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])
@@ -198,7 +200,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         begin = run.time[fresh][steps.argmax()] - run.time[0]
         longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
-    return Track(run, pose, measured, frozen, dropped, between, period, tuple(notes), scale)
+    return Track(
+        run, pose, measured, frozen, dropped, between, period, run.left_out, tuple(notes), scale
+    )
 
 
 def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.ndarray:

@@ -94,6 +94,7 @@ def thinned(track: Track) -> Track:
         dropped,
         gone & ~frozen & ~dropped,
         max(track.period, width),
+        track.out,
         (*track.notes, note),
         track.scale,
     )

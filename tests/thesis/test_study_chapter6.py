@@ -11,6 +11,7 @@ from cosim.dispatch import FinishedRun
 from diagnosis import Model
 from diagnosis.predictors import write_model
 from fmus.hull import RotationalDamping
+from studies import study_report
 from thesis import chapter6
 from thesis.basin_trials import (
     causes,
@@ -515,7 +516,7 @@ def test_a_ship_that_is_behind_is_so_along_itself_and_lost_from_two_metres_on():
 @pytest.mark.timeout(900)
 @pytest.mark.usefixtures("serial")
 def test_whole_study_in_small(tmp_path, monkeypatch):
-    draw, sets = chapter6.draw, {}
+    draw, sets = study_report.draw, {}
 
     def one_set(logs, folder, told):
         """Of the four sets of pictures, which differ by their data alone, the first is drawn."""
@@ -523,7 +524,7 @@ def test_whole_study_in_small(tmp_path, monkeypatch):
             [path.name for path in draw(logs, folder, told)] if not sets else []
         )
 
-    monkeypatch.setattr(chapter6, "draw", one_set)
+    monkeypatch.setattr(study_report, "draw", one_set)
     report = chapter6.study(tmp_path, range(1), 0.02, None, None)
     text = report.read_text()
     results = json.loads((tmp_path / "results.json").read_text())

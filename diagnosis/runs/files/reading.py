@@ -60,7 +60,7 @@ class Run(ShortRepr):
         power: (n, m), force of thrusters as shares of that at full power; None if full.
         notes: what was found that is not as it should be, a line each.
         held: (n,), rows whose commands are missing in the file, and held; None if none is.
-        layout: how it was read: the side-car, units in names, or a proposal.
+        called: signal -> its column in the file, of those with another name; None if there is none.
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
         signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
@@ -71,6 +71,7 @@ class Run(ShortRepr):
         resolution: (n, 3), step to which the pose is rounded in the file [m, m, rad]; None: not at all.
         hashes: file that it was read from -> SHA-256 when it was read: the measurement, then side-cars.
         left_out: number of samples that are left out, as they have no time of their own.
+        layout: how it was read: the side-car, units in names, or a proposal.
     """
 
     name: str
@@ -81,7 +82,7 @@ class Run(ShortRepr):
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     held: np.ndarray | None = None
-    layout: Layout = field(default_factory=Layout)
+    called: Mapping[str, str] | None = None
     file: Path | None = None
     absent: tuple[str, ...] = ()
     signals: tuple[str, ...] = field(default_factory=lambda: ship().layout.commands)
@@ -92,11 +93,7 @@ class Run(ShortRepr):
     resolution: np.ndarray | None = None
     hashes: Mapping[Path, str] = field(default_factory=dict)
     left_out: int = 0
-
-    @property
-    def called(self) -> dict[str, str]:
-        """Signal -> its column in the file, of those with another name."""
-        return {s: c.name for s, c in self.layout.columns.items() if c.name != s}
+    layout: Layout = field(default_factory=Layout)
 
     @property
     def coarse(self) -> np.ndarray:
@@ -221,7 +218,15 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
     run = _run(name, columns, where, of)
     rounded = np.column_stack([steps[name] for name in POSE])
-    return replace(run, layout=layout, noise=noise, trial=layout.trial, resolution=rounded)
+    called = {s: c.name for s, c in layout.columns.items() if c.name != s}
+    return replace(
+        run,
+        called=called or None,
+        noise=noise,
+        trial=layout.trial,
+        resolution=rounded,
+        layout=layout,
+    )
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
