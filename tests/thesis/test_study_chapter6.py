@@ -528,7 +528,7 @@ def test_whole_study_in_small(tmp_path, monkeypatch):
     report = chapter6.study(tmp_path, range(1), 0.02, None, None)
     text = report.read_text()
     results = json.loads((tmp_path / "results.json").read_text())
-    assert len(results["lessons"]) == 10
+    assert len(results["lessons"]) == 13
     assert len(results["observations"]) == 6
     assert {len(r) for r in results["trials"].values()} == {4}
     assert len(results["trials"]) == 8
