@@ -1,6 +1,6 @@
 """The end of a search: what was found, with intervals, shares and evidence, all fitted together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -80,9 +80,11 @@ class Selection:
         for k, p in enumerate(self.accepted):
             values = {n: self.at.values[n] for n in p.names}
             own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
-            seen, alike = self._evidence(p), credible(p.id, p.weights)
+            alike = credible(p.id, p.weights)
+            own_share, set_share = self._beside_coefficients(p, 1, 1 + len(alike))
             of_set = p.weights[p.id] + sum(p.weights[i] for i in alike)
-            together = seen._replace(bagged=of_set * self._beside_coefficients(p, 1 + len(alike)))
+            seen = self._evidence(p, p.weights[p.id] * own_share)
+            together = seen._replace(bagged=of_set * set_share)
             q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
             found = Finding(p.id, values, ci95, np.nan, alike, q2, shares[k], nested[k], seen)
             effects.append(replace(found, set_evidence=together))
@@ -156,30 +158,34 @@ class Selection:
         table = gram_table(t.error(at), t.blocks, [], nuisance, np.asarray(t.sigma))
         return score(table, -1, 1)
 
-    def _evidence(self, p: AcceptedEffect) -> EffectEvidence:
+    def _evidence(self, p: AcceptedEffect, bagged: float) -> EffectEvidence:
         data, model = self.t.data, self.model
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
         std = np.concatenate([omega_std(w, model) for w in data])
-        bagged = p.weights[p.id] * self._beside_coefficients(p, 1)
         return evidence(bagged, without - left, left, std, self.t.blocks)
 
-    def _beside_coefficients(self, p: AcceptedEffect, ids: int) -> float:
-        """Probability of an effect, or of so many ids, beside coefficients as uncertain as stated."""
-        every = {n for each in self.accepted for n in each.names}
-        absent = {1: [self._rival(frozenset(p.names))]}
+    def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
+        """Probability of sets of so many ids, with an effect, beside coefficients as stated."""
+        absent = {1: [self._rival(p.names)]}
         if len(self.accepted) > 1:
-            absent[len(self.accepted)] = [self._rival(frozenset(every))]
-        return probability_beside_coefficients(self._with_all, absent, ids / max(len(self.ranked), ids))
+            absent[len(self.accepted)] = [self._without_any]
+        present, candidates = self._with_all, len(self.ranked)
+        return [probability_beside_coefficients(present, absent, n / max(candidates, n)) for n in ids]
 
     @cached_property
     def _with_all(self) -> list[float]:
         """Log evidences with all effects, coefficients known to a tenth and as stated."""
-        problem, charged = self._linear(frozenset())
+        problem, charged = self._linear(())
         ones = np.ones(problem.offset.size)
         return [problem.log_evidence(wider, charged) for wider in (ones, self._wider)]
 
-    def _rival(self, gone: frozenset[str]) -> float:
+    @cached_property
+    def _without_any(self) -> float:
+        """Log evidence without any effect, coefficients as stated."""
+        return self._rival([n for p in self.accepted for n in p.names])
+
+    def _rival(self, gone: Collection[str]) -> float:
         """Log evidence without some parameters, coefficients as stated."""
         problem, charged = self._linear(gone)
         return problem.log_evidence(self._wider, charged)
@@ -190,15 +196,19 @@ class Selection:
         pairs = [(self.stated.std[n], std) for n, std in self.t.prior.std.items()]
         return np.array([stated / std if std and stated else 1.0 for stated, std in pairs])
 
-    def _linear(self, gone: frozenset[str]) -> tuple[LinearProblem, int]:
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        """Columns of all fitted values and coefficients as weighted rows, see :func:`.weighted_rows`."""
+        return weighted_rows(self._nuisance.columns, self.t.weight)
+
+    def _linear(self, gone: Collection[str]) -> tuple[LinearProblem, int]:
         """The model error without some parameters, and the number of those that are left."""
         t, at = self.t, self.at.without(gone)
         kept = [k for k, n in enumerate(self.at.fitted) if n not in gone]
         first = len(self.at.fitted)
-        columns = weighted_rows(self._nuisance.columns, t.weight)
         y = (t.error(at) * t.weight).ravel()
         n = np.log(y.size / OVERLAP)
-        problem = LinearProblem(y, columns[:, kept], columns[:, first:], at.offset, float(n))
+        problem = LinearProblem(y, self._rows[:, kept], self._rows[:, first:], at.offset, float(n))
         return problem, len(at.values)
 
 

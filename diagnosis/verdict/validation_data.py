@@ -111,7 +111,7 @@ class ValidationData:
             return [Fold(w) for w in self.validate]
         return [Fold(self.train[run], blocks) for run, blocks in run_folds(self.train, self.least)]
 
-    @property
+    @cached_property
     def of_other_runs(self) -> "ValidationData":
         """The same data, each of two runs left out as a whole: what holds in one may not in another."""
         if self.validate:
