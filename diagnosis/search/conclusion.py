@@ -118,10 +118,10 @@ class Selection:
             step = dict(zip(fitted, change.tolist(), strict=False))
             return self.at.plus(step, change[len(fitted) :]).model(t.prior)
 
-        usual, whole = (
-            [without(held) for held in block_folds(t.data, n)] for n in (WHOLE_RUNS, OTHER_RUN)
-        )
-        return usual, whole
+        usual = [without(held) for held in block_folds(t.data, WHOLE_RUNS)]
+        if not OTHER_RUN <= len(t.data) < WHOLE_RUNS:
+            return usual, usual
+        return usual, [without(held) for held in block_folds(t.data, OTHER_RUN)]
 
     def _of(self, at: RefinedModel) -> Nuisance:
         """Nuisance parameters of a part of the effects, by slopes beside all of them."""
