@@ -12,6 +12,7 @@ from cosim import InputError
 from diagnosis import Model, diagnose
 from diagnosis.predictors import omega, weak_windows
 from diagnosis.predictors.thrust import Response, thrust
+from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.report.finding_text import sentence
 from diagnosis.search import Method, method
 from diagnosis.search.candidates import candidates, model_error
@@ -224,6 +225,10 @@ def test_ships_with_and_without_a_users_effects_live_in_one_process(craft):
     for craft, product in ((one, u * u * v), (other, u * r), (one, u * u * v)):
         gives = nominal - omega(w, Model(value, ship=craft))
         assert gives[:, 2] == pytest.approx(w.smooth @ (400.0 * product), abs=1e-9)
+    stds = [omega_std(w, Model(value, ship=craft)) for craft in (one, other)]
+    w.memory.clear()
+    assert stds[1] == pytest.approx(omega_std(w, Model(value, ship=other)), rel=1e-12)
+    assert stds[0] != pytest.approx(stds[1], rel=1e-3)
     said = sentence(Found(one.effects["N_uuv"], value))
     assert said.startswith("A drift at speed turns the ship: ")
     assert "N_uuv" not in ship().effects
