@@ -9,7 +9,8 @@ from scipy import optimize, stats
 from scipy.linalg import block_diag
 
 from diagnosis.predictors.weak_form import OVERLAP
-from diagnosis.runs.cleaning import CHANCE, DIGITS
+from diagnosis.runs.cleaning import DIGITS
+from diagnosis.runs.run_constants import CHANCE
 from diagnosis.search import candidates
 from diagnosis.search.candidates import Candidate, CandidateShape, scaled, smoothness
 from diagnosis.search.gram import Nuisance, block_folds, gram_table, noise

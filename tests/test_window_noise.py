@@ -19,7 +19,7 @@ from diagnosis.predictors.uncertainty import (
     omega_std,
 )
 from diagnosis.predictors.weak_form import BLOCK, EVERY, OVERLAP, WIDTH
-from diagnosis.runs.cleaning import CHANCE
+from diagnosis.runs.run_constants import CHANCE
 from diagnosis.search.prediction_fit import disturbance_summary
 from fmus.scale import REFERENCE
 

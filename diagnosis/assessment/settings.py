@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..predictors.uncertainty import MEASURED, NEGLIGIBLE
-from ..runs.cleaning import CHANCE
+from ..runs.run_constants import CHANCE
 
 
 @dataclass(frozen=True)

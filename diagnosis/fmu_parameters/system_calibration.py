@@ -9,7 +9,7 @@ from scipy.stats import chi2, norm
 
 from ..execution.progress import Advance, silent
 from ..predictors.prediction import FAR_OFF
-from ..runs.cleaning import CHANCE
+from ..runs.run_constants import CHANCE
 from ..search.prediction_fit.joint_posterior import together
 from ..search.shortlist import TIE
 from ..verdict.confidence import EVEN_ODDS, FOUND

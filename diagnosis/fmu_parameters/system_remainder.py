@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..predictors.uncertainty import NEGLIGIBLE, SHARE_OF_COMMAND
-from ..runs.cleaning import CHANCE
+from ..runs.run_constants import CHANCE
 from .measured_system import Window
 from .residuals import WindowResiduals
 

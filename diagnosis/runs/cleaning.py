@@ -15,8 +15,8 @@ from ..execution.short_text import ShortRepr
 from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
-from .row_order import CHANCE as CHANCE
-from .row_order import HORIZON, LONG, ordered
+from .row_order import ordered
+from .run_constants import HELD, HORIZON, LONG
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
@@ -26,9 +26,6 @@ BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to 
 # Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
 # which nothing can be differentiated.
 SPARSE = 0.05
-# s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
-# so that a command that is wrong there hardly counts.
-HELD = 0.5
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 FEWEST = 4  # samples, without which there is no third difference

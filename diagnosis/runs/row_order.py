@@ -13,12 +13,8 @@ from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
 from .files.reading import Run
+from .run_constants import CHANCE, HORIZON, LONG
 
-CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
-# s of CyberShip Enterprise 1, times the scale of the ship: of predictions, and of the shortest run.
-# Chosen: motions of the unstable nominal hull of CyberShip Enterprise 1 grow at up to 0.18 1/s.
-HORIZON = 8.0
-LONG = 5.0  # sampling periods of a gap, if that is longer than HELD seconds
 MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
 
 

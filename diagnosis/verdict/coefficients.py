@@ -8,7 +8,7 @@ import numpy as np
 
 from ..predictors import Model
 from ..predictors.evaluation import quantile
-from ..runs.cleaning import CHANCE
+from ..runs.run_constants import CHANCE
 from ..search.findings import Finding, Findings
 from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator

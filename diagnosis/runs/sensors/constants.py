@@ -11,7 +11,7 @@ import numpy as np
 
 from fmus.scale import REFERENCE_LENGTH, Scale
 
-from ..cleaning import HORIZON
+from ..run_constants import HORIZON
 from .evidence import Evidence, integral
 
 Needs = Literal["velocity", "rate"]

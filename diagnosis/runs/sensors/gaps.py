@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ..cleaning import HELD, LONG, Z95
+from ..cleaning import Z95
 from ..files.telegrams import groups_of
+from ..run_constants import HELD, LONG
 from ..thinning import MOST_ROWS
 from .constants import LEAST
 from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of

@@ -6,8 +6,8 @@ import numpy as np
 
 from fmus.scale import Scale
 
-from ..cleaning import LONG
 from ..files.reading import Run
+from ..run_constants import LONG
 from .evidence import Evidence, evidence, large
 from .wraps import wraps
 

@@ -34,7 +34,7 @@ from scipy.linalg import LinAlgError
 from scipy.optimize import brentq
 from scipy.special import chdtrc
 
-from ..cleaning import CHANCE
+from ..run_constants import CHANCE
 from .penalised import JERK, POSE, Equations, Fit, LinearSystem, Problem, solve
 from .spline import ORDER, third
 

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cleaning import CHANCE, Z95
+from ..cleaning import Z95
+from ..run_constants import CHANCE
 from ..sensors.evidence import FAR
 from .likelihood import adapt, likeliest, with_noise
 from .penalised import Fit, Problem, solve

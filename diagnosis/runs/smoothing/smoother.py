@@ -20,22 +20,11 @@ from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
 from ...execution.short_text import ShortRepr
-from ..cleaning import (
-    BRIEF,
-    CHANCE,
-    HEADING,
-    HORIZON,
-    LONG,
-    PLACE,
-    WIDTH,
-    Counts,
-    Track,
-    noise,
-    repeated,
-)
+from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise, repeated
 from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
 from ..measured_wind import air_along
+from ..run_constants import CHANCE, HORIZON, LONG
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
