@@ -1,10 +1,13 @@
-"""A recorded step of a prediction gives the bits of the functions that it is recorded from."""
+"""A recorded step of a prediction gives the bits of the functions that it is recorded from.
+
+In machine code it gives those of libm, of which a sine or an exponential of numpy may differ in the last.
+"""
 
 import numpy as np
 import pytest
 
 from diagnosis import Model
-from diagnosis.predictors import recorded_step, ship_with
+from diagnosis.predictors import compiled_step, recorded_step, ship_with
 from diagnosis.predictors.prediction import stacked
 from diagnosis.predictors.recorded_step import Inputs, Ready, step
 from diagnosis.predictors.recorded_step import recorded_step as recorded
@@ -41,6 +44,49 @@ def test_numbers(name):
     s, i, b = at(SHIPS[name], np.random.default_rng(2))
     s, i = vessel.State._make(x.item(0) for x in s), Inputs(*(x[:, 0, 0].tolist() for x in i[:2]))
     assert recorded(b, i, single=True)(*s, *i.given, *i.acting, H) == step(s, i, b, H)
+
+
+def by_step(start, given, acting, b):
+    """The states (steps + 1, 7, 3, 5) by the functions that a step is recorded from."""
+    s, found = start, []
+    for k in range(len(given) + 1):
+        found.append(np.stack([np.broadcast_to(x, (3, 5)) for x in s]))
+        if k < len(given):
+            s = step(s, Inputs(given[k], acting[k]), b, H)
+    return np.stack(found)
+
+
+@pytest.mark.skipif(not compiled_step.compiler(), reason="no binary for this: no C compiler")
+@pytest.mark.parametrize("name", SHIPS)
+def test_compiled_steps_follow_each_other(name):
+    """States of three models in five windows, with commands that change from step to step."""
+    rng = np.random.default_rng(5)
+    s, i, b = at(changed(SHIPS[name]), rng)
+    given, acting = (x * rng.uniform(0.5, 1.0, (20, *x.shape)) for x in i[:2])
+    found = recorded_step.compiled_states(b, s, [given, acting, None, None], H)
+    assert found is not None
+    np.testing.assert_allclose(found, by_step(s, given, acting, b), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.skipif(not compiled_step.compiler(), reason="no binary for this: no C compiler")
+def test_what_diverges_is_not_finite():
+    s, i, b = at(SHIPS["otter"], np.random.default_rng(6))
+    s = s._replace(u=np.full((1, 5), 1e200))
+    given, acting = (np.array([x, x]) for x in i[:2])
+    found = recorded_step.compiled_states(b, s, [given, acting, None, None], H)
+    assert found is not None
+    assert not np.isfinite(found[2, 3]).any()
+
+
+def test_without_a_compiler_numpy_predicts(monkeypatch):
+    monkeypatch.setattr(compiled_step, "compiler", lambda: False)
+    compiled_step._library.cache_clear()
+    recorded_step._compiled.cache_clear()
+    s, i, b = at(SHIPS["otter"], np.random.default_rng(7))
+    given, acting = (np.array([x]) for x in i[:2])
+    assert recorded_step.compiled_states(b, s, [given, acting, None, None], H) is None
+    compiled_step._library.cache_clear()
+    recorded_step._compiled.cache_clear()
 
 
 def test_models_of_one_structure_share_the_recording():

@@ -20,7 +20,8 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
 from ..runs.cleaning import DIGITS, WIDTH
-from .recorded_step import Inputs, Ready, recorded_step, thrust_at
+from .compiled_step import compiler
+from .recorded_step import Inputs, Ready, compiled_states, recorded_step, thrust_at
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
 
@@ -169,7 +170,8 @@ def predict_each(starts: WindowStarts, models: Sequence[Model]) -> np.ndarray:
 def _predicted(starts: WindowStarts, model: Model, thrust: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """See :func:`predict`; thrust as of :func:`propagate`."""
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
-        states = _states_of_one(starts, model, thrust) or [*propagate(starts, model, thrust)]
+        alone = [] if compiler() else _states_of_one(starts, model, thrust)
+        states = alone or [*propagate(starts, model, thrust)]
         x, y, psi, *_ = zip(*states, strict=True)
         s = vessel.State(*(np.stack(np.broadcast_arrays(*each)) for each in (x, y, psi)))
         pose = np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull)), axis=1)
@@ -220,6 +222,9 @@ def propagate(
     if single:
         s = vessel.State._make([x.item() for x in s])
         given = [None if x is None else x.reshape(*x.shape[:2]).tolist() for x in given]
+    elif beside is None and (states := compiled_states(ready, s, given, h)) is not None:
+        yield from map(vessel.State._make, states)
+        return
     none = [None] * starts.steps
     each = zip(*(none if x is None else x for x in given), strict=True)
     steps = [Inputs(*x) for x in each]

@@ -60,9 +60,14 @@ def number(x: Operand) -> str:
 
 
 class Writer:
-    """Writes functions that may call each other's kernels."""
+    """Writes functions that may call each other's kernels.
 
-    def __init__(self) -> None:
+    Args:
+        raises: whether a function returns 1 where Python raises, or goes on with an infinity or NaN.
+    """
+
+    def __init__(self, raises: bool = True) -> None:
+        self._raises = raises
         self._kernels: dict[int, str] = {}
 
     def kernel(self, recording: RecordedFunction) -> str:
@@ -83,15 +88,15 @@ class Writer:
             targets: (array, the results that it gets), together all results.
         """
         unused = ", ".join(f"(void){name}" for name in re.findall(r"(\w+)[,)]", head))
-        body = Body(self._kernels).text(recording, targets)
+        body = Body(self._kernels, self._raises).text(recording, targets)
         return f"{head}\n{{\n    {unused};{body[1:]}"
 
 
 class Body:
     """The body of one function: names of its values, and lines."""
 
-    def __init__(self, kernels: Mapping[int, str]) -> None:
-        self.kernels = kernels
+    def __init__(self, kernels: Mapping[int, str], raises: bool = True) -> None:
+        self.kernels, self._raises = kernels, raises
         self.names: dict[int, str] = {}
         self.needed: set[int] = set()
         self.lines: list[str] = []
@@ -115,7 +120,7 @@ class Body:
     def _mark(self, statement: RecordedValue | Branch | Call) -> bool:
         """Note what a statement needs, if it is needed itself: for its value, or as it may fail."""
         if isinstance(statement, RecordedValue):
-            wanted = id(statement) in self.needed or may_fail(statement)
+            wanted = id(statement) in self.needed or (self._raises and may_fail(statement))
             if wanted:
                 self.needed.add(id(statement))
                 self.need(statement.args)
@@ -157,7 +162,7 @@ class Body:
 
     def _operation(self, x: RecordedValue) -> Iterator[str]:
         args = [self.of(a) for a in x.args]
-        if may_fail(x):
+        if self._raises and may_fail(x):
             yield f"if ({args[1]} == 0.0) return 1;"
         if x.operation in INFIX:
             value = f"{args[0]} {INFIX[x.operation]} {args[1]}"
