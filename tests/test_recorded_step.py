@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis import Model
-from diagnosis.predictors import compiled_step, recorded_step, ship_with
+from diagnosis.predictors import compiled_law, recorded_law, recorded_step, ship_with
 from diagnosis.predictors.prediction import stacked
 from diagnosis.predictors.recorded_step import Inputs, Ready, step
 from diagnosis.predictors.recorded_step import recorded_step as recorded
@@ -56,7 +56,7 @@ def by_step(start, given, acting, b):
     return np.stack(found)
 
 
-@pytest.mark.skipif(not compiled_step.compiler(), reason="no binary for this: no C compiler")
+@pytest.mark.skipif(not compiled_law.compiler(), reason="no binary for this: no C compiler")
 @pytest.mark.parametrize("name", SHIPS)
 def test_compiled_steps_follow_each_other(name):
     """States of three models in five windows, with commands that change from step to step."""
@@ -68,7 +68,7 @@ def test_compiled_steps_follow_each_other(name):
     np.testing.assert_allclose(found, by_step(s, given, acting, b), rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.skipif(not compiled_step.compiler(), reason="no binary for this: no C compiler")
+@pytest.mark.skipif(not compiled_law.compiler(), reason="no binary for this: no C compiler")
 def test_what_diverges_is_not_finite():
     s, i, b = at(SHIPS["otter"], np.random.default_rng(6))
     s = s._replace(u=np.full((1, 5), 1e200))
@@ -79,27 +79,27 @@ def test_what_diverges_is_not_finite():
 
 
 def test_without_a_compiler_numpy_predicts(monkeypatch):
-    monkeypatch.setattr(compiled_step, "compiler", lambda: False)
-    compiled_step._library.cache_clear()
-    recorded_step._compiled.cache_clear()
+    monkeypatch.setattr(compiled_law, "compiler", lambda: False)
+    compiled_law._library.cache_clear()
+    recorded_law.in_machine_code.cache_clear()
     s, i, b = at(SHIPS["otter"], np.random.default_rng(7))
     given, acting = (np.array([x]) for x in i[:2])
     assert recorded_step.compiled_states(b, s, [given, acting, None, None], H) is None
-    compiled_step._library.cache_clear()
-    recorded_step._compiled.cache_clear()
+    compiled_law._library.cache_clear()
+    recorded_law.in_machine_code.cache_clear()
 
 
 def test_models_of_one_structure_share_the_recording():
     model, rng = SHIPS["otter"], np.random.default_rng(3)
-    recorded_step._recorded.cache_clear()
+    recorded_law.in_python.cache_clear()
     for drag in (-1.0, -2.0):
         s, i, b = at(model.plus({"delta_X_u": drag}), rng)
         found = recorded(b, i, single=False)(*s, *i.given, *i.acting, H)
         np.testing.assert_array_equal(found[3], step(s, i, b, H).u)
-    assert recorded_step._recorded.cache_info().misses == 1
+    assert recorded_law.in_python.cache_info().misses == 1
     s, i, b = at(model.plus({"V_n": 0.1}), rng)  # flows: another structure
     recorded(b, i, single=False)
-    assert recorded_step._recorded.cache_info().misses == 2
+    assert recorded_law.in_python.cache_info().misses == 2
 
 
 def test_what_cannot_be_recorded_is_called(monkeypatch):
@@ -107,8 +107,8 @@ def test_what_cannot_be_recorded_is_called(monkeypatch):
         raise TraceError
 
     s, i, b = at(SHIPS["otter"], np.random.default_rng(4))
-    recorded_step._recorded.cache_clear()
-    monkeypatch.setattr(recorded_step.Tape, "recording", refuse)
+    recorded_law.in_python.cache_clear()
+    monkeypatch.setattr(recorded_law.Tape, "recording", refuse)
     found = recorded(b, i, single=False)(*s, *i.given, *i.acting, H)
-    recorded_step._recorded.cache_clear()
+    recorded_law.in_python.cache_clear()
     np.testing.assert_array_equal(np.array(found), np.array(step(s, i, b, H)))

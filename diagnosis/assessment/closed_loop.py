@@ -118,7 +118,7 @@ class LoopPart:
 
     def __init__(self, component: Component, values: Mapping[str, float]) -> None:
         self._params = parameters(component, values)
-        self._component, self._prepared = component, component.prepared(self._params)
+        self._component, self.prepared = component, component.prepared(self._params)
 
     def begin(self, inputs: Any) -> tuple[Any, Any]:
         """State and outputs at first."""
@@ -126,7 +126,7 @@ class LoopPart:
 
     def advance(self, state: Any, inputs: Any, h: float) -> tuple[Any, Any]:
         """State and outputs a step of h [s] later; h = 0 gives the outputs of the present state."""
-        return self._component.advance(state, inputs, self._prepared, h)
+        return self._component.advance(state, inputs, self.prepared, h)
 
 
 def distances(reference: ReferencePath, model: Model) -> Iterator[float]:

@@ -1,22 +1,26 @@
 """Where the ship may be during a plan: the closed loop of many models drawn from the posterior."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from fmus.controller import abs as adaptive
 from fmus.controller.backstepping import Inputs
+from fmus.declare import flatten, rebuild
+from fmus.ship import Ship
 from fmus.signals import Estimate, Target
 
 from ..assessment.closed_loop import LoopPart
 from ..predictors import Model
 from ..predictors.prediction import merged
+from ..predictors.recorded_law import stepped
 from .hypotheses import Space
 from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
+POSE = 3  # numbers of a pose
 STEP = 0.2  # s, times the time scale: of this loop, a tenth of the shortest ramp; chosen
 # Times the speed of a plan at which the ships must keep the basin as well: the controller of a ship that
 # is close to diverging loses control there. Two prior standard deviations of a coefficient of a tenth.
@@ -63,21 +67,11 @@ def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
         models: of one ship.
         motion: the target or the orders, at equal steps.
     """
-    h, controller = float(motion.time[1] - motion.time[0]), models[0].ship.serving(adaptive.COMPONENT)
+    h = float(motion.time[1] - motion.time[0])
     if motion.orders is not None:
         return driven(models, motion.orders[..., None], motion.eta[0], h)
-    part, now = LoopPart(controller, {}), None
     targets = np.column_stack([motion.eta, motion.eta_dot, motion.eta_ddot])
-
-    def request(k: int, out: Any) -> Any:
-        nonlocal now
-        v, (x, y, psi) = out.velocity, out.pose[:3]
-        known = Estimate(x, y, psi, v.u, v.v, v.r, out.u_dot, out.v_dot, out.r_dot)
-        given = Inputs(known, Target(*map(float, targets[k])))
-        now, demand = part.begin(given) if now is None else part.advance(now, given, h)
-        return demand.tau
-
-    return _tracks(models, motion.eta[0], h, len(targets), request)
+    return _tracks(models, motion.eta[0], targets[..., None], Loop(models[0].ship, h, True))
 
 
 def driven(models: Sequence[Model], orders: np.ndarray, start: np.ndarray, h: float) -> np.ndarray:
@@ -89,39 +83,95 @@ def driven(models: Sequence[Model], orders: np.ndarray, start: np.ndarray, h: fl
         start: (3,) or (3, p), first pose.
         h: step [s].
     """
-    asked = models[0].ship.thrusters.inputs().request
-    rows = [[x.item() if x.size == 1 else x for x in row] for row in orders]
-    return _tracks(models, start, h, len(rows), lambda k, _: asked._make(rows[k]), orders.shape[2])
+    return _tracks(models, start, orders, Loop(models[0].ship, h, False))
 
 
-def _tracks(
-    models: Sequence[Model],
-    start: np.ndarray,
-    h: float,
-    steps: int,
-    request: Callable[[int, Any], Any],
-    count: int = 1,
-) -> np.ndarray:
-    """Poses (p, steps, 3) from rest, of models or by requests (step, outputs of the ship) of several."""
-    of = merged(models, lambda values: values)
-    craft = of.ship
+class Moving(NamedTuple):
+    """What a loop carries from step to step.
+
+    Attributes:
+        pose, velocity, rates: of the ship; rates are those of its velocity.
+        vessel, thrusters, controller: states of the components; None, () before the first step.
+    """
+
+    pose: tuple[Any, ...]
+    velocity: tuple[Any, ...]
+    rates: tuple[Any, ...]
+    vessel: Any
+    thrusters: Any = None
+    controller: Any = None
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Ships that a controller keeps on targets, or that orders drive.
+
+    Attributes:
+        ship: of all models.
+        h: step [s].
+        held: whether there is a controller.
+        like: what is carried, of any model.
+    """
+
+    ship: Ship
+    h: float
+    held: bool
+    like: Moving | None = field(default=None, compare=False)
+
+    def __call__(self, flat: Sequence[Any], given: Sequence[Any], *parts: Any) -> list[Any]:
+        """A step on numbers in one row."""
+        return flatten(self.step(rebuild(cast(Moving, self.like), flat), given, *parts))
+
+    def step(self, now: Moving, given: Sequence[Any], hull: Any, drive: Any) -> Moving:
+        """A step with a target or orders, by the prepared vessel and thrusters; the first one begins."""
+        vessel, thrusters = self.ship.vessel, self.ship.thrusters
+        begins = now.thrusters is None
+        h = 0.0 if begins else self.h
+        controller, request = self._request(now, given, h)
+        velocity = vessel.outputs().velocity._make(now.velocity)
+        asked = thrusters.inputs(thrusters.inputs().request._make(request), velocity)
+        state = thrusters.init(asked, drive.params) if begins else now.thrusters
+        state, thrust = thrusters.advance(state, asked, drive, h)
+        acting = vessel.inputs(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
+        return seen(*vessel.advance(now.vessel, acting, hull, self.h), state, controller)
+
+    def _request(self, now: Moving, given: Sequence[Any], h: float) -> tuple[Any, Sequence[Any]]:
+        """The state of the controller, and what it asks of the thrusters."""
+        if not self.held:
+            return (), given
+        component = self.ship.serving(adaptive.COMPONENT)
+        params = component.params()
+        inputs = Inputs(Estimate(*now.pose, *now.velocity[:3], *now.rates), Target(*given))
+        state = component.init(inputs, params) if now.thrusters is None else now.controller
+        state, demand = component.advance(state, inputs, component.prepared(params), h)
+        return state, demand.tau
+
+
+def seen(state: Any, out: Any, thrusters: Any = None, controller: Any = None) -> Moving:
+    """What is carried, of the vessel's state and outputs."""
+    rates = out.u_dot, out.v_dot, out.r_dot
+    return Moving(tuple(out.pose[:3]), tuple(out.velocity), rates, state, thrusters, controller)
+
+
+def _tracks(models: Sequence[Model], start: np.ndarray, given: np.ndarray, loop: Loop) -> np.ndarray:
+    """Poses (p, n, 3) from rest, of models or by targets or orders (n, k, p or 1) of several."""
+    of, craft = merged(models, lambda values: values), models[0].ship
     begin = {
         n: x if x.size > 1 else x.item() for n, x in zip(("x_0", "y_0", "psi_0"), start, strict=True)
     }
     ship = LoopPart(craft.vessel, {**of.vessel, **begin})
-    drive = LoopPart(craft.thrusters, of.thrusters)
-    found = np.empty((max(len(models), count), steps, 3))
+    parts = ship.prepared, LoopPart(craft.thrusters, of.thrusters).prepared
+    rows = [[x.item() if x.size == 1 else x for x in row] for row in given]
     with np.errstate(all="ignore"):  # a ship that runs away gives infinities, which count as outside
-        s, out = ship.begin(craft.vessel.inputs())
-        t: Any = None
-        for k in range(steps):
-            for axis in range(3):
-                found[:, k, axis] = out.pose[axis]
-            asked = craft.thrusters.inputs(request(k, out), out.velocity)
-            t, thrust = drive.begin(asked) if t is None else drive.advance(t, asked, h)
-            acting = craft.vessel.inputs(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
-            s, out = ship.advance(s, acting, h)
-    return found
+        first = seen(*ship.begin(craft.vessel.inputs()))
+        now = loop.step(first, rows[0], *parts)
+        further = stepped(replace(loop, like=now), flatten(now), given[1:-1], parts, POSE)
+    count = max(len(models), given.shape[2], np.size(start[0]))
+    poses = [np.broadcast_to(x, count) for x in first.pose]
+    tracks = np.concatenate(
+        [np.stack(poses)[None], np.broadcast_to(further, (len(further), POSE, count))]
+    )
+    return tracks.transpose(2, 0, 1)
 
 
 def spread(

@@ -20,7 +20,7 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
 from ..runs.cleaning import DIGITS, WIDTH
-from .compiled_step import compiler
+from .compiled_law import compiler
 from .recorded_step import Inputs, Ready, compiled_states, recorded_step, thrust_at
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of

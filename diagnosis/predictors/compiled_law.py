@@ -1,4 +1,4 @@
-"""A recorded step in C, which predicts all windows of all models in one call.
+"""A recorded law of a step in C, which takes all steps of all windows and models in one call.
 
 It takes a tenth of the time of numpy, where a step is some hundred operations on short arrays. The
 compiler is that of the system; where there is none, numpy does the same work. Both differ in the last
@@ -26,8 +26,8 @@ from fmus.native.tape import Kernels, RecordedFunction
 # it does not change. A step is done for as many windows as fill a line of the cache.
 LOOP = """
 #define STATE {state}
-#define COUNT {count}
 #define MOVING (STATE + {inputs})
+#define COUNT {count}
 #define BLOCK 8
 
 #if defined(_WIN32)
@@ -35,9 +35,9 @@ __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-void predict(const long long *size, const double *const *at, const long long *stride, double *out)
+void steps(const long long *size, const double *const *at, const long long *stride, double *out)
 {{
-    const long long models = size[1], windows = size[2], points = models * windows;
+    const long long models = size[1], windows = size[2], kept = size[3], points = models * windows;
     double given[BLOCK][COUNT];
     double after[STATE];
     for (long long m = 0; m < models; m++)
@@ -47,11 +47,11 @@ void predict(const long long *size, const double *const *at, const long long *st
             for (int k = 0; k < COUNT; k++)
                 for (int w = 0; w < block; w++)
                     given[w][k] = at[k][stride[3 * k + 1] * m + stride[3 * k + 2] * (first + w)];
-            for (int k = 0; k < STATE; k++)
+            for (int k = 0; k < kept; k++)
                 for (int w = 0; w < block; w++)
                     to[k * points + w] = given[w][k];
             for (long long n = 0; n < size[0]; n++) {{
-                to += STATE * points;
+                to += kept * points;
                 for (int w = 0; w < block; w++) {{
                     for (int k = STATE; k < MOVING; k++) {{
                         const long long *by = stride + 3 * k;
@@ -59,7 +59,9 @@ void predict(const long long *size, const double *const *at, const long long *st
                     }}
                     recorded(given[w], after);
                     for (int k = 0; k < STATE; k++)
-                        to[k * points + w] = given[w][k] = after[k];
+                        given[w][k] = after[k];
+                    for (int k = 0; k < kept; k++)
+                        to[k * points + w] = after[k];
                 }}
             }}
         }}
@@ -67,44 +69,51 @@ void predict(const long long *size, const double *const *at, const long long *st
 """
 
 
-class CompiledStep(NamedTuple):
-    """A step of models of one structure, compiled."""
+class CompiledLaw(NamedTuple):
+    """A law of a step, compiled, with so many numbers in its state."""
 
     library: ctypes.CDLL
     state: int
 
     def states(
-        self, start: Sequence[np.ndarray], inputs: Sequence[np.ndarray], numbers: Sequence[np.ndarray]
+        self,
+        start: Sequence[np.ndarray],
+        inputs: Sequence[np.ndarray],
+        numbers: Sequence[np.ndarray],
+        kept: int | None = None,
     ) -> np.ndarray:
         """The state at the start and after each step.
 
         Args:
             start: the state's numbers, each like (p, w), of p models and w windows.
-            inputs: what acts during a step, each (steps, ...) and like (p, w) beside that.
+            inputs: what acts during a step, each (steps, ...) and like (p, w) beside that, floats.
             numbers: all else, each like (p, w).
+            kept: how many numbers of a state are returned, the first ones; by default all.
 
         Returns:
-            (steps + 1, numbers of a state, p, w).
+            (steps + 1, kept, p, w).
         """
         still = [np.asarray(x, float) for x in (*start, *numbers)]
-        moving = [np.asarray(x, float) for x in inputs]
+        steps, kept = len(inputs[0]), self.state if kept is None else kept
+        moving = [
+            np.asarray(x, float).reshape(steps, *(1,) * (3 - x.ndim), *x.shape[1:]) for x in inputs
+        ]
         shape = np.broadcast_shapes((1, 1), *(x.shape for x in still), *(x.shape[1:] for x in moving))
         each = [np.broadcast_to(x, (1, *shape)) for x in still]
-        moving = [x if x.ndim == 3 else x[:, None] for x in moving]
-        each[len(start) : len(start)] = [np.broadcast_to(x, (len(x), *shape)) for x in moving]
+        each[len(start) : len(start)] = [np.broadcast_to(x, (steps, *shape)) for x in moving]
         strides = np.array([x.strides for x in each]) // np.dtype(float).itemsize
         strides[[len(x) == 1 for x in each], 0] = 0
-        size = np.array([len(moving[0]), *shape])
-        out = np.empty((size[0] + 1, self.state, *shape))
+        out = np.empty((steps + 1, kept, *shape))
         at = np.array([x.ctypes.data for x in each])
-        self.library.predict(*(ctypes.c_void_p(x.ctypes.data) for x in (size, at, strides, out)))
+        parts = np.array([steps, *shape, kept]), at, strides, out
+        self.library.steps(*(ctypes.c_void_p(x.ctypes.data) for x in parts))
         return out
 
 
-def compiled_step(
+def compiled_law(
     recording: RecordedFunction, kernels: Kernels, inputs: int, count: int
-) -> CompiledStep | None:
-    """A recording of a step as machine code; None: this computer has no compiler, or it refuses.
+) -> CompiledLaw | None:
+    """A recording as machine code; None: this computer has no compiler, or it refuses.
 
     Args:
         recording: gives the state, of arguments ``given[0]`` and so on: the state, then the inputs.
@@ -118,7 +127,7 @@ def compiled_step(
     text.append(writer.function(head, recording, [("after", recording.results)]))
     text.append(LOOP.format(state=state, inputs=inputs, count=count))
     library = _library("\n".join(text))
-    return None if library is None else CompiledStep(library, state)
+    return None if library is None else CompiledLaw(library, state)
 
 
 @cache
