@@ -19,7 +19,6 @@ MOST = 8  # hypotheses, the likeliest; chosen: criteria grow with their square
 FIRST = 4  # of the ranking, where a diagnosis names no effect; chosen
 WIDE = 3.0  # prior standard deviations of an effect: multiples of the size that explains all (chosen)
 EXACT = 1e9  # 1/1, prior precision of what is not fitted
-LIKELY = 0.05  # 1, weight from which on a hypothesis counts for the basin; the 5 %
 
 
 class Rival(NamedTuple):

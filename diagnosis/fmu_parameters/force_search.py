@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..execution.progress import Advance
+from ..runs.run_constants import SAME
 from ..search.most_likely import LEVEL
 from .additional_force import SYMBOLS, AdditionalForce
 from .parameter_fit import ParameterFit, added, fit
 from .residuals import Setting, WindowResiduals
 
 TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
-# Correlation of two signals that are one, and of what two forces change beyond parameters, which no such
-# run discriminates.
-SAME = 0.999  # chosen
 ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
 # Central, forward, backward: how an FMU integrates decides which difference its own rate is.
 RATES = (np.gradient, lambda y: np.diff(y, append=y[-1]), lambda y: np.diff(y, prepend=y[0]))

@@ -62,7 +62,7 @@ class LinearModel:
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
-    doubt: float = 0.0
+    doubt: float
 
     def write(self, folder: Path, units: Mapping[str, str]) -> list[str]:
         """Write ``linear.json`` and ``linear.mat``; returns their names."""

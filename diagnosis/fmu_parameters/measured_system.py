@@ -19,7 +19,6 @@ from ..runs.files.tables import as_table, column_names, numbers, table_of_file
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
-ORDERS = (2, 4)  # of differences, by which noise is estimated; chosen
 MOST_STEPS = 20  # between two samples; chosen, an FMU that wants more of them takes them itself
 DIGITS = 1e-5  # of an output's spread: noise below that is rounding; chosen
 # By which the standard deviation of a start value is larger than that of its parabola, which also bends
@@ -124,7 +123,7 @@ def noise_of(values: np.ndarray) -> float:
     the smaller estimate is taken. The median is not moved by a few steps of the signal.
     """
     known = values[np.isfinite(values)]
-    return min(_noise_by_differences(known, order) for order in ORDERS)
+    return min(_noise_by_differences(known, order) for order in (2, 4))
 
 
 def _noise_by_differences(values: np.ndarray, order: int) -> float:

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from ..runs.cleaning import Z95
 from ..search.most_likely import ENOUGH, STEPS
 from .additional_force import AdditionalForce
-from .residuals import MOST_STEPS, Setting, WindowResiduals
+from .residuals import Setting, WindowResiduals
 
 # Cost at the ends of a normal 95 % interval is 3.84 higher. Where it differs by more than a fifth of
 # that, the interval is that of the profile (chosen).
@@ -117,8 +117,7 @@ def fit(
         inside = np.where(np.isfinite(high - low), high - low, 1.0) * 1e-6
         x = np.clip(x, low + inside, high - inside)
         jacobian: Any = slopes  # the stubs of scipy know no function here
-        ends = {"ftol": 1e-6, "xtol": 1e-5, "max_nfev": MOST_STEPS}
-        x = least_squares(residuals, x, jacobian, (low, high), "trf", **ends).x
+        x = least_squares(residuals, x, jacobian, (low, high), ftol=1e-6, xtol=1e-5).x
     s = setting(x)
     if "x" in last and np.array_equal(np.asarray(last["x"]), x):
         J, faults = np.asarray(last["J"]), last["faults"]

@@ -25,12 +25,8 @@ from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
 STEP = 0.02  # of a central difference at most, in prior standard deviations; chosen
-# Rms change of the residuals by one step of a difference, in units of the noise, at most: a longer step
-# shows the curvature of a prediction in its slope. Chosen: a shorter one shows the rounding of solvers.
-MOST_CHANGE = 1.0
 START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
-MOST_STEPS = 30  # of a fit; chosen: a dozen suffices from a start value
 LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
 
@@ -246,7 +242,7 @@ class WindowResiduals:
         bend = off(best)[: base.size] - base - S @ best
         if np.sqrt(np.mean(bend**2)) > LINEAR:
             jacobian: Any = lambda z: np.concatenate([slopes(z), np.eye(z.size)])  # noqa: E731
-            z = least_squares(off, z, jacobian, max_nfev=MOST_STEPS).x
+            z = least_squares(off, z, jacobian).x
             S = slopes(z)
         U, size, _ = np.linalg.svd(S, full_matrices=False)
         return Whitening(U, 1.0 / np.sqrt(1.0 + size**2), begin(z), S @ z)
@@ -267,7 +263,9 @@ class WindowResiduals:
         change = np.sqrt(np.mean(found[0] ** 2, axis=0))
         names = [*(p.name for p in self.parameters), *(f.id for f in setting.forces)]
         last = [self._steps.get(n, STEP) for n in names]
-        steps = np.minimum(STEP, MOST_CHANGE / np.maximum(change, MOST_CHANGE / STEP))
+        # A step that changes the residuals by more than the noise shows the curvature of a prediction in
+        # its slope; a shorter one shows the rounding of solvers.
+        steps = np.minimum(STEP, 1.0 / np.maximum(change, 1.0 / STEP))
         self._steps |= zip(names, steps.tolist(), strict=True)
         again = np.any(np.array(last) > 2.0 * steps)
         return self._differences(setting, sizes) if again else found

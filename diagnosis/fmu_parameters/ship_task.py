@@ -15,7 +15,7 @@ from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER
+from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES
 from ..predictors.windows import step_of, usable_windows
 from ..runs import QUANTITY, Smoothed
 from ..runs.columns.unit_check import SI_UNIT
@@ -29,7 +29,7 @@ from .parameter_file import CalibratedParameter, proposed, read_parameters
 # Of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
 MOST_SAMPLES = 60
 # Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
-EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": QUARTER}, "F_e": {"tau_X": -QUARTER, "tau_Y": 0.0}}
+EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": np.pi / 2}, "F_e": {"tau_X": -np.pi / 2, "tau_Y": 0.0}}
 
 
 class ShipTask(CalibrationTask):

@@ -22,7 +22,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    FiniteFloat,
     NonNegativeFloat,
     PositiveFloat,
 )
@@ -43,13 +42,6 @@ Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
 class MappedVariable(Named):
     """A column in terms of a variable of the FMU: variable = factor * column + offset."""
-
-    factor: FiniteFloat = Field(
-        default=1.0, description="factor from the unit of the column to that of the variable"
-    )
-    offset: FiniteFloat = Field(
-        default=0.0, description="offset that is added, in the unit of the variable"
-    )
 
 
 class MeasuredOutput(MappedVariable):

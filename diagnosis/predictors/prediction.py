@@ -20,13 +20,10 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
 from ..runs.cleaning import DIGITS, WIDTH
+from ..runs.run_constants import FAR_OFF
 from .recorded_step import Inputs, Ready, recorded_step, thrust_at
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
-
-# Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
-# coefficient alone does not explain the data (contract).
-FAR_OFF = 3.0
 
 
 @dataclass(frozen=True, eq=False)

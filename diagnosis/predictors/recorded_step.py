@@ -128,7 +128,7 @@ def _kinds(x: Any) -> Hashable:
     return x.dtype.kind if isinstance(x, np.ndarray) else float if isinstance(x, float) else x
 
 
-@lru_cache(maxsize=64)  # models of one structure follow each other in a fit
+@lru_cache  # models of one structure follow each other in a fit
 def _recorded(of: _Structure) -> Law | None:
     """The step of models of a structure; None: an effect of a user cannot be recorded."""
     tape, names, plain = Tape(Kernels()), [*STATE], ["h"]

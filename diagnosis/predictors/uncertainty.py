@@ -50,7 +50,7 @@ NEGLIGIBLE = 0.05
 MEASURED = 0.1
 
 
-@lru_cache(maxsize=64)  # filters; a fit asks for the same several times
+@lru_cache  # filters; a fit asks for the same several times
 def noise_gain(filters: Filters = NO_FILTERS, time: float = 1.0) -> list[np.ndarray]:
     """For order k = 0 to 3, each channel and w0, (3, w0), the integral of w^2k |kernel U|^2 H [s^-2k-1].
 

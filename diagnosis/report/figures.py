@@ -19,7 +19,7 @@ from .formatting import percent
 from .shape import Curve
 
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
-MOST_RANKED = 2 * LENGTH  # candidates of a picture: the shortlist, and as many again
+MOST_RANKED = 2 * LENGTH  # candidates that are shown: the shortlist, and as many again
 RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {

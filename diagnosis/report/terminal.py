@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
+from ..execution.short_text import WIDTH
 from ..runs import MeasuredChannel, by_name, sensor_lines
 from ..session import CalibratedModel
 from .finding_text import SHOWN
@@ -26,7 +27,6 @@ from .headline import (
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
 
-WIDTH = 80  # columns of a text; as of a terminal
 WEIGH = ", in kg: weigh the ship"  # behind a mass beyond its prior
 ASCII = str.maketrans("−–", "--")  # for any terminal
 

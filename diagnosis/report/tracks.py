@@ -14,9 +14,7 @@ from ..predictors.shooting import INSTANTS
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
 
-QUARTILES = (0.25, 0.5, 0.75)  # 1
-MOST_ELLIPSES = 8  # of a picture, of all levels together; chosen: more hide the tracks
-MOST_SHIPS = 8  # outlines along a track; chosen: more hide it
+MOST_SHAPES = 8  # ellipses, or outlines of the ship, along a track; chosen: more hide it
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
@@ -118,7 +116,7 @@ def worst_window(e: Evaluation, learned: bool) -> Chart | None:
     panel = _map(_around(measured[:, :2], [p[:, :2] for p, _, _ in paths]))
     _broad(panel, *_east_north(measured))
     for around in [] if e.bands is None else [e.bands.ellipses(worst, level) for level in LEVELS]:
-        around = _some(around, MOST_ELLIPSES // len(LEVELS))
+        around = _some(around, MOST_SHAPES // len(LEVELS))
         closed = np.insert(around, around.shape[1], np.nan, axis=1).reshape(-1, 2)
         panel.draw(*_east_north(closed), AFTER, area=True, faint=True)
     for predicted, colour, label in paths:
@@ -149,9 +147,9 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
         _, colour, label = models[0]
         errors = (1e3 * np.hypot(residuals[:, 0], residuals[:, 1]), np.degrees(np.abs(residuals[:, 2])))
         for panel, error in zip(panels, errors, strict=True):
-            bands = np.full((3, parts), np.nan)
+            bands, quarters = np.full((3, parts), np.nan), np.linspace(0.0, 1.0, 5)
             for k in np.unique(part):
-                bands[:, k] = np.quantile(error[part == k], QUARTILES, method="nearest")
+                bands[:, k] = np.quantile(error[part == k], quarters[1:-1], method="nearest")
             panel.fill(middle, bands[0], bands[2], colour)
             panel.draw(middle, bands[1], colour, label if learned else "")
     return Chart(WIDTH, panels)
@@ -167,7 +165,7 @@ def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(high - low for low, high in panel.ends())
     outline = of.vessel.outline
-    for corners in [] if outline is None else hulls(_some(poses, MOST_SHIPS), outline.corners):
+    for corners in [] if outline is None else hulls(_some(poses, MOST_SHAPES), outline.corners):
         if 2 * np.ptp(corners, axis=0).max() < room:
             east, north = np.vstack([corners, corners[:1]]).T
             panel.draw(east, north, INK, width=LINE / 2)

@@ -24,6 +24,7 @@ from ...execution.short_text import ShortRepr
 from ...predictors.evaluation import Evaluation
 from ...report.content import Content, fmu_result, part, sensor_results, versions
 from ...runs import Fingerprint
+from ...runs.run_constants import IN_A_ROW
 from ...session import Comparison
 from ..budget import Budget, Learned, read_learned, sources_of
 from ..criterion import JUDGED, InputStd, ReadCriteria, now, read_criteria
@@ -57,7 +58,6 @@ JUDGEMENT = (
     "tolerance=criterion.tolerance offered=counts.offered excluded=counts.excluded "
     "windows=counts.judged independent"
 )
-STRETCH = 8  # samples; chosen: no noise repeats so many
 BUDGET = (
     "u_D=measurement initial_state parameters process_noise current wind u_input u_num=numerical u_val"
 )
@@ -243,8 +243,8 @@ class _JudgedRuns:
 def _rows(pose: np.ndarray) -> set[bytes]:
     """Each stretch of so many poses (n, 3) that all differ: what two cuts of a log have in common."""
     moving = np.append(False, (np.diff(pose, axis=0) != 0.0).any(axis=1) & np.isfinite(pose[1:, 0]))
-    known = sliding_window_view(moving, STRETCH).all(axis=1)
-    return {pose[k : k + STRETCH].tobytes() for k in np.flatnonzero(known)}
+    known = sliding_window_view(moving, IN_A_ROW).all(axis=1)
+    return {pose[k : k + IN_A_ROW].tobytes() for k in np.flatnonzero(known)}
 
 
 def _model_name(comparison: Comparison) -> str:

@@ -109,6 +109,8 @@ class Named(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
+    factor: FiniteFloat = 1.0  # by which numbers of the column are multiplied
+    offset: FiniteFloat = 0.0  # what is added then, in the unit that they have then
 
     @model_validator(mode="before")
     @classmethod
@@ -120,9 +122,7 @@ class Column(Named):
     """One column of a file, with its name there."""
 
     unit: str | None = None  # SI if not said
-    factor: FiniteFloat = 1.0  # by which its numbers are multiplied to be in that unit
-    flip: bool = False  # whether its axis points the other way
-    offset: FiniteFloat = 0.0  # what is added, in its unit, after the flip
+    flip: bool = False  # whether its axis points the other way, before the offset
     noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
     sign: str | None = None  # another column, which holds the sign
     negative: str = "-1"  # the cell of that in rows with a negative value

@@ -10,10 +10,8 @@ from fmus.frames import rotate_to_earth
 from ..cleaning import NORMAL_MAD, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
+from ..run_constants import FEWEST
 
-# Samples or windows, of which some constants and noises are estimated, and parts of a run whose spread
-# gives a standard deviation (chosen).
-FEWEST = 20
 SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 FAR = 8.0  # times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
 AGREED = 0.7  # correlation from which on two channels measure the same motion (chosen)
