@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from diagnosis import Model
-from diagnosis.predictors import recorded_step, ship_with
+from diagnosis.predictors import ship_with
 from diagnosis.predictors.prediction import stacked
-from diagnosis.predictors.recorded_step import Inputs, Ready, step
-from diagnosis.predictors.recorded_step import recorded_step as recorded
+from diagnosis.predictors.traced import recorded_step
+from diagnosis.predictors.traced.recorded_step import Inputs, Ready, step
+from diagnosis.predictors.traced.recorded_step import recorded_step as recorded
 from fmus.fmi.trace import TraceError
 from fmus.vessel import vessel
 

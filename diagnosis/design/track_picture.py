@@ -6,7 +6,7 @@ import numpy as np
 
 from cosim.results import hulls
 
-from ..report.tracks import MOST_SHAPES
+from ..report.pictures.tracks import MOST_SHAPES
 from .designing import Designer
 from .information import Knowledge
 from .planned_motion import PlannedMotion

@@ -21,9 +21,9 @@ from fmus.vessel import vessel
 from ..runs import Smoothed, idle
 from ..runs.cleaning import DIGITS, WIDTH
 from ..runs.run_constants import FAR_OFF
-from .recorded_step import Inputs, Ready, recorded_step, thrust_at
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
+from .traced.recorded_step import Inputs, Ready, recorded_step, thrust_at
 
 
 @dataclass(frozen=True, eq=False)

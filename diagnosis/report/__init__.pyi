@@ -1,9 +1,3 @@
-from .chart import AFTER as AFTER
-from .chart import BAND as BAND
-from .chart import BEFORE as BEFORE
-from .chart import GRID as GRID
-from .chart import INK as INK
-from .chart import THIRD as THIRD
 from .content import calibration_content as calibration_content
 from .content import comparison_content as comparison_content
 from .content import diagnosis_content as diagnosis_content
@@ -21,9 +15,15 @@ from .formatting import finite as finite
 from .formatting import number as number
 from .formatting import percent as percent
 from .page import write_report as write_report
+from .pictures.chart import AFTER as AFTER
+from .pictures.chart import BAND as BAND
+from .pictures.chart import BEFORE as BEFORE
+from .pictures.chart import GRID as GRID
+from .pictures.chart import INK as INK
+from .pictures.chart import THIRD as THIRD
+from .pictures.shape import Curve as Curve
+from .pictures.shape import curves as curves
 from .report_data import ReportData as ReportData
-from .shape import Curve as Curve
-from .shape import curves as curves
 from .terminal import show_calibration as show_calibration
 from .terminal import show_comparison as show_comparison
 from .terminal import show_diagnosis as show_diagnosis

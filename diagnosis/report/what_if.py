@@ -27,16 +27,16 @@ from fmus.native.program import program
 from fmus.native.webassembly import component_module
 
 from ..predictors import Evaluation, Model, Response, write_model
-from ..predictors.balance_component import balance_component
 from ..predictors.prediction import FAR_OFF, at_rest
-from ..predictors.prediction_component import START, allocation_component, prediction_component
 from ..predictors.ship_model import of_run, parameter_and_run
 from ..predictors.thrust import LONGEST_STEP
+from ..predictors.traced.balance_component import balance_component
+from ..predictors.traced.prediction_component import START, allocation_component, prediction_component
 from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
 from ..session import Diagnosis
-from .figures import MOST_RANKED
+from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 
 if TYPE_CHECKING:

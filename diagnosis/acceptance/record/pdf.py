@@ -12,8 +12,8 @@ from xml.sax.saxutils import escape
 from cosim import InputError
 from cosim.command import missing_extra
 
-from ...report.chart import Chart
 from ...report.document import Plot, ReportSection, Table
+from ...report.pictures.chart import Chart
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"  # those of matplotlib, which have Greek
 SIZE = 8.0  # pt, of letters, and of the margins of a cell together; chosen

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...predictors.evaluation import Evaluation
-from ...report.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
 from ...report.document import Plot
-from ...report.tracks import track
+from ...report.pictures.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
+from ...report.pictures.tracks import track
 from ..judged_criterion import EXPANDED, Judgement
 from ..predictions import Predictions
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...report.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
 from ...report.document import Plot
+from ...report.pictures.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
 from ..residuals import Setting, WindowResiduals
 from ..system_calibration import SystemCalibration
 

@@ -21,7 +21,7 @@ from fmus.ops import when
 from fmus.signals import Force
 from fmus.vessel import vessel
 
-from .thrust import inflow
+from ..thrust import inflow
 
 Law = Callable[..., Sequence[Any]]
 STATE = tuple(f"s{k}" for k in range(len(vessel.State._fields)))

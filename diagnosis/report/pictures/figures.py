@@ -7,15 +7,15 @@ import numpy as np
 from cosim.results import thin
 from fmus.ops import wrap
 
-from ..assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
-from ..assessment.regions import Profile
-from ..predictors.evaluation import Evaluation
-from ..runs import Smoothed
-from ..runs.cleaning import Z95
-from ..search.findings import Ranked
-from ..search.shortlist import LENGTH, TIE
+from ...assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
+from ...assessment.regions import Profile
+from ...predictors.evaluation import Evaluation
+from ...runs import Smoothed
+from ...runs.cleaning import Z95
+from ...search.findings import Ranked
+from ...search.shortlist import LENGTH, TIE
+from ..formatting import percent
 from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Chart, ChartAxis, Panel
-from .formatting import percent
 from .shape import Curve
 
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")

@@ -13,11 +13,11 @@ from fmus.ops import Number, wrap
 from fmus.signals import Force, Measurement
 from fmus.vessel import vessel
 
-from ..runs import Run
-from .prediction import true_motion
+from ...runs import Run
+from ..prediction import true_motion
+from ..ship_model import Model
 from .recorded_step import Inputs, Ready
 from .recorded_step import step as one_step
-from .ship_model import Model
 
 SOLVED = 4  # iterations of the pose behind measurement effects; those of the project need two
 

@@ -8,9 +8,9 @@ from cosim.results import hulls
 from fmus.ops import wrap
 from fmus.ship import Ship
 
-from ..assessment.covariates import means_of_run
-from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
-from ..predictors.shooting import INSTANTS
+from ...assessment.covariates import means_of_run
+from ...predictors.evaluation import LEVELS, Evaluation, PredictionError
+from ...predictors.shooting import INSTANTS
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
 

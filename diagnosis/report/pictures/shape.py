@@ -12,12 +12,12 @@ from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
 from fmus.hull import damping_force
 
-from ..assessment.settings import SETTINGS
-from ..predictors import Model
-from ..predictors.evaluation import Evaluation
-from ..predictors.thrust import commanded_shares
+from ...assessment.settings import SETTINGS
+from ...predictors import Model
+from ...predictors.evaluation import Evaluation
+from ...predictors.thrust import commanded_shares
+from ..reported_effect import ReportedCoefficient, ReportedEffect
 from .chart import WIDTH
-from .reported_effect import ReportedCoefficient, ReportedEffect
 
 
 @dataclass(frozen=True, eq=False)
