@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .fmu_parameters.system_map import SystemMap
 
 FILES = ("linear.json", "linear.mat")
-DOUBTFUL = 0.02  # change of A by longer steps, from which on it is reported; chosen
+DOUBTFUL = 0.02  # 1, change of A by longer steps, from which on it is reported; chosen
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -16,9 +16,9 @@ from .predictions import LATE, Predictions, difference, judged
 from .statistics import Interval, independent, needed, root_mean_square, share
 
 Outcome = Literal["met", "not met", "cannot be judged"]
-EXPANDED = 2.0  # standard uncertainties in the expanded one, about 95 % of a normal distribution
-# Of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half, as
-# noise may be stated too large (chosen).
+EXPANDED = 2.0  # 1, standard uncertainties in the expanded one, about 95 % of a normal distribution
+# 1, of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half,
+# as noise may be stated too large (chosen).
 FAR_BELOW, CHANCE = 0.5, 1e-3
 LEARNED, FEW = "the model was learned from it", "too few samples"
 

@@ -12,7 +12,7 @@ from ..predictors.weak_form import BLOCK
 from ..runs.columns.unit_check import UNITS
 
 AXES = "XYN"
-BINS = 8  # of equal numbers of windows, or sectors of heading; of time twice as many at most; chosen
+BINS = 8  # 1, of equal numbers of windows, or sectors of heading; of time twice as many at most; chosen
 # Unit of values -> quantity and unit for people.
 DISPLAYED = {"rad": ("angle", "deg"), "rad/s": ("rate", "deg/s"), "1": ("command", "%")}
 

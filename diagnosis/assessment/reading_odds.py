@@ -28,7 +28,7 @@ from ..predictors.weak_form import OVERLAP, needed_force
 from .readings import Reading, inertial, reread
 from .settings import SETTINGS
 
-ROUNDS = 5  # of noise and explanation in turn; the density is then within 0.1 of its limit
+ROUNDS = 5  # 1, of noise and explanation in turn; the density is then within 0.1 of its limit
 
 
 @dataclass

@@ -35,19 +35,19 @@ from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows
 from .spread import MEMBERS, Spread, spread
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
-LOG_POINTS = 6  # of the number of Sobol points, to the base 2; chosen: a few seconds
-EVOLVED = 160  # points tried by evolution at the most; chosen: some ten seconds
-POPULATION = 12  # best points that evolve
-MOST_PIECES = 6
-FASTER = 1.5  # times the fastest measured motion: as far as a model is used beyond its data (chosen)
-# Shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
+LOG_POINTS = 6  # 1, of the number of Sobol points, to the base 2; chosen: a few seconds
+EVOLVED = 160  # 1, points tried by evolution at the most; chosen: some ten seconds
+POPULATION = 12  # 1, best points that evolve; chosen: each some ten times
+MOST_PIECES = 6  # 1, manoeuvres of a run; chosen: of more the search finds no good ones in its time
+FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used beyond its data (chosen)
+# 1, shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
-TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
+TRIES = 3  # 1, best plans whose spread is computed, until one keeps the basin; chosen: within the minute
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
     "basin, fewer minutes or a smaller margin"
 )
-ROUNDED = 1.3  # times the largest speeds, which ramps and turned axes exceed a little (chosen)
+ROUNDED = 1.3  # 1, times the largest speeds, which ramps and turned axes exceed a little (chosen)
 
 
 @dataclass(frozen=True)

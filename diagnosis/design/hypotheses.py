@@ -15,10 +15,10 @@ from ..search.candidates import SMALL, CandidateShape, candidate, model_error
 from ..search.prior import NominalPrior
 from .information import Hypothesis, Knowledge
 
-MOST = 8  # hypotheses, the likeliest; chosen: criteria grow with their square
-FIRST = 4  # of the ranking, where a diagnosis names no effect; chosen
-WIDE = 3.0  # prior standard deviations of an effect: multiples of the size that explains all (chosen)
-EXACT = 1e9  # 1/1, prior precision of what is not fitted
+MOST = 8  # 1, hypotheses, the likeliest; chosen: criteria grow with their square
+FIRST = 4  # 1, of the ranking, where a diagnosis names no effect; chosen
+WIDE = 3.0  # 1, prior standard deviations of an effect: multiples of the size that explains all (chosen)
+EXACT = 1e9  # 1, prior precision of what is not fitted: it stays as it is
 
 
 class Rival(NamedTuple):

@@ -16,7 +16,7 @@ from scipy.special import logit, ndtr
 
 SURE = 0.95  # 1, probability from which on a cause counts as certain; the aim of a design
 ODDS = float(logit(SURE))  # nats, the log odds of that
-SMALLEST = 1e-10  # of the largest eigenvalue: what is less is rounding
+SMALLEST = 1e-10  # 1, of the largest eigenvalue: what is less is rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ class Reach(NamedTuple):
 
 # Time (n,) [s], duration [s], numbers from 0 to 1, limits -> pose (n, 3) from rest to rest [m, m, rad].
 Course = Callable[[np.ndarray, float, Sequence[float], Reach], np.ndarray]
-DIMENSIONS = 7  # of a manoeuvre: which one, how it begins, and five numbers from 0 to 1 of its own
+DIMENSIONS = 7  # 1, of a manoeuvre: which one, how it begins, and five numbers from 0 to 1 of its own
 RISE = 2.0  # s, times the time scale; shortest change of speed, as of the guidance's pulses (chosen)
 SOFT = 5.0  # s, times the time scale; longest of them: three time constants of the surge motion (chosen)
 PIECE = 60.0  # s, times the time scale, of a manoeuvre: some ten changes of speed; chosen
@@ -272,8 +272,8 @@ def sequence(point: np.ndarray, seconds: float, library: Iterable[str] = LIBRARY
     ]
 
 
-# Usual runs of the same length, for comparison.
 UsualRuns = Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]]
+# 1, usual runs of the same length, for comparison.
 USUAL: UsualRuns = {
     "ellipse": (("circle", (0.0, 0.0, 1.0, 0.4, 0.6)),),
     "circle": (("circle", (0.0, 0.0, 0.7, 1.0, 0.6)),),

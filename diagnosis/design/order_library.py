@@ -93,7 +93,7 @@ def order_steps(t: np.ndarray, T: float, x: Sequence[float], scale: float) -> np
     return _shares(t, fast, _level(x[1]) * np.where((t / second + 0.5) % 2.0 < 1.0, 1.0, -1.0))
 
 
-# Usual runs of the same length, for comparison.
+# 1, usual runs of the same length, for comparison.
 USUAL_ORDERS = {
     "straight": (("straight", (0.6,) * 3),),
     "circle": (("turn", (0.6, 0.0, 0.6)),),

@@ -20,7 +20,7 @@ from .spread import Spread
 from .track_picture import draw
 
 JSON, PAGE = "next.json", "plan.md"
-MOST_RUNS = 9  # of a plan; chosen
+MOST_RUNS = 9  # 1, of a plan; chosen
 
 
 def files(count: int) -> list[str]:

@@ -18,7 +18,7 @@ from .hypotheses import Space
 from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
-MEMBERS = 20  # drawn from each hypothesis: of these the outermost is the 95 % spread on either side
+MEMBERS = 20  # 1, drawn from each hypothesis: of these the outermost is the 95 % spread on either side
 
 
 @dataclass(frozen=True, eq=False)

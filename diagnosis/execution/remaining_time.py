@@ -32,10 +32,11 @@ USUAL = {
     "report: page": 0.3,
 }
 LAST = [*USUAL][[*USUAL].index(AGAIN) + 1 :]  # steps behind the search
-# Of the remaining time of a search that finds no further effect. Chosen: the largest for which a search
-# that finds none at all, one, two or three effects is within a factor of two from its first round on.
+# 1, of the remaining time of a search that finds no further effect. Chosen: the largest for which a
+# search that finds none at all, one, two or three effects is within a factor of two from its first round
+# on.
 MORE = 1.6
-# Share of its time that a step is taken to go on for where it takes longer than usual; chosen.
+# 1, share of its time that a step is taken to go on for where it takes longer than usual; chosen.
 LATE = 0.3
 
 

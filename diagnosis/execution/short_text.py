@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-WIDTH = 80  # characters, of a line of a terminal; the longest value that is shown as it is
+WIDTH = 80  # 1, characters, of a line of a terminal; the longest value that is shown as it is
 PLAIN = (bool, int, float, str, Path, type(None))
 
 

@@ -12,11 +12,11 @@ from .additional_force import SYMBOLS, AdditionalForce
 from .parameter_fit import ParameterFit, added, fit
 from .residuals import Setting, WindowResiduals
 
-TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
-ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
+TRIED = 4  # 1, candidates that are fitted with all else, of those that promise most; chosen
+ROUNDING = 1e-3  # 1, of a slope that parameters do not explain; chosen
 # Central, forward, backward: how an FMU integrates decides which difference its own rate is.
 RATES = (np.gradient, lambda y: np.diff(y, append=y[-1]), lambda y: np.diff(y, prepend=y[0]))
-SMALL = 1e-2  # of an input's usual size, a force by which the unit of a coefficient is found; chosen
+SMALL = 1e-2  # 1, of an input's usual size, a force by which the unit of a coefficient is found; chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,12 @@ from ..runs.files.tables import as_table, column_names, numbers, table_of_file
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
-MOST_STEPS = 20  # between two samples; chosen, an FMU that wants more of them takes them itself
-DIGITS = 1e-5  # of an output's spread: noise below that is rounding; chosen
-# By which the standard deviation of a start value is larger than that of its parabola, which also bends
-# otherwise than the signal, by as much as the noise hides; chosen.
+MOST_STEPS = 20  # 1, between two samples; chosen, an FMU that wants more of them takes them itself
+DIGITS = 1e-5  # 1, of an output's spread: noise below that is rounding; chosen
+# 1, by which the standard deviation of a start value is larger than that of its parabola, which also
+# bends otherwise than the signal, by as much as the noise hides; chosen.
 UNSURE = 3.0
-WIDTHS = (5, 7, 11, 15, 21, 31, 45, 65)  # samples of a parabola through the start of a window
+WIDTHS = (5, 7, 11, 15, 21, 31, 45, 65)  # 1, samples of a parabola through the start of a window
 
 
 @dataclass(frozen=True, eq=False)

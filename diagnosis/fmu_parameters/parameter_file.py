@@ -34,8 +34,6 @@ from cybership.message_text import quoted
 
 Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
-BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd")
-
 
 class Kind(NamedTuple):
     """What is known of all parameters with some dimension before any data.
@@ -59,9 +57,10 @@ class Kind(NamedTuple):
     def exponents(self) -> tuple[int, ...]:
         """Of kg, m, s, A, K, mol, cd."""
         powers = dict(re.findall(r"([A-Za-z]+)(-?\d*)", self.base))
-        return tuple(int(powers[b] or 1) if b in powers else 0 for b in BASE_UNITS)
+        return tuple(int(powers[b] or 1) if b in powers else 0 for b in cosim.BASE_UNITS)
 
 
+# 1, standard deviations by the kind, see :class:`Kind`.
 KINDS = (
     Kind("mass", "kg", "kg", 0.1, True),
     Kind("moment of inertia", "kg.m2", "kg m2", 0.3, True),
@@ -80,8 +79,8 @@ KINDS = (
     Kind("inductance", "H", "kg m2 s-2 A-2", 0.3, True),
     Kind("capacitance", "F", "kg-1 m-2 s4 A2", 0.3, True),
 )
-QUADRATIC = Kind("quadratic damping", "", "", 0.5, False)
-OTHER = Kind("other", "", "", 0.3, False)
+QUADRATIC = Kind("quadratic damping", "", "", 0.5, False)  # 1, as a damping
+OTHER = Kind("other", "", "", 0.3, False)  # 1, as what data sheets state
 
 
 class Prior(BaseModel):

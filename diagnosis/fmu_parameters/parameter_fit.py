@@ -13,7 +13,7 @@ from ..search.most_likely import ENOUGH, STEPS
 from .additional_force import AdditionalForce
 from .residuals import Setting, WindowResiduals
 
-# Cost at the ends of a normal 95 % interval is 3.84 higher. Where it differs by more than a fifth of
+# 1, cost at the ends of a normal 95 % interval is 3.84 higher. Where it differs by more than a fifth of
 # that, the interval is that of the profile (chosen).
 NOT_NORMAL = 0.2
 

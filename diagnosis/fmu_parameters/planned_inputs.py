@@ -29,9 +29,9 @@ from .residuals import Setting, WindowResiduals
 from .sensitivity import confounded
 from .system_task import SystemTask
 
-LOG_COURSES = 5  # of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
-NUMBERS = 4  # of an input: form, least and largest value, period
-SHORTEST, LONGEST = 0.02, 0.5  # of the length of a run: period of a course; chosen
+LOG_COURSES = 5  # 1, of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
+NUMBERS = 4  # 1, of an input: form, least and largest value, period
+SHORTEST, LONGEST = 0.02, 0.5  # 1, of the length of a run: period of a course; chosen
 PAGE, JSON = "plan.md", "next.json"
 
 

@@ -24,10 +24,10 @@ from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-STEP = 0.02  # of a central difference at most, in prior standard deviations; chosen
-START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
+STEP = 0.02  # 1, of a central difference at most, in prior standard deviations; chosen
+START_STEP = 0.05  # 1, of a difference by a start value, in its standard deviations; chosen
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
-LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
+LINEAR = 0.3  # 1, rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from .force_search import candidates
 from .measured_system import Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 
-# Of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
+# 1, of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
 MOST_SAMPLES = 60
 # Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
 EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": np.pi / 2}, "F_e": {"tau_X": -np.pi / 2, "tau_Y": 0.0}}

@@ -20,7 +20,7 @@ from .parameter_fit import ParameterFit, fit, fitted, intervals
 from .residuals import Setting, WindowResiduals, rms_of
 from .system_remainder import SystemRemainder, change_of_squares, inflation, remainder
 
-MOST_FORCES = 3  # in one model; chosen
+MOST_FORCES = 3  # 1, in one model; chosen
 Verdict = Literal["found", "ambiguous", "parameters", "unexplained", "none"]
 
 

@@ -11,8 +11,8 @@ from ..runs.run_constants import CHANCE
 from .measured_system import Window
 from .residuals import WindowResiduals
 
-BINS = (4, 16, 64)  # samples whose mean is compared with that of white noise; chosen
-BLOCKS = 8  # of a run, by which the correlation of residuals is judged; chosen
+BINS = (4, 16, 64)  # 1, samples whose mean is compared with that of white noise; chosen
+BLOCKS = 8  # 1, of a run, by which the correlation of residuals is judged; chosen
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs,
 from .parameter_file import CalibratedParameter, proposed, read_parameters, unit_of
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
-# Outputs that are no measured ones, of which an additional force may be a function; chosen: the more
+# 1, outputs that are no measured ones, of which an additional force may be a function; chosen: the more
 # are tried, the more alike they are.
 MOST_OUTPUTS = 6
 

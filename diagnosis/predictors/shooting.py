@@ -21,8 +21,8 @@ from .ship_model import Model
 from .thrust import Response
 from .windows import usable_windows
 
-INSTANTS = 16  # of a window at which pose and prediction are compared
-PARTS = 4  # steps between two instants: a tenth of the quickest motion's time in the longest windows
+INSTANTS = 16  # 1, of a window at which pose and prediction are compared
+PARTS = 4  # 1, steps between two instants: a tenth of the quickest motion's time in the longest windows
 UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
 
 

@@ -9,7 +9,7 @@ from fmus.effects.text import Found
 
 from ..predictors.ship_model import parameter_and_run
 
-SHOWN = 4  # names in a sentence, rows of a summary; of values twice as many, more are a curve; chosen
+SHOWN = 4  # 1, names in a sentence, rows of a summary; of values twice as many, more are a curve; chosen
 
 
 def sentence(found: Found) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 NO_VALUE = "–"
 _UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
-WRITTEN_OUT = 1e6  # magnitude below which no digit is left out in favour of an exponent; chosen
+WRITTEN_OUT = 1e6  # 1, magnitude below which no digit is left out in favour of an exponent; chosen
 
 
 def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 SCRIPTS = Path(__file__).parent / "templates" / "what_if"
 # Files of the page's program, in this order.
 PROGRAM = ("data", "predictions", "residual_force", "fit", "own_run", "pictures", "results", "controls")
-MOST_VALUES = 6  # of an effect that was not found: a shape of more has no use as sliders; chosen
+MOST_VALUES = 6  # 1, of an effect that was not found: a shape of more has no use as sliders; chosen
 FIXED = "It changes the delay or the filter of commands or of the measurement: it stays as it is here."
 
 

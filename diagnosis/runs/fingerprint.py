@@ -22,8 +22,8 @@ from .run_constants import FAR_OFF, SAME
 if TYPE_CHECKING:  # at run time it takes a while to import
     from .smoothing.smoother import Smoothed
 
-POINTS = 512  # of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
-PIECES, SHIFTS = 4, 8  # of the shorter run; within a step of the course; chosen
+POINTS = 512  # 1, of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
+PIECES, SHIFTS = 4, 8  # 1, of the shorter run; within a step of the course; chosen
 FEW = 8  # 1, points, or windows, by which a correlation is looked for; chosen
 
 

@@ -10,7 +10,7 @@ CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked 
 # s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
-# Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
+# 1, standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).
 FAR_OFF = 3.0
 # 1, samples, windows or parts of a run by which a correlation, a noise or a standard deviation is

@@ -8,7 +8,7 @@ import pandas as pd
 
 from .cleaning import BRIEF, DIGITS, EVERY, Track, between, impulse, long_gap
 
-# Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
+# 1, rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
 
 

@@ -12,7 +12,7 @@ from ...report.pictures.tracks import track
 from ..judged_criterion import EXPANDED, Judgement
 from ..predictions import Predictions
 
-TRACKS = 6  # figures of tracks of a criterion; chosen: a page or two
+TRACKS = 6  # 1, figures of tracks of a criterion; chosen: a page or two
 
 
 def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) -> Iterator[Plot]:

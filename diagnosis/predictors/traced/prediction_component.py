@@ -19,7 +19,7 @@ from ..ship_model import Model
 from .recorded_step import Inputs, Ready
 from .recorded_step import step as one_step
 
-SOLVED = 4  # iterations of the pose behind measurement effects; those of the project need two
+SOLVED = 4  # 1, iterations of the pose behind measurement effects; those of the project need two
 
 # What a window starts from: measured pose and its rate [m, m, rad, m/s, m/s, rad/s], and the time [s].
 START = ("x", "y", "psi", "x_dot", "y_dot", "psi_dot", "t")

@@ -19,7 +19,7 @@ from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Chart, ChartAxis, Panel
 from .shape import Curve
 
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
-MOST_RANKED = 2 * LENGTH  # candidates that are shown: the shortlist, and as many again
+MOST_RANKED = 2 * LENGTH  # 1, candidates that are shown: the shortlist, and as many again
 RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {

@@ -14,7 +14,7 @@ from ...predictors.shooting import INSTANTS
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
 
-MOST_SHAPES = 8  # ellipses, or outlines of the ship, along a track; chosen: more hide it
+MOST_SHAPES = 8  # 1, ellipses, or outlines of the ship, along a track; chosen: more hide it
 
 
 def track(e: Evaluation, learned: bool) -> Chart:

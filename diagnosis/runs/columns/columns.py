@@ -48,7 +48,7 @@ from fmus.ship import Ship
 from .unit_check import UNITS
 
 FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
-PREAMBLE = 1000  # lines; chosen: far more than any file has before its names
+PREAMBLE = 1000  # 1, lines; chosen: far more than any file has before its names
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
@@ -109,7 +109,7 @@ class Named(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
-    factor: FiniteFloat = 1.0  # by which numbers of the column are multiplied
+    factor: FiniteFloat = 1.0  # 1, by which numbers of the column are multiplied
     offset: FiniteFloat = 0.0  # what is added then, in the unit that they have then
 
     @model_validator(mode="before")
@@ -136,7 +136,7 @@ class Layout(BaseModel):
     separator: Mark = ","  # between two cells
     decimal: Mark = "."  # the decimal point
     encoding: str = UTF_8  # of the text, as Python calls it
-    skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # lines before that of the names
+    skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # 1, lines before that of the names
     units_line: bool = False  # whether the line below the names is of units
     columns: dict[str, Column] = {}  # x, y, psi, ... -> a column
     trial: str | None = None  # the manoeuvring trial that it is, as zigzag

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..run_constants import IN_A_ROW
 
-# A row is on a line to rounding, which must be less than this share of the distance of the other rows.
-# With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
+# 1, a row is on a line to rounding, which must be less than this share of the distance of the other
+# rows. With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
 ON_LINE = 0.03
-FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
+FEWEST = 0.15  # 1, share of rows on lines from which on a log counts as filled; chosen, far above chance
 
 
 def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndarray:

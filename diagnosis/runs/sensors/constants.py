@@ -25,8 +25,8 @@ DEVIATIONS: Mapping[Deviation, Callable[[np.ndarray], np.ndarray]] = {
     "deviation_sin_2": lambda psi: np.sin(2.0 * psi),
     "deviation_cos_2": lambda psi: np.cos(2.0 * psi),
 }
-# Of a channel or a clock, rad, ship's lengths, or rad in a window of prediction; of a delay as below.
-# Chosen: smaller faults matter in no manoeuvre.
+# [1, rad] of a channel or a clock, of ship's lengths, or in a window of prediction. Chosen: smaller
+# faults matter in no manoeuvre.
 LEAST = 0.005
 
 

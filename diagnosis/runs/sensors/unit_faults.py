@@ -17,7 +17,7 @@ from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, inte
 from .sensor_finding import Examined, SensorFinding
 
 WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
-NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen)
+NEAR = 0.15  # 1, relative distance within which a factor is that of a unit (chosen)
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is reversed"
 

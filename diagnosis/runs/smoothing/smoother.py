@@ -38,8 +38,8 @@ from .spline import DEGREE, Knots, basis, knots
 QUICKEST = 0.5  # s, of a motion (chosen)
 # [m, m, rad]; a smaller noise is implausible, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
-# Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
-# of channels against each other are wrong by less than four.
+# 1, times what the samples scatter by, from which on a given noise is doubted. Chosen: with less,
+# weights of channels against each other are wrong by less than four.
 MISSTATED = 2.0
 FILTERED = "; after a filter samples scatter less than their error"
 
