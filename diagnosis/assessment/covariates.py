@@ -104,11 +104,7 @@ class CovariateValues:
 
 
 def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues]]:
-    """The covariates for X, Y and N: those of all runs together, then the time of each run.
-
-    Args:
-        data: windows of each run.
-    """
+    """The covariates for X, Y and N: those of all runs together, then the time of each run."""
     counts, scale = [w.middle.size for w in data], data[0].scale
     every = np.arange(sum(counts))
     speed, turn, level, heading, place = map(np.concatenate, zip(*map(means_of_run, data), strict=True))

@@ -46,10 +46,6 @@ class Misreading(NamedTuple):
 def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWindows]:
     """Refuse runs whose files were read otherwise than meant.
 
-    Args:
-        runs: windows of the runs.
-        model: the initial one.
-
     Returns:
         The runs, with a line on a mistake that is likely, but not as sure as a refusal needs.
 

@@ -214,12 +214,6 @@ def knowledge(
 
     Weights are the confidences of the diagnosis; what these leave open among the rivals of an effect is
     shared by the evidence of the runs.
-
-    Args:
-        data: training runs.
-        start: the initial model.
-        prior: of its coefficients.
-        found: the effects and their rivals.
     """
     sets = [tuple(i for i in r.ids if usable(start, i)) for r in found]
     ids = [*dict.fromkeys(i for s in sets for i in s if i)]

@@ -10,7 +10,7 @@ from cosim.scenario import find_scenario
 
 from ..predictors.black_box import POSE, TAU
 from ..predictors.thrust import LONGEST_STEP
-from ..report.formatting import as_json
+from ..report.formatting import write_json
 from .designing import Designer, ScoredPlan
 
 TARGET = [f"{axis}_t{order}" for order in ("", "_dot", "_ddot") for axis in ("x", "y", "psi")]
@@ -63,7 +63,7 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
     }
     if ship is not None:
         content["ship"] = ship
-    (folder / scenario_file(number)).write_text(as_json(content) + "\n", encoding="utf-8")
+    write_json(folder / scenario_file(number), content)
 
 
 def _closed_loop() -> dict[str, Any]:

@@ -55,10 +55,6 @@ def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
     """(p, n, 3), poses of models that a controller keeps on a target, or by orders, started at rest.
 
     The controller gets the true motion: noise of the measurement moves a ship much less than its margin.
-
-    Args:
-        models: of one ship.
-        motion: the target or the orders, at equal steps.
     """
     h, controller = float(motion.time[1] - motion.time[0]), models[0].ship.serving(adaptive.COMPONENT)
     if motion.orders is not None:

@@ -188,11 +188,9 @@ def windows_of(
 
 def step_of(model: FmuModel, period: float) -> float:
     """Length of a step [s], for samples that are a period apart [s]."""
-    suggested = model.description.defaultExperiment
-    own = float(suggested.stepSize) if suggested is not None and suggested.stepSize else period
-    told = model.description.coSimulation
+    own, told = model.suggested_step or period, model.description.coSimulation
     if told is not None and not told.canHandleVariableCommunicationStepSize:
-        return own * max(1.0, round(period / own)) if suggested is not None else period
+        return own * max(1.0, round(period / own))
     return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - 1e-6))))
 
 

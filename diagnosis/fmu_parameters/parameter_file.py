@@ -173,11 +173,6 @@ class ParameterFile(BaseModel):
 def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> list[CalibratedParameter]:
     """The parameters of a file, checked against an FMU.
 
-    Args:
-        path: of the file.
-        model: the FMU.
-        mapped: variables that the map uses, which cannot be calibrated.
-
     Raises:
         InputError: no such file, a fault of it, or a name that the FMU does not have.
     """
@@ -216,10 +211,6 @@ def can_be_calibrated(v: FmuVariable) -> bool:
 
 def proposed(model: FmuModel, mapped: Collection[str]) -> tuple[list[CalibratedParameter], list[str]]:
     """The parameters of an FMU with a prior by their kind.
-
-    Args:
-        model: the FMU.
-        mapped: variables that the map uses.
 
     Returns:
         The parameters, and a sentence for each that has no scale, which is left out.

@@ -172,12 +172,6 @@ def ship_task(
 ) -> ShipTask:
     """Read the FMU of a ship, its map, its parameters and measured runs.
 
-    Args:
-        options: of the command.
-        paths: use -> files of the runs.
-        advance: receives the name of each step.
-        execution: how the FMU is run.
-
     Raises:
         InputError: one of them is not as it should be.
     """

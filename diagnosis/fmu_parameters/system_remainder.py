@@ -71,15 +71,7 @@ def remainder(
     names: Sequence[str],
     units: Sequence[str],
 ) -> SystemRemainder:
-    """What is left in whitened residuals (size,).
-
-    Args:
-        r: their windows.
-        white: the residuals.
-        first: those of the first model.
-        fitted: number of fitted values.
-        names, units: of the outputs.
-    """
+    """What is left in whitened residuals (size,)."""
     found = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
         own, before = _of_output(r, white, k), _of_output(r, first, k)

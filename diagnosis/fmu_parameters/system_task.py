@@ -78,11 +78,7 @@ class SystemTask(CalibrationTask):
         self.names = [c.name for c in map.outputs.values()]
         self.units = [unit_of(model.variables[n]) for n in self.names]
         self.forces_on = force_inputs(map, model)
-        others = [
-            v.name
-            for v in model.variables.values()
-            if v.causality == "output" and v.type == "Real" and v.name not in self.names
-        ]
+        others = [v.name for v in model.reals("output") if v.name not in self.names]
         self.outputs = [*self.names, *(others[:MOST_OUTPUTS] if self.forces_on else [])]
 
     @cached_property
@@ -146,11 +142,7 @@ def system_task(
     elif train:
         found = map_by_names(model, columns_of(train[0]), f"'{train[0]}'")
     else:
-        outputs = {
-            v.name: v.name
-            for v in model.variables.values()
-            if v.causality == "output" and v.type == "Real"
-        }
+        outputs = {v.name: v.name for v in model.reals("output")}
         if not outputs:
             raise InputError(f"'{fmu}' has no output of type Real to compare with measurements")
         found = SystemMap.model_validate({"outputs": outputs})

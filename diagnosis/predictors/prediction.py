@@ -322,9 +322,14 @@ def true_pose(measured: Any, b: vessel.PreparedVessel) -> list[Any]:
     """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
     pose = [np.atleast_2d(m) for m in measured]
     for _ in range(8):
-        x, y, psi = vessel.measured(vessel.State(*pose), b)
-        off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
-        pose = [a + b for a, b in zip(pose, off, strict=True)]
+        pose, off = nearer_pose(pose, measured, b)
         if not any((np.abs(o) > DIGITS).any() for o in off):
             break
     return pose
+
+
+def nearer_pose(pose: Any, measured: Any, b: vessel.PreparedVessel) -> tuple[list[Any], list[Any]]:
+    """One step of that iteration, and by how much the pose changes."""
+    x, y, psi = vessel.measured(vessel.State(*pose), b)
+    off = [measured[0] - x, measured[1] - y, wrap(measured[2] - psi)]
+    return [a + b for a, b in zip(pose, off, strict=True)], off

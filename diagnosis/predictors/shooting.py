@@ -116,12 +116,7 @@ class Shooting:
         return _off(self.measured, self._poses(self._states(model), model)[0])
 
     def around(self, model: Model, steps: Mapping[str, float]) -> Around:
-        """A model's predictions and what changes them.
-
-        Args:
-            model: about which.
-            steps: parameter -> step of its finite difference.
-        """
+        """A model's predictions and what changes them."""
         key = Response.key(model), model.filters
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
         same = {n: m for n, m in changed.items() if (Response.key(m), m.filters) == key}

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,3 +71,8 @@ def finite(value: Any) -> Any:
 def as_json(content: Any, indent: int | None = 2) -> str:
     """The text of a JSON file; a number that is not finite is null."""
     return json.dumps(finite(content), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON file; a number that is not finite is null."""
+    path.write_text(as_json(content) + "\n", encoding="utf-8")

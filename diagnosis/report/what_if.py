@@ -36,6 +36,7 @@ from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
 from ..session import Diagnosis
+from .finding_text import SHOWN
 from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 SCRIPTS = Path(__file__).parent / "templates" / "what_if"
 # Files of the page's program, in this order.
 PROGRAM = ("data", "predictions", "residual_force", "fit", "own_run", "pictures", "results", "controls")
-MOST_VALUES = 6  # 1, of an effect that was not found: a shape of more has no use as sliders; chosen
 FIXED = "It changes the delay or the filter of commands or of the measurement: it stays as it is here."
 
 
@@ -262,7 +262,7 @@ class MovableModel:
                 yield self._choice(effect, "calibrated", {}, True)
         for ranked in self.r.ranking[:MOST_RANKED]:
             effect = effects[ranked.id]
-            if ranked.id not in done and len(effect.parameters) <= MOST_VALUES and effect.function:
+            if ranked.id not in done and len(effect.parameters) <= 2 * SHOWN and effect.function:
                 yield self._choice(effect, "candidate", {}, False)
         for name, std in prior.std.items():
             if std or self.learned.value(name) != self.start.value(name):

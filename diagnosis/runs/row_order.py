@@ -21,10 +21,6 @@ MOST_WRONG = 0.1  # 1, of the rows; chosen: of a run of the real ship 7 % are sp
 def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     """A run whose time grows from row to row.
 
-    Args:
-        run: as it was read.
-        scale: of the ship.
-
     Returns:
         The run with the rows that have a time; ``left_out`` counts the others.
 

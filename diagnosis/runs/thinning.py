@@ -16,9 +16,6 @@ def filled_up(track: Track) -> Track:
     """A run with more rows, without measurements, where its rows are rarer than windows of forces.
 
     There the smoothed motion leads from one sample to the next, and commands are held.
-
-    Args:
-        track: a run with its samples judged.
     """
     time = track.run.time
     steps = np.diff(time)

@@ -7,12 +7,11 @@ import numpy as np
 
 from ...predictors.evaluation import Evaluation
 from ...report.document import Plot
+from ...report.finding_text import SHOWN
 from ...report.pictures.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
 from ...report.pictures.tracks import track
 from ..judged_criterion import EXPANDED, Judgement
 from ..predictions import Predictions
-
-TRACKS = 6  # 1, figures of tracks of a criterion; chosen: a page or two
 
 
 def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) -> Iterator[Plot]:
@@ -28,8 +27,8 @@ def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) 
         if c.horizon in drawn or not evaluations:
             continue
         drawn.add(c.horizon)
-        for p, rows in j.windows[:TRACKS]:
-            more = f" (of {len(j.windows)} runs the first {TRACKS})" if len(j.windows) > TRACKS else ""
+        for p, rows in j.windows[:SHOWN]:
+            more = f" (of {len(j.windows)} runs the first {SHOWN})" if len(j.windows) > SHOWN else ""
             told = (
                 f"{p.name}: measured track, and predictions over {c.horizon:g} s from the start of each "
                 "window"

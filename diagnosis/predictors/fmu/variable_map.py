@@ -223,10 +223,9 @@ def _with_hints(signals: Iterable[str], model: FmuModel, group: str) -> str:
 
 def _candidates(model: FmuModel, group: str) -> list[FmuVariable]:
     """The variables of an FMU that can be in a group of a map."""
-    real = [v for v in model.variables.values() if v.type == "Real"]
     if group == "start":
-        return [v for v in real if model.can_be_set(v)]
-    return [v for v in real if v.causality == ("output" if group == "outputs" else "input")]
+        return [v for v in model.reals() if model.can_be_set(v)]
+    return model.reals("output" if group == "outputs" else "input")
 
 
 def _meant(v: FmuVariable, group: str, known: Mapping[str, str]) -> Meant:

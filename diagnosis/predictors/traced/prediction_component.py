@@ -9,12 +9,12 @@ from dataclasses import replace
 from typing import Any
 
 from fmus.declare import Component, Fields, Variable, group_of
-from fmus.ops import Number, wrap
+from fmus.ops import Number
 from fmus.signals import Force, Measurement
 from fmus.vessel import vessel
 
 from ...runs import Run
-from ..prediction import true_motion
+from ..prediction import nearer_pose, true_motion
 from ..ship_model import Model
 from .recorded_step import Inputs, Ready
 from .recorded_step import step as one_step
@@ -112,7 +112,5 @@ def solved_pose(measured: Sequence[Number], b: vessel.PreparedVessel) -> list[Nu
     """As :func:`.prediction.true_pose`, of numbers and with as many iterations for all."""
     pose = [*measured]
     for _ in range(SOLVED):
-        x, y, psi = vessel.measured(vessel.State(*pose), b)
-        off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
-        pose = [a + b for a, b in zip(pose, off, strict=True)]
+        pose, _ = nearer_pose(pose, measured, b)
     return pose

@@ -72,13 +72,7 @@ def step(s: vessel.State, i: Inputs, b: Ready, h: Any) -> vessel.State:
 
 
 def recorded_step(b: Ready, i: Inputs, single: bool) -> Law:
-    """A function of state and inputs, all in one row, and the step, that gives the next state.
-
-    Args:
-        b: of the model.
-        i: the inputs of a step.
-        single: whether all are numbers, not arrays.
-    """
+    """A function of state and inputs, all in one row, and the step, that gives the next state."""
     numbers: list[Any] = []
     _mapped(b, numbers.append)
     counts = tuple([None if part is None else len(part) for part in i])

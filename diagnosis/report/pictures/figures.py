@@ -128,7 +128,8 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
         label = "best" if k == 0 else "not clearly worse" if tied else "clearly worse"
         panel.draw([x - std, x + std], [k, k], colour)
         panel.draw(x, k, colour, label, dots=True, hollow=tied and k > 0)
-        panel.notes[k] = _explained(r.beyond if np.isfinite(r.beyond) else r.q2)
+        share = r.beyond if np.isfinite(r.beyond) else r.q2
+        panel.notes[k] = percent(max(share, 0.0)) if np.isfinite(share) else ""
     return Chart(WIDTH / 2 + ROW * len(shown), [panel])
 
 
@@ -137,11 +138,6 @@ def _behind(r: Ranked, first: Ranked) -> tuple[float, float]:
     if np.isfinite(r.behind):
         return r.behind, float(np.nan_to_num(r.behind_std))
     return r.score - first.score, 0.0
-
-
-def _explained(share: float) -> str:
-    """The share next to a candidate; a negative one explains nothing."""
-    return percent(max(share, 0.0)) if np.isfinite(share) else ""
 
 
 def curve(c: Curve) -> Chart:

@@ -28,10 +28,6 @@ def fits_matlab(of: Ship) -> bool:
 def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
     """Signals of one of NTNU's files: one matrix, one column for each sample.
 
-    Args:
-        path: of the file.
-        of: the ship, with the names of its commands.
-
     Raises:
         InputError: not such a file.
     """
