@@ -241,8 +241,11 @@ def test_e_is_simulation_minus_data(comparison):
     predicted = [Predicted("a", ahead, sources_of(p, None), {})]
     heading = {**EASY, "quantity": "heading", "unit": "deg", "tolerance": 5.0}
     j = judge(Criterion(**heading), ["a"], predicted)
-    assert j.errors == pytest.approx(0.02)
-    assert judge(Criterion(**EASY), ["a"], predicted).offset == pytest.approx([0.1, 0.0])
+    assert j.found is not None
+    assert j.found.errors == pytest.approx(0.02)
+    found = judge(Criterion(**EASY), ["a"], predicted).found
+    assert found is not None
+    assert found.offset == pytest.approx([0.1, 0.0])
 
 
 def test_an_error_far_below_that_of_the_measurement_is_flagged(comparison):
