@@ -9,11 +9,11 @@ from .document import ReportSection as ReportSection
 from .document import Table as Table
 from .document import numbers as numbers
 from .document import write_document as write_document
-from .document import write_json as write_json
 from .formatting import as_json as as_json
 from .formatting import finite as finite
 from .formatting import number as number
 from .formatting import percent as percent
+from .formatting import write_json as write_json
 from .page import write_report as write_report
 from .pictures.chart import AFTER as AFTER
 from .pictures.chart import BAND as BAND

@@ -18,7 +18,6 @@ from .unit_check import OTHERS
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
-MOST = {"x": np.pi / 2, "y": np.pi}  # rad
 
 
 def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
@@ -50,7 +49,8 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
     there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
     origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
-    if not origin or any(np.radians(np.abs(degrees[s][there]).max()) > most for s, most in MOST.items()):
+    largest = {s: np.radians(np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()}
+    if not origin or largest["x"] > np.pi / 2 or largest["y"] > np.pi:
         return {}
     latitude = np.radians(origin["x"])
     flat = 1.0 - SQUARED_ECCENTRICITY * np.sin(latitude) ** 2
