@@ -222,6 +222,5 @@ def _size(r: WindowResiduals, k: int) -> float:
     if k < r.noise.size:
         y = np.concatenate([w.measured[:, k] for w in r.windows])
     else:
-        zero = Setting((0.0,) * len(r.parameters))
-        y = np.concatenate([p.outputs[:, k] for p in r.predict([zero])[0]])
+        y = np.concatenate([p.outputs[:, k] for p in r.predict([r.start])[0]])
     return max(float(np.sqrt(np.nanmean(y**2))), 1e-12) if np.isfinite(y).any() else 1.0

@@ -95,8 +95,7 @@ def fit(
     def setting(x: np.ndarray) -> Setting:
         y = whole.copy()
         y[free] = x
-        forces = zip(begin.forces, (y[p:] * size).tolist(), strict=True)
-        return Setting(tuple(y[:p].tolist()), tuple(replace(f, coefficient=c) for f, c in forces))
+        return Setting(tuple(y[:p].tolist()), begin.forces).with_coefficients((y[p:] * size).tolist())
 
     def residuals(x: np.ndarray) -> np.ndarray:
         s = setting(x)
@@ -178,8 +177,8 @@ def _reach(
         z = np.array([np.clip(x, *p.bounds) for x, p in zip(z, r.parameters, strict=True)])
         z[k] = f.setting.z[k] + sign * d
         change = sign * d * line[len(z) :] * np.array(f.sizes)
-        forces = zip(f.setting.forces, f.coefficients, change, strict=True)
-        s = Setting(tuple(z.tolist()), tuple(replace(g, coefficient=c + float(x)) for g, c, x in forces))
+        forces = (np.array(f.coefficients) + change).tolist()
+        s = Setting(tuple(z.tolist()), f.setting.forces).with_coefficients(forces)
         (found,) = r.whitened([s])
         total = float(found @ found + z @ z) - f.cost
         return total / inflation if np.isfinite(total) else np.inf

@@ -6,7 +6,7 @@ start value, and are whitened by the inverse root of that. Where a prediction is
 the slopes are those about the most likely start (Laplace's method).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
@@ -41,6 +41,11 @@ class Setting:
 
     z: tuple[float, ...]
     forces: tuple[AdditionalForce, ...] = ()
+
+    def with_coefficients(self, values: Iterable[float]) -> "Setting":
+        """The same with other coefficients of its forces."""
+        pairs = zip(self.forces, values, strict=True)
+        return Setting(self.z, tuple(replace(f, coefficient=c) for f, c in pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +105,11 @@ class WindowResiduals:
         sizes = [w.measured.size for w in windows]
         ends = np.cumsum([0, *sizes])
         self.rows = [slice(a, b) for a, b in pairwise(ends.tolist())]
+
+    @property
+    def start(self) -> Setting:
+        """The prior means, without additional forces."""
+        return Setting((0.0,) * len(self.parameters))
 
     def choose(self, parameters: Sequence[CalibratedParameter]) -> None:
         """Calibrate other parameters."""
@@ -300,17 +310,12 @@ class WindowResiduals:
             step = self._steps.get(p.name, STEP)
             down, up = min(step, max(z - low, 0.0)), min(step, max(high - z, 0.0))
             yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
-        for k, (f, size) in enumerate(zip(setting.forces, sizes, strict=True)):
+        present = np.array([f.coefficient for f in setting.forces])
+        for f, size, axis in zip(setting.forces, sizes, np.eye(present.size), strict=True):
             step = self._steps.get(f.id, STEP)
-            low, high = (self._forced(setting, k, sign * step * size) for sign in (-1.0, 1.0))
+            ends = (present - step * size * axis, present + step * size * axis)
+            low, high = (setting.with_coefficients(c.tolist()) for c in ends)
             yield f.id, low, high, step, step
-
-    @staticmethod
-    def _forced(setting: Setting, k: int, change: float) -> Setting:
-        """A setting with another coefficient of a force."""
-        forces = list(setting.forces)
-        forces[k] = replace(forces[k], coefficient=forces[k].coefficient + change)
-        return Setting(setting.z, tuple(forces))
 
     @staticmethod
     def at(setting: Setting, k: int, z: float) -> Setting:

@@ -56,7 +56,7 @@ def sensitivities(r: WindowResiduals, advance: Advance) -> Sensitivities:
     Raises:
         InputError: the FMU fails at its start values.
     """
-    start = Setting((0.0,) * len(r.parameters))
+    start = r.start
     advance("predictions with the start values")
     r.whiten_about(start)
     advance("ranges in which the FMU runs")
