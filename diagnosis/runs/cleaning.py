@@ -153,7 +153,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     seen, repeats, between = updates(run, PLACE, gone)
     turned, constant, lined = updates(run, HEADING, gone)
     if turned.sum() < FEWEST <= min(seen.sum(), constant.sum()):
-        turned = turned | _believed_constant(constant, where, anyway)
+        if not anyway:
+            raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
+        turned = turned | constant
     # Where no heading is near, a place tells nothing of surge and sway.
     apart = max(WIDTH * scale.time, LONG * row)
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
@@ -200,17 +202,6 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     return Track(
         run, pose, measured, frozen, dropped, between, period, run.left_out, tuple(notes), scale
     )
-
-
-def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.ndarray:
-    """Rows (n,) in which a heading repeats throughout, if that is believed.
-
-    Raises:
-        InputError: it is not.
-    """
-    if not anyway:
-        raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
-    return constant
 
 
 def long_gap(period: float, scale: Scale) -> float:
