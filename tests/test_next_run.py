@@ -354,7 +354,7 @@ def test_what_the_actuators_cannot_do_is_not_proposed(designer):
     fast.reach = d.reach._replace(speed=3.0, rate=3.0)
     found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, 120.0, 0.0)])
     assert found.excess > 0.0
-    assert found.score < -100.0
+    assert found.score < -1.0, "below any plan that keeps the limits"
     assert not found.gram.any()
 
 

@@ -151,8 +151,7 @@ def test_further_files_are_hashed_once_whether_one_or_several(monkeypatch, tmp_p
     paths = [tmp_path / name for name in ("a.py", "b.py", "criteria.json")]
     for path in paths:
         path.write_text(path.name)
-    for part in ("_data", "_model"):
-        monkeypatch.setattr(f"diagnosis.acceptance.record.provenance.{part}", lambda _: [])
+    monkeypatch.setattr("diagnosis.acceptance.record.provenance._model", lambda _: [])
     further = {"effects": [*paths[:2], tmp_path / "installed"], "ship": None, "criteria": str(paths[2])}
     found = files_of(SimpleNamespace(evaluations=[]), further | {"again": paths[0]})
     assert [(f["role"], f["path"]) for f in found] == [
