@@ -44,7 +44,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .predictors import MAP, open_model, ship_of_model, ship_with
     from .report import ReportData, file_content, show_comparison, write_report
-    from .report.document import write_json
+    from .report.formatting import write_json
 
     if options.criteria is None and (options.sign or options.learned):
         raise InputError("--sign and --learned belong to a record: --criteria FILE.json is missing")

@@ -139,7 +139,7 @@ def _compared(task: "Session", options: argparse.Namespace) -> Done:
     """First answer: the initial model against the runs. Files of an older result go away."""
     from .predictors import WRITTEN
     from .report import ReportData, file_content, show_comparison
-    from .report.document import write_json
+    from .report.formatting import write_json
 
     report = ReportData.of(task.compare(), options.model, [COMPARISON])
     with together(options.out, [*dict.fromkeys((*EARLY, *FILES, *WRITTEN))]) as new:
@@ -151,7 +151,7 @@ def _calibrated(task: "Session", options: argparse.Namespace) -> Done | None:
     """Second answer: the coefficients alone; None: there is none to fit, and a search follows."""
     from .predictors import write_model
     from .report import ReportData, calibration_content, show_calibration, write_report
-    from .report.document import write_json
+    from .report.formatting import write_json
 
     calibrated, more = task.calibrate(), not options.quick
     left_out = [] if more else [LEFT_OUT]
@@ -172,7 +172,7 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
     """Third answer: which effect is missing."""
     from .predictors import WRITTEN
     from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
-    from .report.document import write_json
+    from .report.formatting import write_json
 
     possible = [*dict.fromkeys((*FILES, *WRITTEN))]
     diagnosis = task.diagnose()

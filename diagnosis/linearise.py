@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .fmu_parameters.system_map import SystemMap
 
 FILES = ("linear.json", "linear.mat")
-DOUBTFUL = 0.02  # change of A by longer steps, from which on it is reported; chosen
+DOUBTFUL = 0.02  # 1, change of A by longer steps, from which on it is reported; chosen
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,6 +41,7 @@ def linearise(options: argparse.Namespace, advance: Advance) -> Done:
     from cosim.fmu import FmuModel
 
     from .fmu_parameters.linear_model import linearised, states_of
+    from .fmu_parameters.parameter_file import unit_of
     from .fmu_parameters.system_map import check_map, read_system_map
     from .fmu_parameters.system_task import is_system
 
@@ -60,11 +61,11 @@ def linearise(options: argparse.Namespace, advance: Advance) -> Done:
         at = _of_ship(options, advance)
     else:
         at = _of_run(options, model, given)
-    outputs = [v.name for v in model.variables.values() if v.causality == "output" and v.type == "Real"]
+    outputs = [v.name for v in model.reals("output")]
     advance("slopes")
     found = linearised(model, states, at, outputs, execution_of(options))
     names = (*found.states, *found.inputs, *found.outputs)
-    units = {n: "1" if (u := model.variables[n].unit) is None else u.name for n in names}
+    units = {n: unit_of(model.variables[n]) for n in names}
     with together(options.out, FILES) as new:
         found.write(new, units)
     roots = ", ".join(f"{x:.4g}" for x in np.linalg.eigvals(found.A))
@@ -97,7 +98,7 @@ def _read_state(path: Path, model: "FmuModel") -> dict[str, float]:
     content = json_content(path, "a state")
     if not isinstance(content, dict):
         raise InputError(f'\'{path}\' must be an object of numbers, as {{"u_0": 0.1, "tau_X": 0.5}}')
-    possible = [v.name for v in model.variables.values() if v.type == "Real" and model.can_be_set(v)]
+    possible = [v.name for v in model.reals() if model.can_be_set(v)]
     for name, value in content.items():
         if name not in possible:
             raise InputError(

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from cosim import InputError
@@ -132,12 +131,10 @@ def _tabulated(
     paths: Iterable[Path], runs: Mapping[Path, "Run"], craft: "Ship", anyway: bool, advance: Advance
 ) -> list[RenderableType]:
     """A row for each measurement, one for each channel, and why some measurements cannot be used."""
-    from .report.terminal import channel_table
+    from .report.terminal import channel_table, plain_table
     from .runs import channels_of
 
-    table, refused, channels = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0)), [], []
-    for k, name in enumerate(("file", "time", "every", *HEADS)):
-        table.add_column(name, justify="right" if k else "left", overflow="fold")
+    table, refused, channels = plain_table("file", "time", "every", *HEADS), [], []
     for path in paths:
         cells = ["-"] * (2 + len(HEADS))
         try:

@@ -279,7 +279,9 @@ class Session(ShortRepr):
     def diagnose(self) -> Diagnosis:
         """Third answer: which effect is missing, and how sure that is."""
         found = self.method.fit(self.train, self.start, self.prior, self.advance, self.seed)
-        data, region = self.data(found.sigma), self._region()
+        data = self.data(found.sigma)
+        nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
+        region = OperatingRegion.of(nu, self.start.ship.scale)
         calibrates = self.predictor.parametric
         verdict = judge(found, data, self.known, self.harms, region, calibrates, self.advance)
         gain = self._gained(verdict, data) if self.predictor.parametric else None
@@ -291,11 +293,6 @@ class Session(ShortRepr):
         calibrated = None if self.calibration is None else self.calibration.findings
         learned = verdict.learned.model if verdict.changed else self.start
         return gain_of_search(data, self.start, calibrated, verdict.learned, learned)
-
-    def _region(self) -> OperatingRegion:
-        """The motions that the training runs hold."""
-        nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
-        return OperatingRegion.of(nu, self.start.ship.scale)
 
     def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:
         decide, runs = len(self.train) + len(self.validate), self.runs

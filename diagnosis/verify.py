@@ -8,7 +8,7 @@ from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, printable, run_command
 
 SHOWN = {True: "holds      ", False: "DIFFERS    ", None: "NOT CHECKED"}
-DIFFERS, UNCHECKED = 1, 4
+DIFFERS, UNCHECKED = 1, 4  # 1, exit codes
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

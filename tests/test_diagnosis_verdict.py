@@ -30,8 +30,7 @@ from diagnosis.search.significance import lower_throughout, worse
 from diagnosis.verdict.confidence import confidence_of, probability
 from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.paired_errors import harm
-from diagnosis.verdict.pruning import prune, without
-from diagnosis.verdict.unproven import overfits, proven
+from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, Losses, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}

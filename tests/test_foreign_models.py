@@ -3,6 +3,7 @@
 import json
 import os
 import re
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from zipfile import ZipFile
@@ -15,7 +16,7 @@ from support.measured import sail
 
 import diagnosis
 from cosim import InputError, Unit
-from cosim.fmu import FmuVariable
+from cosim.fmu import FmuModel, FmuVariable
 from diagnosis import Fmu, Run, compare, learn
 from diagnosis.predictors import UnmatchedError
 from diagnosis.predictors.fmu.variable_map import completed, propose, signal_lines
@@ -288,6 +289,7 @@ def test_names_and_units_that_an_fmu_declares_are_matched():
     model = SimpleNamespace(
         variables={v.name: v for v in declared}, can_be_set=lambda v: v.causality == "parameter"
     )
+    model.reals = partial(FmuModel.reals, model)
     commands = {"tau_X": "force", "rudder.delta": "angle"}
     proposed = propose(model, commands)
     assert proposed.content()["outputs"] == {

@@ -1,12 +1,13 @@
 """Which variable of an FMU is which signal, in the tongues of the field; what is not taken without asking."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cosim import Unit
-from cosim.fmu import FmuVariable
+from cosim.fmu import FmuModel, FmuVariable
 from diagnosis.predictors.black_box import commanded, planes
 from diagnosis.predictors.fmu.variable_map import completed, propose, signal_lines
 from diagnosis.runs import Run
@@ -23,7 +24,9 @@ def variable(name, causality, unit=None, low=None, high=None, start=None):
 
 def fmu(*variables):
     known = {v.name: v for v in variables}
-    return SimpleNamespace(variables=known, can_be_set=lambda v: v.causality in ("parameter", "input"))
+    model = SimpleNamespace(variables=known, can_be_set=lambda v: v.causality in ("parameter", "input"))
+    model.reals = partial(FmuModel.reals, model)
+    return model
 
 
 def outputs(*names, **limits):

@@ -46,16 +46,17 @@ from diagnosis.design.information import (
     projected,
 )
 from diagnosis.design.limits import limits_of
-from diagnosis.design.manoeuvre_library import LIBRARY, NUMBERS, PlanStep, Reach, poses, sequence, usual
+from diagnosis.design.manoeuvre_library import LIBRARY, PlanStep, Reach, poses, sequence, usual
 from diagnosis.design.planned_motion import EVERY, PlannedMotion
 from diagnosis.design.rehearsal import Rehearsal, RehearsedEffect
-from diagnosis.design.spread import STEP, drawn, followed
+from diagnosis.design.spread import drawn, followed
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 
+NUMBERS = DIMENSIONS - 2  # of a manoeuvre
 Q, OWN = 3, 2  # nuisance parameters, and those of each of two hypotheses
 REACH = Reach(0.15, 0.2, 2.5, 1.0, -0.5, 0.5)
 
@@ -353,7 +354,7 @@ def test_what_the_actuators_cannot_do_is_not_proposed(designer):
     fast.reach = d.reach._replace(speed=3.0, rate=3.0)
     found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, 120.0, 0.0)])
     assert found.excess > 0.0
-    assert found.score < -100.0
+    assert found.score < -1.0, "below any plan that keeps the limits"
     assert not found.gram.any()
 
 
@@ -373,7 +374,7 @@ def test_the_planned_motion_is_what_its_thrust_gives():
 
 def test_a_faster_motion_has_the_same_track(designer):
     d, _ = designer
-    slow = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), STEP)
+    slow = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), EVERY)
     fast = slow.faster(1.2)
     h = float(fast.time[1] - fast.time[0])
     assert fast.eta == pytest.approx(slow.eta)
@@ -385,7 +386,7 @@ def test_a_plan_keeps_a_margin_to_the_speed_at_which_a_ship_diverges(designer, m
     """A ship that is lost at any speed above that of the plan is outside of every basin."""
     d, k = designer
     s = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
-    track = d.motion(s.steps, s.size, STEP)
+    track = d.motion(s.steps, s.size, EVERY)
 
     def lost(models, motion):
         eta = np.tile(track.eta, (len(models), 1, 1))
@@ -433,7 +434,7 @@ def test_runs_needed_are_counted_at_first_and_for_all_larger_numbers():
 def test_the_loop_of_many_models_is_that_of_each_alone(designer):
     d, k = designer
     models = drawn(d.space, k, 0, np.random.default_rng(0))[:3]
-    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), STEP)
+    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), EVERY)
     short = PlannedMotion(*(x[:60] for x in (motion.time, motion.eta, motion.eta_dot, motion.eta_ddot)))
     together = followed(models, short)
     for n, model in enumerate(models):

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from diagnosis import Model
-from diagnosis.predictors import compiled_law, recorded_law, recorded_step, ship_with
+from diagnosis.predictors import ship_with
 from diagnosis.predictors.prediction import stacked
-from diagnosis.predictors.recorded_step import Inputs, Ready, step
-from diagnosis.predictors.recorded_step import recorded_step as recorded
+from diagnosis.predictors.traced import compiled_law, recorded_law, recorded_step
+from diagnosis.predictors.traced.recorded_step import Inputs, Ready, step
+from diagnosis.predictors.traced.recorded_step import recorded_step as recorded
 from fmus.fmi.trace import TraceError
 from fmus.vessel import vessel
 

@@ -30,13 +30,13 @@ from diagnosis.report import (
     glossary,
     headline,
     page,
-    tracks,
     write_coefficients,
     write_report,
 )
-from diagnosis.report.chart import Text
 from diagnosis.report.content import coefficients
 from diagnosis.report.error_change import error_changes
+from diagnosis.report.pictures import tracks
+from diagnosis.report.pictures.chart import Text
 from diagnosis.report.reported_effect import ReportedCoefficient
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from fmus.ship import ship

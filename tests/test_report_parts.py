@@ -13,9 +13,10 @@ from diagnosis import Model
 from diagnosis.assessment.covariates import HEADING, SPEED
 from diagnosis.assessment.regions import Profile
 from diagnosis.assessment.settings import SETTINGS
-from diagnosis.report import chart, figures, finding_text, formatting, headline, shape, tracks
+from diagnosis.report import finding_text, formatting, headline
+from diagnosis.report.pictures import chart, figures, shape, tracks
+from diagnosis.report.pictures.shape import Curve
 from diagnosis.report.reported_effect import ReportedCoefficient
-from diagnosis.report.shape import Curve
 from diagnosis.report.terminal import _number as terminal_number
 from diagnosis.report.terminal import _percent as terminal_percent
 from fmus.ship import ship

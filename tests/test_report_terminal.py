@@ -11,8 +11,7 @@ from support.reported import STABILITY, diagnosis, effect, learned, ranked, repo
 from cosim import InputError
 from diagnosis import Counts
 from diagnosis.assessment.covariates import SPEED
-from diagnosis.report import figures, notebook, tracks
-from diagnosis.report.chart import Chart, Panel
+from diagnosis.report import notebook
 from diagnosis.report.content import gain_content
 from diagnosis.report.headline import (
     NOTHING_FOUND,
@@ -21,6 +20,8 @@ from diagnosis.report.headline import (
     first_sentences,
     gain_sentences,
 )
+from diagnosis.report.pictures import figures, tracks
+from diagnosis.report.pictures.chart import Chart, Panel
 from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.sensors.sensor_finding import SensorFinding

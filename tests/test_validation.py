@@ -23,7 +23,14 @@ from diagnosis.acceptance.budget import (
     sources_of,
 )
 from diagnosis.acceptance.criterion import Criterion
-from diagnosis.acceptance.judged_criterion import Judgement, Predicted, WindowCounts, decide, judge
+from diagnosis.acceptance.judged_criterion import (
+    JudgedErrors,
+    Judgement,
+    Predicted,
+    WindowCounts,
+    decide,
+    judge,
+)
 from diagnosis.acceptance.predictions import Predictions, difference, judged
 from diagnosis.acceptance.record.validation import _result
 from diagnosis.acceptance.statistics import Interval, independent, root_mean_square, share
@@ -43,10 +50,10 @@ def criterion(**changes):
 def test_a_record_has_the_statistics_of_the_errors_in_the_unit_of_the_criterion(statistic):
     """In cm; a fraction has no unit."""
     errors, bounds = np.array([0.03, -0.04, 0.01]), Interval(0.9, 0.8, 0.95)
-    made = Judgement(
-        criterion(unit="cm", tolerance=5.0, statistic=statistic), None, "", WindowCounts(3, 3, {}, ["a"], {}),
-        errors=errors, offset=np.array([0.02, -0.01]), interval=bounds,
-    )  # fmt: skip
+    unsure = Budget(0.01, *[None] * 6)
+    found = JudgedErrors(np.zeros(3), errors, np.array([0.02, -0.01]), 3.0, bounds, unsure)
+    counts = WindowCounts(3, 3, {}, ["a"], {})
+    made = Judgement(criterion(unit="cm", tolerance=5.0, statistic=statistic), None, "", counts, found)
     found = _result(made)
     assert found["E"] == pytest.approx(0.0)
     assert found["rms"] == pytest.approx(100.0 * (26e-4 / 3.0) ** 0.5)
@@ -54,7 +61,7 @@ def test_a_record_has_the_statistics_of_the_errors_in_the_unit_of_the_criterion(
     assert found["E_axes"] == pytest.approx([2.0, -1.0])
     factor = 100.0 if statistic == "rms" else 1.0
     assert [found[n] for n in ("estimate", "low", "high")] == pytest.approx([factor * x for x in bounds])
-    none = _result(made._replace(errors=np.zeros(0), interval=None))
+    none = _result(made._replace(found=None))
     assert [none[n] for n in ("E", "rms", "largest", "E_axes", "estimate", "budget")] == [None] * 6
 
 
@@ -263,7 +270,8 @@ def test_only_windows_within_count(comparison, predictions):
     p = Predicted("run", predictions, sources_of(predictions, None), window_means(predictions))
     u = p.signals["u"]
     some = judge(criterion(operating_range={"u": [float(np.median(u)), 9.0]}), ["run"], [p])
-    assert some.errors.size == np.sum(u >= np.median(u))
+    assert some.found is not None
+    assert some.found.errors.size == np.sum(u >= np.median(u))
     none = judge(criterion(operating_range={"u": [8.0, 9.0]}), ["run"], [p])
     assert none.reason == "outside the data: no window has u from 8 to 9"
     assert judge(criterion(runs=["other"]), ["run"], [p]).reason == "run other was not compared"

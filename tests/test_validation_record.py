@@ -151,8 +151,7 @@ def test_further_files_are_hashed_once_whether_one_or_several(monkeypatch, tmp_p
     paths = [tmp_path / name for name in ("a.py", "b.py", "criteria.json")]
     for path in paths:
         path.write_text(path.name)
-    for part in ("_data", "_model"):
-        monkeypatch.setattr(f"diagnosis.acceptance.record.provenance.{part}", lambda _: [])
+    monkeypatch.setattr("diagnosis.acceptance.record.provenance._model", lambda _: [])
     further = {"effects": [*paths[:2], tmp_path / "installed"], "ship": None, "criteria": str(paths[2])}
     found = files_of(SimpleNamespace(evaluations=[]), further | {"again": paths[0]})
     assert [(f["role"], f["path"]) for f in found] == [
@@ -241,8 +240,11 @@ def test_e_is_simulation_minus_data(comparison):
     predicted = [Predicted("a", ahead, sources_of(p, None), {})]
     heading = {**EASY, "quantity": "heading", "unit": "deg", "tolerance": 5.0}
     j = judge(Criterion(**heading), ["a"], predicted)
-    assert j.errors == pytest.approx(0.02)
-    assert judge(Criterion(**EASY), ["a"], predicted).offset == pytest.approx([0.1, 0.0])
+    assert j.found is not None
+    assert j.found.errors == pytest.approx(0.02)
+    found = judge(Criterion(**EASY), ["a"], predicted).found
+    assert found is not None
+    assert found.offset == pytest.approx([0.1, 0.0])
 
 
 def test_an_error_far_below_that_of_the_measurement_is_flagged(comparison):

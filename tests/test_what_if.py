@@ -16,7 +16,7 @@ from support.measured import sail, smoothed
 from diagnosis import Comparison, Model, evaluate_run
 from diagnosis.predictors import read_model, weak_windows
 from diagnosis.predictors.prediction import predict
-from diagnosis.predictors.prediction_component import prediction_component
+from diagnosis.predictors.traced.prediction_component import prediction_component
 from diagnosis.report import ReportData, write_report
 from diagnosis.report.reported_effect import ReportedCoefficient
 from diagnosis.report.what_if import FIXED, MovableModel, what_if

@@ -206,6 +206,17 @@ class FmuModel:
             return False
         return PYTHON_SYMBOL.encode() not in content
 
+    def reals(self, *causality: str) -> list[FmuVariable]:
+        """Its real variables, those of some causalities or all."""
+        every = (v for v in self.variables.values() if v.type == "Real")
+        return [v for v in every if not causality or v.causality in causality]
+
+    @property
+    def suggested_step(self) -> float | None:
+        """Step of its default experiment [s]; None: it suggests none."""
+        told = self.description.defaultExperiment
+        return float(told.stepSize) if told is not None and told.stepSize else None
+
     @property
     def needs_tool(self) -> bool:
         """Whether it needs the tool that it was made with (``needsExecutionTool``)."""

@@ -26,16 +26,18 @@ from fmus.frames import rotate_to_body
 from ..predictors import Model
 from ..predictors.shooting import Shooting
 from ..runs import Fingerprint, Smoothed, fingerprints
+from ..runs.files.resolution import FUZZ
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
 from .criterion import JUDGED, InputStd
 from .predictions import Predictions, difference, judged
 
 # Parameters of the effects current and earth_force.
 CURRENT, WIND = ("V_n", "V_e"), ("F_n", "F_e")
-SAME = 1e-6  # of a value or its standard deviation: rounding in files; chosen
-ROUNDING = 1e-9  # of the motion: a change that is none, but of the last digits of a log; chosen
-SLOWEST = 0.5  # order of convergence below which there is none; chosen, an explicit Euler method has 1
-HIGHEST = 5.0  # and above which halving did not act on each step; chosen, that of Runge and Kutta has 4
+ROUNDING = 1e-9  # 1, of the motion: a change that is none, but of the last digits of a log; chosen
+# 1, order of convergence below which there is none; chosen, an explicit Euler method has 1
+SLOWEST = 0.5
+# 1, order above which halving did not act on each step; chosen, the method of Runge and Kutta has 4
+HIGHEST = 5.0
 Variances = Mapping[str, np.ndarray]  # quantity -> variance in each window (w,)
 # Source, as a field of Budget -> variances of the predictions, or why they are not known.
 Sources = Mapping[str, Variances | str]
@@ -63,7 +65,7 @@ class Learned(NamedTuple):
         p, known = self.posterior, model.values
         names = [name.partition(".")[2] for name in p.names]
         values = np.array([model.value(n) if "@" in n or n in known else np.nan for n in names])
-        reach = SAME * np.maximum(p.std, np.abs(p.mean))
+        reach = FUZZ * np.maximum(p.std, np.abs(p.mean))
         return bool(np.all(np.abs(values - p.mean) <= reach))
 
 

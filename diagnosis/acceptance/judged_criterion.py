@@ -16,9 +16,9 @@ from .predictions import LATE, Predictions, difference, judged
 from .statistics import Interval, independent, needed, root_mean_square, share
 
 Outcome = Literal["met", "not met", "cannot be judged"]
-EXPANDED = 2.0  # standard uncertainties in the expanded one, about 95 % of a normal distribution
-# Of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half, as
-# noise may be stated too large (chosen).
+EXPANDED = 2.0  # 1, standard uncertainties in the expanded one, about 95 % of a normal distribution
+# 1, of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half,
+# as noise may be stated too large (chosen).
 FAR_BELOW, CHANCE = 0.5, 1e-3
 LEARNED, FEW = "the model was learned from it", "too few samples"
 
@@ -40,20 +40,35 @@ class WindowCounts(NamedTuple):
     left_out: Mapping[str, str]
 
 
+class JudgedErrors(NamedTuple):
+    """The errors in the windows that count. Numbers in SI.
+
+    Attributes:
+        run: (w,), of each window the number of its run.
+        errors: (w,), predicted less measured, E = S - D; of position the distance.
+        offset: mean of predicted less measured position, forward and to starboard [m].
+        independent: how many of the windows are.
+        interval: share, or RMS, with bounds.
+        budget: uncertainty of the errors.
+    """
+
+    run: np.ndarray
+    errors: np.ndarray
+    offset: np.ndarray
+    independent: float
+    interval: Interval
+    budget: Budget
+
+
 class Judgement(NamedTuple):
-    """What the windows say of a criterion. Numbers in SI.
+    """What the windows say of a criterion.
 
     Attributes:
         criterion: that is judged.
         outcome: of it.
         reason: in a sentence.
         counts: what it rests on.
-        run, start: (w,), of each window that counts the number of its run, and when it begins [s].
-        errors: (w,), predicted less measured, E = S - D; of position the distance.
-        offset: mean of predicted less measured position, forward and to starboard [m].
-        independent: how many of the windows are.
-        interval: share, or RMS, with bounds.
-        budget: uncertainty of the errors; None without windows.
+        found: the errors; None: no window counts.
         flags: what a reader must know of the outcome, a sentence each.
         windows: those that count, of each run that does.
     """
@@ -62,13 +77,7 @@ class Judgement(NamedTuple):
     outcome: Outcome
     reason: str
     counts: WindowCounts
-    run: np.ndarray = np.zeros(0)
-    start: np.ndarray = np.zeros(0)
-    errors: np.ndarray = np.zeros(0)
-    offset: np.ndarray = np.full(2, np.nan)
-    independent: float = 0.0
-    interval: Interval | None = None
-    budget: Budget | None = None
+    found: JudgedErrors | None = None
     flags: Sequence[str] = ()
     windows: Sequence[tuple["Predicted", np.ndarray]] = ()
 
@@ -116,7 +125,6 @@ def judge(
     off = [difference(p.predictions.motion, p.predictions.measured)[rows] for p, rows in chosen]
     errors = np.concatenate([judged(c.quantity, d) for d in off])
     run = np.repeat(np.arange(len(chosen)), [int(rows.sum()) for _, rows in chosen])
-    start = np.concatenate([p.predictions.start[rows] for p, rows in chosen])
     psi = np.concatenate([p.predictions.measured[rows, 2] for p, rows in chosen])
     every = np.concatenate(off)
     offset = np.array([np.mean(x) for x in rotate_to_body(psi, every[:, 0], every[:, 1])])
@@ -132,21 +140,8 @@ def judge(
     flags.append(_too_early(c, np.concatenate([p.predictions.after[rows] for p, rows in chosen])))
     if any(p.learned for p, _ in chosen):
         flags.append("Training runs of the model count, as the criterion states.")
-    return Judgement(
-        c,
-        outcome,
-        reason,
-        counts,
-        run,
-        start,
-        errors,
-        offset,
-        n,
-        interval,
-        told,
-        [*filter(None, flags)],
-        chosen,
-    )
+    found = JudgedErrors(run, errors, offset, n, interval, told)
+    return Judgement(c, outcome, reason, counts, found, [*filter(None, flags)], chosen)
 
 
 def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Outcome, str, Interval]:

@@ -14,7 +14,7 @@ from ..predictors.evaluation import Evaluation
 from ..runs import Smoothed
 from .criterion import JUDGED
 
-LATE = 0.1  # of the horizon, or 1.5 samples: by so much earlier the last sample may be; chosen
+LATE = 0.1  # 1, of the horizon, or 1.5 samples: by so much earlier the last sample may be; chosen
 
 
 class Predictions:

@@ -13,7 +13,7 @@ from .predictions import Predictions
 QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
 # By the quantity of a command.
 SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
-SLOW = 0.1  # of the speed that a run reaches, below which there is no drift angle; chosen
+SLOW = 0.1  # 1, of the speed that a run reaches, below which there is no drift angle; chosen
 
 
 def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:

@@ -12,7 +12,7 @@ from ..predictors.weak_form import BLOCK
 from ..runs.columns.unit_check import UNITS
 
 AXES = "XYN"
-BINS = 8  # of equal numbers of windows, or sectors of heading; of time twice as many at most; chosen
+BINS = 8  # 1, of equal numbers of windows, or sectors of heading; of time twice as many at most; chosen
 # Unit of values -> quantity and unit for people.
 DISPLAYED = {"rad": ("angle", "deg"), "rad/s": ("rate", "deg/s"), "1": ("command", "%")}
 
@@ -104,11 +104,7 @@ class CovariateValues:
 
 
 def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues]]:
-    """The covariates for X, Y and N: those of all runs together, then the time of each run.
-
-    Args:
-        data: windows of each run.
-    """
+    """The covariates for X, Y and N: those of all runs together, then the time of each run."""
     counts, scale = [w.middle.size for w in data], data[0].scale
     every = np.arange(sum(counts))
     speed, turn, level, heading, place = map(np.concatenate, zip(*map(means_of_run, data), strict=True))

@@ -31,7 +31,7 @@ from .settings import SETTINGS
 # rad; a heading that is off by any of them is an effect of the library, and no mistake where it explains
 # a run as well. Chosen: 30 degrees apart, so that one is within 15 degrees.
 TURNS = tuple(k * np.pi / 6.0 for k in range(-5, 6) if k)
-MOST = 6  # power of ten of the odds that are stated; no model is true enough for more
+MOST = 6  # 1, power of ten of the odds that are stated; no model is true enough for more
 
 
 class Misreading(NamedTuple):
@@ -45,10 +45,6 @@ class Misreading(NamedTuple):
 
 def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWindows]:
     """Refuse runs whose files were read otherwise than meant.
-
-    Args:
-        runs: windows of the runs.
-        model: the initial one.
 
     Returns:
         The runs, with a line on a mistake that is likely, but not as sure as a refusal needs.

@@ -28,7 +28,7 @@ from ..predictors.weak_form import OVERLAP, needed_force
 from .readings import Reading, inertial, reread
 from .settings import SETTINGS
 
-ROUNDS = 5  # of noise and explanation in turn; the density is then within 0.1 of its limit
+ROUNDS = 5  # 1, of noise and explanation in turn; the density is then within 0.1 of its limit
 
 
 @dataclass
@@ -98,7 +98,8 @@ class ReadingOdds:
             w = reread(self.w, reading, self.model)
             e, z, a = omega(w, self.model), needed_force(w, self.model), inertial(w, self.model)
             each = [omega(w, self.model.plus({n: 1.0})) - e for n in self._thrusters]
-            streams = [omega(w, self.model.plus({n: self._stream})) - e for n in ("V_n", "V_e")]
+            steady = SETTINGS.steady * self.model.ship.scale.speed  # deviation of a current [m/s]
+            streams = [omega(w, self.model.plus({n: steady})) - e for n in ("V_n", "V_e")]
             found = np.concatenate([e, z, a, *each, *streams])
         if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
             return -np.inf
@@ -128,11 +129,6 @@ class ReadingOdds:
         for column in ([north, -east, zero], [east, north, zero]):
             why.may(np.column_stack(column), SETTINGS.steady * float(self._full[0]))
         return why
-
-    @property
-    def _stream(self) -> float:
-        """Deviation of a current [m/s]."""
-        return SETTINGS.steady * self.model.ship.scale.speed
 
     @cached_property
     def _thrusters(self) -> list[str]:

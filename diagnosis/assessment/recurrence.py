@@ -41,13 +41,12 @@ class Recurrence(NamedTuple):
         return name if self.shares[name] >= SETTINGS.repeats else None
 
 
-def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> list[Recurrence]:
+def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence]:
     """How the model error of each axis comes again.
 
     Args:
         data: windows of each run.
         left: (K, 3), model error in them, one run after the other [N, N, N m].
-        seed: of the shifts.
     """
     run = np.repeat(np.arange(len(data)), [w.middle.size for w in data])
     time = np.concatenate([w.middle for w in data])
@@ -58,7 +57,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> 
     spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     shifts = round(1.0 / SETTINGS.chance) - 1
     offsets = rng.integers(count, max(len(left) - count, count + 1), shifts)
     lasts = data[0].every * correlated_windows(data, left)

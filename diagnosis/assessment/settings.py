@@ -29,7 +29,7 @@ class AssessmentSettings:
     # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no
     # coefficient is known to 1 %.
     hardly: float = 0.01
-    neighbours: int = 5  # windows by which that of a model error is predicted; chosen
+    neighbours: int = 5  # 1, windows by which that of a model error is predicted; chosen
     repeats: float = 0.25  # 1, share from which on an error is said to repeat; chosen
     # 1. Calibrated by tests/test_diagnosis_where.py: with one block three times as many regions were
     # found where an error depends on no covariate.
@@ -40,7 +40,8 @@ class AssessmentSettings:
     # 1, variance by noise of a mean over windows, as a share of that of independent ones: measured 0.04
     # to 0.13 without a hidden cause, and doubled.
     slow_noise: float = 0.25
-    directions: int = 21  # along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
+    # 1, along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
+    directions: int = 21
     least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen
     limits: tuple[float, float, float] = (0.4, 0.2, 0.6)  # m/s, m/s, rad/s: 99 % of each published run
     runaway: float = 3.0  # 1, times the speeds of the region; chosen

@@ -59,9 +59,6 @@ def trial_errors(e: Evaluation) -> TrialErrors | None:
     All three are from shortly before the first execute on, where the predictions begin; the instants
     at which the order is put over are those of the measurement.
 
-    Args:
-        e: the run.
-
     Returns:
         Name of a measure -> [measured, before, after]; ``overshoot`` and ``overshoot_time`` -> a list of
         these; None in place of what a track does not tell. None for a run that is no trial.

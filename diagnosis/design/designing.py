@@ -16,29 +16,38 @@ from cosim.errors import nearest
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
-from .hypotheses import LIKELY, Space
+from ..predictors.uncertainty import NEGLIGIBLE
+from .hypotheses import Space
 from .information import CRITERIA, Knowledge, inseparable
-from .manoeuvre_library import DIMENSIONS, LIBRARY, USUAL, PlanStep, Reach, UsualRuns, sequence, usual
+from .manoeuvre_library import (
+    DIMENSIONS,
+    LIBRARY,
+    PIECE,
+    USUAL,
+    PlanStep,
+    Reach,
+    UsualRuns,
+    sequence,
+    usual,
+)
 from .order_library import ORDERS, USUAL_ORDERS, Orders
 from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
-from .spread import MEMBERS, STEP, Spread, spread
+from .spread import MEMBERS, Spread, spread
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
-LOG_POINTS = 6  # of the number of Sobol points, to the base 2; chosen: a few seconds
-EVOLVED = 160  # points tried by evolution at the most; chosen: some ten seconds
-POPULATION = 12  # best points that evolve
-PIECE = 60.0  # s, times the time scale, of a manoeuvre: some ten changes of speed; chosen
-MOST_PIECES = 6
-FASTER = 1.5  # times the fastest measured motion: as far as a model is used beyond its data (chosen)
-FORBIDDEN = 1e3  # of a criterion, for each unit by which a limit is exceeded
-# Shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
+LOG_POINTS = 6  # 1, of the number of Sobol points, to the base 2; chosen: a few seconds
+EVOLVED = 160  # 1, points tried by evolution at the most; chosen: some ten seconds
+POPULATION = 12  # 1, best points that evolve; chosen: each some ten times
+MOST_PIECES = 6  # 1, manoeuvres of a run; chosen: of more the search finds no good ones in its time
+FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used beyond its data (chosen)
+# 1, shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
-TRIES = 3  # best plans whose spread is computed, until one keeps the basin; chosen: within the minute
+TRIES = 3  # 1, best plans whose spread is computed, until one keeps the basin; chosen: within the minute
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
     "basin, fewer minutes or a smaller margin"
 )
-ROUNDED = 1.3  # times the largest speeds, which ramps and turned axes exceed a little (chosen)
+ROUNDED = 1.3  # 1, times the largest speeds, which ramps and turned axes exceed a little (chosen)
 
 
 @dataclass(frozen=True)
@@ -68,7 +77,7 @@ class ScoredPlan:
         motion: the target.
         gram: (p, p), information of a run along it; zero where it cannot be carried out.
         excess: by how much it exceeds limits, zero where it keeps them [1].
-        score: by the criterion, less what it exceeds.
+        score: by the criterion; below that of any plan that keeps the limits where one is exceeded.
     """
 
     steps: Sequence[PlanStep]
@@ -211,7 +220,7 @@ class Designer:
                     found[n] = ScoredPlan(plans[n], size, motion, gram, excess, score)
                 elif size == SMALLER[-1]:
                     none = np.zeros_like(k.G)
-                    found[n] = ScoredPlan(plans[n], size, motion, none, excess, -FORBIDDEN * excess)
+                    found[n] = ScoredPlan(plans[n], size, motion, none, excess, -1.0 - excess)
         self.tried += (each := [found[n] for n in range(len(plans))])
         return each
 
@@ -285,8 +294,8 @@ class Designer:
 
     def spread(self, k: Knowledge, s: ScoredPlan, seed: int) -> Spread:
         """The tracks of a plan under every likely hypothesis."""
-        motion = self.motion(s.steps, s.size, STEP * self.scale)
-        likely = [n for n, w in enumerate(k.weights) if w > LIKELY] or [int(np.argmax(k.weights))]
+        motion = self.motion(s.steps, s.size, EVERY * self.scale)
+        likely = [n for n, w in enumerate(k.weights) if w > NEGLIGIBLE] or [int(np.argmax(k.weights))]
         self.advance(f"closed loop of {len(likely) * MEMBERS} models along the plan")
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
 

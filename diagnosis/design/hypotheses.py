@@ -15,11 +15,10 @@ from ..search.candidates import SMALL, CandidateShape, candidate, model_error
 from ..search.prior import NominalPrior
 from .information import Hypothesis, Knowledge
 
-MOST = 8  # hypotheses, the likeliest; chosen: criteria grow with their square
-FIRST = 4  # of the ranking, where a diagnosis names no effect; chosen
-WIDE = 3.0  # prior standard deviations of an effect: multiples of the size that explains all (chosen)
-EXACT = 1e9  # 1/1, prior precision of what is not fitted
-LIKELY = 0.05  # 1, weight from which on a hypothesis counts for the basin; the issue's 5 %
+MOST = 8  # 1, hypotheses, the likeliest; chosen: criteria grow with their square
+FIRST = 4  # 1, of the ranking, where a diagnosis names no effect; chosen
+WIDE = 3.0  # 1, prior standard deviations of an effect: multiples of the size that explains all (chosen)
+EXACT = 1e9  # 1, prior precision of what is not fitted: it stays as it is
 
 
 class Rival(NamedTuple):
@@ -215,12 +214,6 @@ def knowledge(
 
     Weights are the confidences of the diagnosis; what these leave open among the rivals of an effect is
     shared by the evidence of the runs.
-
-    Args:
-        data: training runs.
-        start: the initial model.
-        prior: of its coefficients.
-        found: the effects and their rivals.
     """
     sets = [tuple(i for i in r.ids if usable(start, i)) for r in found]
     ids = [*dict.fromkeys(i for s in sets for i in s if i)]

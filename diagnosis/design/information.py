@@ -12,11 +12,11 @@ from functools import cached_property
 from itertools import permutations
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import logit, ndtr
 
 SURE = 0.95  # 1, probability from which on a cause counts as certain; the aim of a design
-ODDS = float(np.log(SURE / (1.0 - SURE)))  # nats, the log odds of that
-SMALLEST = 1e-10  # of the largest eigenvalue: what is less is rounding
+ODDS = float(logit(SURE))  # nats, the log odds of that
+SMALLEST = 1e-10  # 1, of the largest eigenvalue: what is less is rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,9 +34,10 @@ class Reach(NamedTuple):
 
 # Time (n,) [s], duration [s], numbers from 0 to 1, limits -> pose (n, 3) from rest to rest [m, m, rad].
 Course = Callable[[np.ndarray, float, Sequence[float], Reach], np.ndarray]
-NUMBERS = 5  # of each manoeuvre
+DIMENSIONS = 7  # 1, of a manoeuvre: which one, how it begins, and five numbers from 0 to 1 of its own
 RISE = 2.0  # s, times the time scale; shortest change of speed, as of the guidance's pulses (chosen)
 SOFT = 5.0  # s, times the time scale; longest of them: three time constants of the surge motion (chosen)
+PIECE = 60.0  # s, times the time scale, of a manoeuvre: some ten changes of speed; chosen
 LIBRARY: dict[str, Course] = {}
 TEXTS: dict[str, str] = {}
 
@@ -80,12 +81,13 @@ def there_and_back(reach: float, speed: float, rise: float, T: float) -> list[fl
     return [reach, -reach] * rounds
 
 
-def _between(low: float, high: float, x: float) -> float:
+def between(low: float, high: float, x: float) -> float:
+    """A number at a share x of the way from one to another."""
     return low + (high - low) * x
 
 
 def _rise(x: float, r: Reach) -> float:
-    return r.time * _between(RISE, SOFT, x)
+    return r.time * between(RISE, SOFT, x)
 
 
 @manoeuvre("legs")
@@ -97,12 +99,12 @@ def legs(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 @manoeuvre("crab")
 def crab(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Legs with a constant drift angle, up to sway alone, both ways"""
-    return _straight(t, T, x, r, np.pi * _between(0.1, 0.9, x[3]))
+    return _straight(t, T, x, r, np.pi * between(0.1, 0.9, x[3]))
 
 
 def _straight(t: np.ndarray, T: float, x: Sequence[float], r: Reach, drift: float) -> np.ndarray:
-    speed, rise = r.speed * _between(0.25, 1.0, x[0]), _rise(x[1], r)
-    places = there_and_back(0.5 * r.room * _between(0.3, 1.0, x[2]), speed, rise, T)
+    speed, rise = r.speed * between(0.25, 1.0, x[0]), _rise(x[1], r)
+    places = there_and_back(0.5 * r.room * between(0.3, 1.0, x[2]), speed, rise, T)
     s = visits(t, places, speed, rise, T)
     return np.column_stack([s * np.cos(drift), s * np.sin(drift), 0.0 * s])
 
@@ -110,9 +112,9 @@ def _straight(t: np.ndarray, T: float, x: Sequence[float], r: Reach, drift: floa
 @manoeuvre("stairs")
 def stairs(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Legs ahead and astern with steps of the speed from slow to fast"""
-    half, rise = 0.5 * r.room * _between(0.4, 1.0, x[0]), _rise(x[1], r)
-    fast = r.speed * _between(0.5, 1.0, x[2])
-    shares = np.linspace(_between(0.2, 0.6, x[3]), 1.0, 3)
+    half, rise = 0.5 * r.room * between(0.4, 1.0, x[0]), _rise(x[1], r)
+    fast = r.speed * between(0.5, 1.0, x[2])
+    shares = np.linspace(between(0.2, 0.6, x[3]), 1.0, 3)
     steps = np.diff([0.0, half, -half, half, 0.0])
     speeds = fast * np.array([shares[0], shares[1], shares[2], shares[0]])
     way = (np.abs(steps) / speeds).sum()
@@ -130,9 +132,9 @@ def stairs(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 def circle(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Circles or ellipses to one side, ahead or astern"""
     side, along = (1.0 if x[0] < 0.5 else -1.0), (1.0 if x[1] < 0.7 else -1.0)
-    a = 0.5 * r.room * _between(0.25, 1.0, x[2])
-    b = a * _between(0.5, 1.0, x[3])
-    speed = min(r.speed * _between(0.3, 1.0, x[4]), r.rate * b * b / a)
+    a = 0.5 * r.room * between(0.25, 1.0, x[2])
+    b = a * between(0.5, 1.0, x[3])
+    speed = min(r.speed * between(0.3, 1.0, x[4]), r.rate * b * b / a)
     length = 2.0 * np.pi * np.sqrt(0.5 * (a * a + b * b))
     turns = max(1.0, np.round(speed * T / length))
     smaller = min(1.0, speed * T / (turns * length))
@@ -147,9 +149,9 @@ def circle(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
 @manoeuvre("rotation")
 def rotation(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Rotation to both sides about a point between the last and the first actuator"""
-    rate, rise = r.rate * _between(0.25, 1.0, x[0]), _rise(x[1], r)
-    psi = visits(t, there_and_back(np.pi * _between(0.3, 1.0, x[2]), rate, rise, T), rate, rise, T)
-    pivot = _between(r.aft, r.fore, x[3])
+    rate, rise = r.rate * between(0.25, 1.0, x[0]), _rise(x[1], r)
+    psi = visits(t, there_and_back(np.pi * between(0.3, 1.0, x[2]), rate, rise, T), rate, rise, T)
+    pivot = between(r.aft, r.fore, x[3])
     return np.column_stack([pivot * (1.0 - np.cos(psi)), -pivot * np.sin(psi), psi])
 
 
@@ -157,7 +159,7 @@ def rotation(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarra
 def headings(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Station keeping at several headings in turn"""
     count = 2 + int(2.999 * x[0])
-    rise, every, rate = _rise(x[2], r), T / count, r.rate * _between(0.3, 1.0, x[1])
+    rise, every, rate = _rise(x[2], r), T / count, r.rate * between(0.3, 1.0, x[1])
     turn = min(0.5 * every, rise + 2.0 * np.pi / count / rate)
     angle = min(2.0 * np.pi / count, rate * max(turn - rise, 0.5 * turn))
     psi = np.sum([moved(t - (k + 1) * every + turn, angle, turn, rise) for k in range(count)], axis=0)
@@ -168,8 +170,8 @@ def headings(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarra
 def zigzag(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Zig-zag: legs on which heading and course swing to both sides"""
     pose = _straight(t, T, x, r, 0.0)
-    period = r.time * _between(10.0, 30.0, x[3])
-    amplitude = min(np.radians(_between(10.0, 40.0, x[4])), r.rate * period / (2.0 * np.pi))
+    period = r.time * between(10.0, 30.0, x[3])
+    amplitude = min(np.radians(between(10.0, 40.0, x[4])), r.rate * period / (2.0 * np.pi))
     ends = moved(t, 1.0, 2.0 * SOFT * r.time, SOFT * r.time)
     swing = amplitude * np.sin(2.0 * np.pi * t / period) * ends * ends[::-1]
     side = np.cumsum(np.diff(pose[:, 0], prepend=0.0) * np.sin(swing))
@@ -183,7 +185,7 @@ SINES = np.array([[0.11, 0.31], [0.13, 0.37], [0.17, 0.43]])
 @manoeuvre("multisine")
 def multisine(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Multisine of surge, sway and yaw at once"""
-    omega = SINES * _between(0.8, 2.0, x[0]) / r.time
+    omega = SINES * between(0.8, 2.0, x[0]) / r.time
     limit = np.array([r.speed, r.speed, r.rate]) * np.array([x[1], x[2], x[3]])
     share = np.array([1.0, x[4]]) / (1.0 + x[4])
     ends = moved(t, 1.0, 2.0 * SOFT * r.time, SOFT * r.time)
@@ -195,7 +197,7 @@ def multisine(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarr
 def steps(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Steps of surge, sway and yaw force in turn: short moves"""
     rise = r.time * RISE
-    size = np.array([r.speed, 0.7 * r.speed, r.rate]) * _between(0.3, 1.0, x[0]) * rise
+    size = np.array([r.speed, 0.7 * r.speed, r.rate]) * between(0.3, 1.0, x[0]) * rise
     long = 1.0 + 2.0 * x[1]  # of a move, over the time of its ramps
     third = T / 3.0
     order = np.roll(np.arange(3), int(2.999 * x[2]))
@@ -252,9 +254,6 @@ def poses(plan: Sequence[PlanStep], seconds: float, h: float, r: Reach) -> np.nd
     return np.concatenate([whole[:n], np.repeat(whole[-1:], max(n - len(whole), 0), axis=0)])
 
 
-DIMENSIONS = NUMBERS + 2  # of a manoeuvre: which one, how it begins, its numbers
-
-
 def sequence(point: np.ndarray, seconds: float, library: Iterable[str] = LIBRARY) -> list[PlanStep]:
     """The plan at a point of the unit cube, DIMENSIONS numbers for each manoeuvre of a library."""
     rows = point.reshape(-1, DIMENSIONS)
@@ -273,8 +272,8 @@ def sequence(point: np.ndarray, seconds: float, library: Iterable[str] = LIBRARY
     ]
 
 
-# Usual runs of the same length, for comparison.
 UsualRuns = Mapping[str, tuple[tuple[str, tuple[float, ...]], ...]]
+# 1, usual runs of the same length, for comparison.
 USUAL: UsualRuns = {
     "ellipse": (("circle", (0.0, 0.0, 1.0, 0.4, 0.6)),),
     "circle": (("circle", (0.0, 0.0, 0.7, 1.0, 0.6)),),

@@ -16,7 +16,7 @@ from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.black_box import TAU
-from .manoeuvre_library import TEXTS, PlanStep
+from .manoeuvre_library import PIECE, SOFT, TEXTS, PlanStep, between
 from .planned_motion import MOST_THRUST, Basin, PlannedMotion
 from .spread import driven
 
@@ -24,8 +24,6 @@ from .spread import driven
 OrderCourse = Callable[[np.ndarray, float, Sequence[float], float], np.ndarray]
 ORDERS: dict[str, OrderCourse] = {}
 HARD_OVER = np.radians(35.0)  # rad, largest rudder angle of usual trials (IMO MSC/Circ.1053)
-SHORTEST = 5.0  # s, times the time scale; of an order: as the slowest ramps of the other library
-LONGEST = 30.0  # s, times the time scale; of an order: half a manoeuvre of a plan (chosen)
 LEAST = 0.3  # 1, share of thrust under way: less hardly steers (chosen)
 
 
@@ -44,11 +42,11 @@ def _shares(t: np.ndarray, thrust: ArrayLike, rudder: ArrayLike) -> np.ndarray:
 
 
 def _level(x: float) -> float:
-    return LEAST + (1.0 - LEAST) * x
+    return between(LEAST, 1.0, x)
 
 
 def _half_period(x: float, scale: float) -> float:
-    return scale * (SHORTEST + (LONGEST - SHORTEST) * x)
+    return scale * between(SOFT, PIECE / 2.0, x)  # up to half of a manoeuvre
 
 
 @order("straight")
@@ -95,7 +93,7 @@ def order_steps(t: np.ndarray, T: float, x: Sequence[float], scale: float) -> np
     return _shares(t, fast, _level(x[1]) * np.where((t / second + 0.5) % 2.0 < 1.0, 1.0, -1.0))
 
 
-# Usual runs of the same length, for comparison.
+# 1, usual runs of the same length, for comparison.
 USUAL_ORDERS = {
     "straight": (("straight", (0.6,) * 3),),
     "circle": (("turn", (0.6, 0.0, 0.6)),),

@@ -15,7 +15,6 @@ from .manoeuvre_library import PlanStep, Reach, poses
 
 EVERY = 0.2  # s, times the time scale: samples of a planned motion; ten in the shortest ramp
 MOST_THRUST = 0.8  # 1, of the limit of an actuator: the rest is for control and for what is not known
-PLANNED = "planned run"
 
 
 @dataclass(frozen=True)
@@ -117,22 +116,19 @@ def load(tau: np.ndarray, model: Model) -> float:
     return max(float(np.max(np.maximum(x / high, x / low))) / small for x, (low, high) in limits)
 
 
-def as_windows(
-    motion: PlannedMotion, tau: np.ndarray, like: Smoothed, name: str = PLANNED
-) -> WeakWindows:
+def as_windows(motion: PlannedMotion, tau: np.ndarray, like: Smoothed) -> WeakWindows:
     """The motion as a smoothed run of the same ship and measurement as a measured one.
 
     Args:
         motion: of the ship.
         tau: (n, 3), commanded force [N, N, N m].
         like: a measured run, whose noise and uncertainty the new one gets.
-        name: of the run.
     """
     n, period = motion.time.size, float(motion.time[1] - motion.time[0])
     old, known = like.track, np.isfinite(like.nu[:, 0])
     commands = None if motion.orders is tau else motion.orders
     signals = old.run.signals
-    run = Run(name, motion.time, motion.eta, tau, commands, ship=old.run.ship, signals=signals)
+    run = Run("planned run", motion.time, motion.eta, tau, commands, ship=old.run.ship, signals=signals)
     no, yes = np.zeros(n, bool), np.ones(n, bool)
     every = np.ones((n, 3), bool)
     track = replace(

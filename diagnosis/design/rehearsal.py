@@ -28,11 +28,11 @@ from ..verdict.confidence import confidence_of, doubt_of_data, probability
 from .hypotheses import Space, block_of
 from .information import SURE, Hypothesis, Knowledge
 
-DRAWS = 60  # simulated outcomes, so that the standard error of a probability is at most 0.065
+DRAWS = 60  # 1, simulated outcomes, so that the standard error of a probability is at most 0.065
 CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
 LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
 UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by what the likeliest leaves."
-UNIT = np.full(3, OVERLAP**-0.5)  # noise of overlapping windows where that of one that counts is 1
+UNIT = np.full(3, OVERLAP**-0.5)  # 1, noise of overlapping windows where that of one that counts is 1
 
 
 class RowsOfRuns(NamedTuple):

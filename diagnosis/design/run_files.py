@@ -9,10 +9,10 @@ import numpy as np
 from cosim.scenario import find_scenario
 
 from ..predictors.black_box import POSE, TAU
-from ..report.formatting import as_json
+from ..predictors.thrust import LONGEST_STEP
+from ..report.formatting import write_json
 from .designing import Designer, ScoredPlan
 
-STEP = 0.02  # s, times the time scale: base step of the scenarios
 TARGET = [f"{axis}_t{order}" for order in ("", "_dot", "_ddot") for axis in ("x", "y", "psi")]
 MEASURED = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 
@@ -35,7 +35,7 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
     With set points, the columns tau_X, tau_Y and tau_N are the force that the likeliest model needs:
     feed-forward. With orders, the track is that of this model.
     """
-    h = STEP * d.scale
+    h = LONGEST_STEP * d.scale
     fine = d.motion(found.steps, found.size, h)
     orders = d.orders
     if orders is None:
@@ -63,7 +63,7 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
     }
     if ship is not None:
         content["ship"] = ship
-    (folder / scenario_file(number)).write_text(as_json(content) + "\n", encoding="utf-8")
+    write_json(folder / scenario_file(number), content)
 
 
 def _closed_loop() -> dict[str, Any]:

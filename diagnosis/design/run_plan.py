@@ -9,7 +9,7 @@ import numpy as np
 
 from ..execution.result_folder import together
 from ..execution.short_text import ShortRepr
-from ..report.formatting import as_json, finite
+from ..report.formatting import write_json
 from ..runs.cleaning import Z95
 from .designing import Designer, ScoredPlan
 from .hypotheses import Space
@@ -20,7 +20,7 @@ from .spread import Spread
 from .track_picture import draw
 
 JSON, PAGE = "next.json", "plan.md"
-MOST_RUNS = 9  # of a plan; chosen
+MOST_RUNS = 9  # 1, of a plan; chosen
 
 
 def files(count: int) -> list[str]:
@@ -195,7 +195,7 @@ class Plan:
                 write_run(r.designer, r.scored, n, new, self.ship)
                 draw(r.designer, r.before, r.scored.motion, r.spread, new / picture_file(n))
             (new / PAGE).write_text(page(self), encoding="utf-8")
-            (new / JSON).write_text(as_json(finite(self.content())) + "\n", encoding="utf-8")
+            write_json(new / JSON, self.content())
         return written
 
 

@@ -15,17 +15,14 @@ from fmus.signals import Estimate, Target
 from ..assessment.closed_loop import LoopPart
 from ..predictors import Model
 from ..predictors.prediction import merged
-from ..predictors.recorded_law import stepped
+from ..predictors.traced.recorded_law import stepped
+from ..predictors.uncertainty import MEASURED
 from .hypotheses import Space
 from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
-POSE = 3  # numbers of a pose
-STEP = 0.2  # s, times the time scale: of this loop, a tenth of the shortest ramp; chosen
-# Times the speed of a plan at which the ships must keep the basin as well: the controller of a ship that
-# is close to diverging loses control there. Two prior standard deviations of a coefficient of a tenth.
-HASTE = 1.2
-MEMBERS = 20  # drawn from each hypothesis: of these the outermost is the 95 % spread on either side
+POSE = 3  # 1, numbers of a pose
+MEMBERS = 20  # 1, drawn from each hypothesis: of these the outermost is the 95 % spread on either side
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +34,7 @@ class Spread:
         eta: (h, members, n, 3), poses; the first member has the mean parameters.
         ids: numbers of the hypotheses.
         margin: (h,), least distance of the hull from the walls of the basin over all members, at the
-            speed of the plan and at HASTE times that [m].
+            speed of the plan and faster [m].
     """
 
     time: np.ndarray
@@ -62,10 +59,6 @@ def followed(models: Sequence[Model], motion: PlannedMotion) -> np.ndarray:
     """(p, n, 3), poses of models that a controller keeps on a target, or by orders, started at rest.
 
     The controller gets the true motion: noise of the measurement moves a ship much less than its margin.
-
-    Args:
-        models: of one ship.
-        motion: the target or the orders, at equal steps.
     """
     h = float(motion.time[1] - motion.time[0])
     if motion.orders is not None:
@@ -188,15 +181,18 @@ def spread(
     Args:
         space, k: the hypotheses and their parameters.
         ids: numbers of those that are likely.
-        motion: the target every ``STEP`` times the time scale.
+        motion: the target every ``EVERY`` times the time scale.
         basin, outline: walls, and corners of the hull (k, 2) [m].
         seed: of the draws.
     """
     rng = np.random.default_rng(seed)
     models = [m for n in ids for m in drawn(space, k, n, rng)]
     eta = followed(models, motion)
-    # Orders have no speed of their own.
-    every = [eta] if motion.orders is not None else [eta, followed(models, motion.faster(HASTE))]
+    every = [eta]
+    if motion.orders is None:  # which have no speed of their own
+        # The controller of a ship that is close to diverging loses control at a higher speed: by two
+        # prior standard deviations of a coefficient.
+        every.append(followed(models, motion.faster(1.0 + 2.0 * MEASURED)))
     least = [[basin.margin(track, outline).min() for track in each] for each in every]
     margins = np.nan_to_num(np.min(least, axis=0), nan=-np.inf).reshape(len(ids), MEMBERS)
     return Spread(

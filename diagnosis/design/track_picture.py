@@ -6,12 +6,11 @@ import numpy as np
 
 from cosim.results import hulls
 
+from ..report.finding_text import SHOWN
 from .designing import Designer
 from .information import Knowledge
 from .planned_motion import PlannedMotion
 from .spread import Spread
-
-OUTLINES = 12  # of the ship along the track; chosen
 
 
 def draw(d: Designer, k: Knowledge, motion: PlannedMotion, spread: Spread, path: Path) -> None:
@@ -31,7 +30,7 @@ def draw(d: Designer, k: Knowledge, motion: PlannedMotion, spread: Spread, path:
             colour_of = {"color": f"C{colour}", "alpha": 0.4, "linewidth": 0.7}
             axes.plot(track[:, 1], track[:, 0], label=label, **colour_of)
     axes.plot(eta[:, 1], eta[:, 0], "k--", linewidth=0.8, label="target")
-    for corners in hulls(eta[np.linspace(0, len(eta) - 1, OUTLINES).astype(int)], d.outline):
+    for corners in hulls(eta[np.linspace(0, len(eta) - 1, 2 * SHOWN).astype(int)], d.outline):
         axes.plot(*np.vstack([corners, corners[:1]]).T, color="0.5", linewidth=0.5)
     axes.plot(eta[0, 1], eta[0, 0], "ko", markersize=4, label="start")
     axes.set_aspect("equal")

@@ -16,7 +16,7 @@ from .remaining_time import RemainingTime
 Advance = Callable[[str], None]
 # s between two lines where there is no terminal; chosen: nobody thinks that it hangs.
 EVERY = 30.0
-WIDTH = 20  # of the bar, characters; chosen
+WIDTH = 20  # 1, of the bar, characters; chosen
 
 
 def silent(what: str) -> None:

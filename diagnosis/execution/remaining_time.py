@@ -11,14 +11,19 @@ import re
 import time
 from collections.abc import Callable
 
-# s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count.
-ROUND = {"every effect as a candidate": 0.8, "candidates refined": 1.1}
-AGAIN = {"its place searched again": 4.8}  # of one effect, each time that another one is found
-OF_EACH = {"validation data are predicted better": 1.2}  # for each effect
-OF_EFFECTS = {**OF_EACH, "fit to predictions": 5.0}
-LAST = {
+ROUND = ("every effect as a candidate", "candidates refined")
+AGAIN = "its place searched again"  # of one effect, each time that another one is found
+OF_EACH = "validation data are predicted better"  # for each effect
+OF_EFFECTS = (OF_EACH, "fit to predictions")  # only where there is one
+# s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count. In their order.
+USUAL = {
+    "reading": 0.1,
+    "smoothing": 1.4,
+    "calibration of the coefficients": 2.4,
+    **dict(zip(ROUND, (0.8, 1.1), strict=True)),
+    AGAIN: 4.8,
     "waves": 0.6,
-    **OF_EFFECTS,
+    **dict(zip(OF_EFFECTS, (1.2, 5.0), strict=True)),
     "residual": 0.1,
     "gain of the search over calibration": 1.5,
     "predicting": 0.8,
@@ -26,12 +31,12 @@ LAST = {
     "report: figures": 1.1,
     "report: page": 0.3,
 }
-FIRST = {"reading": 0.1, "smoothing": 1.4, "calibration of the coefficients": 2.4}
-USUAL = {**FIRST, **ROUND, **AGAIN, **LAST}
-# Of the remaining time of a search that finds no further effect. Chosen: the largest for which a search
-# that finds none at all, one, two or three effects is within a factor of two from its first round on.
+LAST = [*USUAL][[*USUAL].index(AGAIN) + 1 :]  # steps behind the search
+# 1, of the remaining time of a search that finds no further effect. Chosen: the largest for which a
+# search that finds none at all, one, two or three effects is within a factor of two from its first round
+# on.
 MORE = 1.6
-# Share of its time that a step is taken to go on for where it takes longer than usual; chosen.
+# 1, share of its time that a step is taken to go on for where it takes longer than usual; chosen.
 LATE = 0.3
 
 
@@ -86,29 +91,29 @@ class RemainingTime:
         if self._step:
             self._took.setdefault(self._step, []).append((now - self._begun) / self._number)
         self._step, self._begun, self._number = step, now, 1.0
-        if step in ROUND or step in AGAIN:
-            self._again = self._again + 1 if step in AGAIN else 0
+        if step in ROUND or step == AGAIN:
+            self._again = self._again + 1 if step == AGAIN else 0
             number = re.match(r"effect (\d+)", what)
             self._round = max(self._round, int(number[1]) if number and step in ROUND else 1)
             self._left = self._following()
         elif step in LAST and self._round:
-            names, effects = [*LAST], self._round - 1.0
-            self._number = max(effects, 1.0) if step in OF_EACH else 1.0
+            effects = self._round - 1.0
+            self._number = max(effects, 1.0) if step == OF_EACH else 1.0
             numbers = dict.fromkeys(LAST, 1.0) | self._of_effects(effects)
-            self._left = {name: numbers[name] for name in names[names.index(step) + 1 :]}
+            self._left = {name: numbers[name] for name in LAST[LAST.index(step) + 1 :]}
 
     def _of_effects(self, effects: float) -> dict[str, float]:
         """The number of steps that depend on how many effects there are."""
-        return dict.fromkeys(OF_EFFECTS, min(effects, 1.0)) | dict.fromkeys(OF_EACH, effects)
+        return dict.fromkeys(OF_EFFECTS, min(effects, 1.0)) | {OF_EACH: effects}
 
     def _following(self) -> dict[str, float]:
         """The number of each kind of step that usually follows the present one of a round."""
         effects = max(self._round if self._again else self._round - 1.0, 1.0)
         left = dict.fromkeys(ROUND, effects + 1.0 - self._round)
-        if self._step == next(iter(ROUND)):
-            left["candidates refined"] += 1.0
+        if self._step == ROUND[0]:
+            left[ROUND[1]] += 1.0
         # With each further effect the place of each before it is searched again.
         again = max(effects - 1.0 - self._again, 0.0) if self._again else 0.0
         last = dict.fromkeys(LAST, 1.0) | self._of_effects(effects)
-        steps = left | dict.fromkeys(AGAIN, again) | last
+        steps = left | {AGAIN: again} | last
         return {name: MORE * number for name, number in steps.items()}

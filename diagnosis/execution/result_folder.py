@@ -97,13 +97,7 @@ def _hash(path: Path, size: int, changed: int) -> str:
 
 
 def default_folder(usual: Path, inputs: Mapping[str, str], overwrite: bool = False) -> Path:
-    """The usual folder, or the first of ``usual_2``, ... that is free or has a result of these inputs.
-
-    Args:
-        usual: where results go.
-        inputs: file -> hash.
-        overwrite: whether the usual folder may hold any result.
-    """
+    """The usual folder, or the first of ``usual_2``, ... free or with a result of these files."""
     if overwrite:
         return usual
     for number in count(1):

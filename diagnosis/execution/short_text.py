@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-SHORT = 80  # letters of a value that is shown as it is; chosen: a line of a terminal
+WIDTH = 80  # 1, characters, of a line of a terminal; the longest value that is shown as it is
 PLAIN = (bool, int, float, str, Path, type(None))
 
 
@@ -21,7 +21,7 @@ def _short(value: Any) -> str:
     parts = value if isinstance(value, Sequence) else [value]
     parts = [*value, *value.values()] if isinstance(value, Mapping) else parts
     text = repr(value) if all(isinstance(part, PLAIN) for part in parts) else ""
-    if 0 < len(text) <= SHORT:
+    if 0 < len(text) <= WIDTH:
         return text
     shape = getattr(value, "shape", (len(value),) if isinstance(value, Sized) else ())
     size = " x ".join(map(str, shape))

@@ -6,19 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..execution.progress import Advance
+from ..runs.run_constants import SAME
 from ..search.most_likely import LEVEL
 from .additional_force import SYMBOLS, AdditionalForce
 from .parameter_fit import ParameterFit, added, fit
 from .residuals import Setting, WindowResiduals
 
-TRIED = 4  # candidates that are fitted with all else, of those that promise most; chosen
-# Correlation of two signals that are one, and of what two forces change beyond parameters, which no such
-# run discriminates.
-SAME = 0.999  # chosen
-ROUNDING = 1e-3  # of a slope that parameters do not explain; chosen
+TRIED = 4  # 1, candidates that are fitted with all else, of those that promise most; chosen
+ROUNDING = 1e-3  # 1, of a slope that parameters do not explain; chosen
 # Central, forward, backward: how an FMU integrates decides which difference its own rate is.
 RATES = (np.gradient, lambda y: np.diff(y, append=y[-1]), lambda y: np.diff(y, prepend=y[0]))
-SMALL = 1e-2  # of an input's usual size, a force by which the unit of a coefficient is found; chosen
+SMALL = 1e-2  # 1, of an input's usual size, a force by which the unit of a coefficient is found; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,6 +222,5 @@ def _size(r: WindowResiduals, k: int) -> float:
     if k < r.noise.size:
         y = np.concatenate([w.measured[:, k] for w in r.windows])
     else:
-        zero = Setting((0.0,) * len(r.parameters))
-        y = np.concatenate([p.outputs[:, k] for p in r.predict([zero])[0]])
+        y = np.concatenate([p.outputs[:, k] for p in r.predict([r.start])[0]])
     return max(float(np.sqrt(np.nanmean(y**2))), 1e-12) if np.isfinite(y).any() else 1.0

@@ -19,7 +19,7 @@ from ..predictors.fmu.fmu_playback import confined
 from ..predictors.fmu.short_steps import ShortSteps
 from ..predictors.fmu.variable_map import VariableMap, propose
 from ..predictors.weak_form import SMALL
-from ..report.document import write_json
+from ..report.formatting import write_json
 from ..runs import QUANTITY
 from .system_map import SystemMap, column_of_start
 
@@ -62,7 +62,7 @@ class LinearModel:
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
-    doubt: float = 0.0
+    doubt: float
 
     def write(self, folder: Path, units: Mapping[str, str]) -> list[str]:
         """Write ``linear.json`` and ``linear.mat``; returns their names."""
@@ -172,13 +172,11 @@ def linearised(
     Raises:
         InputError: the FMU refuses the state, or fails; a name that cannot be set.
     """
-    real = [v for v in model.variables.values() if v.type == "Real"]
-    inputs = [v.name for v in real if v.causality == "input"]
+    inputs = [v.name for v in model.reals("input")]
     start = {s.name: float(model.variables[s.name].start or 0.0) for s in states}
     start |= {n: x for n, x in at.items() if n not in inputs}
     driven = {n: at.get(n, float(model.variables[n].start or 0.0)) for n in inputs}
-    suggested = model.description.defaultExperiment
-    h = float(suggested.stepSize) if suggested is not None and suggested.stepSize else STEP
+    h = model.suggested_step or STEP
     with closing(confined(model, execution)) as fmu:
         n, doubt, every = len(states), 0.0, (*(s.name for s in states), *driven)
         J = _exact(fmu, states, start, driven, outputs, h)

@@ -19,13 +19,12 @@ from ..runs.files.tables import as_table, column_names, numbers, table_of_file
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
-ORDERS = (2, 4)  # of differences, by which noise is estimated; chosen
-MOST_STEPS = 20  # between two samples; chosen, an FMU that wants more of them takes them itself
-DIGITS = 1e-5  # of an output's spread: noise below that is rounding; chosen
-# By which the standard deviation of a start value is larger than that of its parabola, which also bends
-# otherwise than the signal, by as much as the noise hides; chosen.
+MOST_STEPS = 20  # 1, between two samples; chosen, an FMU that wants more of them takes them itself
+DIGITS = 1e-5  # 1, of an output's spread: noise below that is rounding; chosen
+# 1, by which the standard deviation of a start value is larger than that of its parabola, which also
+# bends otherwise than the signal, by as much as the noise hides; chosen.
 UNSURE = 3.0
-WIDTHS = (5, 7, 11, 15, 21, 31, 45, 65)  # samples of a parabola through the start of a window
+WIDTHS = (5, 7, 11, 15, 21, 31, 45, 65)  # 1, samples of a parabola through the start of a window
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ def noise_of(values: np.ndarray) -> float:
     the smaller estimate is taken. The median is not moved by a few steps of the signal.
     """
     known = values[np.isfinite(values)]
-    return min(_noise_by_differences(known, order) for order in ORDERS)
+    return min(_noise_by_differences(known, order) for order in (2, 4))
 
 
 def _noise_by_differences(values: np.ndarray, order: int) -> float:
@@ -189,11 +188,9 @@ def windows_of(
 
 def step_of(model: FmuModel, period: float) -> float:
     """Length of a step [s], for samples that are a period apart [s]."""
-    suggested = model.description.defaultExperiment
-    own = float(suggested.stepSize) if suggested is not None and suggested.stepSize else period
-    told = model.description.coSimulation
+    own, told = model.suggested_step or period, model.description.coSimulation
     if told is not None and not told.canHandleVariableCommunicationStepSize:
-        return own * max(1.0, round(period / own)) if suggested is not None else period
+        return own * max(1.0, round(period / own))
     return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - 1e-6))))
 
 

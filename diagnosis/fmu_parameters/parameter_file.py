@@ -41,7 +41,7 @@ class Kind(NamedTuple):
     Attributes:
         name: of the kind.
         unit: name of its unit, where a file leaves out the definition; empty: no other one.
-        exponents: of kg, m, s, A, K, mol, cd.
+        base: the dimension in base units, each with its exponent, as ``kg m2 s-2``.
         rel_std: relative standard deviation of the prior. Chosen: a weighed or measured quantity to a
             tenth, one that data sheets state to three tenths, one that is mostly guessed to a half.
         positive: whether a value below zero has no meaning.
@@ -49,31 +49,38 @@ class Kind(NamedTuple):
 
     name: str
     unit: str
-    exponents: tuple[int, ...]
+    base: str
     rel_std: float
     positive: bool
 
+    @property
+    def exponents(self) -> tuple[int, ...]:
+        """Of kg, m, s, A, K, mol, cd."""
+        powers = dict(re.findall(r"([A-Za-z]+)(-?\d*)", self.base))
+        return tuple(int(powers[b] or 1) if b in powers else 0 for b in cosim.BASE_UNITS)
 
+
+# 1, standard deviations by the kind, see :class:`Kind`.
 KINDS = (
-    Kind("mass", "kg", (1, 0, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("moment of inertia", "kg.m2", (1, 2, 0, 0, 0, 0, 0), 0.3, True),
-    Kind("length", "m", (0, 1, 0, 0, 0, 0, 0), 0.1, False),
-    Kind("area", "m2", (0, 2, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("volume", "m3", (0, 3, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("density", "", (1, -3, 0, 0, 0, 0, 0), 0.1, True),
-    Kind("time constant", "s", (0, 0, 1, 0, 0, 0, 0), 0.3, True),
-    Kind("frequency", "Hz", (0, 0, -1, 0, 0, 0, 0), 0.3, True),
-    Kind("stiffness", "N/m", (1, 0, -2, 0, 0, 0, 0), 0.3, True),
-    Kind("damping", "N.s/m", (1, 0, -1, 0, 0, 0, 0), 0.5, True),
-    Kind("temperature", "K", (0, 0, 0, 0, 1, 0, 0), 0.02, False),
-    Kind("heat capacity", "J/K", (1, 2, -2, 0, -1, 0, 0), 0.3, True),
-    Kind("thermal conductance", "W/K", (1, 2, -3, 0, -1, 0, 0), 0.5, True),
-    Kind("electric resistance", "Ohm", (1, 2, -3, -2, 0, 0, 0), 0.1, True),
-    Kind("inductance", "H", (1, 2, -2, -2, 0, 0, 0), 0.3, True),
-    Kind("capacitance", "F", (-1, -2, 4, 2, 0, 0, 0), 0.3, True),
+    Kind("mass", "kg", "kg", 0.1, True),
+    Kind("moment of inertia", "kg.m2", "kg m2", 0.3, True),
+    Kind("length", "m", "m", 0.1, False),
+    Kind("area", "m2", "m2", 0.1, True),
+    Kind("volume", "m3", "m3", 0.1, True),
+    Kind("density", "", "kg m-3", 0.1, True),
+    Kind("time constant", "s", "s", 0.3, True),
+    Kind("frequency", "Hz", "s-1", 0.3, True),
+    Kind("stiffness", "N/m", "kg s-2", 0.3, True),
+    Kind("damping", "N.s/m", "kg s-1", 0.5, True),
+    Kind("temperature", "K", "K", 0.02, False),
+    Kind("heat capacity", "J/K", "kg m2 s-2 K-1", 0.3, True),
+    Kind("thermal conductance", "W/K", "kg m2 s-3 K-1", 0.5, True),
+    Kind("electric resistance", "Ohm", "kg m2 s-3 A-2", 0.1, True),
+    Kind("inductance", "H", "kg m2 s-2 A-2", 0.3, True),
+    Kind("capacitance", "F", "kg-1 m-2 s4 A2", 0.3, True),
 )
-QUADRATIC = Kind("quadratic damping", "", (), 0.5, False)
-OTHER = Kind("other", "", (), 0.3, False)
+QUADRATIC = Kind("quadratic damping", "", "", 0.5, False)  # 1, as a damping
+OTHER = Kind("other", "", "", 0.3, False)  # 1, as what data sheets state
 
 
 class Prior(BaseModel):
@@ -166,11 +173,6 @@ class ParameterFile(BaseModel):
 def read_parameters(path: Path, model: FmuModel, mapped: Collection[str]) -> list[CalibratedParameter]:
     """The parameters of a file, checked against an FMU.
 
-    Args:
-        path: of the file.
-        model: the FMU.
-        mapped: variables that the map uses, which cannot be calibrated.
-
     Raises:
         InputError: no such file, a fault of it, or a name that the FMU does not have.
     """
@@ -209,10 +211,6 @@ def can_be_calibrated(v: FmuVariable) -> bool:
 
 def proposed(model: FmuModel, mapped: Collection[str]) -> tuple[list[CalibratedParameter], list[str]]:
     """The parameters of an FMU with a prior by their kind.
-
-    Args:
-        model: the FMU.
-        mapped: variables that the map uses.
 
     Returns:
         The parameters, and a sentence for each that has no scale, which is left out.

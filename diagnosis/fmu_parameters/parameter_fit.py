@@ -11,9 +11,9 @@ from scipy.optimize import least_squares
 from ..runs.cleaning import Z95
 from ..search.most_likely import ENOUGH, STEPS
 from .additional_force import AdditionalForce
-from .residuals import MOST_STEPS, Setting, WindowResiduals
+from .residuals import Setting, WindowResiduals
 
-# Cost at the ends of a normal 95 % interval is 3.84 higher. Where it differs by more than a fifth of
+# 1, cost at the ends of a normal 95 % interval is 3.84 higher. Where it differs by more than a fifth of
 # that, the interval is that of the profile (chosen).
 NOT_NORMAL = 0.2
 
@@ -95,8 +95,7 @@ def fit(
     def setting(x: np.ndarray) -> Setting:
         y = whole.copy()
         y[free] = x
-        forces = zip(begin.forces, (y[p:] * size).tolist(), strict=True)
-        return Setting(tuple(y[:p].tolist()), tuple(replace(f, coefficient=c) for f, c in forces))
+        return Setting(tuple(y[:p].tolist()), begin.forces).with_coefficients((y[p:] * size).tolist())
 
     def residuals(x: np.ndarray) -> np.ndarray:
         s = setting(x)
@@ -117,8 +116,7 @@ def fit(
         inside = np.where(np.isfinite(high - low), high - low, 1.0) * 1e-6
         x = np.clip(x, low + inside, high - inside)
         jacobian: Any = slopes  # the stubs of scipy know no function here
-        ends = {"ftol": 1e-6, "xtol": 1e-5, "max_nfev": MOST_STEPS}
-        x = least_squares(residuals, x, jacobian, (low, high), "trf", **ends).x
+        x = least_squares(residuals, x, jacobian, (low, high), ftol=1e-6, xtol=1e-5).x
     s = setting(x)
     if "x" in last and np.array_equal(np.asarray(last["x"]), x):
         J, faults = np.asarray(last["J"]), last["faults"]
@@ -179,8 +177,8 @@ def _reach(
         z = np.array([np.clip(x, *p.bounds) for x, p in zip(z, r.parameters, strict=True)])
         z[k] = f.setting.z[k] + sign * d
         change = sign * d * line[len(z) :] * np.array(f.sizes)
-        forces = zip(f.setting.forces, f.coefficients, change, strict=True)
-        s = Setting(tuple(z.tolist()), tuple(replace(g, coefficient=c + float(x)) for g, c, x in forces))
+        forces = (np.array(f.coefficients) + change).tolist()
+        s = Setting(tuple(z.tolist()), f.setting.forces).with_coefficients(forces)
         (found,) = r.whitened([s])
         total = float(found @ found + z @ z) - f.cost
         return total / inflation if np.isfinite(total) else np.inf

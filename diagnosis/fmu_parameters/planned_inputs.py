@@ -22,16 +22,16 @@ from ..design.information import Hypothesis, Knowledge, a_optimal, d_optimal
 from ..design.run_files import commands_file
 from ..execution.progress import Advance, silent
 from ..execution.result_folder import together
-from ..report.formatting import as_json, finite
+from ..report.formatting import write_json
 from ..runs.cleaning import Z95
 from .measured_system import MeasuredRun, windows_of
 from .residuals import Setting, WindowResiduals
 from .sensitivity import confounded
 from .system_task import SystemTask
 
-LOG_COURSES = 5  # of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
-NUMBERS = 4  # of an input: form, least and largest value, period
-SHORTEST, LONGEST = 0.02, 0.5  # of the length of a run: period of a course; chosen
+LOG_COURSES = 5  # 1, of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
+NUMBERS = 4  # 1, of an input: form, least and largest value, period
+SHORTEST, LONGEST = 0.02, 0.5  # 1, of the length of a run: period of a course; chosen
 PAGE, JSON = "plan.md", "next.json"
 
 
@@ -129,7 +129,7 @@ class FmuPlan:
                 f"Inputs over time: {', '.join(tables)}.",
             ]
             (new / PAGE).write_text("\n".join(text) + "\n", encoding="utf-8")
-            (new / JSON).write_text(as_json(finite(content)) + "\n", encoding="utf-8")
+            write_json(new / JSON, content)
         return [JSON, PAGE, *tables]
 
 

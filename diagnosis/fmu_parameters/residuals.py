@@ -6,7 +6,7 @@ start value, and are whitened by the inverse root of that. Where a prediction is
 the slopes are those about the most likely start (Laplace's method).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
@@ -24,14 +24,10 @@ from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-STEP = 0.02  # of a central difference at most, in prior standard deviations; chosen
-# Rms change of the residuals by one step of a difference, in units of the noise, at most: a longer step
-# shows the curvature of a prediction in its slope. Chosen: a shorter one shows the rounding of solvers.
-MOST_CHANGE = 1.0
-START_STEP = 0.05  # of a difference by a start value, in its standard deviations; chosen
+STEP = 0.02  # 1, of a central difference at most, in prior standard deviations; chosen
+START_STEP = 0.05  # 1, of a difference by a start value, in its standard deviations; chosen
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
-MOST_STEPS = 30  # of a fit; chosen: a dozen suffices from a start value
-LINEAR = 0.3  # rms by which a prediction may differ from its slopes, in units of the noise; chosen
+LINEAR = 0.3  # 1, rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
 
 @dataclass(frozen=True)
@@ -45,6 +41,11 @@ class Setting:
 
     z: tuple[float, ...]
     forces: tuple[AdditionalForce, ...] = ()
+
+    def with_coefficients(self, values: Iterable[float]) -> "Setting":
+        """The same with other coefficients of its forces."""
+        pairs = zip(self.forces, values, strict=True)
+        return Setting(self.z, tuple(replace(f, coefficient=c) for f, c in pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +105,11 @@ class WindowResiduals:
         sizes = [w.measured.size for w in windows]
         ends = np.cumsum([0, *sizes])
         self.rows = [slice(a, b) for a, b in pairwise(ends.tolist())]
+
+    @property
+    def start(self) -> Setting:
+        """The prior means, without additional forces."""
+        return Setting((0.0,) * len(self.parameters))
 
     def choose(self, parameters: Sequence[CalibratedParameter]) -> None:
         """Calibrate other parameters."""
@@ -246,7 +252,7 @@ class WindowResiduals:
         bend = off(best)[: base.size] - base - S @ best
         if np.sqrt(np.mean(bend**2)) > LINEAR:
             jacobian: Any = lambda z: np.concatenate([slopes(z), np.eye(z.size)])  # noqa: E731
-            z = least_squares(off, z, jacobian, max_nfev=MOST_STEPS).x
+            z = least_squares(off, z, jacobian).x
             S = slopes(z)
         U, size, _ = np.linalg.svd(S, full_matrices=False)
         return Whitening(U, 1.0 / np.sqrt(1.0 + size**2), begin(z), S @ z)
@@ -267,7 +273,9 @@ class WindowResiduals:
         change = np.sqrt(np.mean(found[0] ** 2, axis=0))
         names = [*(p.name for p in self.parameters), *(f.id for f in setting.forces)]
         last = [self._steps.get(n, STEP) for n in names]
-        steps = np.minimum(STEP, MOST_CHANGE / np.maximum(change, MOST_CHANGE / STEP))
+        # A step that changes the residuals by more than the noise shows the curvature of a prediction in
+        # its slope; a shorter one shows the rounding of solvers.
+        steps = np.minimum(STEP, 1.0 / np.maximum(change, 1.0 / STEP))
         self._steps |= zip(names, steps.tolist(), strict=True)
         again = np.any(np.array(last) > 2.0 * steps)
         return self._differences(setting, sizes) if again else found
@@ -302,17 +310,12 @@ class WindowResiduals:
             step = self._steps.get(p.name, STEP)
             down, up = min(step, max(z - low, 0.0)), min(step, max(high - z, 0.0))
             yield p.name, self.at(setting, k, z - down), self.at(setting, k, z + up), down, up
-        for k, (f, size) in enumerate(zip(setting.forces, sizes, strict=True)):
+        present = np.array([f.coefficient for f in setting.forces])
+        for f, size, axis in zip(setting.forces, sizes, np.eye(present.size), strict=True):
             step = self._steps.get(f.id, STEP)
-            low, high = (self._forced(setting, k, sign * step * size) for sign in (-1.0, 1.0))
+            ends = (present - step * size * axis, present + step * size * axis)
+            low, high = (setting.with_coefficients(c.tolist()) for c in ends)
             yield f.id, low, high, step, step
-
-    @staticmethod
-    def _forced(setting: Setting, k: int, change: float) -> Setting:
-        """A setting with another coefficient of a force."""
-        forces = list(setting.forces)
-        forces[k] = replace(forces[k], coefficient=forces[k].coefficient + change)
-        return Setting(setting.z, tuple(forces))
 
     @staticmethod
     def at(setting: Setting, k: int, z: float) -> Setting:

@@ -12,11 +12,12 @@ from ..search.prediction_fit.joint_posterior import TOGETHER, connected
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
 
-# Share of its prior standard deviation that a value keeps with the runs, from which on they cannot tell
-# it. Chosen: a tenth less is hardly news.
+# 1, share of its prior standard deviation that a value keeps with the runs, from which on they cannot
+# tell it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
-ROUNDING = 1e-5  # of the squared length of a slope by differences, below which it is not known; chosen
-SHARED = 0.1  # of a direction: part of a parameter in it, and cosine of two parts; chosen
+# 1, of the squared length of a slope by differences, below which it is not known; chosen
+ROUNDING = 1e-5
+SHARED = 0.1  # 1, of a direction: part of a parameter in it, and cosine of two parts; chosen
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def sensitivities(r: WindowResiduals, advance: Advance) -> Sensitivities:
     Raises:
         InputError: the FMU fails at its start values.
     """
-    start = Setting((0.0,) * len(r.parameters))
+    start = r.start
     advance("predictions with the start values")
     r.whiten_about(start)
     advance("ranges in which the FMU runs")

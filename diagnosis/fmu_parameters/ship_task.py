@@ -15,7 +15,7 @@ from ..execution.progress import Advance
 from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
-from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES, QUARTER
+from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES
 from ..predictors.windows import step_of, usable_windows
 from ..runs import QUANTITY, Smoothed
 from ..runs.columns.unit_check import SI_UNIT
@@ -26,10 +26,10 @@ from .force_search import candidates
 from .measured_system import Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 
-# Of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
+# 1, of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
 MOST_SAMPLES = 60
 # Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
-EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": QUARTER}, "F_e": {"tau_X": -QUARTER, "tau_Y": 0.0}}
+EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": np.pi / 2}, "F_e": {"tau_X": -np.pi / 2, "tau_Y": 0.0}}
 
 
 class ShipTask(CalibrationTask):
@@ -171,12 +171,6 @@ def ship_task(
     execution: Execution,
 ) -> ShipTask:
     """Read the FMU of a ship, its map, its parameters and measured runs.
-
-    Args:
-        options: of the command.
-        paths: use -> files of the runs.
-        advance: receives the name of each step.
-        execution: how the FMU is run.
 
     Raises:
         InputError: one of them is not as it should be.

@@ -20,7 +20,7 @@ from .parameter_fit import ParameterFit, fit, fitted, intervals
 from .residuals import Setting, WindowResiduals, rms_of
 from .system_remainder import SystemRemainder, change_of_squares, inflation, remainder
 
-MOST_FORCES = 3  # in one model; chosen
+MOST_FORCES = 3  # 1, in one model; chosen
 Verdict = Literal["found", "ambiguous", "parameters", "unexplained", "none"]
 
 
@@ -101,7 +101,7 @@ def calibrate(
     Raises:
         InputError: the FMU fails at its start values.
     """
-    train, start = parts["train"], Setting((0.0,) * len(parts["train"].parameters))
+    train, start = parts["train"], parts["train"].start
     advance("predictions with the start values")
     train.whiten_about(start)
     before = fit(train, start, (), range(len(start.z)))
@@ -184,9 +184,9 @@ def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
     p = len(best.setting.z)
     if not p:
         return Moved(False, ())
-    held = Setting((0.0,) * p, best.setting.forces)
+    held = Setting(r.start.z, best.setting.forces)
     if not np.isfinite(r.whitened([held])[0]).all():  # forces of other parameters make the FMU diverge
-        held = Setting(held.z, tuple(replace(f, coefficient=0.0) for f in held.forces))
+        held = held.with_coefficients([0.0] * len(held.forces))
     other = fit(r, held, best.sizes, range(p))
     ratio = (other.data_cost - best.data_cost) / grown
     some = ratio > float(chi2.ppf(1.0 - CHANCE, p))

@@ -13,23 +13,22 @@ The key is the column, the name that of the variable, as in the map of a ship. W
 that are called as inputs and outputs are those.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import (
     AllowInfNan,
     BaseModel,
     ConfigDict,
     Field,
-    FiniteFloat,
     NonNegativeFloat,
     PositiveFloat,
 )
 
 from cosim import InputError
 from cosim.errors import nearest
-from cosim.fmu import FmuModel, FmuVariable
+from cosim.fmu import FmuModel
 from cosim.scenario import read_model
 from cybership.message_text import quoted
 
@@ -43,13 +42,6 @@ Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
 class MappedVariable(Named):
     """A column in terms of a variable of the FMU: variable = factor * column + offset."""
-
-    factor: FiniteFloat = Field(
-        default=1.0, description="factor from the unit of the column to that of the variable"
-    )
-    offset: FiniteFloat = Field(
-        default=0.0, description="offset that is added, in the unit of the variable"
-    )
 
 
 class MeasuredOutput(MappedVariable):
@@ -103,27 +95,22 @@ def read_system_map(path: Path) -> SystemMap:
     return read_model(path, SystemMap, "a map", strict=False, renamed="map")
 
 
-def map_by_names(model: FmuModel, columns: Iterable[str], where: str) -> SystemMap:
+def map_by_names(model: FmuModel, columns: Collection[str], where: str) -> SystemMap:
     """The map in which columns are the variables of their names.
 
     Raises:
         InputError: no column is an output.
     """
-    known = model.variables
-    named = [c for c in columns if c in known and known[c].type == "Real"]
-    outputs = [c for c in named if known[c].causality == "output"]
+    known = ({v.name for v in model.reals(group)} for group in ("input", "output"))
+    inputs, outputs = ([c for c in columns if c in names] for names in known)
     if not outputs:
-        names = ", ".join(v.name for v in known.values() if v.causality == "output") or "none"
+        names = ", ".join(v.name for v in model.variables.values() if v.causality == "output") or "none"
         raise InputError(
             f"{where}: no column has the name of an output of '{model.path.name}' ({names}); --map "
             "FILE.json maps columns to variables"
         )
-    return SystemMap.model_validate(
-        {
-            "inputs": {c: c for c in named if known[c].causality == "input"},
-            "outputs": {c: c for c in outputs},
-        }
-    )
+    each = {"inputs": inputs, "outputs": outputs}
+    return SystemMap.model_validate({group: {c: c for c in names} for group, names in each.items()})
 
 
 def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
@@ -132,16 +119,14 @@ def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
     Raises:
         InputError: it names a variable that the FMU does not have, or not in this role.
     """
-
-    def real(test: Any) -> dict[str, FmuVariable]:
-        return {v.name: v for v in model.variables.values() if v.type == "Real" and test(v)}
-
-    roles: dict[str, tuple[dict[str, FmuVariable], str]] = {
-        "inputs": (real(lambda v: v.causality == "input"), "input"),
-        "outputs": (real(lambda v: v.causality in ("output", "local")), "output"),
-        "start": (real(model.can_be_set), "value that can be set before a simulation"),
+    settable = [v for v in model.reals() if model.can_be_set(v)]
+    roles = {
+        "inputs": (model.reals("input"), "input"),
+        "outputs": (model.reals("output", "local"), "output"),
+        "start": (settable, "value that can be set before a simulation"),
     }
-    for group, (possible, role) in roles.items():
+    for group, (variables, role) in roles.items():
+        possible = [v.name for v in variables]
         channels: Mapping[str, MappedVariable] = getattr(found, group)
         for column, channel in channels.items():
             place = f"{where}: {group}.{column}"
@@ -150,9 +135,10 @@ def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
                 raise InputError(f"{place}: the FMU has no {role} {quoted(channel.name)}{hint}")
             if channel.factor == 0.0:
                 raise InputError(f"{place}.factor must not be zero")
+    inputs = [v.name for v in model.reals("input")]
     for name in found.disturbance_inputs or ():
-        if name not in roles["inputs"][0]:
-            hint = nearest(name, roles["inputs"][0])
+        if name not in inputs:
+            hint = nearest(name, inputs)
             raise InputError(f"{where}: disturbance_inputs: the FMU has no input {quoted(name)}{hint}")
     for column in found.start:
         if column_of_start(column)[0] not in found.outputs:
@@ -171,5 +157,4 @@ def force_inputs(found: SystemMap, model: FmuModel) -> list[str]:
     """Inputs on which a force may act in addition."""
     if found.disturbance_inputs is not None:
         return list(found.disturbance_inputs)
-    real = (v for v in model.variables.values() if v.causality == "input" and v.type == "Real")
-    return [v.name for v in real if v.unit is not None and v.unit.name in FORCES]
+    return [v.name for v in model.reals("input") if v.unit is not None and v.unit.name in FORCES]

@@ -11,8 +11,8 @@ from ..runs.run_constants import CHANCE
 from .measured_system import Window
 from .residuals import WindowResiduals
 
-BINS = (4, 16, 64)  # samples whose mean is compared with that of white noise; chosen
-BLOCKS = 8  # of a run, by which the correlation of residuals is judged; chosen
+BINS = (4, 16, 64)  # 1, samples whose mean is compared with that of white noise; chosen
+BLOCKS = 8  # 1, of a run, by which the correlation of residuals is judged; chosen
 
 
 @dataclass(frozen=True)
@@ -71,15 +71,7 @@ def remainder(
     names: Sequence[str],
     units: Sequence[str],
 ) -> SystemRemainder:
-    """What is left in whitened residuals (size,).
-
-    Args:
-        r: their windows.
-        white: the residuals.
-        first: those of the first model.
-        fitted: number of fitted values.
-        names, units: of the outputs.
-    """
+    """What is left in whitened residuals (size,)."""
     found = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
         own, before = _of_output(r, white, k), _of_output(r, first, k)

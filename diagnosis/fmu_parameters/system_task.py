@@ -23,7 +23,7 @@ from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs,
 from .parameter_file import CalibratedParameter, proposed, read_parameters, unit_of
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
-# Outputs that are no measured ones, of which an additional force may be a function; chosen: the more
+# 1, outputs that are no measured ones, of which an additional force may be a function; chosen: the more
 # are tried, the more alike they are.
 MOST_OUTPUTS = 6
 
@@ -78,11 +78,7 @@ class SystemTask(CalibrationTask):
         self.names = [c.name for c in map.outputs.values()]
         self.units = [unit_of(model.variables[n]) for n in self.names]
         self.forces_on = force_inputs(map, model)
-        others = [
-            v.name
-            for v in model.variables.values()
-            if v.causality == "output" and v.type == "Real" and v.name not in self.names
-        ]
+        others = [v.name for v in model.reals("output") if v.name not in self.names]
         self.outputs = [*self.names, *(others[:MOST_OUTPUTS] if self.forces_on else [])]
 
     @cached_property
@@ -146,11 +142,7 @@ def system_task(
     elif train:
         found = map_by_names(model, columns_of(train[0]), f"'{train[0]}'")
     else:
-        outputs = {
-            v.name: v.name
-            for v in model.variables.values()
-            if v.causality == "output" and v.type == "Real"
-        }
+        outputs = {v.name: v.name for v in model.reals("output")}
         if not outputs:
             raise InputError(f"'{fmu}' has no output of type Real to compare with measurements")
         found = SystemMap.model_validate({"outputs": outputs})

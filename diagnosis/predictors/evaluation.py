@@ -15,7 +15,7 @@ from .ship_model import Model
 from .weak_form import WeakWindows, omega
 from .windows import WindowErrors, Windows
 
-LEVELS = (0.5, 0.9)  # probabilities of the bands that are shown; 90 % of the contract, and half
+LEVELS = (0.5, 0.9)  # 1, probabilities of the bands that are shown; 90 % of the contract, and half
 
 
 def quantile(level: float, dof: int) -> float:

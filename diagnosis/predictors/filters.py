@@ -10,7 +10,8 @@ from fmus.ops import wrap
 
 from ..runs import Smoothed
 
-DAMPING = 0.5**0.5  # of a steady Kalman filter of constant velocity, whose noise is white acceleration
+# 1, of a steady Kalman filter of constant velocity, whose noise is white acceleration
+DAMPING = 0.5**0.5
 
 
 class Filters(NamedTuple):
@@ -70,7 +71,7 @@ class Filters(NamedTuple):
         return found
 
 
-NO_FILTERS = Filters((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+NO_FILTERS = Filters((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # s, of most measurements
 
 
 @lru_cache  # a fit asks for the same runs several times

@@ -20,14 +20,11 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
 from ..runs.cleaning import DIGITS, WIDTH
-from .compiled_law import compiler
-from .recorded_step import Inputs, Ready, compiled_states, recorded_step, thrust_at
+from ..runs.run_constants import FAR_OFF
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
-
-# Standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
-# coefficient alone does not explain the data (contract).
-FAR_OFF = 3.0
+from .traced.compiled_law import compiler
+from .traced.recorded_step import Inputs, Ready, compiled_states, recorded_step, thrust_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,9 +327,14 @@ def true_pose(measured: Any, b: vessel.PreparedVessel) -> list[Any]:
     """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
     pose = [np.atleast_2d(m) for m in measured]
     for _ in range(8):
-        x, y, psi = vessel.measured(vessel.State(*pose), b)
-        off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
-        pose = [a + b for a, b in zip(pose, off, strict=True)]
+        pose, off = nearer_pose(pose, measured, b)
         if not any((np.abs(o) > DIGITS).any() for o in off):
             break
     return pose
+
+
+def nearer_pose(pose: Any, measured: Any, b: vessel.PreparedVessel) -> tuple[list[Any], list[Any]]:
+    """One step of that iteration, and by how much the pose changes."""
+    x, y, psi = vessel.measured(vessel.State(*pose), b)
+    off = [measured[0] - x, measured[1] - y, wrap(measured[2] - psi)]
+    return [a + b for a, b in zip(pose, off, strict=True)], off

@@ -21,8 +21,8 @@ from .ship_model import Model
 from .thrust import Response
 from .windows import usable_windows
 
-INSTANTS = 16  # of a window at which pose and prediction are compared
-PARTS = 4  # steps between two instants: a tenth of the quickest motion's time in the longest windows
+INSTANTS = 16  # 1, of a window at which pose and prediction are compared
+PARTS = 4  # 1, steps between two instants: a tenth of the quickest motion's time in the longest windows
 UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
 
 
@@ -116,12 +116,7 @@ class Shooting:
         return _off(self.measured, self._poses(self._states(model), model)[0])
 
     def around(self, model: Model, steps: Mapping[str, float]) -> Around:
-        """A model's predictions and what changes them.
-
-        Args:
-            model: about which.
-            steps: parameter -> step of its finite difference.
-        """
+        """A model's predictions and what changes them."""
         key = Response.key(model), model.filters
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
         same = {n: m for n, m in changed.items() if (Response.key(m), m.filters) == key}

@@ -29,28 +29,28 @@ from .filters import NO_FILTERS, Filters
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
+# [N, N, N m]. Chosen: below, rounding and the shape of commands between samples matter more than noise.
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
-# N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
 # On a noise-free run at 20 Hz with smooth commands the true model leaves 4e-5 N and 1e-5 N m.
 FLOOR = np.array([3e-4, 3e-4, 1e-4])
 # rad/s, grid of the integral and of w0, which is held within it; chosen, far beyond the kernel's width
 FREQUENCIES = np.geomspace(0.02, 60.0, 400)
-# Factor within which the standard deviation is right (tests/test_diagnosis_where.py).
+# 1, factor within which the standard deviation is right (tests/test_diagnosis_where.py).
 NOISE_TOLERANCE = 1.3
-# Of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come from
-# how a simulator integrates. Contract, for the residual; the same for findings, there also of the
+# 1, of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come
+# from how a simulator integrates. Contract, for the residual; the same for findings, there also of the
 # squares of the first model error.
 SHARE_OF_COMMAND = 0.02
 # 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
 # from a limit; the same for commands and windows, and for what must be explained.
 NEGLIGIBLE = 0.05
-# Relative standard deviation of a measured coefficient. The search has no more for any coefficient; one
-# prior for all has no more for masses, thrusters' forces and places, which no other ship had to lend.
-# So much of the inertial force a model lacks at the least.
+# 1, relative standard deviation of a measured coefficient. The search has no more for any coefficient;
+# one prior for all has no more for masses, thrusters' forces and places, which no other ship had to
+# lend. So much of the inertial force a model lacks at the least.
 MEASURED = 0.1
 
 
-@lru_cache(maxsize=64)  # filters; a fit asks for the same several times
+@lru_cache  # filters; a fit asks for the same several times
 def noise_gain(filters: Filters = NO_FILTERS, time: float = 1.0) -> list[np.ndarray]:
     """For order k = 0 to 3, each channel and w0, (3, w0), the integral of w^2k |kernel U|^2 H [s^-2k-1].
 

@@ -26,14 +26,14 @@ from .prediction import at_rest, before_filters, true_motion
 from .ship_model import Model
 from .thrust import Response, inflow, thrust
 
-# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-# Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
-# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
+# 1, windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
+# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up. Seconds are those of
+# CyberShip Enterprise 1, times the scale of the ship.
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64  # 1; chosen: Gram matrices of more take memory, and no fold needs them
-SMALL = 1e-3  # of its usual size: step of a finite difference where nothing is linear; chosen
-# Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
+SMALL = 1e-3  # 1, of its usual size: step of a finite difference where nothing is linear; chosen
+# bytes, for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.
 ROOM = 4e7
 OF_MOTION = ("motion", "change", "free", "met")  # parts that do not depend on commands

@@ -30,7 +30,7 @@ ANY_TIME = (-np.inf, np.inf)  # s
 # m, times the scale of the ship, and rad; where predictions begin a velocity is known if its standard
 # deviation displaces the ship by no more over a window. Chosen: a tenth of its length.
 DISPLACED = 0.1
-SETTLED = 2.0  # times the median of a run, or so well; chosen: at its ends it is three to four
+SETTLED = 2.0  # 1, times the median of a run, or so well; chosen: at its ends it is three to four
 
 
 @dataclass(frozen=True, eq=False, repr=False)

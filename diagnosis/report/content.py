@@ -98,20 +98,14 @@ def comparison_content(comparison: Comparison, model: Path | None, files: Sequen
 
     Args:
         comparison: the errors of a model on some runs.
-        model: its file; None: the nominal one.
+        model: file of the initial model; None: the nominal one.
         files: names of the files that are written together.
     """
     return file_content(ReportData.of(comparison, model, files))
 
 
 def diagnosis_content(diagnosis: Diagnosis, model: Path | None, files: Sequence[str]) -> Content:
-    """The content of ``diagnosis.json``.
-
-    Args:
-        diagnosis: what was learned.
-        model: file of the initial model; None: the nominal one.
-        files: names of the files that are written together.
-    """
+    """The content of ``diagnosis.json``; arguments as of :func:`comparison_content`."""
     return file_content(ReportData.of(diagnosis, model, files))
 
 

@@ -74,11 +74,6 @@ def write_document(path: Path, document: Document) -> None:
     write_page(path, "document.html", title=document.title, document=document, drawn=drawn)
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write the content of a JSON file; a number that is not finite is null."""
-    path.write_text(formatting.as_json(content) + "\n", encoding="utf-8")
-
-
 def numbers(values: Sequence[float], digits: int = 3) -> list[str]:
     """Numbers as a table shows them."""
     return [formatting.number(float(x), digits) for x in values]

@@ -9,7 +9,9 @@ from fmus.effects.text import Found
 
 from ..predictors.ship_model import parameter_and_run
 
-SHOWN = 4  # names in a sentence, rows of a summary; of values twice as many, more are a curve; chosen
+# 1, names in a sentence, rows of a summary, figures of tracks in a record; of values, of sliders of an
+# effect, and of outlines along a track twice as many. Chosen: more are not read.
+SHOWN = 4
 
 
 def sentence(found: Found) -> str:

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 NO_VALUE = "–"
 _UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
-WRITTEN_OUT = 1e6  # magnitude below which no digit is left out in favour of an exponent; chosen
+WRITTEN_OUT = 1e6  # 1, magnitude below which no digit is left out in favour of an exponent; chosen
 
 
 def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
@@ -70,3 +71,8 @@ def finite(value: Any) -> Any:
 def as_json(content: Any, indent: int | None = 2) -> str:
     """The text of a JSON file; a number that is not finite is null."""
     return json.dumps(finite(content), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON file; a number that is not finite is null."""
+    path.write_text(as_json(content) + "\n", encoding="utf-8")

@@ -49,9 +49,6 @@ def _words() -> re.Pattern[str]:
 def linked(page: str) -> tuple[str, list[GlossaryTerm]]:
     """Link the first use of each term in the sentences and the column headings of a page.
 
-    Args:
-        page: HTML, in which texts are escaped.
-
     Returns:
         The page, and its terms in their order; each link leads to the anchor of a term.
     """

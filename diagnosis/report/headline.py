@@ -118,12 +118,7 @@ def verdict_title(r: ReportData) -> str:
 
 
 def page_title(r: ReportData, day: str) -> str:
-    """Ship or model, runs, date and verdict, as the title of a page.
-
-    Args:
-        r: the result.
-        day: on which the page is written.
-    """
+    """Ship or model, runs, date and verdict, as the title of a page."""
     predictor = r.comparison.predictor
     of = predictor.model.ship.description.title if predictor.parametric else predictor.name
     names = [e.name for e in r.evaluations]

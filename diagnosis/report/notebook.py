@@ -3,10 +3,10 @@
 from cosim import InputError
 from cosim.results import Drawn
 
-from . import figures, tracks
-from .chart import Chart
 from .headline import cause, headline, verdict_title
 from .page import rendered
+from .pictures import figures, tracks
+from .pictures.chart import Chart
 from .report_data import ReportData
 
 

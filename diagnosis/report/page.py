@@ -13,14 +13,15 @@ import cosim
 from ..assessment.covariates import EAST, NORTH
 from ..execution.progress import Advance, silent
 from ..predictors.evaluation import Evaluation
-from . import figures, formatting, tracks
-from .chart import data_uri, themed
+from . import formatting
 from .content import coefficients, versions
 from .error_change import error_changes
 from .glossary import linked
 from .headline import boundedness, cause, finding_sentence, first_sentences, gain_of_search, page_title
+from .pictures import figures, tracks
+from .pictures.chart import data_uri, themed
+from .pictures.shape import curves
 from .report_data import USES, ReportData, trial_rows
-from .shape import curves
 from .what_if import what_if
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class Drawing(NamedTuple):
 
 
 class Figure(Protocol):
-    """A :class:`.chart.Chart`, or what else can be an SVG element of a page."""
+    """A :class:`.pictures.chart.Chart`, or what else can be an SVG element of a page."""
 
     def svg(self, key: str, label: str) -> str: ...
 

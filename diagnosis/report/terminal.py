@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
+from ..execution.short_text import WIDTH
 from ..runs import MeasuredChannel, by_name, sensor_lines
 from ..session import CalibratedModel
 from .finding_text import SHOWN
@@ -26,7 +27,6 @@ from .headline import (
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
 
-WIDTH = 80  # columns of a text; as of a terminal
 WEIGH = ", in kg: weigh the ship"  # behind a mass beyond its prior
 ASCII = str.maketrans("−–", "--")  # for any terminal
 
@@ -134,7 +134,8 @@ def _files(r: ReportData, out: str) -> Iterator[RenderableType]:
         yield Text(f"{', '.join(r.files)} in {out}", no_wrap=True, overflow="ignore")
 
 
-def _table(*columns: str) -> Table:
+def plain_table(*columns: str) -> Table:
+    """An empty table of columns, the first with words, the others with numbers."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for k, name in enumerate(columns):
         table.add_column(Text(name), justify="right" if k else "left", overflow="fold")
@@ -143,7 +144,7 @@ def _table(*columns: str) -> Table:
 
 def _runs(r: ReportData) -> Iterator[RenderableType]:
     """The data, what channels of each run say of each other, and where the model fails."""
-    table = _table("run", "time", "samples", "frozen", "dropped", "spikes", "used")
+    table = plain_table("run", "time", "samples", "frozen", "dropped", "spikes", "used")
     for e in r.evaluations:
         table.add_row(Text(r.called(e)), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
     yield from _titled("Data", table)
@@ -165,7 +166,7 @@ def channel_table(
     of_runs: Sequence[tuple[str, Sequence[MeasuredChannel]]],
 ) -> Iterator[RenderableType]:
     """A row for each channel of some runs, by their names; nothing where there is none."""
-    table = _table("channel", "rate", "held", "noise", "", "outliers", "used")
+    table = plain_table("channel", "rate", "held", "noise", "", "outliers", "used")
     for c in by_name(c for _, channels in of_runs for c in channels):
         runs = ((run, x) for run, channels in of_runs for x in channels if x.name == c.name)
         first = next((f": {run} {_number(x.outlier_times[0])} s" for run, x in runs if x.outliers), "")
@@ -194,10 +195,10 @@ def _effect(e: ReportedEffect) -> Iterator[str]:
 
 def _errors(r: ReportData) -> Iterator[RenderableType]:
     """Errors of predictions, the model error, and what is measured of actuators and of trials."""
-    predictions = _table("run", "position [mm]", "heading [°]")
-    forces = _table("run", "X [N]", "Y [N]", "N [N m]")
-    measured = _table("run", "measured output", "error [SI]")
-    trials = _table("run", "measure", "measured", "predicted", "unit")
+    predictions = plain_table("run", "position [mm]", "heading [°]")
+    forces = plain_table("run", "X [N]", "Y [N]", "N [N m]")
+    measured = plain_table("run", "measured output", "error [SI]")
+    trials = plain_table("run", "measure", "measured", "predicted", "unit")
 
     def cell(before: float | None, after: float | None, scale: float = 1.0) -> str:
         parts = (before, after) if r.learned else (before,)

@@ -27,15 +27,17 @@ from fmus.native.program import program
 from fmus.native.webassembly import component_module
 
 from ..predictors import Evaluation, Model, Response, write_model
-from ..predictors.balance_component import balance_component
-from ..predictors.prediction import at_rest
-from ..predictors.prediction_component import START, allocation_component, prediction_component
+from ..predictors.prediction import FAR_OFF, at_rest
 from ..predictors.ship_model import of_run, parameter_and_run
 from ..predictors.thrust import LONGEST_STEP
+from ..predictors.traced.balance_component import balance_component
+from ..predictors.traced.prediction_component import START, allocation_component, prediction_component
 from ..predictors.windows import WindowStarts
-from ..runs.cleaning import Z95
+from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
 from ..session import Diagnosis
+from .finding_text import SHOWN
+from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 
 if TYPE_CHECKING:
@@ -44,13 +46,7 @@ if TYPE_CHECKING:
 SCRIPTS = Path(__file__).parent / "templates" / "what_if"
 # Files of the page's program, in this order.
 PROGRAM = ("data", "predictions", "residual_force", "fit", "own_run", "pictures", "results", "controls")
-CANDIDATES = 12  # effects of the ranking that a reader may try; chosen: of more the list is not read
-MOST_VALUES = 6  # of an effect that was not found: a shape of more has no use as sliders; chosen
-REACH = 3.0  # a slider ends so many standard deviations, or changes, from the first value; chosen
-SEEN = 0.75  # s, times the scale of the ship, on both sides of a start, without a smoother; chosen
 FIXED = "It changes the delay or the filter of commands or of the measurement: it stays as it is here."
-# Whole numbers in which values are stored, as shares of the largest: far below 1e-6 of any error.
-LEVELS = 2.0**31 - 1.0
 
 
 class Slider(NamedTuple):
@@ -244,7 +240,7 @@ class MovableModel:
             "force": run.commands is None,
             "length": w.horizon,
             "longest": LONGEST_STEP * w.scale.time,
-            "reach": SEEN * w.scale.time,
+            "reach": WIDTH / 4 * w.scale.time,  # on both sides of a start, without a smoother
         }
 
     # Coefficients.
@@ -264,9 +260,9 @@ class MovableModel:
             if effect.id not in done and any(self.learned.value(n) != self.start.value(n) for n in free):
                 done.add(effect.id)
                 yield self._choice(effect, "calibrated", {}, True)
-        for ranked in self.r.ranking[:CANDIDATES]:
+        for ranked in self.r.ranking[:MOST_RANKED]:
             effect = effects[ranked.id]
-            if ranked.id not in done and len(effect.parameters) <= MOST_VALUES and effect.function:
+            if ranked.id not in done and len(effect.parameters) <= 2 * SHOWN and effect.function:
                 yield self._choice(effect, "candidate", {}, False)
         for name, std in prior.std.items():
             if std or self.learned.value(name) != self.start.value(name):
@@ -296,9 +292,9 @@ class MovableModel:
             (after - Z95 * posterior[name], after + Z95 * posterior[name]) if name in posterior else None
         )
         away = [
-            REACH * abs(after - before),
+            FAR_OFF * abs(after - before),
             *(abs(x - before) for x in ci95 or ()),
-            REACH * (std or 0.0),
+            FAR_OFF * (std or 0.0),
         ]
         reach = max(away) or self.start.unit(name)
         low, high = declared.range.min, declared.range.max
@@ -434,7 +430,7 @@ class ArrayStore:
 
     def near(self, values: np.ndarray) -> int:
         """The number of an array, kept to a 2^31st of its largest value as second differences."""
-        scale = float(np.abs(values).max(initial=0.0)) / LEVELS or 1.0
+        scale = float(np.abs(values).max(initial=0.0)) / np.iinfo(np.int32).max or 1.0
         whole = np.round(values / scale).astype(np.int64)
         change = np.diff(np.diff(whole, prepend=0), prepend=0).astype("<i4")  # modulo 2^32
         return self._keep(change.view(np.uint8).reshape(-1, 4), scale)

@@ -21,17 +21,17 @@ from .run_constants import HELD, HORIZON, LONG
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
 EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
-RESPONSE = 3.0  # time constants, after which 5 % of an unknown earlier command are left
+RESPONSE = 3.0  # 1, time constants, after which 5 % of an unknown earlier command are left
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
-# Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
-# which nothing can be differentiated.
+# 1, of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts,
+# of which nothing can be differentiated.
 SPARSE = 0.05
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
-FEWEST = 4  # samples, without which there is no third difference
-SHOWN = 3  # items of a list that a message states one by one; chosen
-DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
-# Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
+FEWEST = 4  # 1, samples, without which there is no third difference
+SHOWN = 3  # 1, items of a list that a message states one by one; chosen
+DIGITS = float(np.finfo(float).eps) ** 0.5  # 1, relative size of what rounding may have left
+# 1, standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
 
 
@@ -153,7 +153,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     seen, repeats, between = updates(run, PLACE, gone)
     turned, constant, lined = updates(run, HEADING, gone)
     if turned.sum() < FEWEST <= min(seen.sum(), constant.sum()):
-        turned = turned | _believed_constant(constant, where, anyway)
+        if not anyway:
+            raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
+        turned = turned | constant
     # Where no heading is near, a place tells nothing of surge and sway.
     apart = max(WIDTH * scale.time, LONG * row)
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
@@ -200,17 +202,6 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     return Track(
         run, pose, measured, frozen, dropped, between, period, run.left_out, tuple(notes), scale
     )
-
-
-def _believed_constant(constant: np.ndarray, where: str, anyway: bool) -> np.ndarray:
-    """Rows (n,) in which a heading repeats throughout, if that is believed.
-
-    Raises:
-        InputError: it is not.
-    """
-    if not anyway:
-        raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
-    return constant
 
 
 def long_gap(period: float, scale: Scale) -> float:

@@ -17,16 +17,14 @@ import numpy as np
 
 from cosim import InputError
 
+from .run_constants import FAR_OFF, SAME
+
 if TYPE_CHECKING:  # at run time it takes a while to import
     from .smoothing.smoother import Smoothed
 
-POINTS = 512  # of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
-PIECES, SHIFTS = 4, 8  # of the shorter run; within a step of the course; chosen
-FEWEST = 8  # points of a piece; chosen
-# Correlation of pieces of one motion. Copies have 0.9995 and more in the median, two zig-zags of a
-# tanker's model 0.9975 and less (tests/test_independence.py).
-SAME = 0.999
-STILL = 3.0  # times its standard deviation, below which a velocity does not vary; chosen
+POINTS = 512  # 1, of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
+PIECES, SHIFTS = 4, 8  # 1, of the shorter run; within a step of the course; chosen
+FEW = 8  # 1, points, or windows, by which a correlation is looked for; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
             at = np.arange(begin + shift, begin + short.seconds / PIECES, period)
             grid = short.period * np.arange(len(short.course))
             piece = np.column_stack([np.interp(at, grid, x) for x in short.course.T])
-            if len(piece) >= FEWEST and len(piece) <= len(long.course):
+            if len(piece) >= FEW and len(piece) <= len(long.course):
                 found.append(_correlation(piece, long.course, short.certain))
         if found and not np.isnan(best := float(np.max(found))):
             yield best
@@ -123,7 +121,7 @@ def _correlation(piece: np.ndarray, course: np.ndarray, certain: np.ndarray) -> 
     m = len(piece)
     off = piece - piece.mean(axis=0)
     power = np.mean(off**2, axis=0)
-    moving = power > (STILL * certain) ** 2
+    moving = power > (FAR_OFF * certain) ** 2
     if not moving.any():
         return np.nan
     total = np.zeros(len(course) - m + 1)

@@ -15,7 +15,7 @@ from .columns.unit_check import SI_UNIT
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
-# Relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
+# 1, relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
 # begins below half of it.
 HARDLY_KNOWN = 0.3
 GIVEN, ESTIMATED = "given", "estimated"

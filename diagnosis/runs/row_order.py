@@ -15,15 +15,11 @@ from fmus.scale import REFERENCE, Scale
 from .files.reading import Run
 from .run_constants import CHANCE, HORIZON, LONG
 
-MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
+MOST_WRONG = 0.1  # 1, of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
 
 
 def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     """A run whose time grows from row to row.
-
-    Args:
-        run: as it was read.
-        scale: of the ship.
 
     Returns:
         The run with the rows that have a time; ``left_out`` counts the others.

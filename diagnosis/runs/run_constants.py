@@ -1,4 +1,4 @@
-"""What all steps on a run share: lengths of time, and the chance of a false report.
+"""What all steps on a run share: lengths of time, the chance of a false report, and what is enough.
 
 Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 """
@@ -10,3 +10,14 @@ CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked 
 # s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
+# 1, standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
+# coefficient alone does not explain the data (contract).
+FAR_OFF = 3.0
+# 1, samples, windows or parts of a run by which a correlation, a noise or a standard deviation is
+# estimated (chosen).
+FEWEST = 20
+# 1, samples that noise neither repeats nor leaves on a line (chosen).
+IN_A_ROW = 8
+# 1, correlation of two signals that are one. Copies of a motion have 0.9995 and more in the median, two
+# zig-zags of a tanker's model 0.9975 and less (tests/test_independence.py).
+SAME = 0.999

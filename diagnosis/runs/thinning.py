@@ -8,7 +8,7 @@ import pandas as pd
 
 from .cleaning import BRIEF, DIGITS, EVERY, Track, between, impulse, long_gap
 
-# Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
+# 1, rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
 
 
@@ -16,9 +16,6 @@ def filled_up(track: Track) -> Track:
     """A run with more rows, without measurements, where its rows are rarer than windows of forces.
 
     There the smoothed motion leads from one sample to the next, and commands are held.
-
-    Args:
-        track: a run with its samples judged.
     """
     time = track.run.time
     steps = np.diff(time)

@@ -46,11 +46,6 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     than FAR_OFF from its prior, by where its value is from, and the data that decide (each of two runs
     left out as a whole) are not worse than without. They then take the place of effects of which none
     is a finding, if these data are not worse either.
-
-    Args:
-        found: the findings that pruning left.
-        data: the data that decide.
-        prior: of the nominal coefficients, by where their values are from.
     """
     start, unseen = data.start, data.of_other_runs
     if any_finding(found, start) or (found.effects and found.refit is None):
@@ -72,11 +67,6 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
 
     No effect follows from it. Each training run is predicted without it; a current is in it where that
     shows beyond chance, and is beyond its own uncertainty. Validation runs can reject it.
-
-    Args:
-        found: what was found, of which nothing is a finding.
-        data: the data that decide.
-        prior: of the nominal coefficients.
     """
     train, start = data.train, data.start
     if len(train) < WHOLE_RUNS or not any(prior.std.values()):

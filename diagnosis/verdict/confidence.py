@@ -18,13 +18,13 @@ from ..search.effect_evidence import EffectEvidence
 from ..search.findings import Finding
 from ..search.refinement import at_limit
 
-# Constants of the logistic map, to be fitted by benchmarks.hidden_effects on other seeds and effects
+# 1, constants of the logistic map, to be fitted by benchmarks.hidden_effects on other seeds and effects
 # than its reliability diagram shows. These are first values, chosen: 0.99 without any doubt, one half
 # where a third of what the effect explains is left, or its size varies by as much.
 SURE = 4.6
-PER_DOUBT = 14.0
-FOUND = 0.8  # confidence from which on an effect is found; contract
-# Confidence at the most where an unknown alternative is as likely as the effect; that of a set of
+PER_DOUBT = 14.0  # 1, of the shares that are left and vary; as the one before
+FOUND = 0.8  # 1, confidence from which on an effect is found; contract
+# 1, confidence at the most where an unknown alternative is as likely as the effect; that of a set of
 # effects from which on the set is a finding, and not only a possibility; contract.
 EVEN_ODDS = 0.5
 MAY_BE_NONE = "the intervals of all its values include zero"

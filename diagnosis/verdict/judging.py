@@ -25,9 +25,8 @@ from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
 from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
 from .paired_errors import harm
-from .pruning import NOTHING, Withdrawn, prune
+from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
-from .unproven import overfits, proven
 from .validation_data import ValidationData
 
 VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]

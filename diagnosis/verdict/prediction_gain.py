@@ -69,10 +69,6 @@ def prediction_gain(
 ) -> PredictionGain | None:
     """The gain of a model over another; findings are fitted without the fold that they are judged on.
 
-    Args:
-        data: the data that decide.
-        before, after: the two models.
-
     Returns:
         None where that is not known: no window has enough samples, or a method does not fit its findings
         without a part of the data.

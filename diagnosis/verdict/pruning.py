@@ -2,6 +2,11 @@
 
 Pruning only removes: what is rejected is replaced by nothing. Confidence does not count: what makes
 predictions better stays in the model.
+
+Then the possibilities without a proven gain go, which are reported as well. An effect that is no finding
+describes the motions that it was found on, whatever their cause is. In other manoeuvres it may do harm.
+It stays in the model if data that it was not fitted to show its gain: validation runs, other training
+runs, or stretches of a single one.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -12,7 +17,8 @@ from ..predictors import Model
 from ..search.findings import Finding, Findings
 from ..search.refinement import at_limit
 from ..search.significance import lower_throughout
-from .paired_errors import gain
+from .confidence import confidence_of
+from .paired_errors import gain, predicts_worse
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
 
@@ -34,9 +40,7 @@ def prune(
 ) -> tuple[Findings, list[Withdrawn]]:
     """Reject effects that make the data that decide worse.
 
-    Waves and failures are not judged: no model has waves, and the times of a failure are those of the
-    run in which it was found. Where nothing else is left, the nominal coefficients that were fitted
-    together with them are.
+    Where nothing else is left, the nominal coefficients that were fitted together with them are judged.
 
     Args:
         found: the findings on the training runs.
@@ -48,8 +52,7 @@ def prune(
         The findings that are left, all else fitted anew, and the rejected effects.
     """
     start = data.start
-    search = {f.id: start.ship.effects[f.id].search for f in found.effects}
-    judged = [i for i, s in search.items() if s.by == "regression" and not s.times]
+    judged = _judged(found, start)
     if not found.effects or not data.judges(found):
         return found, []
     sizes = {f.id: len(f.values) for f in found.effects}
@@ -78,6 +81,16 @@ def prune(
         if harm(its, first, 0):
             kept = added(kept, kept.effects, start)
     return kept, gone
+
+
+def _judged(found: Findings, start: Model) -> list[str]:
+    """The effects that data can judge, by their ids.
+
+    Waves and failures are not: no model has waves, and the times of a failure are those of the run in
+    which it was found.
+    """
+    search = {f.id: start.ship.effects[f.id].search for f in found.effects}
+    return [i for i, s in search.items() if s.by == "regression" and not s.times]
 
 
 def _alternative(rest: Findings, kept: Findings, start: Model) -> Findings | Model:
@@ -147,3 +160,49 @@ def added(found: Findings, effects: Sequence[Finding], start: Model) -> Findings
         model = model.plus(f.values)
         on_top.append(replace(f, model=model))
     return replace(found, effects=on_top, model=model, suspects=[], moved={})
+
+
+def proven(found: Findings, data: ValidationData, harm: Harm) -> tuple[Findings, list[Finding]]:
+    """Take out the possibilities without which the data are fitted and predicted as well.
+
+    The comparison is that of pruning with the burden of proof reversed. The last possibility is compared
+    with the initial model, which takes its place.
+
+    Returns:
+        The findings that are left, all else fitted anew, and the effects that were taken out.
+    """
+    start, data, judged = data.start, data.of_other_runs, _judged(found, data.start)
+    doubted = [f for f in found.effects if f.id in judged and not confidence_of(f, start).is_finding]
+    kept, gone = found, []
+    while doubted and data.judges(kept):
+        rests = [without(found, [*(f.id for f in gone), each.id], start) for each in doubted]
+        full, *losses = data.losses(kept, *(rest if rest.effects else start for rest in rests))
+        idle = [
+            (gain(full, other), k)
+            for k, (f, other) in enumerate(zip(doubted, losses, strict=True))
+            if not harm(other, full, -len(f.values))
+        ]
+        if not idle:
+            break
+        k = max(idle)[1]
+        kept = rests[k]
+        gone.append(doubted.pop(k))
+    return kept, gone
+
+
+def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) -> bool:
+    """Whether a fit to predictions is worse on runs that it has not seen than what it began with.
+
+    Its priors are wider than those of the search, and a coefficient that one run determines may be false
+    in another one.
+
+    Args:
+        fit, before: the same findings, fitted to predictions and to the model error.
+        data: the training runs; validation runs judge the fit by themselves.
+        harm: the criterion of pruning.
+    """
+    data = data.of_other_runs
+    if not (data.judges(fit) and data.judges(before)):
+        return False
+    its, others, first = data.losses(fit, before, data.start)
+    return predicts_worse(its, others) or bool(harm(its, first, 0))

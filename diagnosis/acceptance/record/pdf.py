@@ -12,18 +12,18 @@ from xml.sax.saxutils import escape
 from cosim import InputError
 from cosim.command import missing_extra
 
-from ...report.chart import Chart
 from ...report.document import Plot, ReportSection, Table
+from ...report.pictures.chart import Chart
 
-FONT, BOLD, SIZE = "DejaVuSans", "DejaVuSans-Bold", 8.0  # pt; those of matplotlib, which have Greek
-MARGIN, DOTS = 56.0, 200  # pt; per inch of a figure; chosen
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"  # those of matplotlib, which have Greek
+SIZE = 8.0  # pt, of letters, and of the margins of a cell together; chosen
+DOTS = 200  # per inch of a figure; chosen
 HIGHEST = 310.0  # pt, of a figure: two to a page of A4; chosen
 SHADES = {
     "met": "#dcefdc",
     "not met": "#f3d9d6",
     "cannot be judged": "#ececec",
 }  # by a verdict's beginning
-PADDING = 8.0  # pt, left and right of a cell together; chosen
 
 
 def write_pdf(
@@ -53,11 +53,8 @@ def write_pdf(
     pictures, pages = [_png(plot) for plot in figures], 0
     while True:  # the second time the number of pages is known
         out, foot = BytesIO(), partial(_foot, f"{title} · {' '.join(next(iter(head.items())))}", pages)
-        made = SimpleDocTemplate(
-            out, pagesize=A4, title=title, leftMargin=MARGIN, rightMargin=MARGIN,
-            topMargin=MARGIN, bottomMargin=MARGIN, invariant=1,
-        )  # fmt: skip
-        story = _story(title, head, parts, [*zip(figures, pictures, strict=True)], A4[0] - 2.0 * MARGIN)
+        made = SimpleDocTemplate(out, pagesize=A4, title=title, invariant=1)
+        story = _story(title, head, parts, [*zip(figures, pictures, strict=True)], made.width)
         made.build(story, onFirstPage=foot, onLaterPages=foot)
         if pages == made.page:
             break
@@ -89,9 +86,10 @@ def _story(
 def _foot(text: str, pages: int, canvas: Any, document: Any) -> None:
     """What stands at the foot of each page."""
     canvas.setFont(FONT, SIZE - 1.0)
-    canvas.drawString(MARGIN, MARGIN / 2.0, text)
+    canvas.drawString(document.leftMargin, document.bottomMargin / 2.0, text)
     last = f"page {document.page} of {pages}"
-    canvas.drawRightString(document.pagesize[0] - MARGIN, MARGIN / 2.0, last)
+    right = document.leftMargin + document.width
+    canvas.drawRightString(right, document.bottomMargin / 2.0, last)
 
 
 def _styles() -> dict[str, Any]:
@@ -143,8 +141,8 @@ def _table(table: Table, styles: Mapping[str, Any], width: float) -> Any:
     look: list[Any] = [
         ("LINEBELOW", (0, 0), (-1, -1), 0.3, HexColor("#bbbbbb")),
         ("VALIGN", (0, 0), (-1, -1), "TOP"),
-        ("LEFTPADDING", (0, 0), (-1, -1), PADDING / 2.0),
-        ("RIGHTPADDING", (0, 0), (-1, -1), PADDING / 2.0),
+        ("LEFTPADDING", (0, 0), (-1, -1), SIZE / 2.0),
+        ("RIGHTPADDING", (0, 0), (-1, -1), SIZE / 2.0),
     ]
     cells = []
     for k, row in enumerate(rows):
@@ -167,7 +165,7 @@ def _widths(rows: Sequence[Sequence[str]], width: float) -> list[float]:
     from reportlab.pdfbase.pdfmetrics import stringWidth
 
     def across(text: str) -> float:
-        return stringWidth(text, BOLD, SIZE - 1.0) + PADDING
+        return stringWidth(text, BOLD, SIZE - 1.0) + SIZE
 
     columns = [*zip(*rows, strict=True)]
     most = 1.5 * width / len(columns)  # a word that is longer, such as a hash, is broken

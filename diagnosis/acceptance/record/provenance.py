@@ -56,7 +56,12 @@ def files_of(comparison: Comparison, further: Files) -> list[dict[str, str]]:
     Raises:
         InputError: one cannot be read, has changed, or is not the one that was compared.
     """
-    found = [*_data(comparison.evaluations), *_model(comparison)]
+    data = [
+        entry("data" if path == run.file else "layout of data", path, known)
+        for run in (e.weak_windows.run for e in comparison.evaluations)
+        for path, known in run.hashes.items()
+    ]
+    found = [*data, *_model(comparison)]
     known = {role: f["sha256"] for f in reversed(found) for role in [f["role"]]}
     paths = {Path(f["path"]).resolve() for f in found}
     for role, given in further.items():
@@ -71,13 +76,6 @@ def files_of(comparison: Comparison, further: Files) -> list[dict[str, str]]:
                 found.append(each)
                 paths.add(path.resolve())
     return found
-
-
-def _data(evaluations: Sequence[Evaluation]) -> Iterator[dict[str, str]]:
-    for e in evaluations:
-        run = e.weak_windows.run
-        for path, known in run.hashes.items():
-            yield entry("data" if path == run.file else "layout of data", path, known)
 
 
 def _model(comparison: Comparison) -> Iterator[dict[str, str]]:

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from ...predictors.evaluation import Evaluation
-from ...report.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
 from ...report.document import Plot
-from ...report.tracks import track
-from ..judged_criterion import EXPANDED, Judgement
+from ...report.finding_text import SHOWN
+from ...report.pictures.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
+from ...report.pictures.tracks import track
+from ..criterion import Criterion
+from ..judged_criterion import EXPANDED, JudgedErrors, Judgement
 from ..predictions import Predictions
-
-TRACKS = 6  # figures of tracks of a criterion; chosen: a page or two
 
 
 def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) -> Iterator[Plot]:
@@ -20,16 +20,16 @@ def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) 
     drawn: set[float] = set()
     by_name = {e.name: e for e in evaluations}
     for j in judgements:
-        if not j.errors.size:
+        if j.found is None:
             continue
         c = j.criterion
-        told = f"{c.title}: error E = S − D of each of the {j.errors.size} windows that count"
-        yield Plot(_errors(j), f"{told}, the tolerance, and 2 u_val about zero.")
+        told = f"{c.title}: error E = S − D of each of the {j.found.errors.size} windows that count"
+        yield Plot(_errors(c, j.found), f"{told}, the tolerance, and 2 u_val about zero.")
         if c.horizon in drawn or not evaluations:
             continue
         drawn.add(c.horizon)
-        for p, rows in j.windows[:TRACKS]:
-            more = f" (of {len(j.windows)} runs the first {TRACKS})" if len(j.windows) > TRACKS else ""
+        for p, rows in j.windows[:SHOWN]:
+            more = f" (of {len(j.windows)} runs the first {SHOWN})" if len(j.windows) > SHOWN else ""
             told = (
                 f"{p.name}: measured track, and predictions over {c.horizon:g} s from the start of each "
                 "window"
@@ -40,17 +40,15 @@ def figures(judgements: Sequence[Judgement], evaluations: Sequence[Evaluation]) 
             )
 
 
-def _errors(j: Judgement) -> Chart:
+def _errors(c: Criterion, found: JudgedErrors) -> Chart:
     """The error in each window, by runs and time; the tolerance, and 2 u_val from zero."""
-    c = j.criterion
-    errors, distance = j.errors / c.factor, c.quantity == "position"
+    errors, distance = found.errors / c.factor, c.quantity == "position"
     number, inside = np.arange(1, errors.size + 1), np.abs(errors) <= c.tolerance
-    reach = 0.0 if j.budget is None else EXPANDED * j.budget.u_val / c.factor
+    reach = EXPANDED * found.budget.u_val / c.factor
     ends, least = (0, errors.size + 1), 0.0 if distance else -1.0
     panel = Panel(ChartAxis("window", ends), ChartAxis(f"{c.quantity} [{c.unit}]"), zero=True)
-    if j.budget is not None:
-        panel.fill(ends, least * reach, reach, BAND, "2 u_val")
-    for k in np.flatnonzero(np.diff(j.run)):
+    panel.fill(ends, least * reach, reach, BAND, "2 u_val")
+    for k in np.flatnonzero(np.diff(found.run)):
         between = np.full(2, number[k : k + 2].mean())
         panel.draw(between, [least * c.tolerance, c.tolerance], BAND, width=LINE / 2)
     panel.draw(ends, [c.tolerance, c.tolerance], BEFORE, "tolerance")

@@ -24,6 +24,7 @@ from ...execution.short_text import ShortRepr
 from ...predictors.evaluation import Evaluation
 from ...report.content import Content, fmu_result, part, sensor_results, versions
 from ...runs import Fingerprint
+from ...runs.run_constants import IN_A_ROW
 from ...session import Comparison
 from ..budget import Budget, Learned, read_learned, sources_of
 from ..criterion import JUDGED, InputStd, ReadCriteria, now, read_criteria
@@ -55,9 +56,13 @@ JUDGEMENT = (
     "criterion=criterion.title requirement=criterion.text restrictions=criterion.restrictions outcome "
     "reason flags runs=counts.runs left_out=counts.left_out unit=criterion.unit "
     "tolerance=criterion.tolerance offered=counts.offered excluded=counts.excluded "
-    "windows=counts.judged independent"
+    "windows=counts.judged"
 )
-STRETCH = 8  # samples; chosen: no noise repeats so many
+# Keys of the numbers of windows, null where none counts.
+NUMBERS = (
+    *("independent", "E", "E_axes", "k", "k_u_val", "rms", "largest"),
+    *("estimate", "low", "high", "budget"),
+)
 BUDGET = (
     "u_D=measurement initial_state parameters process_noise current wind u_input u_num=numerical u_val"
 )
@@ -243,8 +248,8 @@ class _JudgedRuns:
 def _rows(pose: np.ndarray) -> set[bytes]:
     """Each stretch of so many poses (n, 3) that all differ: what two cuts of a log have in common."""
     moving = np.append(False, (np.diff(pose, axis=0) != 0.0).any(axis=1) & np.isfinite(pose[1:, 0]))
-    known = sliding_window_view(moving, STRETCH).all(axis=1)
-    return {pose[k : k + STRETCH].tobytes() for k in np.flatnonzero(known)}
+    known = sliding_window_view(moving, IN_A_ROW).all(axis=1)
+    return {pose[k : k + IN_A_ROW].tobytes() for k in np.flatnonzero(known)}
 
 
 def _model_name(comparison: Comparison) -> str:
@@ -282,21 +287,21 @@ def _of_code(comparison: Comparison) -> Iterator[str]:
 
 
 def _result(j: Judgement) -> dict[str, Any]:
-    c, f = j.criterion, j.criterion.factor
-    some, whole = j.errors.size > 0, 1.0 if c.statistic != "rms" else f
-    estimate, low, high = (None, None, None) if j.interval is None else (x / whole for x in j.interval)
-    return part(j, JUDGEMENT) | {
-        "E": float(np.mean(j.errors)) / f if some else None,
-        "E_axes": (j.offset / f).tolist() if some and c.quantity == "position" else None,
-        "k": EXPANDED,
-        "k_u_val": None if j.budget is None else EXPANDED * j.budget.u_val / f,
-        "rms": float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
-        "largest": float(np.max(np.abs(j.errors))) / f if some else None,
-        "estimate": estimate,
-        "low": low,
-        "high": high,
-        "budget": None if j.budget is None else _budget(j.budget, f),
-    }
+    c, f, e = j.criterion, j.criterion.factor, j.found
+    if e is None:
+        return part(j, JUDGEMENT) | dict.fromkeys(NUMBERS) | {"independent": 0.0, "k": EXPANDED}
+    numbers = (
+        e.independent,
+        float(np.mean(e.errors)) / f,
+        (e.offset / f).tolist() if c.quantity == "position" else None,
+        EXPANDED,
+        EXPANDED * e.budget.u_val / f,
+        float(np.sqrt(np.mean(e.errors**2))) / f,
+        float(np.max(np.abs(e.errors))) / f,
+        *(x / (f if c.statistic == "rms" else 1.0) for x in e.interval),
+        _budget(e.budget, f),
+    )
+    return part(j, JUDGEMENT) | dict(zip(NUMBERS, numbers, strict=True))
 
 
 def _budget(b: Budget, factor: float) -> dict[str, Any]:
@@ -316,7 +321,7 @@ def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Ite
     if rest:
         yield f"Errors of {', '.join(rest)}: no criterion on them is judged."
     for j in judgements:
-        unknown = [] if j.budget is None else j.budget.unknown
+        unknown = [] if j.found is None else j.found.budget.unknown
         if unknown:
             yield (
                 f"{j.criterion.title}: u_val does not include {', '.join(unknown)}, which are not known."

@@ -14,8 +14,9 @@ import cosim
 from cosim.fmu import FmuModel
 
 from ...predictors.prediction import FAR_OFF
-from ...report.document import Document, Plot, ReportSection, numbers, write_document, write_json
+from ...report.document import Document, Plot, ReportSection, numbers, write_document
 from ...report.document import Table as PageTable
+from ...report.formatting import write_json
 from ...runs.cleaning import Z95
 from ..additional_force import AdditionalForce
 from ..calibration_task import CalibrationTask

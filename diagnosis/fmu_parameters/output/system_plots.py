@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...report.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
 from ...report.document import Plot
-from ..residuals import Setting, WindowResiduals
+from ...report.pictures.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
+from ..residuals import WindowResiduals
 from ..system_calibration import SystemCalibration
 
 
@@ -16,8 +16,7 @@ def plots_of(
     """Measured and predicted outputs of each run."""
     found = []
     for part in parts.values():
-        start = Setting((0.0,) * len(part.parameters))
-        before, after = part.raw([start, r.fit.setting if r.changed else start])
+        before, after = part.raw([part.start, r.fit.setting if r.changed else part.start])
         for run in dict.fromkeys(w.run for w in part.windows):
             panels = []
             for k, name in enumerate(names):

@@ -28,7 +28,7 @@ from cosim.fmu import (
 
 from ..predictor import Execution
 
-PROCESSES = 2  # chosen: as everywhere in the diagnosis
+PROCESSES = 2  # 1, chosen: as everywhere in the diagnosis
 
 
 def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:

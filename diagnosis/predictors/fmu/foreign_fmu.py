@@ -121,9 +121,7 @@ class Fmu:
     @property
     def step(self) -> float | None:
         """The step that is asked for, or that it suggests [s]; None: neither."""
-        suggested = self.model.description.defaultExperiment
-        told = float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
-        return self.execution.step or told
+        return self.execution.step or self.model.suggested_step
 
     @property
     def fixed_step(self) -> float | None:
@@ -379,11 +377,7 @@ def _as_one(path: Path, folder: Path) -> tuple[Path, list[tuple[str, Path]]]:
     made, scenario = folder / f"{path.stem}.fmu", cosim.load_scenario(path)
     with closing(prepare(scenario)) as system:
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
-        every = {
-            f"{name}.{v.name}"
-            for name, model in system.models.items()
-            for v in model.variables.values()
-            if v.causality == "parameter" and v.type == "Real"
-        }
+        models = system.models.items()
+        every = {f"{name}.{v.name}" for name, model in models for v in model.reals("parameter")}
         export_fmu(system, made, expose=every - given)
         return made, parts_of(scenario, system)

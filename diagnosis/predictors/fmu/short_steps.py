@@ -9,7 +9,7 @@ from cosim.fmu import ConfinedFmu
 
 from .fmu_playback import Playback, PlaybackRequest
 
-STEPS = 3  # Chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
+STEPS = 3  # 1, chosen: of a motion at 1 rad/s in steps of 0.02 s differences are then right to 1e-6.
 
 
 class ShortSteps:

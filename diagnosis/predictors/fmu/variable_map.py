@@ -42,7 +42,6 @@ from ...runs.columns.unit_check import SI_UNIT
 from ..black_box import MOTION, POSE, VELOCITY
 from .signal_names import NONE, Meant, lone, meant
 
-QUARTER = 0.5 * pi  # rad, from north to east
 PROPOSED = ("inputs", "outputs", "start")
 DISTURBANCES = "disturbance_inputs"
 GROUPS = (*PROPOSED, DISTURBANCES)
@@ -165,7 +164,7 @@ def propose(model: FmuModel, commands: Mapping[str, str]) -> VariableMap:
 
 def _column(v: FmuVariable, m: Meant) -> Column:
     told = m.unit or (v.unit.name if v.unit else "rad")
-    quarter = QUARTER / UNITS["angle"].get(told, 1.0) if m.quarter else 0.0
+    quarter = pi / 2.0 / UNITS["angle"].get(told, 1.0) if m.quarter else 0.0
     return Column(name=v.name, unit=m.unit, flip=m.flip, offset=quarter)
 
 
@@ -224,10 +223,9 @@ def _with_hints(signals: Iterable[str], model: FmuModel, group: str) -> str:
 
 def _candidates(model: FmuModel, group: str) -> list[FmuVariable]:
     """The variables of an FMU that can be in a group of a map."""
-    real = [v for v in model.variables.values() if v.type == "Real"]
     if group == "start":
-        return [v for v in real if model.can_be_set(v)]
-    return [v for v in real if v.causality == ("output" if group == "outputs" else "input")]
+        return [v for v in model.reals() if model.can_be_set(v)]
+    return model.reals("output" if group == "outputs" else "input")
 
 
 def _meant(v: FmuVariable, group: str, known: Mapping[str, str]) -> Meant:

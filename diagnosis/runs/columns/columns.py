@@ -48,7 +48,7 @@ from fmus.ship import Ship
 from .unit_check import UNITS
 
 FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
-PREAMBLE = 1000  # lines; chosen: far more than any file has before its names
+PREAMBLE = 1000  # 1, lines; chosen: far more than any file has before its names
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
@@ -109,6 +109,8 @@ class Named(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
+    factor: FiniteFloat = 1.0  # 1, by which numbers of the column are multiplied
+    offset: FiniteFloat = 0.0  # what is added then, in the unit that they have then
 
     @model_validator(mode="before")
     @classmethod
@@ -120,9 +122,7 @@ class Column(Named):
     """One column of a file, with its name there."""
 
     unit: str | None = None  # SI if not said
-    factor: FiniteFloat = 1.0  # by which its numbers are multiplied to be in that unit
-    flip: bool = False  # whether its axis points the other way
-    offset: FiniteFloat = 0.0  # what is added, in its unit, after the flip
+    flip: bool = False  # whether its axis points the other way, before the offset
     noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
     sign: str | None = None  # another column, which holds the sign
     negative: str = "-1"  # the cell of that in rows with a negative value
@@ -136,7 +136,7 @@ class Layout(BaseModel):
     separator: Mark = ","  # between two cells
     decimal: Mark = "."  # the decimal point
     encoding: str = UTF_8  # of the text, as Python calls it
-    skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # lines before that of the names
+    skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # 1, lines before that of the names
     units_line: bool = False  # whether the line below the names is of units
     columns: dict[str, Column] = {}  # x, y, psi, ... -> a column
     trial: str | None = None  # the manoeuvring trial that it is, as zigzag
@@ -287,12 +287,6 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
 
     A force on an axis that is never commanded needs no column, unless one has nearly its name.
 
-    Args:
-        layout: which column is which signal.
-        names: columns of the file.
-        where: what messages call the file.
-        of: the ship that was measured.
-
     Raises:
         InputError: a column is missing, or there twice.
     """
@@ -317,12 +311,14 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
         named = layout.columns.keys()
         others = [s for s in (*BESIDE, *outputs(of.commands)) if layout.column(s).name in names]
         wanted |= dict.fromkeys((*named, *others))
-    others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
+    there = {layout.column(s).name for s in wanted}
+    others = [name.casefold().replace("_", "") for name in names if name not in there]
     for signal in list(wanted):
         name = layout.column(signal).name
         if names.count(name) > 1:
             raise InputError(f"{where} has the column '{name}' more than once")
-        if name not in names and signal in TAU and signal not in named and not _named_so(signal, others):
+        nearly = any(signal.casefold().replace("_", "") in other for other in others)
+        if name not in names and signal in TAU and signal not in named and not nearly:
             del wanted[signal]
         elif name not in names:
             meant = f" (for {signal})" if name != signal else ""
@@ -331,13 +327,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
 
 
 def missing(layout: Layout, names: Sequence[str], of: Ship) -> list[str]:
-    """Signals that a run must have, and of which no column is known.
-
-    Args:
-        layout: which column is which signal.
-        names: columns of the file.
-        of: the ship that was measured.
-    """
+    """Signals that a run must have, and of which no column is known."""
     every = _forms(of)
     there = [g for g in every if any(layout.column(s).name in names for s in g)]
     # Of forces that are there, those on other axes are taken as zero.
@@ -349,8 +339,3 @@ def _forms(of: Ship) -> list[tuple[str, ...]]:
     """Forms of a ship's commands, the one that is meant where there is none first."""
     own = [tuple(form) for form in of.command_forms]
     return [TAU, *own] if of.fully_actuated else [*own, TAU]
-
-
-def _named_so(signal: str, names: Sequence[str]) -> bool:
-    """Whether some name holds a signal's, but for case and lines between words."""
-    return any(signal.casefold().replace("_", "") in n.casefold().replace("_", "") for n in names)

@@ -13,14 +13,11 @@ import numpy as np
 
 from .columns import Column
 from .likely_columns import words_of
-from .unit_check import UNITS
+from .unit_check import OTHERS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
-MOST = {"x": 90.0, "y": 180.0}  # degrees
-# Units of an angle that are not SI.
-DEGREES = {unit for unit, size in UNITS["angle"].items() if size != 1.0}
 
 
 def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
@@ -33,7 +30,7 @@ def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
         signal: [
             column
             for column, (bare, unit) in named.items()
-            if words & {*words_of(bare)} and unit in ("", "-", *DEGREES)
+            if words & {*words_of(bare)} and unit in ("", "-", *OTHERS["angle"][1])
         ]
         for signal, words in WORDS.items()
     }
@@ -52,7 +49,8 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
     there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
     origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
-    if not origin or any(np.abs(degrees[s][there]).max() > most for s, most in MOST.items()):
+    largest = {s: np.radians(np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()}
+    if not origin or largest["x"] > np.pi / 2 or largest["y"] > np.pi:
         return {}
     latitude = np.radians(origin["x"])
     flat = 1.0 - SQUARED_ECCENTRICITY * np.sin(latitude) ** 2

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cleaning import SHOWN
+from ..run_constants import FEWEST
 from .unit_check import UNITS, doubts
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -41,9 +42,8 @@ ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "a
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
 SMOOTHED = 1.0  # s, over which speeds are taken (chosen)
-FEWEST = 20  # rows of which a correlation says anything (chosen)
-LIKELY = 0.4  # correlation or likeness of names from which on it counts (chosen)
-# Largest numbers of an angle and of a command in any of their units, with what overshoots (chosen).
+LIKELY = 0.4  # 1, correlation or likeness of names from which on it counts (chosen)
+# [deg, %] largest numbers of an angle and of a command in any unit, with what overshoots (chosen).
 LARGEST = {"angle": 400.0, "command": 105.0}
 
 

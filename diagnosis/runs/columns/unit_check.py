@@ -11,7 +11,7 @@ from scipy import constants as c
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
-# Quantity -> its unit in SI, and other units -> factor to that.
+# Quantity -> its unit in SI, and other units -> factor to that [1].
 OTHERS: dict[str, tuple[str, dict[str, float]]] = {
     "time": ("s", {"ms": c.milli, "us": c.micro, "ns": c.nano, "min": c.minute}),
     "length": ("m", {"mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch}),
@@ -26,6 +26,7 @@ OTHERS: dict[str, tuple[str, dict[str, float]]] = {
     "angular acceleration": ("rad/s2", {"deg/s2": c.degree}),
 }
 SI_UNIT = {quantity: unit for quantity, (unit, _) in OTHERS.items()}
+# 1, of all units, that of SI first.
 UNITS = {quantity: {unit: 1.0, **others} for quantity, (unit, others) in OTHERS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"

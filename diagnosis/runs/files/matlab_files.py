@@ -15,7 +15,7 @@ MATLAB = "cse1_data"
 ROWS = ("time", "x", "y", "z", "roll", "pitch", "psi")
 COMMANDS = np.s_[7:12]
 POWER = np.s_[12:14]
-# The settings in dynamic positioning, at which the thrusters give their nominal force.
+# 1, the settings in dynamic positioning, at which the thrusters give their nominal force.
 FULL = (0.4, 0.5)
 
 
@@ -27,10 +27,6 @@ def fits_matlab(of: Ship) -> bool:
 
 def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
     """Signals of one of NTNU's files: one matrix, one column for each sample.
-
-    Args:
-        path: of the file.
-        of: the ship, with the names of its commands.
 
     Raises:
         InputError: not such a file.

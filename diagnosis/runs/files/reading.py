@@ -44,7 +44,7 @@ from .tables import as_table, column_names, date_stamps, is_cell, numbers, table
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
 # Real commands overshoot by rounding; far beyond they are in another unit.
-MOST_COMMAND = 1.05  # of the full command
+MOST_COMMAND = 1.05  # 1, of the full command
 
 
 @dataclass(frozen=True, eq=False, repr=False)

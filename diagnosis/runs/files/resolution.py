@@ -2,9 +2,9 @@
 
 import numpy as np
 
-MOST_DIGITS = 12  # of a number that counts as rounded; double precision has 15 (chosen)
-EXACT = 0.999  # share of the numbers that are rounded so; chosen: a few may be of another writer
-FUZZ = 1e-6  # of a step, by which arithmetic may have moved a number (chosen)
+MOST_DIGITS = 12  # 1, of a number that counts as rounded; double precision has 15 (chosen)
+EXACT = 0.999  # 1, share of the numbers that are rounded so; chosen: a few may be of another writer
+FUZZ = 1e-6  # 1, of a step or a value, by which arithmetic may have moved a number (chosen)
 
 
 def resolution(values: np.ndarray) -> np.ndarray:

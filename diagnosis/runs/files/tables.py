@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.constants import day
 
 from cosim import InputError
 from cybership.message_text import quoted
@@ -25,7 +26,6 @@ from ..columns.side_car import (
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 DAY_FIRST = re.compile(r"^(\d\d)\.(\d\d)\.(\d{4})[ T]")
 TIME_OF_DAY = re.compile(r"^(?=\d\d:\d\d:\d\d)")
-DAY = 86_400.0  # s
 ANY_DAY = "2000-01-01 "  # of times without a date
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
@@ -152,7 +152,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
     seconds = np.array((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
     if without_date:
         there = np.isfinite(seconds)
-        seconds[there] = np.unwrap(seconds[there], period=DAY)
+        seconds[there] = np.unwrap(seconds[there], period=day)
     ends = pd.DatetimeIndex(stamps[leap]).floor("s").unique() + pd.Timedelta(seconds=1)
     return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
 

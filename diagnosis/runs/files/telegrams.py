@@ -6,12 +6,12 @@ where a telegram arrived the lines meet, mostly between two rows.
 
 import numpy as np
 
-# A row is on a line to rounding, which must be less than this share of the distance of the other rows.
-# With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
+from ..run_constants import IN_A_ROW
+
+# 1, a row is on a line to rounding, which must be less than this share of the distance of the other
+# rows. With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
 ON_LINE = 0.03
-FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
-KINK = 2  # rows about a telegram that are on no line
-LONGEST = 8  # rows in a line that cannot be steady motion without noise (chosen)
+FEWEST = 0.15  # 1, share of rows on lines from which on a log counts as filled; chosen, far above chance
 
 
 def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndarray:
@@ -25,7 +25,7 @@ def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndar
         step: to which they are rounded.
     """
     none = np.zeros(time.size, bool)
-    if time.size < 2 * LONGEST:
+    if time.size < 2 * IN_A_ROW:
         return none
     share = (np.diff(time)[:-1] / (time[2:] - time[:-2]))[:, None]
     off = np.abs(position[1:-1] - position[:-2] - share * (position[2:] - position[:-2])).max(axis=1)
@@ -33,7 +33,7 @@ def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndar
     on = none.copy()
     on[1:-1] = off <= rounding
     # A long line is a ship's steady motion, unless what is on no line are single kinks.
-    too_long = _often(on, LONGEST) and _often(~on[1:-1], KINK)
+    too_long = _often(on, IN_A_ROW) and _often(~on[1:-1], 2)  # the rows about a telegram are on no line
     kinks = off[~on[1:-1]]
     if not kinks.size or rounding > ON_LINE * np.median(kinks) or on.mean() < FEWEST or too_long:
         return none

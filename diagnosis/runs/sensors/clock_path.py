@@ -32,16 +32,17 @@ STATES = len(NODE)
 CLOCKS = slice(NODE.index("rate of the clock"), None, STATES)  # the rates among all unknowns
 # s between two nodes, or as long as a sampling period. Chosen: a clock of arrival wanders over seconds.
 SPACING = 1.0
-MOST_SAMPLES = 8  # between two nodes, evenly chosen of more; chosen: the path between is nearly straight
-# Prior standard deviation of c about 1 at each node; chosen: no clock runs at half or double rate.
+# 1, between two nodes, evenly chosen of more; chosen: the path between is nearly straight
+MOST_SAMPLES = 8
+# 1, prior standard deviation of c about 1 at each node; chosen: no clock runs at half or double rate.
 ANCHOR = 0.5
-# The same of a clock that may not be off; m or rad of a noise; inverse of the prior standard deviation
-# of a pose. It keeps the equations well-posed.
+# [1, m, rad] the same of a clock that may not be off; of a noise; inverse of the prior deviation of a
+# pose. It keeps the equations well-posed.
 NEGLIGIBLE = 1e-6
-SLOWEST = 0.1  # true seconds in a second of the log, at the least: time does not fall; chosen
-BEGIN = 0.1  # of the walks in a second, times the noise or the rate; first guess
-LEAST = 1e-3  # of the noise, and of the walks over the whole run; less changes no path (chosen)
-SWEEPS = 25  # of the fixed point; chosen: the likelihood then changes by less than 0.1
+SLOWEST = 0.1  # 1, true seconds in a second of the log, at the least: time does not fall; chosen
+BEGIN = 0.1  # 1, of the walks in a second, times the noise or the rate; first guess
+LEAST = 1e-3  # 1, of the noise, and of the walks over the whole run; less changes no path (chosen)
+SWEEPS = 25  # 1, of the fixed point; chosen: the likelihood then changes by less than 0.1
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
 

@@ -25,10 +25,9 @@ DEVIATIONS: Mapping[Deviation, Callable[[np.ndarray], np.ndarray]] = {
     "deviation_sin_2": lambda psi: np.sin(2.0 * psi),
     "deviation_cos_2": lambda psi: np.cos(2.0 * psi),
 }
-# Of a channel or a clock, rad, ship's lengths, or rad in a window of prediction; of a delay as below.
-# Chosen: smaller faults matter in no manoeuvre.
+# [1, rad] of a channel or a clock, of ship's lengths, or in a window of prediction. Chosen: smaller
+# faults matter in no manoeuvre.
 LEAST = 0.005
-LEAST_DELAY = 0.5  # of the time between two samples
 
 
 class FaultColumn(NamedTuple):
@@ -55,7 +54,7 @@ class FaultColumn(NamedTuple):
 
 def columns(e: Evidence, scale: Scale) -> list[FaultColumn]:
     """All constant faults that the channels of a run can show."""
-    late = LEAST_DELAY * float(np.median(np.diff(e.time[e.rows])))
+    late = float(np.median(np.diff(e.time[e.rows]))) / 2.0  # half of the time between two samples
     return [*_of_velocity(e, scale, late), *_of_rate(e, scale, late)]
 
 

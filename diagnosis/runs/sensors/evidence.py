@@ -10,16 +10,14 @@ from fmus.frames import rotate_to_earth
 from ..cleaning import NORMAL_MAD, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
+from ..run_constants import FEWEST
 
-# Samples or windows, of which some constants and noises are estimated, and parts of a run whose spread
-# gives a standard deviation (chosen).
-FEWEST = 20
-SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
-FAR = 8.0  # times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
-AGREED = 0.7  # correlation from which on two channels measure the same motion (chosen)
-ALIKE = 0.3  # relative difference up to which two quantities may be the same but for a fault (chosen)
+SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
+FAR = 8.0  # 1, times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
+AGREED = 0.7  # 1, correlation from which on two channels measure the same motion (chosen)
+ALIKE = 0.3  # 1, relative difference up to which two quantities may be the same but for a fault (chosen)
 LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)
-# Of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
+# 1, of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
 STRAIGHT = 0.25
 # Channels that give the velocity over ground, best first: with the heading, or without it.
 VELOCITIES = (("u", "v"), ("x_dot", "y_dot"), ("speed", "course"))

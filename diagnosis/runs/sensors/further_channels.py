@@ -19,7 +19,7 @@ from fmus.scale import Scale
 
 from ..cleaning import WIDTH
 from ..files.reading import Run
-from .constants import LEAST, LEAST_DELAY, Kind, least_place
+from .constants import LEAST, Kind, least_place
 from .evidence import FEWEST, SURE, blocked_fit, evidence, integral
 from .sensor_finding import Examined, SensorFinding
 
@@ -93,7 +93,7 @@ def _places(run: Run, scale: Scale) -> list[SensorFinding]:
     faults = (
         _Fault("x_2", "place", "m", least, antenna + "ahead of the first"),
         _Fault("y_2", "place", "m", least, antenna + "to starboard of the first"),
-        _Fault("x_2", "delay", "s", LEAST_DELAY * period, late),
+        _Fault("x_2", "delay", "s", period / 2.0, late),
     )
     return _findings(faults, *blocked_fit(np.column_stack([sides, -speed]), body, time), time)
 

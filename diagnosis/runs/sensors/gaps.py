@@ -10,7 +10,7 @@ from .constants import LEAST
 from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
 from .sensor_finding import SensorFinding
 
-FAST = 3.0  # times the log's step, or its inverse: what is less is a clock that runs fast (chosen)
+FAST = 3.0  # 1, times the log's step, or its inverse: what is less is a clock that runs fast (chosen)
 AROUND = int(LONG)  # samples before and after, in which a spike returns, and whose speed counts
 
 

@@ -25,7 +25,7 @@ STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to loca
 CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
 CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
 CLOCK_OR_RATE = "no speed is measured: a clock at this rate has the same effect"
-# Of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
+# 1, of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
 # differ by beyond noise. Chosen: with more, most of it is not common to both.
 MOST_APART = 0.5
 TWO_CLOCKS = (

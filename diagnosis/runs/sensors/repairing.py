@@ -13,8 +13,6 @@ from .constants import DEVIATIONS
 from .evidence import Evidence, straight
 from .sensor_finding import SensorFinding
 
-TWICE = 2.0  # times nearer to no leeway, from which on an axis is taken as the right one (chosen)
-
 
 @dataclass(frozen=True, eq=False)
 class Correction:
@@ -76,7 +74,7 @@ def heading_is_off(e: Evidence, offset: float) -> bool:
     legs = straight(np.gradient(e.psi, e.time) if e.rate is None else e.rate)
     u, v = rotate_to_body(e.psi, *e.velocity.T)
     leeway = float(np.median(np.arctan2(v, np.abs(u))[legs]))
-    return TWICE * abs(leeway) < abs(leeway - offset)
+    return 2.0 * abs(leeway) < abs(leeway - offset)
 
 
 def _later(time: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:

@@ -40,13 +40,6 @@ class SensorFinding:
     repaired: bool = True
     aside: tuple[str, ...] = ()
 
-    @property
-    def not_repaired(self) -> str:
-        """What becomes of a fault that is not repaired."""
-        return (
-            f" (not repaired; {' and '.join(self.aside)} not used)" if self.aside else " (not repaired)"
-        )
-
     @classmethod
     def estimated(
         cls,
@@ -110,4 +103,5 @@ def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
         found = [f for f in found if f.kind != "clock_rate"]
     for f in found:
         when = f", {f.start:.1f} to {f.end:.1f} s" if f.kind == "clock_rate" else ""
-        yield f"{f.sentence}{when}{'' if f.repaired else f.not_repaired}"
+        unused = f"; {' and '.join(f.aside)} not used" if f.aside else ""
+        yield f"{f.sentence}{when}{'' if f.repaired else f' (not repaired{unused})'}"

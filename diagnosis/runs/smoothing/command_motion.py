@@ -18,7 +18,7 @@ from ..linear_filter import filtered
 from .spline import Knots
 
 # Of CyberShip Enterprise 1, times the scale of the ship.
-# m/s, m/s, rad/s: a ship slower than that at a run's start had no thrusters at work before. Chosen; of
+# [m/s, m/s, rad/s] a ship slower than that at a run's start had no thrusters at work before. Chosen; of
 # a turn at 0.035 rad/s at the start, by noise alone, a run of the Otter was predicted nine times worse.
 IDLE = (0.02, 0.02, 0.05)
 FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)

@@ -29,11 +29,6 @@ def with_commands(
 ) -> tuple[Problem, np.ndarray, CommandResponse]:
     """A smoothing spline in addition to the response to the commands, if that is likelier than it alone.
 
-    Args:
-        p: the pose, with an even penalty.
-        alone, fit: splines that know of no commands.
-        commands: commands and headings.
-
     Returns:
         What is left by the response, its smoothness (3,), and the response.
     """

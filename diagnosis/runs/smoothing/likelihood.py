@@ -38,14 +38,15 @@ from ..run_constants import CHANCE
 from .penalised import JERK, POSE, Equations, Fit, LinearSystem, Problem, solve
 from .spline import ORDER, third
 
-# Of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise (chosen).
+# 1, of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise
+# (chosen).
 ROUNDS = 2
-LEAST_JERK = 0.2  # of the mean square: where there is none, it may yet begin (chosen)
-# Decades of the smoothness, to both sides of 1: from none at all to motions slower than 7 s at knots of
-# 0.05 s.
+LEAST_JERK = 0.2  # 1, of the mean square: where there is none, it may yet begin (chosen)
+# 1, decades of the smoothness, to both sides of 1: from none at all to motions slower than 7 s at knots
+# of 0.05 s.
 DECADES = 8.0
-STEP = 0.05  # of log s, for the derivative (chosen: its error is a thousandth)
-EXACT = 1e-10  # decades; the logarithm of the roughness is rounded to 1e-11
+STEP = 0.05  # 1, of log s, for the derivative (chosen: its error is a thousandth)
+EXACT = 1e-10  # 1, decades; the logarithm of the roughness is rounded to 1e-11
 
 
 def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:

@@ -11,10 +11,10 @@ from .likelihood import adapt, likeliest, with_noise
 from .penalised import Fit, Problem, solve
 from .spline import DEGREE, WIDTH
 
-OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
-REWEIGHTINGS = 10  # most rounds of reweighting, and of each test; two or three are the rule
+OUTLIER = 5.0  # 1, standard deviations: one in 1.7 million samples of normal noise is refused
+REWEIGHTINGS = 10  # 1, most rounds of reweighting, and of each test; two or three are the rule
 
-HALVINGS = 4  # of the time constant of the first spline: to an eighth of a sampling period (chosen)
+HALVINGS = 4  # 1, of the time constant of the first spline: to an eighth of a sampling period (chosen)
 
 
 class TooFewError(Exception):

@@ -36,11 +36,10 @@ from .spline import DEGREE, Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 QUICKEST = 0.5  # s, of a motion (chosen)
-SPACING = 0.1 * QUICKEST  # s between knots, or a sampling period if that is longer
 # [m, m, rad]; a smaller noise is implausible, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
-# Times what the samples scatter by, from which on a given noise is doubted. Chosen: with less, weights
-# of channels against each other are wrong by less than four.
+# 1, times what the samples scatter by, from which on a given noise is doubted. Chosen: with less,
+# weights of channels against each other are wrong by less than four.
 MISSTATED = 2.0
 FILTERED = "; after a filter samples scatter less than their error"
 
@@ -207,7 +206,7 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     time, scale = track.run.time - track.run.time[0], track.scale
     with np.errstate(over="ignore"):  # of poses that are no place on earth
         origin = np.nanmedian(track.pose, axis=0)
-    spacing = max(SPACING * scale.time, float(np.median(np.diff(time[rows]))))
+    spacing = max(0.1 * QUICKEST * scale.time, float(np.median(np.diff(time[rows]))))
     grid = knots(*stretches(rows[track.valid[rows]], track), spacing)
     dense = rows[within(grid, time[rows])]
     z = track.pose[dense] - origin

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.constants import inch, point
 
-from .formatting import number
+from ..formatting import number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,8 +11,8 @@ from fmus.ops import when
 from fmus.signals import Force
 from fmus.vessel import vessel
 
+from ..thrust import inflow
 from .recorded_law import in_machine_code, in_python, numbers_of, structure
-from .thrust import inflow
 
 STATE = len(vessel.State._fields)
 

@@ -12,13 +12,12 @@ from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
 from fmus.hull import damping_force
 
-from ..assessment.settings import SETTINGS
-from ..predictors import Model
-from ..predictors.evaluation import Evaluation
-from ..predictors.thrust import commanded_shares
-from .reported_effect import ReportedCoefficient, ReportedEffect
-
-POINTS = 401  # of a curve; chosen, so that its corners are seen
+from ...assessment.settings import SETTINGS
+from ...predictors import Model
+from ...predictors.evaluation import Evaluation
+from ...predictors.thrust import commanded_shares
+from ..reported_effect import ReportedCoefficient, ReportedEffect
+from .chart import WIDTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +94,7 @@ def _over_command(p: Picture, e: Effect, m: Model) -> Sweep:
 
 def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
     # The nominal force over the command is inverted by interpolation.
-    c = np.linspace(*_limits(p, m), POINTS)
+    c = np.linspace(*_limits(p, m), int(WIDTH))
     nominal = np.broadcast_to(given(p, m, c), c.shape)
     order = np.argsort(nominal, kind="stable")
 
@@ -157,7 +156,7 @@ def _curve(
 ) -> Curve:
     of_effect = {v.name for v in effect.parameters}
     data = np.concatenate([s.data(e) for e in evaluations])
-    x = np.linspace(*(s.reach or (data.min(), data.max())), POINTS)
+    x = np.linspace(*(s.reach or (data.min(), data.max())), int(WIDTH))
 
     def by(value: Callable[[ReportedCoefficient], float]) -> np.ndarray:
         wanted = {name: value(c) for name, c in found.coefficients.items() if name in of_effect}

@@ -9,17 +9,17 @@ from dataclasses import replace
 from typing import Any
 
 from fmus.declare import Component, Fields, Variable, group_of
-from fmus.ops import Number, wrap
+from fmus.ops import Number
 from fmus.signals import Force, Measurement
 from fmus.vessel import vessel
 
-from ..runs import Run
-from .prediction import true_motion
+from ...runs import Run
+from ..prediction import nearer_pose, true_motion
+from ..ship_model import Model
 from .recorded_step import Inputs, Ready
 from .recorded_step import step as one_step
-from .ship_model import Model
 
-SOLVED = 4  # iterations of the pose behind measurement effects; those of the project need two
+SOLVED = 4  # 1, iterations of the pose behind measurement effects; those of the project need two
 
 # What a window starts from: measured pose and its rate [m, m, rad, m/s, m/s, rad/s], and the time [s].
 START = ("x", "y", "psi", "x_dot", "y_dot", "psi_dot", "t")
@@ -112,7 +112,5 @@ def solved_pose(measured: Sequence[Number], b: vessel.PreparedVessel) -> list[Nu
     """As :func:`.prediction.true_pose`, of numbers and with as many iterations for all."""
     pose = [*measured]
     for _ in range(SOLVED):
-        x, y, psi = vessel.measured(vessel.State(*pose), b)
-        off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
-        pose = [a + b for a, b in zip(pose, off, strict=True)]
+        pose, _ = nearer_pose(pose, measured, b)
     return pose

@@ -8,15 +8,12 @@ from cosim.results import hulls
 from fmus.ops import wrap
 from fmus.ship import Ship
 
-from ..assessment.covariates import means_of_run
-from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
-from ..predictors.shooting import INSTANTS
+from ...assessment.covariates import means_of_run
+from ...predictors.evaluation import LEVELS, Evaluation, PredictionError
+from ...predictors.shooting import INSTANTS
+from ..finding_text import SHOWN
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
-
-QUARTILES = (0.25, 0.5, 0.75)  # 1
-MOST_ELLIPSES = 8  # of a picture, of all levels together; chosen: more hide the tracks
-MOST_SHIPS = 8  # outlines along a track; chosen: more hide it
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
@@ -36,12 +33,7 @@ def track(e: Evaluation, learned: bool) -> Chart:
 
 
 def free(e: Evaluation, found: str = "") -> Chart:
-    """A whole run, predicted by the models from its first state.
-
-    Args:
-        e: the run.
-        found: the cause that was found, for a line below.
-    """
+    """A whole run, predicted by the models from its first state."""
     measured = e.smoothed.eta[:, :2]
     paths = [p[:, :2] for p in e.free_runs()[1]][: 2 if e.learned else 1]
     panel = _map(_around(measured, paths))
@@ -118,7 +110,7 @@ def worst_window(e: Evaluation, learned: bool) -> Chart | None:
     panel = _map(_around(measured[:, :2], [p[:, :2] for p, _, _ in paths]))
     _broad(panel, *_east_north(measured))
     for around in [] if e.bands is None else [e.bands.ellipses(worst, level) for level in LEVELS]:
-        around = _some(around, MOST_ELLIPSES // len(LEVELS))
+        around = _some(around, 2 * SHOWN // len(LEVELS))
         closed = np.insert(around, around.shape[1], np.nan, axis=1).reshape(-1, 2)
         panel.draw(*_east_north(closed), AFTER, area=True, faint=True)
     for predicted, colour, label in paths:
@@ -149,9 +141,9 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
         _, colour, label = models[0]
         errors = (1e3 * np.hypot(residuals[:, 0], residuals[:, 1]), np.degrees(np.abs(residuals[:, 2])))
         for panel, error in zip(panels, errors, strict=True):
-            bands = np.full((3, parts), np.nan)
+            bands, quarters = np.full((3, parts), np.nan), np.linspace(0.0, 1.0, 5)
             for k in np.unique(part):
-                bands[:, k] = np.quantile(error[part == k], QUARTILES, method="nearest")
+                bands[:, k] = np.quantile(error[part == k], quarters[1:-1], method="nearest")
             panel.fill(middle, bands[0], bands[2], colour)
             panel.draw(middle, bands[1], colour, label if learned else "")
     return Chart(WIDTH, panels)
@@ -167,7 +159,7 @@ def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(high - low for low, high in panel.ends())
     outline = of.vessel.outline
-    for corners in [] if outline is None else hulls(_some(poses, MOST_SHIPS), outline.corners):
+    for corners in [] if outline is None else hulls(_some(poses, 2 * SHOWN), outline.corners):
         if 2 * np.ptp(corners, axis=0).max() < room:
             east, north = np.vstack([corners, corners[:1]]).T
             panel.draw(east, north, INK, width=LINE / 2)

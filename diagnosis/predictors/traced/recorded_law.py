@@ -83,7 +83,7 @@ def stepped(
     return np.stack([np.stack(np.broadcast_arrays(*s[:kept])) for s in states])
 
 
-@lru_cache(maxsize=64)  # models of one structure follow each other in a fit
+@lru_cache  # models of one structure follow each other in a fit
 def in_python(of: Structure, single: bool) -> Callable[..., Sequence[Any]] | None:
     """A law as a function of numbers in one row, or of arrays; None: it cannot be recorded."""
     tape, names, plain = Tape(Kernels()), list[str](), list[str]()
@@ -102,7 +102,7 @@ def in_python(of: Structure, single: bool) -> Callable[..., Sequence[Any]] | Non
     return series_function(after, tape.kernels, names, frozenset(plain))
 
 
-@lru_cache(maxsize=64)
+@lru_cache
 def in_machine_code(of: Structure) -> CompiledLaw | None:
     """A law in machine code; None: it cannot be recorded, or there is no compiler."""
     tape, number = Tape(Kernels()), count()

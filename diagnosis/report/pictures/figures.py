@@ -7,19 +7,19 @@ import numpy as np
 from cosim.results import thin
 from fmus.ops import wrap
 
-from ..assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
-from ..assessment.regions import Profile
-from ..predictors.evaluation import Evaluation
-from ..runs import Smoothed
-from ..runs.cleaning import Z95
-from ..search.findings import Ranked
-from ..search.shortlist import LENGTH, TIE
+from ...assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
+from ...assessment.regions import Profile
+from ...predictors.evaluation import Evaluation
+from ...runs import Smoothed
+from ...runs.cleaning import Z95
+from ...search.findings import Ranked
+from ...search.shortlist import LENGTH, TIE
+from ..formatting import percent
 from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Chart, ChartAxis, Panel
-from .formatting import percent
 from .shape import Curve
 
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
-MOST_RANKED = 2 * LENGTH  # candidates of a picture: the shortlist, and as many again
+MOST_RANKED = 2 * LENGTH  # 1, candidates that are shown: the shortlist, and as many again
 RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {
@@ -128,7 +128,8 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
         label = "best" if k == 0 else "not clearly worse" if tied else "clearly worse"
         panel.draw([x - std, x + std], [k, k], colour)
         panel.draw(x, k, colour, label, dots=True, hollow=tied and k > 0)
-        panel.notes[k] = _explained(r.beyond if np.isfinite(r.beyond) else r.q2)
+        share = r.beyond if np.isfinite(r.beyond) else r.q2
+        panel.notes[k] = percent(max(share, 0.0)) if np.isfinite(share) else ""
     return Chart(WIDTH / 2 + ROW * len(shown), [panel])
 
 
@@ -137,11 +138,6 @@ def _behind(r: Ranked, first: Ranked) -> tuple[float, float]:
     if np.isfinite(r.behind):
         return r.behind, float(np.nan_to_num(r.behind_std))
     return r.score - first.score, 0.0
-
-
-def _explained(share: float) -> str:
-    """The share next to a candidate; a negative one explains nothing."""
-    return percent(max(share, 0.0)) if np.isfinite(share) else ""
 
 
 def curve(c: Curve) -> Chart:

@@ -17,11 +17,11 @@ from fmus.ops import Number
 from fmus.signals import Force
 from fmus.vessel import vessel
 
-from ..runs import Run
-from .prediction import true_motion
+from ...runs import Run
+from ..prediction import true_motion
+from ..ship_model import Model
 from .prediction_component import START, solved_pose, with_values
 from .recorded_step import Ready
-from .ship_model import Model
 
 MET = ("met_u", "met_v", "met_r")  # inputs: velocity with which the thrusters meet the water
 
