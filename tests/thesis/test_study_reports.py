@@ -1,6 +1,5 @@
 """Reports, pictures and commands of the studies, of numbers and logs that were made up: nothing sails."""
 
-import inspect
 import itertools
 import json
 import re
@@ -13,7 +12,6 @@ import pytest
 import cosim
 from cosim.dispatch import FinishedRun
 from fmus.hull import RotationalDamping
-from studies import measured_ship
 from studies.measured import ship_tables
 from studies.measured.expected import BY_HAND, STEERED, Fall
 from studies.study_report import Report, Verdict
@@ -861,39 +859,6 @@ def test_windows_are_told_with_those_that_are_worse_or_run_away(tmp_path):
         "Geometric mean of the reduction of the heading error: 1.00× left out, 2.00× with the run"
         in text
     )
-
-
-def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
-    """What each table gets is checked against what it takes; their content is tested elsewhere."""
-    run = SimpleNamespace(run=SimpleNamespace(name="a"))
-    content = {"verdict": "found", "where": "long"}
-    fold = SimpleNamespace(name="a", content=content, evaluation=None)
-    last = SimpleNamespace(learned=SimpleNamespace(model="learned"))
-    parts = {}
-    for name in ("falls", "windows", "expected", "curve", "findings"):
-        takes = inspect.signature(getattr(ship_tables, f"write_{name}"))
-
-        def write(*given, name=name, takes=takes):
-            parts.setdefault(name, []).append(takes.bind(*given).arguments)
-
-        monkeypatch.setattr(ship_tables, f"write_{name}", write)
-    monkeypatch.setattr(ship_tables, "model_error_picture", lambda e: "drawn")
-    monkeypatch.setattr(measured_ship.bollard, "read", lambda _: "pulls")
-    monkeypatch.setattr(measured_ship, "measured_files", lambda _: ["a.mat"])
-    monkeypatch.setattr(measured_ship, "gather", lambda files, advance: [run])
-    monkeypatch.setattr(measured_ship, "learned", lambda runs, prior, quick, advance: [fold])
-    monkeypatch.setattr(measured_ship, "with_all", lambda folds, found: folds)
-    monkeypatch.setattr(measured_ship.diagnosis, "diagnose", lambda *_, **__: last)
-    monkeypatch.setattr(measured_ship, "diagnosis_content", lambda found, model, files: content)
-    text, results = written(measured_ship.study(tmp_path, tmp_path, 0.1, quick=True), tmp_path)
-    assert [list(arguments.values())[1:] for arguments in parts["curve"]] == [
-        [[fold], "learned", "pulls"]
-    ]
-    assert [a["name"] for a in parts["findings"]] == ["Learned without a", "Learned from all runs"]
-    assert [len(parts[name]) for name in ("falls", "windows", "expected")] == [1, 1, 1]
-    assert figures["omega_a"][0] == "drawn"
-    assert results["diagnoses"] == {"without a": {"verdict": "found"}, "all runs": {"verdict": "found"}}
-    assert "`python -m diagnosis.learn --prior 0.1`" in text
 
 
 # Commands
