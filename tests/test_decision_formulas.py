@@ -122,7 +122,8 @@ def test_a_gain_is_wrong_that_no_ship_has(value, share, told):
     assert turned.wrong.tolist() == [value[0] * (1.0 - 3.0 * share[0]) > -0.1, False, False]
     assert turned.mean is None, "no factor mends a sign"
     unknown = ThrustGains(np.full(3, np.nan), error, np.zeros(3, bool))
-    assert not (unknown.wrong.any() or unknown.close)
+    assert not unknown.wrong.any()
+    assert not unknown.close
     if not wrong:
         assert found.mean is None
     else:

@@ -247,5 +247,3 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
     else:
         assert c.learned.model is START
         assert c.learned.suspects == []
-
-
