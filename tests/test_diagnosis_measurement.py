@@ -446,10 +446,9 @@ class TestColumns:
         below = sep.join(units.get(name, "-") for name in table.columns) + "\n" if units_line else ""
         path.write_bytes(f"Schlepptank Länge\n\nrun 3\n{head}\n{below}{rows}".encode(encoding))
 
-    @pytest.mark.parametrize("units_line", [False, True])
     @pytest.mark.parametrize(
-        ("encoding", "sep", "decimal"),
-        [("latin-1", ";", ","), ("utf-8", ",", "."), ("utf-16", "\t", ".")],
+        ("encoding", "sep", "decimal", "units_line"),
+        [("latin-1", ";", ",", True), ("utf-8", ",", ".", False), ("utf-16", "\t", ".", False)],
     )
     def test_foreign_file_is_proposed_written_and_read(
         self, tmp_path, encoding, sep, decimal, units_line

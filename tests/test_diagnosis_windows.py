@@ -12,7 +12,7 @@ from support.closed_form import Allocation, allocate
 from support.cse1 import ASIDE, FIVE, THRUSTERS
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
-from diagnosis import InputError, Model, Windows, clean, read, smooth
+from diagnosis import InputError, Model, Windows, read
 from diagnosis.predictors import DescribedShip
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.predictors.weak_form import HORIZON
@@ -273,7 +273,7 @@ def test_defaults_are_the_nominal_model():
 @pytest.mark.slow
 @needs_data
 def test_measured_runs_are_predicted():
-    runs = [smooth(clean(read(path))) for path in sorted((DATA / "cse1").glob("*.mat"))]
+    runs = [smoothed(read(path)) for path in sorted((DATA / "cse1").glob("*.mat"))]
     windows = Windows(runs)
     assert set(windows.run) == {0, 1, 2, 3}
     nominal, delayed = (
