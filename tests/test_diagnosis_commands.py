@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.cse1 import EFFECTS
-from support.measured import sail
+from support.measured import sail, table_of
 from support.shared import once
 
 import diagnosis
@@ -47,8 +47,7 @@ SIGNALS |= {f"tau_{a}": f"thrusters.tau_cmd_{a}" for a in "XYN"}
 
 
 def frame(seconds=96.0, **hidden):
-    run, _ = sail(seconds, h=0.05, **hidden)
-    return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
+    return table_of(sail(seconds, h=0.05, **hidden)[0])
 
 
 def write_runs(folder):

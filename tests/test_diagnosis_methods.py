@@ -7,10 +7,9 @@ from importlib.util import find_spec
 from itertools import product
 
 import numpy as np
-import pandas as pd
 import pytest
 from support.cases import in_part
-from support.measured import sail, smoothed
+from support.measured import csv_of, sail, smoothed
 from support.project import ROOT
 
 import diagnosis
@@ -136,11 +135,7 @@ def test_default_method_imports_no_library_of_the_others():
 def file(tmp_path):
     """A measured run with lost yaw moment as CSV."""
     run, _ = sail(96.0, h=0.05, thrusters={"loss_yaw": 0.3})
-    columns = np.column_stack([run.time, run.pose, run.tau_cmd])
-    path = tmp_path / "run.csv"
-    names = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
-    pd.DataFrame(columns, columns=names).to_csv(path, index=False)
-    return path
+    return csv_of(run, tmp_path / "run.csv")
 
 
 def test_command_refuses_an_unknown_method_before_any_work(tmp_path, capsys):

@@ -11,7 +11,7 @@ from support.cases import in_part
 from support.ccode import stepped
 from support.command import command
 from support.cse1 import VESSEL
-from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, smoothed
+from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, smoothed, table_of
 
 import diagnosis
 from benchmarks.ship_effects import causes
@@ -349,7 +349,7 @@ def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
 def test_the_side_car_of_a_run_that_seems_mirrored_is_written_all_the_same(tmp_path):
     """What is known of names and units stands then, and the line that mends the rest has it."""
     run = edited(pose=flipped(1, 1, -1))
-    table = pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
+    table = table_of(run)
     table = table.assign(yaw=np.degrees(table["psi"])).drop(columns="psi")
     table.to_csv(tmp_path / "a.csv", index=False)
     done = command(propose_columns.main, tmp_path / "a.csv", "--write")

@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 from support.cases import in_part
 from support.closed_form import Allocation, thrust
-from support.measured import DATA, commands, jumps, needs_data, sail, smoothed
+from support.measured import DATA, commands, jumps, needs_data, sail, smoothed, table_of
 from support.planted import voyages
 
 import diagnosis
 from benchmarks.spoilt_files.outcomes import Outcome, outcome
-from benchmarks.spoilt_files.ways import POSE, TAU, WAYS, struck
+from benchmarks.spoilt_files.ways import POSE, WAYS, struck
 from diagnosis import InputError, Model, compare, learn, weak_windows
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import refuse_implausible
@@ -31,10 +31,7 @@ def windows():
 
 
 def good(given=commands):
-    run = sail(60.0, 1.0 / RATE, given=given)[0]
-    return pd.DataFrame(
-        np.column_stack([run.time, run.pose, run.tau_cmd]), columns=["time", *POSE, *TAU]
-    )
+    return table_of(sail(60.0, 1.0 / RATE, given=given)[0])
 
 
 def written(folder, table):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from support.foreign import needs_compiler
-from support.measured import sail
+from support.measured import csv_of, sail
 
 import diagnosis
 from cosim import InputError, Unit
@@ -188,10 +188,7 @@ def test_without_a_start_whole_runs_from_rest_or_after_a_run_in(folder, runs, no
 @pytest.fixture
 def csv(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run, _ = sail(40.0)
-    table = np.column_stack([run.time, run.pose, run.tau_cmd])
-    header = "time,x,y,psi,tau_X,tau_Y,tau_N"
-    np.savetxt(tmp_path / "run.csv", table, delimiter=",", header=header, comments="")
+    csv_of(sail(40.0)[0], "run.csv")
     return "run.csv"
 
 
@@ -346,18 +343,12 @@ def test_nothing_is_found_beside_an_unknown_ship_that_lacks_nothing(vendor):
     assert d.learned.effects == []
 
 
-def as_csv(path, run):
-    table = np.column_stack([run.time, run.pose, run.tau_cmd])
-    np.savetxt(path, table, delimiter=",", header="time,x,y,psi,tau_X,tau_Y,tau_N", comments="")
-    return str(path)
-
-
 @pytest.mark.slow
 def test_learn_writes_an_fmu_with_what_was_found(vendor, tmp_path, capsys):
     """It predicts a run of which nothing was learned; an FMU without an input for it is told which."""
     hidden = VENDOR | {"delta_X_u": -2.0}
     runs = [
-        as_csv(tmp_path / f"{k}.csv", sail(s, ship=hidden, seed=k)[0])
+        str(csv_of(sail(s, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
         for k, s in enumerate((70.0, 40.0))
     ]
     out = tmp_path / "out"
@@ -472,7 +463,7 @@ def test_a_force_in_the_earth_frame_is_found_in_addition_to_parameters(vendor, t
     """On every heading it acts on other inputs; the FMU with it predicts what the fit does."""
     hidden = VENDOR | {"F_n": 0.25}
     runs = [
-        as_csv(tmp_path / f"{k}.csv", sail(s, ship=hidden, seed=k)[0])
+        str(csv_of(sail(s, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
         for k, s in enumerate((60.0, 30.0))
     ]
     parameters = [{"name": "X_u", "value": VENDOR["X_u"], "prior": {"rel_std": 0.2}}]

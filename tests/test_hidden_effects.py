@@ -236,7 +236,7 @@ FLEET = [
 def test_fleet_sails_as_single_ships_do_in_cosimulation(short, monkeypatch):
     """To rounding, noise, freezes, spikes and all; only the acceleration at the start is before any force."""
     for module in (simulated_runs, fleet):
-        monkeypatch.setattr(module, "STOP", 22.0)
+        monkeypatch.setattr(module, "STOP", 15.0)
     orders = [Order(manoeuvres(0)[k % 3], hidden, 1.0, k) for k, hidden in enumerate(FLEET)]
     for order, together in zip(orders, sail_all(orders), strict=True):
         alone = sail(order.manoeuvre, order.hidden, order.noise, order.seed, short)
@@ -337,7 +337,7 @@ def simulated(shared):
         with pytest.MonkeyPatch.context() as patch:
             for module in (simulated_runs, fleet):
                 patch.setattr(module, "STOP", 60.0)
-            assert make([HIDDEN], folder) == [HIDDEN.key]
+            assert list(make([HIDDEN], folder)) == [HIDDEN.key]
 
     return once(shared / "hidden_problems", simulate)
 

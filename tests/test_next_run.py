@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import multivariate_normal
 from support.command import command
 from support.foreign import needs_compiler
-from support.measured import sail
+from support.measured import sail, table_of
 from support.oscillator import build_oscillator
 
 import cosim
@@ -270,13 +270,8 @@ def ahead(t):
 def question():
     """Two candidates that a run ahead leaves open: drag by |u|u and by uu."""
     run, _ = sail(64.0, h=0.05, ship={"delta_X_absu_u": -4.0}, given=ahead)
-    data = diagnosis.load(diagnosis_frame(run))
+    data = diagnosis.load(table_of(run))
     return Question(data, content(), Model(), 0.1, Limits(SECONDS, size=(6.0, 6.0)))
-
-
-def diagnosis_frame(run):
-    columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
-    return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=columns)
 
 
 @pytest.fixture(scope="module")
