@@ -121,7 +121,7 @@ def test_spike_is_distinguished_from_the_end_of_a_freeze():
     ]
 
 
-@pytest.mark.parametrize("name", ["controller_cl_svd_eps", "controller_cl_win_z2"])
+@pytest.mark.parametrize("name", ["controller_cl_win_z2"])
 def test_replayed_controller_stores_what_it_stored_in_the_run(name, tmp_path):
     content = trials.scenario(SLOW._replace(seconds=12.0), name, parameters=chapter6_runs.OPEN)
     spikes = {**trials.SPIKES, "at": [8.0]}
