@@ -437,9 +437,9 @@ def test_broken_ships_in_small(tmp_path, monkeypatch):
 @linux_only
 def test_killed_commands_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
-    assert killed_commands.interrupted_compares(1, 2, tmp_path, nothing) == []
+    assert killed_commands.interrupted_compares(2, 2, tmp_path, nothing) == []
     assert killed_commands.killed_diagnoses(1, 2, tmp_path, nothing) == []
-    assert killed_commands.ended_builds(1, 2, tmp_path, nothing) == []
+    assert killed_commands.ended_builds(2, 2, tmp_path, nothing) == []
     assert killed_commands.killed_campaigns(1, 2, tmp_path, nothing) == []
 
 
