@@ -236,7 +236,7 @@ FLEET = [
 def test_fleet_sails_as_single_ships_do_in_cosimulation(short, monkeypatch):
     """To rounding, noise, freezes, spikes and all; only the acceleration at the start is before any force."""
     for module in (simulated_runs, fleet):
-        monkeypatch.setattr(module, "STOP", 15.0)
+        monkeypatch.setattr(module, "STOP", 22.0)
     orders = [Order(manoeuvres(0)[k % 3], hidden, 1.0, k) for k, hidden in enumerate(FLEET)]
     for order, together in zip(orders, sail_all(orders), strict=True):
         alone = sail(order.manoeuvre, order.hidden, order.noise, order.seed, short)
@@ -353,7 +353,8 @@ def test_diagnosis_gets_a_measurement_and_nothing_else(simulated):
         assert known == given | empty
         assert not any(getattr(run, name) for name in empty)
         assert run.pose.shape == run.tau_cmd.shape == (3001, 3)
-        assert (np.diff(run.pose[:, 0]) == 0.0).any(), "there are freezes"
+    frozen = [(np.diff(run.pose[:, 0]) == 0.0).any() for run in problem.runs]
+    assert any(frozen), "there are freezes"
 
 
 @pytest.mark.slow
