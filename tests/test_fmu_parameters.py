@@ -325,7 +325,7 @@ def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():
 
 
 def test_start_values_are_those_of_the_motion(fmu):
-    t = H * np.arange(400)
+    t = H * np.arange(200)
     noise = 1e-3 * np.random.default_rng(3).standard_normal(t.size)
     run = MeasuredRun("r", t, {"force": 0.0 * t, "position": np.sin(t) + noise})
     given = SystemMap.model_validate({**MAP, "start": START})

@@ -225,9 +225,7 @@ def short(ships, tmp_path, monkeypatch):
 
 
 FLEET = [
-    Hidden(),
-    Hidden({"delta_X_u": -1.0, "m": 15.0}, {"lag": 0.3}),
-    Hidden({"V_n": 0.02}, {"deadband": 0.05, "delay": 0.13}, clock=0.1),
+    Hidden({"V_n": 0.02, "m": 15.0}, {"deadband": 0.05, "delay": 0.13, "lag": 0.3}, clock=0.1),
     Hidden({"drag_1_5": 1.0}, {"bow_exp": 3.0}, other=True),
 ]
 
