@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.cases import slow
 from support.cse1 import VESSEL
 from support.loops import closed_loop, ellipse_target, multisine_target, unlimited
 from support.project import COMPONENTS
@@ -103,7 +104,7 @@ def test_rotational_damping_is_found_under_rich_motion(name):
     assert out.learning.stored == SIZE
 
 
-@four
+@pytest.mark.parametrize("name", [FOUR[0], slow(FOUR[3])])
 def test_ellipse_is_tracked_within_a_centimetre_on_the_second_lap(name):
     component = COMPONENTS[name]
     loop = closed_loop(component, component.params(), 198.0, 0.02, ellipse_target())
