@@ -14,7 +14,6 @@ from support.ships import (
     SHIPS,
     described,
     part,
-    scaled,
 )
 
 from fmus.actuators.actuation import forces
@@ -179,17 +178,9 @@ def test_a_tanker_turns_on_the_same_track_at_every_speed():
     assert u[-1] == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize("length", [320.0, pytest.param(1.0, marks=pytest.mark.slow)])
-def test_a_tanker_turns_on_the_same_track_at_every_size(length):
-    ratio = length / TANKER.length
-    model = turn("kvlcc2", TANKER, 1.0, math.radians(-20.0))
-    other = turn("kvlcc2", scaled(TANKER, ratio), math.sqrt(ratio), math.radians(-20.0))
-    assert other == pytest.approx(model, abs=1e-5)
-
-
 @pytest.mark.parametrize(
     ("name", "side"),
-    [("gunnerus", -1.0), ("gunnerus", 1.0), pytest.param("kvlcc2", 1.0, marks=pytest.mark.slow)],
+    [("gunnerus", -1.0), ("kvlcc2", 1.0)],
 )
 def test_a_ship_comes_to_its_new_heading(name, side):
     _, y, psi, u = turn(name, SHIPS[name], speed(name), side * math.radians(30.0), 20.0)

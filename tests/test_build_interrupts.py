@@ -1,20 +1,13 @@
 """Builds and checks of FMUs that are interrupted: one line, no file half written, at whatever time."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
-import time
-import zipfile
-from functools import partial
 
 import pytest
-from support.command import without_progress
-from support.events import once_there
 from support.project import ROOT
 
-from benchmarks.reliability import endings
 from cybership.scratch_folder import scratch_folder
 from fmus import interruption
 from fmus.build import building
@@ -124,49 +117,3 @@ def test_source_that_cannot_be_written_is_not_there_in_part(tmp_path, monkeypatc
         building.export(["guidance_setpoint"], tmp_path / "source")
     assert len(written) == 2
     assert not (tmp_path / "source").exists()
-
-
-@posix
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["fmus.build", "guidance_setpoint", "guidance_ellipse", "--out"],
-        ["fmus.build", "--native", "--source"],
-        ["fmus.check", "guidance_setpoint"],
-    ],
-    ids=" ".join,
-)
-def test_builds_and_checks_end_in_one_line_at_any_time(command, tmp_path):
-    def started(k):
-        out, cache = tmp_path / f"out{k}", tmp_path / f"cache{k}"
-        return subprocess.Popen(
-            [sys.executable, "-m", *command, *([str(out)] if command[-1].startswith("--") else [])],
-            cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-            env={**os.environ, "CYBERSHIP_CACHE": str(cache)},
-        )  # fmt: skip
-
-    def ready(process):
-        return process.poll() is not None or endings.catches(process.pid)
-
-    begun = time.perf_counter()
-    started("whole").communicate()
-    lasts = min(time.perf_counter() - begun, 1.5)
-    rng, ended = random.Random(1), set()
-    for k in range(3):
-        process = started(k)
-        if k:
-            time.sleep(lasts * rng.uniform(0.5, 1.0))
-        else:  # as soon as it can
-            once_there(partial(ready, process), 0.0005)
-        process.send_signal(signal.SIGINT)
-        stderr = without_progress(process.communicate()[1])
-        ended.add(process.returncode)
-        if process.returncode == 130:
-            assert stderr == "interrupted\n"
-        else:
-            assert (process.returncode, stderr) == (0, ""), "it came too late"
-        assert not list(tmp_path.rglob("*.part"))
-        for fmu in tmp_path.rglob("*.fmu"):
-            assert building.is_whole(fmu) or zipfile.ZipFile(fmu).testzip() is None
-    assert 130 in ended

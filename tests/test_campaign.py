@@ -405,14 +405,6 @@ def test_a_killed_worker_changes_nothing(base, scheduler, monkeypatch):
 
 
 @pytest.mark.slow
-def test_processes_of_this_computer_give_the_same(base):
-    path = campaign(base, {"seed": {"set": "seed", "values": [0, 1, 2]}})
-    spread = cosim.run_campaign(path, base / "spread", workers=2)
-    here = cosim.run_campaign(path, base / "here", workers=0)
-    assert without_time(spread).equals(without_time(here))
-
-
-@pytest.mark.slow
 def test_a_run_that_ends_its_process_is_a_failed_row_and_no_other(base, chain, plain_fmu):
     init = (
         "self.y = 0.0\nself.k = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))\n"

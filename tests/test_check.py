@@ -37,8 +37,7 @@ RUNNING = [rule.name for rule in in_order() if rule.runs]
 LIGHT = ("vessel", "observer_mdf", "controller_bs", "guidance_ellipse")  # run in the quick part
 # One of each kind of memory; those left out differ from one of them by parameters or by a law.
 OTHERS = (
-    "thrusters", "thrusters_propeller", "thrusters_table", "observer_kalman", "observer_luenberger",
-    "controller_abs", "controller_cl_improved", "controller_cl_svd_z2", "controller_cl_win_eps",
+    "thrusters_propeller", "observer_kalman", "controller_cl_svd_z2", "controller_cl_win_eps",
     "guidance_waypoints", "watch_thrusters",
 )  # fmt: skip
 compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")

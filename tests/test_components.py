@@ -77,7 +77,7 @@ def test_traced_component_computes_what_the_plain_one_does(name):
     component = component_of(name)
     trace = trace_step(component)
     rng = random.Random(name)
-    points = [(*arguments(component, rng), 0.01) for _ in range(15)]
+    points = [(*arguments(component, rng), 0.01) for _ in range(5)]
     traced = evaluated(trace.state + trace.outputs, [values_of(*point) for point in points])
     assert list(traced) == [directly(component, *point) for point in points]
 

@@ -14,16 +14,12 @@ from diagnosis.predictors import Model
 from diagnosis.predictors.evaluation import Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
-from diagnosis.search.conclusion import interval, laplace_std, suspected
 from diagnosis.search.effect_evidence import EffectEvidence, evidence, variation
 from diagnosis.search.findings import Finding, Findings
-from diagnosis.search.gram import Nuisance
-from diagnosis.search.nonlinear.multistart import Landscape, linear_ones
 from diagnosis.search.prior import NominalPrior
 from diagnosis.verdict import coefficients
 from diagnosis.verdict.coefficients import concluded
 from diagnosis.verdict.confidence import probability
-from fmus.declare import Range, Variable
 from fmus.ops import wrap
 from fmus.scale import Scale
 
@@ -64,19 +60,6 @@ def test_the_size_of_an_effect_varies_by_its_spread_less_that_of_noise():
     assert found == pytest.approx(np.sqrt((0.4**2 * h - 1.0) / (2.0 * h)))
     assert variation(force, 0.01 * force, two) == 0.0
     assert variation(force * (two == 3)[:, None], force, two) == 0.0, "of one block nothing varies"
-
-
-def test_intervals_and_deviations_are_those_of_a_normal_distribution():
-    assert interval(3.0, 0.5) == pytest.approx((3.0 - 0.98, 3.0 + 0.98), abs=1e-4)
-    columns, weight = drawn(50, 3, 2), np.array([2.0, 1.0, 0.5])
-    A = (columns * weight[:, None]).reshape(-1, 2)
-    prior = np.diag([0.0, 9.0])
-    n = Nuisance(columns, prior, np.zeros(2), np.ones(2))
-    exact = np.sqrt(np.diag(np.linalg.inv(A.T @ A + prior)))
-    assert laplace_std(SimpleNamespace(weight=weight), n) == pytest.approx(exact, rel=1e-6)
-    three = NominalPrior({"a": 10.0, "b": -2.0, "c": 1.0}, {"a": 1.0, "b": 0.5, "c": 0.1})
-    found = suspected(three, np.array([1.0, -3.0, 0.5]), np.array([0.1, 0.1, 10.0]))
-    assert [(s.name, s.z, s.value) for s in found] == [("b", -3.0, -3.5), ("a", 1.0, 11.0)]
 
 
 # Bands, and errors of windows
@@ -264,68 +247,3 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
     else:
         assert c.learned.model is START
         assert c.learned.suspects == []
-
-
-# Ranges in which parameters are tried
-
-
-def declared(name, unit, low=None, high=None):
-    return Variable(name, unit, name, 1.0, Range(low, high), False)
-
-
-def landscape(force=lambda v: np.ones(4), values=None, shape=("s",), coefficients=("k",), **ranges):
-    names = dict.fromkeys([*shape, *coefficients])
-    parameters = tuple(declared(n, *ranges.get(n, ("1",))) for n in names)
-    effect = SimpleNamespace(parameters=parameters, shape_parameters=shape, coefficients=coefficients)
-    units = dict.fromkeys(names, 1.0) | {"k": 5.0}
-    return Landscape(effect, force, np.ones(4), 20.0, values or dict.fromkeys(names, 0.0), units)
-
-
-@pytest.mark.parametrize(
-    ("range_", "value", "places"),
-    [
-        (("1", 2.0, 6.0), 0.0, [2.0, 3.0, 4.0, 6.0]),
-        (("1", 0.01, 100.0), 0.0, [0.01, 0.1, 1.0, 100.0]),  # over the logarithm
-        (("1", 1.0, 100.0), 0.0, [1.0, 25.75, 50.5, 100.0]),
-        (
-            ("1",),
-            2.0,
-            [-18.0, 2.0 - 2.0 * np.sinh(0.5 * np.arcsinh(10.0)), 2.0, 22.0],
-        ),  # ten times itself
-        (("m",), 0.5, [-39.5, 0.5 - 4.0 * np.sinh(0.5 * np.arcsinh(10.0)), 0.5, 40.5]),  # of the way
-        (("m", 0.0), 0.5, [0.0, 0.0, 0.5, 40.5]),
-        (("rad",), 0.0, [-np.pi, -0.1 * np.pi * np.sinh(0.5 * np.arcsinh(10.0)), 0.0, np.pi]),
-        (("1", None, 3.0), 0.0, [-30.0, -3.0 * np.sinh(0.5 * np.arcsinh(10.0)), 0.0, 3.0]),
-        (("1",), 0.0, [-10.0, -np.sinh(0.5 * np.arcsinh(10.0)), 0.0, 10.0]),
-    ],
-)
-def test_values_are_tried_over_the_limits_or_far_to_both_sides(range_, value, places):
-    of = landscape(values={"s": value, "k": 0.0}, s=range_)
-    (p,) = of.declared(["s"])
-    assert [of.within(p, share) for share in (0.0, 0.25, 0.5, 1.0)] == pytest.approx(places)
-    tried = [v["s"] for v in of.points(["s"])]
-    assert tried[0] == value
-    assert len(tried) == 33
-    assert of.within(p, 31.0 / 32.0) == pytest.approx(max(tried[1:]))
-
-
-def test_coefficients_are_linear_idle_or_neither():
-    x = np.array([1.0, 2.0, -1.0, 0.5])
-
-    def force(v):
-        return v["a"] * x + np.tanh(v["b"]) * x**2 + v["c"] * v["a"] + 1e-10 * v["d"] * x
-
-    none = dict.fromkeys("sabcd", 0.0)
-    of = landscape(lambda v: force({**none, **v}), none, ("s",), tuple("abcd"))
-    assert linear_ones(of) == (["a"], ["c", "d"])
-    assert of.columns({"s": 0.0}, ["a", "b"]) == pytest.approx(np.column_stack([x, np.tanh(1.0) * x**2]))
-    line = np.ones(4) - x * (x.sum() / (x @ x))
-    assert of.left({"s": 0.0}, ["a"]) == pytest.approx(line)
-    assert of.left({"a": 0.5}, []) == pytest.approx(np.ones(4) - 0.5 * x)
-    lost = landscape(lambda v: np.full(4, np.nan))
-    assert lost.left({"s": 0.0}, ["k"]) == pytest.approx(np.ones(4))
-    assert [landscape(k=r).unit("k") for r in (("1",), ("1", None, 4.0), ("1", None, 40.0))] == [
-        5.0,
-        2.0,
-        5.0,
-    ]

@@ -29,7 +29,7 @@ def times(device, spans, run=""):
     return dict(pairs)
 
 
-@pytest.mark.parametrize("device", ["bow", pytest.param("vsp", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("device", ["bow"])
 def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tmp_path):
     hidden = times(device, SPANS)
     w = weak_windows(smoothed(sail(64.0, thrusters=hidden)[0]))

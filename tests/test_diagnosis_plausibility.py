@@ -11,15 +11,15 @@ from support.cases import in_part
 from support.ccode import stepped
 from support.command import command
 from support.cse1 import VESSEL
-from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, smoothed
+from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, smoothed, table_of
 
 import diagnosis
 from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
-from diagnosis import InputError, Model, Run, compare, propose_columns, weak_windows
+from diagnosis import InputError, Model, Run, propose_columns, weak_windows
 from diagnosis.assessment import plausibility
 from diagnosis.assessment.command_check import without_force
-from diagnosis.assessment.gains import ThrustGains, _own, gains
+from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import (
     likeliest_mistake,
     pushed_aside,
@@ -218,36 +218,6 @@ def test_a_propeller_that_cannot_reverse_gives_no_force():
     assert "propeller.n is beyond its limits, 0 to 20, in all rows" in said
 
 
-@pytest.mark.parametrize(
-    ("value", "told", "wrong", "close"),
-    [
-        ([1.0, 1.1, 0.9], [1, 1, 1], [0, 0, 0], True),
-        ([1.0, 2.6, 0.9], [1, 1, 1], [0, 0, 0], False),  # within three standard errors
-        ([1.0, 2.9, 0.9], [1, 1, 1], [0, 1, 0], False),
-        ([1.0, 2.9, 0.9], [1, 0, 1], [0, 0, 0], True),  # of what is not told, nothing is said
-        ([1.0, 0.2, 0.9], [1, 1, 1], [0, 0, 0], False),  # a weak thruster is the diagnosis' matter
-        ([1.0, 0.05, 0.9], [1, 1, 1], [0, 1, 0], False),
-        ([0.2, 0.25, 0.2], [1, 1, 1], [1, 1, 1], False),  # all of them are not
-        ([0.2, 0.25, np.nan], [1, 1, 0], [1, 1, 0], False),
-        ([0.2, 0.25, 0.2], [1, 1, 0], [0, 0, 0], False),
-        ([-1.0, 1.0, 1.0], [1, 1, 1], [1, 0, 0], False),
-        ([np.nan] * 3, [0, 0, 0], [0, 0, 0], False),
-    ],
-)
-def test_gains_beyond_two_and_a_half_or_of_hardly_anything_are_wrong(value, told, wrong, close):
-    value = np.array(value)
-    g = ThrustGains(value, np.abs(value) * [0.01, 0.04, 0.02], np.array(told, bool))
-    assert g.wrong.tolist() == [bool(w) for w in wrong]
-    assert g.wrong.any() == any(wrong)
-    assert g.close == close
-    known = [k for k in range(3) if wrong[k] and value[k] > 0.0]
-    if known:
-        weight = np.array([0.01, 0.04, 0.02])[known] ** -2.0
-        assert g.mean == pytest.approx(np.exp(weight @ np.log(value[known]) / weight.sum()))
-    else:
-        assert g.mean is None
-
-
 @pytest.mark.parametrize("k", [0.3, 1.0, 4.0])
 def test_the_gain_is_how_many_times_the_commanded_force_acts(k):
     w = weak_windows(smoothed(edited(commands=lambda tau: tau / k)))
@@ -256,13 +226,6 @@ def test_the_gain_is_how_many_times_the_commanded_force_acts(k):
     assert (np.abs(g.value - k) < 4.0 * g.error).all()
     assert (g.error < 0.1 * k).all()
     assert g.told.all()
-
-
-def test_own_is_the_share_of_a_command_that_follows_from_no_other():
-    a, b = np.random.default_rng(0).standard_normal((2, 5000))
-    assert _own(a, []) == pytest.approx(1.0)
-    assert _own(7.0 + 3.0 * a + 4.0 * b, [1e6 * a]) == pytest.approx(16.0 / 25.0, rel=0.05)
-    assert _own(2.0 * a - b, [a, b]) == pytest.approx(0.0, abs=1e-9)
 
 
 def circling(seconds=110.0, h=0.1, camera=0.1):
@@ -341,21 +304,6 @@ def test_column_that_is_used_twice_is_found(edits, pair):
 
 
 @pytest.mark.slow
-def test_command_refuses_goes_on_anyway_and_takes_the_line(tmp_path):
-    run = edited(pose=flipped(1, 1, -1))
-    table = pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
-    table.to_csv(tmp_path / "a.csv", index=False)
-    out = tmp_path / "out"
-    refused = command(compare.main, tmp_path / "a.csv", "--out", out)
-    assert refused.returncode == 2
-    assert "heading is mirrored" in refused.stderr
-    assert not out.exists()
-    assert command(compare.main, tmp_path / "a.csv", "--anyway", "--out", out).returncode == 0
-    (tmp_path / "a.csv.json").write_text('{"columns": {"psi": {"name": "psi", "flip": true}}}')
-    assert command(compare.main, tmp_path / "a.csv", "--out", out).returncode == 0
-
-
-@pytest.mark.slow
 @needs_data
 def test_tanker_with_a_rudder_is_a_unit_alone():
     """KVLCC2, its rudder read as a command of yaw, with the model of quite another ship: so at the most."""
@@ -401,7 +349,7 @@ def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
 def test_the_side_car_of_a_run_that_seems_mirrored_is_written_all_the_same(tmp_path):
     """What is known of names and units stands then, and the line that mends the rest has it."""
     run = edited(pose=flipped(1, 1, -1))
-    table = pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
+    table = table_of(run)
     table = table.assign(yaw=np.degrees(table["psi"])).drop(columns="psi")
     table.to_csv(tmp_path / "a.csv", index=False)
     done = command(propose_columns.main, tmp_path / "a.csv", "--write")

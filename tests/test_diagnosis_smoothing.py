@@ -197,7 +197,7 @@ def test_spikes_are_found_and_nothing_else():
     assert np.abs(s.nu - smooth_base().nu).max() < 3e-3
 
 
-@pytest.mark.parametrize("size", [0.05, 1.0, 1e6, 1e300])
+@pytest.mark.parametrize("size", [0.05, 1e6, 1e300])
 def test_bursts_and_absurd_values_do_no_harm(size):
     rows = np.r_[500:503, 1000, 1500:1506]
     pose = base().pose[rows] + [size, 0.0, 0.0]
@@ -293,7 +293,7 @@ def test_band_of_the_inverse_is_that_of_the_inverse():
 @needs_data
 def test_measured_runs_are_smoothed():
     for path in sorted((DATA / "cse1").glob("*.mat")):
-        s = smooth(clean(read(path)))
+        s = smoothed(read(path))
         assert s.counts.used > 0.8 * s.counts.samples
         assert (s.noise < (2e-4, 2e-4, 1e-3)).all(), "a tenth of a millimetre"
         assert np.nanmax(np.abs(s.nu)) < 2.0

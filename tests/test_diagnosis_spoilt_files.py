@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 from support.cases import in_part
 from support.closed_form import Allocation, thrust
-from support.measured import DATA, commands, jumps, needs_data, sail, smoothed
+from support.measured import DATA, commands, jumps, needs_data, sail, smoothed, table_of
 from support.planted import voyages
 
 import diagnosis
 from benchmarks.spoilt_files.outcomes import Outcome, outcome
-from benchmarks.spoilt_files.ways import POSE, TAU, WAYS, struck
+from benchmarks.spoilt_files.ways import POSE, WAYS, struck
 from diagnosis import InputError, Model, compare, learn, weak_windows
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import refuse_implausible
@@ -31,10 +31,7 @@ def windows():
 
 
 def good(given=commands):
-    run = sail(60.0, 1.0 / RATE, given=given)[0]
-    return pd.DataFrame(
-        np.column_stack([run.time, run.pose, run.tau_cmd]), columns=["time", *POSE, *TAU]
-    )
+    return table_of(sail(60.0, 1.0 / RATE, given=given)[0])
 
 
 def written(folder, table):
@@ -56,20 +53,17 @@ TOLD = [
     ("swap_xy", '{"x": {"name": "y"}, "y": {"name": "x"}}'),
     ("swap_tau", '{"tau_X": {"name": "tau_Y"}, "tau_Y": {"name": "tau_X"}}'),
     ("feet", column(x={"unit": "ft"}, y={"unit": "ft"})),
-    ("dm", '"factor": 0.'),
     ("tau_mN", column(**MILLI)),
-    ("tau_N_Nmm", column(tau_N={"unit": "N.mm"})),
     ("tau_percent", "times the 1.165 N that the thrusters give"),
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
     ("psi_180", column(psi={"offset": 3.142})),
     ("const_tau", "all its commands are constant"),
-    ("const_x", "x is constant in all rows"),
     ("outliers_tau", "leave false cells empty"),
     ("commands_zero_half", "all commands are zero for 2"),
 ]
 
 
-@pytest.mark.parametrize(("way", "line"), in_part(TOLD, keep=[TOLD[k] for k in (1, 2, 7)]))
+@pytest.mark.parametrize(("way", "line"), in_part(TOLD, keep=[TOLD[k] for k in (1, 2, 5)]))
 def test_spoilt_file_is_refused_with_the_line_that_mends_it(way, line, tmp_path):
     with pytest.raises(InputError) as error:
         diagnosis.load(spoilt(tmp_path, way))
@@ -164,10 +158,10 @@ SHIPS = [
 LATE = [({}, {"delay": 1.0}), ({}, {"lag": 2.0})]
 CASES = [(*each, (commands, jumps)[k % 2]) for k, each in enumerate(SHIPS)]
 CASES += [(*each, given) for each in LATE for given in (commands, jumps)]
-CASES = [case for k, case in enumerate(CASES) if k % 3]  # two of three: each kind of effect is left
+CASES = CASES[2::3]  # one of three
 
 
-@pytest.mark.parametrize(("ship", "thrusters", "given"), in_part(CASES, keep=[CASES[2], CASES[-1]]))
+@pytest.mark.parametrize(("ship", "thrusters", "given"), in_part(CASES, keep=[CASES[1], CASES[-1]]))
 def test_no_hidden_effect_is_refused(ship, thrusters, given):
     run = sail(60.0, 1.0 / RATE, ship=ship, thrusters=thrusters, given=given)[0]
     refuse_implausible([weak_windows(smoothed(run))], Model())
@@ -175,7 +169,7 @@ def test_no_hidden_effect_is_refused(ship, thrusters, given):
 
 @pytest.mark.slow
 @needs_data
-@pytest.mark.parametrize("name", ["dptest1", "dptest3", "random_run1", "run1"])
+@pytest.mark.parametrize("name", ["dptest1", "run1"])
 def test_real_run_is_not_refused(name):
     assert len(diagnosis.load(DATA / "cse1" / f"{name}.mat")) == 1
 

@@ -20,18 +20,17 @@ from diagnosis.predictors.uncertainty import correlated_windows, omega_std
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
-from diagnosis.search.effect_evidence import credible, evidence
+from diagnosis.search.effect_evidence import credible
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
-from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import lower_throughout, worse
-from diagnosis.verdict.confidence import confidence_of, probability
+from diagnosis.verdict.confidence import confidence_of
 from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.paired_errors import harm
 from diagnosis.verdict.pruning import overfits, proven, prune, without
-from diagnosis.verdict.validation_data import Fold, Losses, ValidationData, fold_losses
+from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
@@ -133,18 +132,6 @@ def learned(runs, prior):
     return diagnosis.diagnose(runs[:-1], runs[-1:], prior)
 
 
-def off(share):
-    """Every nominal coefficient that much off, to either side."""
-    values = NominalPrior.of(Model(), share)
-    parts = Model().ship.parameters
-    sign = np.random.default_rng(3).choice([-1.0, 1.0], values.size)
-    wrong = {n: v + s * values.std[n] for (n, v), s in zip(values.mean.items(), sign, strict=True)}
-    return {
-        "ship": {n: v for n, v in wrong.items() if n in parts["vessel"]},
-        "thrusters": {n: v for n, v in wrong.items() if n in parts["thrusters"]},
-    }
-
-
 @pytest.mark.slow
 @pytest.mark.numerical
 def test_cause_that_no_candidate_has_is_unexplained():
@@ -156,20 +143,6 @@ def test_cause_that_no_candidate_has_is_unexplained():
     assert "gusts" in content.remainder.sentence
     assert "no missing effect" not in content.sentence
     assert content.remainder.axes["X"].rms > 20.0 * content.remainder.axes["X"].uncertainty
-
-
-@pytest.mark.slow
-@pytest.mark.numerical
-def test_wrong_coefficients_alone_are_written():
-    found = learned(voyages(**off(0.1)), 0.1)
-    assert found.verdict == "coefficients"
-    assert not found.remainder.significant
-    assert not found.learned.effects
-    held_out = found.comparison.evaluations[-1]
-    assert held_out.after.position < 0.2 * held_out.before.position
-    for s in found.learned.suspects:
-        assert found.learned.model.value(s.name) == pytest.approx(s.value)
-        assert abs(s.z) <= 3.0
 
 
 @pytest.mark.slow
@@ -267,29 +240,6 @@ def test_the_stretches_of_a_run_miss_together_what_it_misses():
         "windows begin and end in a stretch, or do not count"
     )
     assert np.isin(positions, whole.position).all()
-
-
-def misses(omega=1.0, position=1.0, heading=1.0, seed=0):
-    """Losses of 40 blocks and windows, of so many times the usual size."""
-    draws = np.random.default_rng(seed).exponential(1.0, (3, 40))
-    return Losses(*(size * x for size, x in zip((omega, position, heading), draws, strict=True)))
-
-
-@pytest.mark.parametrize(
-    ("its", "harms"),
-    [
-        ({}, False),
-        ({"omega": 1.5}, True),
-        ({"position": 1.5}, True),
-        ({"heading": 1.5}, True),
-        ({"position": 0.5, "heading": 0.9}, False),
-        ({"position": 0.1, "heading": 1.3}, False),
-        ({"position": 0.9, "heading": 3.0}, True),
-        ({"position": np.inf}, True),
-    ],
-)
-def test_harm_is_by_the_model_error_or_by_predictions(its, harms):
-    assert bool(harm(misses(**its), misses())) == harms
 
 
 class OnPredictions(ValidationData):
@@ -573,22 +523,6 @@ def test_candidates_that_are_the_same_share_their_probability():
     far = replace(one, candidate=2, blocks=blocks + 10.0)
     shares = first_share([one, replace(one, candidate=1), far], np.random.default_rng(0))
     assert shares == pytest.approx([0.5, 0.5, 0.0], abs=1e-6)
-
-
-def test_confidence_falls_with_what_is_left_and_where_the_size_varies():
-    rng = np.random.default_rng(0)
-    blocks = np.repeat(np.arange(40), 30)
-    std = np.full((1200, 3), 0.01)
-    force = np.zeros((1200, 3))
-    force[:, 0] = 0.2 * np.sin(np.arange(1200) / 7.0)
-    noise = std * rng.standard_normal((1200, 3))
-    sure = evidence(1.0, force, noise, std, blocks)
-    assert sure.left == sure.varies == 0.0
-    assert probability(sure) > 0.95
-    amplitude = (1.0 + 0.5 * rng.standard_normal(40))[blocks, None]
-    unsteady = evidence(1.0, force, noise + (amplitude - 1.0) * force, std, blocks)
-    assert unsteady.varies == pytest.approx(0.5, rel=0.3)
-    assert probability(unsteady) < 0.1
 
 
 def test_correlation_is_that_of_an_autoregression(lap):

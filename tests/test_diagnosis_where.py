@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.cases import in_part, slow
+from support.cases import slow
 from support.measured import NOISE, sail, smoothed
 
 from diagnosis import Model, omega_std
@@ -38,10 +38,7 @@ FAR = (
 )  # a position to centimetres beside a good heading: the sway velocity is uncertain
 
 
-HELD = [(1.0, 1), (4.0, 1), (10.0, 1), (FAR, 1), (4.0, 10)]
-
-
-@pytest.mark.parametrize(("level", "held"), in_part(HELD, keep=[(4.0, 1), (FAR, 1), (4.0, 10)]))
+@pytest.mark.parametrize(("level", "held"), [(4.0, 1), (FAR, 1), (4.0, 10)])
 def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level, held):
     """With the true model and the same motion under other noise, the model error left is that of the noise.
 
@@ -109,7 +106,6 @@ def test_noise_alone_has_no_region(noise):
     [
         ({"ship": {"delta_X_absu_u": -20.0}}, "X", SPEED),
         ({"thrusters": {"bow_failure_time": 118.0}}, "Y", TIME),
-        slow(({"thrusters": {"loss_yaw": 0.2}}, "N", THRUST)),
         slow(({"ship": {"V_n": 0.05}}, "Y", HEADING)),
     ],
 )

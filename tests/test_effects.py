@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import ccode
 from support.cse1 import EFFECTS, SHIP, THRUSTERS, Inputs
 from support.cse1 import VESSEL as COMPONENT
 from support.project import ROOT
@@ -25,70 +24,9 @@ from fmus.frames import rotate_to_earth
 from fmus.hull import Inertia, damping_force
 from fmus.signals import Force, VelocityInCurrent
 from fmus.thrusters import propeller, table
-from fmus.vessel.vessel import State, VesselStart, hull
+from fmus.vessel.vessel import State, hull
 from fmus.vessel.vessel_effects import vessel_effects
 
-CONTRACT = [
-    "X_u",
-    "X_|u|u",
-    "X_uuu",
-    "X_|u|r",
-    "X_vr",
-    "X_vv",
-    "X_rr",
-    "Y_v",
-    "Y_|v|v",
-    "Y_vvv",
-    "Y_r",
-    "Y_|r|r",
-    "Y_|r|v",
-    "Y_|v|r",
-    "Y_ur",
-    "Y_uv",
-    "N_v",
-    "N_|v|v",
-    "N_r",
-    "N_|r|r",
-    "N_|r|v",
-    "N_|v|r",
-    "N_ur",
-    "N_uv",
-    "loss_surge",
-    "loss_sway",
-    "loss_yaw",
-    "loss_vsp",
-    "loss_bow",
-    "bow_failure",
-    "bow_speed_loss",
-    "deadband",
-    "thrust_curve",
-    "saturation",
-    "attack_point",
-    "lag",
-    "delay",
-    "earth_force",
-    "current",
-    "body_bias",
-    "waves",
-    "mass",
-    "added_mass_X",
-    "added_mass_Y",
-    "added_mass_N",
-    "heading_offset",
-    "marker_offset",
-    "clock_offset",
-    "linear_map",
-    "curve_X(u)",
-    "curve_vsp_x(c)",
-    "curve_bow(|u|)",
-    "bow_outage",
-    "vsp_outage",
-    "curve_vsp_y(c)",
-    "curve_vsp1_x(c)",
-    "curve_vsp1_y(c)",
-    "curve_vsp2_x(c)",
-    "curve_vsp2_y(c)",
-]
 Params = COMPONENT.params
 PROPELLER, TABLE = (m.make(SHIP.effects, SHIP.description) for m in (propeller, table))
 CHANGES, OUTSIDE = vessel_effects(EFFECTS).changes, vessel_effects(EFFECTS).outside
@@ -112,10 +50,6 @@ def sail(p, seconds=5.0, h=0.01, tau=Force(0.5, 0.2, 0.1), start=None):
     for _ in range(round(seconds / h)):
         s, out = COMPONENT.advance(s, tau, ready, h)
     return s, out
-
-
-def test_every_effect_of_the_contract_is_registered():
-    assert set(CONTRACT) <= set(EFFECTS)
 
 
 def test_every_parameter_of_an_effect_is_one_of_an_fmu():
@@ -211,18 +145,6 @@ def test_earth_force_pushes_the_same_way_on_every_heading(psi, F_n, F_e):
     X, Y, N = EFFECTS["earth_force"].function(Motion(psi=psi), F_n, F_e, 100.0, 0.0)
     assert rotate_to_earth(psi, X, Y) == pytest.approx((F_n, F_e), abs=1e-12)
     assert N == 0.0
-
-
-def test_constant_current_is_a_change_of_the_frame():
-    """Galileo: in a frame that moves with the water, everything is as in still water."""
-    V_n, V_e, seconds = 0.07, -0.04, 20.0
-    still, _ = sail(Params(start=VesselStart(psi_0=0.7, u_0=0.1)), seconds)
-    c, s = math.cos(0.7), math.sin(0.7)
-    start = VesselStart(psi_0=0.7, u_0=0.1 + c * V_n + s * V_e, v_0=c * V_e - s * V_n)
-    flowing, _ = sail(with_params(COMPONENT, V_n=V_n, V_e=V_e)._replace(start=start), seconds)
-    assert flowing.psi == pytest.approx(still.psi, abs=1e-7)
-    assert flowing.x - still.x == pytest.approx(V_n * seconds, abs=1e-7)
-    assert flowing.y - still.y == pytest.approx(V_e * seconds, abs=1e-7)
 
 
 def test_a_ship_without_thrust_drifts_with_the_current():
@@ -436,26 +358,6 @@ def test_table_interpolates_over_command_and_inflow():
     for u, share in ((0.0, 1.0), (0.1, 0.9), (0.2, 0.8), (0.4, 0.6), (1.0, 0.6)):
         out = push(p, (9.0, 0.0, 0.0), VelocityInCurrent(u, 0.0, 0.0), model=TABLE)
         assert out.tau_act_X == pytest.approx(share * 1.165)
-
-
-@pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
-@pytest.mark.parametrize("component", [COMPONENT, THRUSTERS], ids=lambda c: c.name)
-def test_same_source_in_c_with_every_effect_on(component):
-    run = ccode.Compiled(component)
-    rng = random.Random(4)
-    names = {p.name for e in EFFECTS.values() for p in e.parameters}
-    for _ in range(20):
-        changed = {
-            v.name: v.start + rng.uniform(0.0, 0.3) for v in component.variables if v.name in names
-        }
-        p = with_params(component, **changed)
-        state = component.init(None, p)
-        inputs = [rng.uniform(-0.5, 0.5) for _ in variables(component.inputs)]
-        for _ in range(5):
-            state, _ = component.step(state, packer(component.inputs)(inputs), p, 0.01)
-        new, out = component.step(state, packer(component.inputs)(inputs), p, 0.01)
-        got = run.step(flatten(p), inputs, flatten(state), 0.01)
-        assert ccode.same_bits(got, flatten(new) + flatten(out))
 
 
 def test_actuator_effects_leave_what_they_do_not_concern():

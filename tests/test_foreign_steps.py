@@ -9,7 +9,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from support.foreign import needs_compiler
-from support.measured import sail
+from support.measured import csv_of, sail
 
 import diagnosis
 from cosim import InputError
@@ -265,10 +265,7 @@ def test_a_hang_is_one_line_that_names_the_run(made, tmp_path):
 
 def test_the_length_of_the_ship_is_stated(made, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run, _ = sail(20.0)
-    table = np.column_stack([run.time, run.pose, run.tau_cmd])
-    header = "time,x,y,psi,tau_X,tau_Y,tau_N"
-    np.savetxt("run.csv", table, delimiter=",", header=header, comments="")
+    csv_of(sail(20.0)[0], "run.csv")
     assert diagnosis.compare.main(["run.csv", "--model", str(made), "--out", "out"]) == 0
     assert "a ship of 1.105 m" in " ".join(capsys.readouterr().out.split())
 

@@ -2,18 +2,14 @@
 
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
 import threading
-import time
 from contextlib import suppress
 
 import pytest
-from support.command import without_progress
 from support.project import ROOT
-from test_diagnosis_commands import frame
 
 from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
 from cosim.master.loop_surroundings import interruptible
@@ -252,43 +248,6 @@ def test_interrupt_while_folders_come_and_go(step, tmp_path, monkeypatch):
         assert [p.name for p in out.iterdir()] == ["file"]
     with pytest.raises(KeyboardInterrupt):
         interrupt()
-
-
-@pytest.mark.slow
-@posix
-def test_interrupts_at_any_time_leave_nothing(tmp_path):
-    frame(48.0).to_csv(tmp_path / "a.csv", index=False)
-    command = [sys.executable, "-m", "diagnosis.compare", str(tmp_path / "a.csv"), "--out"]
-
-    def start(out):
-        return subprocess.Popen(
-            [*command, str(out)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-
-    began = time.perf_counter()
-    assert start(tmp_path / "whole").wait() == 0
-    whole = time.perf_counter() - began
-    rng = random.Random(0)
-    load = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
-    try:
-        for k in range(6):
-            out = tmp_path / str(k) / "deep"
-            process = start(out)
-            time.sleep(rng.uniform(0.0, whole))
-            process.send_signal(signal.SIGINT)
-            text, said = process.communicate()
-            if process.returncode == 0:
-                assert len(list(out.iterdir())) == 2, "it came too late"
-                continue
-            assert not out.parent.exists()
-            if process.returncode != 130:  # before the first line of ours
-                assert str(ROOT) not in said
-                continue
-            assert (text, without_progress(said)) == ("", "interrupted\n")
-    finally:
-        for each in load:
-            each.kill()
-            each.wait()
 
 
 def test_texts_of_a_run_have_room_of_their_own():

@@ -104,9 +104,7 @@ def test_strings_whole_numbers_flags_and_messages_pass(plain_fmu, tmp_path):
 
 CRASHES = {
     "os._exit(7)": "its process died in the step from t = 0.5 s (exit code 7)",
-    "os.kill(os.getpid(), 11)": "its process died in the step from t = 0.5 s (signal 11, SIGSEGV)",
     "import ctypes; ctypes.string_at(0)": "its process died in the step from t = 0.5 s (signal 11, SIGSEGV)",
-    "[0 for _ in iter(int, 1)]": "the step from t = 0.5 s took longer than 3 s; its process was ended",
     "time.sleep(1000)": "the step from t = 0.5 s took longer than 3 s; its process was ended",
     "raise ValueError('boom')": "the step from t = 0.5 s returned fatal",
 }
@@ -130,7 +128,6 @@ def test_crash_or_hang_ends_in_one_message_with_the_log_kept(plain_fmu, tmp_path
     [
         ("os._exit(3)", "its process died in its instantiation"),
         ("self.enter_initialization_mode = lambda: os._exit(3)", "died in fmi2EnterInitializationMode"),
-        ("self.exit_initialization_mode = lambda: time.sleep(99)", "took longer than 3 s"),
         (
             "self.setup_experiment = lambda *_: time.sleep(99)",
             "fmi2SetupExperiment took longer than 3 s",
@@ -217,7 +214,7 @@ def test_what_it_prints_goes_to_standard_error(plain_fmu, tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
-@pytest.mark.parametrize("last", ["return True", "return t < 0.45", "os._exit(0)"])
+@pytest.mark.parametrize("last", ["return True", "os._exit(0)"])
 def test_what_an_fmu_has_started_ends_with_it(plain_fmu, tmp_path, last):
     mark = tmp_path / "pid"
     step = f"""

@@ -22,7 +22,6 @@ NAN = math.nan
 HIDDEN = {
     "drag": {"vessel.delta_X_u": -4.0},
     "rotational damping": {"vessel.delta_Y_r": 7.25, "vessel.delta_N_r": 1.0},
-    "weak thrusters": {"thrusters.plant_F_vsp": 0.8, "thrusters.plant_F_bow": 1.8},
 }
 
 
@@ -88,10 +87,7 @@ def velocity_error(estimates, nu, rows=slice(None)):
 
 @pytest.mark.parametrize(
     ("hidden", "frozen"),
-    [
-        case if case[0] == "drag" else slow(case)
-        for case in zip(HIDDEN, (False, True, False), strict=True)
-    ],
+    [case if case[0] == "drag" else slow(case) for case in zip(HIDDEN, (False, True), strict=True)],
 )
 def test_best_of_all_observers_on_the_same_log(hidden, frozen, tmp_path):
     """Rich motion with noise: every velocity and acceleration, model right or wrong."""
@@ -200,7 +196,7 @@ def test_heading_is_continuous_over_many_turns():
     assert velocity_error(estimates, nu, slice(1000, None)) < 0.005
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_whatever_comes_in_what_goes_out_is_finite_and_recovers(seed):
     rng = random.Random(seed)
     wild = [NAN, math.inf, -math.inf, 0.0, 1e308, -1e308, 1e154, -1e30, 1e3, -7.0, 5e-324]
@@ -238,7 +234,7 @@ def test_covariance_is_that_of_the_matrices(h):
     assert axis.covariance == pytest.approx(P[np.triu_indices(4)], rel=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_covariance_stays_one(seed):
     """Positive semidefinite and bounded, however odd the innovations and long the pauses."""
     rng = random.Random(seed)

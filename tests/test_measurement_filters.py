@@ -181,19 +181,6 @@ def test_models_that_differ_in_their_filters_are_predicted_each_by_its_own():
 
 
 @pytest.mark.slow
-def test_a_filter_is_found_in_addition_to_the_hidden_effect():
-    """A filter that is computed once a sample lags half a sample less than its time constant."""
-    h, hidden, channel, lag = 0.1, {"delta_X_u": -2.0}, "heading_lag", 1.0
-    run = behind_filters(sail(120.0, h=h, ship=hidden)[0], **{channel: lag})
-    found = {e.id: e for e in diagnose([weak_windows(smoothed(run))]).content.effects}
-    assert {*found} == {channel, "X_u"}
-    assert found["X_u"].confidence > 0.9
-    assert found[channel].confidence >= 0.5
-    assert found[channel].coefficients[channel].value == pytest.approx(lag - h / 2.0, rel=0.1)
-    assert found["X_u"].coefficients["delta_X_u"].value == pytest.approx(-2.0, rel=0.05)
-
-
-@pytest.mark.slow
 def test_a_tracker_is_found_in_addition_to_the_hidden_effect():
     """The heading of an alpha-beta filter at 10 Hz, whose continuous time constant is h / sqrt(beta)."""
     h, gain = 0.1, 0.2

@@ -615,18 +615,6 @@ class TestRoles:
         assert found["energy"] == pytest.approx(2.0 * (last - first) + 1.5 * (last**2 - first**2))
         assert {k: v for k, v in found.items() if k != "energy"} == compute(log, 1.0, 5.0)
 
-    @pytest.mark.slow
-    def test_pictures_do_not_depend_on_names(self, tmp_path):
-        log = wild()
-        drawing.draw({"a": log, "b": wild(2)}, tmp_path / "plain")
-        drawing.draw(
-            {"a": self.renamed(log), "b": wild(2)},
-            tmp_path / "other",
-            {"a": RunOptions(roles=self.OTHER)},
-        )
-        for name in TestPlots.ALL:
-            assert (tmp_path / "plain" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
-
     def test_needed_follows_roles(self):
         assert performance.needed(["vessel.x", "boat.n", "u.b"], self.OTHER) == ["boat.n", "u.b"]
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import multivariate_normal
 from support.command import command
 from support.foreign import needs_compiler
-from support.measured import sail
+from support.measured import sail, table_of
 from support.oscillator import build_oscillator
 
 import cosim
@@ -26,6 +26,7 @@ from diagnosis.design import (
     Basin,
     Limits,
     Question,
+    designing,
     plan_next,
     prepared,
     rehearsal,
@@ -58,6 +59,7 @@ from diagnosis.search.prior import NominalPrior
 
 NUMBERS = DIMENSIONS - 2  # of a manoeuvre
 Q, OWN = 3, 2  # nuisance parameters, and those of each of two hypotheses
+SECONDS = 60.0  # of a planned run
 REACH = Reach(0.15, 0.2, 2.5, 1.0, -0.5, 0.5)
 
 
@@ -269,13 +271,8 @@ def ahead(t):
 def question():
     """Two candidates that a run ahead leaves open: drag by |u|u and by uu."""
     run, _ = sail(64.0, h=0.05, ship={"delta_X_absu_u": -4.0}, given=ahead)
-    data = diagnosis.load(diagnosis_frame(run))
-    return Question(data, content(), Model(), 0.1, Limits(120.0, size=(6.0, 6.0)))
-
-
-def diagnosis_frame(run):
-    columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
-    return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=columns)
+    data = diagnosis.load(table_of(run))
+    return Question(data, content(), Model(), 0.1, Limits(SECONDS, size=(6.0, 6.0)))
 
 
 @pytest.fixture(scope="module")
@@ -290,8 +287,8 @@ def test_running_astern_discriminates_what_running_ahead_does_not(designer):
     d, k = designer
     assert {h.ids for h in k.hypotheses} == {("X_|u|u",), ("X_uu",)}
     assert k.weights == pytest.approx(0.5, abs=1e-3)
-    astern = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
-    around = d.scored(k, usual("circle", 120.0))
+    astern = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)])
+    around = d.scored(k, usual("circle", SECONDS))
     assert astern.excess == around.excess == 0.0
     assert astern.score > 0.9 > 0.1 > around.score
     d.tried[:] = [around]
@@ -305,8 +302,8 @@ def rehearsed(question, designer):
     """What learn would report, a run astern and one around."""
     d, k = designer
     plans = (
-        d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)]),
-        d.scored(k, usual("circle", 120.0)),
+        d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)]),
+        d.scored(k, usual("circle", SECONDS)),
     )
     return Rehearsal(question.data, d.space, k), *(d.windows(s.motion) for s in plans)
 
@@ -352,7 +349,7 @@ def test_what_the_actuators_cannot_do_is_not_proposed(designer):
     d, k = designer
     fast = replace(d, tried=[])
     fast.reach = d.reach._replace(speed=3.0, rate=3.0)
-    found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, 120.0, 0.0)])
+    found = fast.scored(k, [PlanStep("legs", (1.0,) * NUMBERS, SECONDS, 0.0)])
     assert found.excess > 0.0
     assert found.score < -1.0, "below any plan that keeps the limits"
     assert not found.gram.any()
@@ -385,7 +382,7 @@ def test_a_faster_motion_has_the_same_track(designer):
 def test_a_plan_keeps_a_margin_to_the_speed_at_which_a_ship_diverges(designer, monkeypatch):
     """A ship that is lost at any speed above that of the plan is outside of every basin."""
     d, k = designer
-    s = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, 120.0, 0.0)])
+    s = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)])
     track = d.motion(s.steps, s.size, EVERY)
 
     def lost(models, motion):
@@ -446,13 +443,17 @@ def test_no_simulated_ship_leaves_the_basin(designer):
     """A plan that keeps the basin with the spread of its draws keeps it with draws of another seed."""
     d, k = designer
     rng = np.random.default_rng(3)
-    plans = (d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), 120.0)) for _ in range(50))
+    plans = (d.scored(k, sequence(rng.random(2 * (NUMBERS + 2)), SECONDS)) for _ in range(50))
     kept = next(s for s in plans if s.excess == 0.0 and d.spread(k, s, 0).margin.min() > 0.0)
     assert d.spread(k, kept, 99).margin.min() > 0.0
 
 
 @pytest.mark.slow
-def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path):
+def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path, monkeypatch):
+    for module, name, few in (
+        (designing, "LOG_POINTS", 4), (designing, "EVOLVED", 24), (rehearsal, "DRAWS", 20),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, few)
     plan = plan_next(question)
     assert plan.runs[0].sure > 0.9
     assert plan.runs[0].spread.margin.min() > 0.0
@@ -586,7 +587,7 @@ def test_basins_by_size_and_by_file(tmp_path):
 
 def test_a_basin_smaller_than_the_ship_and_an_unknown_criterion_are_refused(question):
     with pytest.raises(InputError, match="too small"):
-        plan_next(replace(question, limits=Limits(120.0, size=(1.0, 1.0))))
+        plan_next(replace(question, limits=Limits(SECONDS, size=(1.0, 1.0))))
     with pytest.raises(InputError, match="certainty"):
         plan_next(replace(question, criterion="certain"))
     with pytest.raises(InputError, match="minutes or more"):

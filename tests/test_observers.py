@@ -130,7 +130,7 @@ def test_no_upset_is_for_good(observer, h, upset):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("observer", [o for o in OBSERVERS if o != "observer_df"])
+@pytest.mark.parametrize("observer", ["observer_luenberger", "observer_nonlinear"])
 def test_heading_runs_on_over_turns(on_the_ellipse, observer):
     log = on_the_ellipse(observer)
     assert np.abs(log["vessel.psi"]).max() > math.pi

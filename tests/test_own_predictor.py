@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from support.command import command
-from support.measured import sail
+from support.measured import csv_of, sail
 from support.project import ROOT
 
 import diagnosis
@@ -83,10 +83,7 @@ def test_a_wrong_term_is_the_force_that_the_function_lacks(runs, plain):
 def test_a_wrong_term_of_a_function_is_learned(tmp_path, file):
     """The ship has a damper that the function lacks, by the command."""
     for k, seconds in enumerate((64.0, 40.0)):
-        run = sail(seconds, ship=DAMPER, seed=k)[0]
-        table = np.column_stack([run.time, run.pose, run.tau_cmd])
-        header = "time,x,y,psi,tau_X,tau_Y,tau_N"
-        np.savetxt(tmp_path / f"{k}.csv", table, delimiter=",", header=header, comments="")
+        csv_of(sail(seconds, ship=DAMPER, seed=k)[0], tmp_path / f"{k}.csv")
     given = ("0.csv", "--test", "1.csv", "--model", file, "--prior", 0, "--out", "out")
     done = command(learn.main, *given, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -99,10 +96,7 @@ def test_a_wrong_term_of_a_function_is_learned(tmp_path, file):
 
 
 def test_the_command_takes_a_file_and_says_how_it_predicts(tmp_path, file):
-    run = sail(40.0)[0]
-    table = np.column_stack([run.time, run.pose, run.tau_cmd])
-    header = "time,x,y,psi,tau_X,tau_Y,tau_N"
-    np.savetxt(tmp_path / "run.csv", table, delimiter=",", header=header, comments="")
+    csv_of(sail(40.0)[0], tmp_path / "run.csv")
     given = ("run.csv", "--model", file, "--out", "out")
     done = command(diagnosis.compare.main, *given, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -134,7 +134,7 @@ def test_of_a_trial_that_is_the_whole_run_or_a_part(prepared, monkeypatch, spoil
     assert (part.used == prepared.samples[inside]).mean() > 0.999  # a spike may be told at an end
 
 
-@pytest.mark.parametrize("main", [pca.main, slow(pls.main), slow(sysid.main)])
+@pytest.mark.parametrize("main", [pca.main, slow(sysid.main)])
 def test_of_the_analyses_of_the_thesis(prepared, monkeypatch, spoilt, tmp_path, main):
     found = []
     gather = analysis.gather_samples

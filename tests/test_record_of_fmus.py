@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 from support.foreign import needs_compiler
-from support.measured import sail
-from test_validation_record import validated, write_run
+from support.measured import csv_of, sail
+from test_validation_record import validated
 
 import diagnosis
 from benchmarks.foreign_parameters.c_fmu import CSystem, Quantity, build_c_fmu
@@ -59,7 +59,7 @@ MAP = {"inputs": {n: n for n in SHIP.inputs}, "outputs": NAMES, "start": {n: f"{
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    return write_run(tmp_path_factory.mktemp("run") / "a.csv", sail(48.0, h=0.1)[0])
+    return csv_of(sail(48.0, h=0.1)[0], tmp_path_factory.mktemp("run") / "a.csv")
 
 
 def compared(run, folder, name, habit="", **execution):

@@ -50,10 +50,7 @@ def run_alone(fmu, tmp_path, **options):
 
 DEATHS = {
     "__import__('ctypes').CDLL(None).exit(0)": "exit code 0",
-    "os._exit(0)": "exit code 0",
-    "os.abort()": "signal 6, SIGABRT",
     "__import__('ctypes').string_at(0)": "signal 11, SIGSEGV",
-    "os.kill(os.getpid(), 9)": "signal 9, SIGKILL",
     "os.kill(os.getpid(), 15)": "signal 15, SIGTERM",
 }
 
@@ -165,8 +162,11 @@ COMMANDS = (
 
 
 @linux_only
-@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda arguments: arguments[0])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("arguments", "number"),
+    [*((c, signal.SIGINT) for c in COMMANDS), (COMMANDS[0], signal.SIGTERM)],
+    ids=lambda x: x[0] if isinstance(x, list) else x.name,
+)
 def test_interrupt_while_it_imports_is_one_line(tmp_path, arguments, number):
     process = subprocess.Popen(
         [sys.executable, "-m", *arguments], cwd=ROOT, text=True,
@@ -416,29 +416,29 @@ def test_runs_in_one_process_leave_nothing(ellipse, tmp_path):
 @linux_only
 def test_campaign_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
-    assert mutations.broken_scenarios(20, 2, tmp_path, nothing) == []
-    assert mutations.broken_files(10, 2, tmp_path, nothing) == []
+    assert mutations.broken_scenarios(6, 2, tmp_path, nothing) == []
+    assert mutations.broken_files(4, 2, tmp_path, nothing) == []
     assert endings.kills(1, 2, tmp_path, nothing) == []
     assert endings.signals(1, 2, tmp_path, nothing) == []
     assert endings.short_of_disk(1, 2, tmp_path, nothing) == []
-    assert endings.deaths(3, 2, tmp_path, nothing) == []
+    assert endings.deaths(1, 2, tmp_path, nothing) == []
     assert campaigns.interrupted_campaigns(1, 2, tmp_path, nothing) == []
-    assert campaigns.deaths_elsewhere(2, 2, tmp_path, nothing) == []
+    assert campaigns.deaths_elsewhere(1, 2, tmp_path, nothing) == []
     assert campaigns.spoilt_cache(1, 2, tmp_path, nothing) == []
 
 
 @linux_only
 def test_broken_ships_in_small(tmp_path, monkeypatch):
     monkeypatch.setattr(ship_mutations, "EACH", 1000)  # none but the first is built
-    assert ship_mutations.broken_ships(20, 2, tmp_path, lambda: None) == []
+    assert ship_mutations.broken_ships(8, 2, tmp_path, lambda: None) == []
 
 
 @pytest.mark.slow
 @linux_only
 def test_killed_commands_in_small(tmp_path):
     nothing = lambda: None  # noqa: E731
-    assert killed_commands.interrupted_compares(1, 2, tmp_path, nothing) == []
-    assert killed_commands.killed_diagnoses(2, 2, tmp_path, nothing) == []
+    assert killed_commands.interrupted_compares(2, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_diagnoses(1, 2, tmp_path, nothing) == []
     assert killed_commands.ended_builds(2, 2, tmp_path, nothing) == []
     assert killed_commands.killed_campaigns(1, 2, tmp_path, nothing) == []
 
@@ -447,4 +447,4 @@ def test_killed_commands_in_small(tmp_path):
 @linux_only
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 def test_random_calls_under_sanitizers(tmp_path):
-    assert sanitized.sanitized_calls(8, 2, tmp_path, lambda: None) == []
+    assert sanitized.sanitized_calls(4, 2, tmp_path, lambda: None) == []

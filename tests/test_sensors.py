@@ -474,7 +474,7 @@ def test_of_a_pose_alone_nothing_can_be_said(tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("trial", ["trial_1", "trial_2"])
+@pytest.mark.parametrize("trial", ["trial_1"])
 def test_the_sea_trial_closes_once_its_clock_is_repaired(trial):
     path = DATA / "gunnerus" / f"{trial}.csv"
     if not path.is_file():

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from support.measured import jumps, sail
+from support.measured import csv_of, jumps, sail
 from test_own_effects import LINEAR
 
 import diagnosis
@@ -32,13 +32,6 @@ from fmus.build import build, native_targets
 
 pypdf = pytest.importorskip("pypdf")
 EASY = {"quantity": "position", "horizon": 4.0, "tolerance": 0.5, "unit": "m", "coverage": 0.5}
-NAMES = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
-
-
-def write_run(path, run):
-    columns = np.column_stack([run.time, run.pose, run.tau_cmd])
-    pd.DataFrame(columns, columns=NAMES).to_csv(path, index=False)
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +39,9 @@ def folder(tmp_path_factory):
     """Three runs, of which the second is the first at other times."""
     made = tmp_path_factory.mktemp("runs")
     run = sail(48.0, h=0.1)[0]
-    write_run(made / "a.csv", run)
-    write_run(made / "again.csv", replace(run, time=run.time + 7.0))
-    write_run(made / "b.csv", sail(48.0, h=0.1, given=jumps)[0])
+    csv_of(run, made / "a.csv")
+    csv_of(replace(run, time=run.time + 7.0), made / "again.csv")
+    csv_of(sail(48.0, h=0.1, given=jumps)[0], made / "b.csv")
     return made
 
 
@@ -197,7 +190,7 @@ def test_effects_of_a_user_are_code_that_nothing_confines(folder, tmp_path):
 
 def test_falsified_data_next_to_an_original_does_not_hold(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    data = write_run(tmp_path / "run.csv", sail(48.0, h=0.1)[0])
+    data = csv_of(sail(48.0, h=0.1)[0], tmp_path / "run.csv")
     v = validated(diagnosis.compare("run.csv"), tmp_path, {})
     v.write(tmp_path / "out")
     usual = [str(tmp_path / "out" / FILES[0]), "--allow-missing", "signature"]
@@ -356,7 +349,7 @@ def test_a_predictor_of_a_user_is_named_by_its_code(comparison, tmp_path):
 def test_cuts_of_one_log_that_overlap_count_once(folder, tmp_path):
     run = sail(64.0, h=0.1)[0]
     for name, begin, end in (("first", 0.0, 40.0), ("last", 30.0, 64.0)):
-        write_run(tmp_path / f"{name}.csv", run.rows((run.time >= begin) & (run.time < end)))
+        csv_of(run.rows((run.time >= begin) & (run.time < end)), tmp_path / f"{name}.csv")
     c = diagnosis.compare([tmp_path / "first.csv", tmp_path / "last.csv"])
     assert validated(c, tmp_path, {}).content.judgements[0].runs == ["first"]
 
@@ -378,7 +371,7 @@ def test_samples_that_are_well_before_the_horizon_are_said(folder, tmp_path):
     """At 1 Hz the last sample of a window of 4 s is at 3 s, where the error is smaller."""
     run = sail(48.0, h=0.1)[0]
     rare = replace(run, time=run.time[::10], pose=run.pose[::10], tau_cmd=run.tau_cmd[::10])
-    c = diagnosis.compare(write_run(tmp_path / "rare.csv", rare))
+    c = diagnosis.compare(csv_of(rare, tmp_path / "rare.csv"))
     early, late = validated(c, tmp_path, {"horizon": 4.0}, {"horizon": 12.0}).content.judgements
     assert any("is 3 s after the start" in flag for flag in early.flags)
     assert not any("Samples are rare" in flag for flag in late.flags)
@@ -412,7 +405,7 @@ def test_the_inside_of_a_system_is_hashed(tmp_path, monkeypatch):
     system = {"name": "system", "step": 0.05, "stop": 10.0, "fmus": {"ship": {"path": "inner.fmu"}}}
     (tmp_path / "system.json").write_text(json.dumps(system))
     run = sail(24.0, h=0.1)[0]
-    write_run(tmp_path / "run.csv", run)
+    csv_of(run, tmp_path / "run.csv")
     c = diagnosis.compare("run.csv", model="system.json")
     v = validated(c, tmp_path, {})
     assert {f.role for f in v.content.files} == {"data", "model", "FMU ship"}

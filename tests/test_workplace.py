@@ -3,7 +3,6 @@
 import argparse
 import importlib.util
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -31,7 +30,6 @@ from cosim.system import prepare
 from cybership import completion, subcommands
 from cybership.__main__ import main, usage
 from cybership.subcommands import GROUP, SUBCOMMANDS, all_modules, purpose
-from diagnosis import compare
 from diagnosis.commands import command_line
 from diagnosis.execution import result_folder
 from diagnosis.verdict import judging
@@ -327,21 +325,6 @@ def test_a_diagnosis_is_not_laid_over_that_of_other_inputs(tmp_path):
     result_folder.keep_inputs(usual, inputs)
     assert result_folder.default_folder(usual, inputs) == usual
     assert result_folder.default_folder(usual, {"b": "other"}) == second
-
-
-def test_a_refused_call_removes_what_killed_calls_have_left(tmp_path, capsys):
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    left = tmp_path / f".new-{ended.pid}_abc"
-    (left / "files").mkdir(parents=True)
-    mine = tmp_path / f".new-{os.getpid()}_abc"
-    mine.mkdir()
-    assert compare.main([str(tmp_path / "nowhere.csv"), "--out", str(tmp_path)]) == 2
-    assert not left.exists()
-    assert mine.exists()  # its process lives
-    note, error = capsys.readouterr().err.splitlines()
-    assert note.startswith("note: removed 1 unfinished result")
-    assert error.startswith("error: no such measurement")
 
 
 def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from diagnosis import Run, clean, smooth
@@ -117,6 +118,18 @@ def smoothed(run):
 
 def _smoothed(run):
     return smooth(clean(run))
+
+
+def table_of(run):
+    """The run as a table of the usual columns."""
+    columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+    return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=columns)
+
+
+def csv_of(run, path):
+    """The path of a file with the run."""
+    table_of(run).to_csv(path, index=False)
+    return path
 
 
 def changed(run, rows, pose):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from support.command import command
 from support.cse1 import VESSEL as COMPONENT
-from support.measured import sail, smoothed
+from support.measured import csv_of, sail, smoothed
 
 from cosim import InputError
 from diagnosis.assessment import least_dissipation
@@ -322,9 +322,7 @@ def runs(tmp_path_factory):
             ship={"delta_X_u": -3.0},
             thrusters={"loss_yaw": 0.2},
         )
-        table = np.column_stack([run.time, run.pose, run.tau_cmd])
-        columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
-        pd.DataFrame(table, columns=columns).to_csv(folder / f"{name}.csv", index=False)
+        csv_of(run, folder / f"{name}.csv")
     return folder
 
 

@@ -1,6 +1,5 @@
 """Reports, pictures and commands of the studies, of numbers and logs that were made up: nothing sails."""
 
-import inspect
 import itertools
 import json
 import re
@@ -13,7 +12,6 @@ import pytest
 import cosim
 from cosim.dispatch import FinishedRun
 from fmus.hull import RotationalDamping
-from studies import measured_ship
 from studies.measured import ship_tables
 from studies.measured.expected import BY_HAND, STEERED, Fall
 from studies.study_report import Report, Verdict
@@ -294,58 +292,6 @@ def test_scenarios_of_chapter_7():
         assert ("eight" in name) == ("eight" in content["fmus"]["guidance"]["path"])
 
 
-def test_report_of_chapter_7(tmp_path, monkeypatch):
-    """What each part gets; the parts are tested by themselves."""
-    asked, parts = [], {}
-
-    def gather_samples(folders, by):
-        asked.append((by, [f.parent.name for f in folders]))
-        return [by] * len(folders)
-
-    def part(name):
-        return lambda report, *given: parts.setdefault(name, []).append(given) or name
-
-    monkeypatch.setattr(cosim, "read_log", lambda folder: f"log of {folder.parent.name}")
-    monkeypatch.setattr(
-        chapter7, "run_all", lambda todo, seeds, analyse, *more: asked.append((set(todo), *more[:2]))
-    )
-    monkeypatch.setattr(chapter7, "true_samples", lambda folder: f"samples of {folder.parent.name}")
-    monkeypatch.setattr(analysis, "gather_samples", gather_samples)
-    monkeypatch.setattr(analysis, "joined", "+".join)
-    monkeypatch.setattr(chapter7, "simulated", part("simulated"))
-    monkeypatch.setattr(chapter7, "measured", part("measured"))
-    monkeypatch.setattr(chapter7, "write_loops", part("loops"))
-    monkeypatch.setattr(chapter7.tables, "write_shapes", part("shapes"))
-    monkeypatch.setattr(chapter7.tables, "write_eight", part("eight"))
-    monkeypatch.setattr(chapter7, "write_replay", part("replay"))
-    text, _ = written(chapter7.study(tmp_path, 60.0, 3, None), tmp_path)
-    assert asked == [
-        ({*chapter7.scenarios(60.0)}, tmp_path / "logs", 3),
-        ("mdf", [*trials.CONTROLLERS]),
-        ("mdf", [f"{c}_eight" for c in trials.CONTROLLERS]),
-        ("smoothed", ["true"]),
-        ("mdf", ["true"]),
-    ]
-    own = [
-        ("true states", "samples of true"),
-        ("smoothed", "smoothed"),
-        ("mdf", "mdf"),
-        ("eight", "samples of eight"),
-    ]
-    (replayed,) = parts.pop("replay")
-    assert replayed[0] == tmp_path / "logs" / "controller_cl_win_eps_eight" / "0"
-    assert replayed[1] == chapter7.scenarios(60.0)["controller_cl_win_eps_eight"]
-    assert parts == {
-        "eight": [("mdf+mdf+mdf+mdf", "simulated")],
-        "shapes": [("mdf+mdf+mdf+mdf", "log of true")],
-        "simulated": [("mdf+mdf+mdf+mdf", own)],
-        "loops": [("simulated", 60.0, 3)],
-    }
-    assert "Runs in a row: RBS, ABS, CLZ, CLE; ellipse" in text
-    chapter7.study(tmp_path, None, None, tmp_path)
-    assert parts["measured"] == [(tmp_path,)]
-
-
 def test_last_lap_is_the_last_99_seconds():
     late = np.arange(0.0, 300.0, 0.5) >= 299.5 - improved.LAP
     zero = {f"controller__omega_hat_{a}": 0.0 for a in AXES}
@@ -383,22 +329,6 @@ def laps(improved_=0.001, others=0.3):
         }
         for sense in improved.SENSES
     }  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("size", "others", "here"),
-    [
-        (0.003, 0.3, [True, True, True, True]),
-        (0.001, 0.3, [True, True, True, False]),
-        (0.2, 0.3, [False, False, False, False]),
-        (0.003, 0.05, [False, True, True, True]),
-        (0.4, 0.3, [False, False, False, False]),
-        (0.3, 0.3, [False, False, False, False]),
-    ],
-)
-def test_verdicts_on_the_improved_controller(size, others, here):
-    found = improved.claims(laps(size, others))
-    assert [row.holds for row in found] == here
 
 
 def test_report_of_the_improved_controller(tmp_path, monkeypatch, figures, drawn, read):
@@ -861,39 +791,6 @@ def test_windows_are_told_with_those_that_are_worse_or_run_away(tmp_path):
         "Geometric mean of the reduction of the heading error: 1.00× left out, 2.00× with the run"
         in text
     )
-
-
-def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
-    """What each table gets is checked against what it takes; their content is tested elsewhere."""
-    run = SimpleNamespace(run=SimpleNamespace(name="a"))
-    content = {"verdict": "found", "where": "long"}
-    fold = SimpleNamespace(name="a", content=content, evaluation=None)
-    last = SimpleNamespace(learned=SimpleNamespace(model="learned"))
-    parts = {}
-    for name in ("falls", "windows", "expected", "curve", "findings"):
-        takes = inspect.signature(getattr(ship_tables, f"write_{name}"))
-
-        def write(*given, name=name, takes=takes):
-            parts.setdefault(name, []).append(takes.bind(*given).arguments)
-
-        monkeypatch.setattr(ship_tables, f"write_{name}", write)
-    monkeypatch.setattr(ship_tables, "model_error_picture", lambda e: "drawn")
-    monkeypatch.setattr(measured_ship.bollard, "read", lambda _: "pulls")
-    monkeypatch.setattr(measured_ship, "measured_files", lambda _: ["a.mat"])
-    monkeypatch.setattr(measured_ship, "gather", lambda files, advance: [run])
-    monkeypatch.setattr(measured_ship, "learned", lambda runs, prior, quick, advance: [fold])
-    monkeypatch.setattr(measured_ship, "with_all", lambda folds, found: folds)
-    monkeypatch.setattr(measured_ship.diagnosis, "diagnose", lambda *_, **__: last)
-    monkeypatch.setattr(measured_ship, "diagnosis_content", lambda found, model, files: content)
-    text, results = written(measured_ship.study(tmp_path, tmp_path, 0.1, quick=True), tmp_path)
-    assert [list(arguments.values())[1:] for arguments in parts["curve"]] == [
-        [[fold], "learned", "pulls"]
-    ]
-    assert [a["name"] for a in parts["findings"]] == ["Learned without a", "Learned from all runs"]
-    assert [len(parts[name]) for name in ("falls", "windows", "expected")] == [1, 1, 1]
-    assert figures["omega_a"][0] == "drawn"
-    assert results["diagnoses"] == {"without a": {"verdict": "found"}, "all runs": {"verdict": "found"}}
-    assert "`python -m diagnosis.learn --prior 0.1`" in text
 
 
 # Commands
