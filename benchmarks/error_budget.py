@@ -2,7 +2,7 @@
 
 The model is calibrated to all runs of a data set. Its predictions in the longest windows are linearised.
 *Stated*: share of the mean square error that a part has by its own uncertainty. *Explained*: share that
-is gone once the part is fitted, within its prior, to what it explains; an upper bound, and parts overlap.
+goes if the part is fitted, within its prior, to what it explains; an upper bound, and parts overlap.
 """
 
 import argparse

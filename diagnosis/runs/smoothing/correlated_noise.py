@@ -34,7 +34,7 @@ NORMAL = 0.4549  # median of the square of a standard normal variable
 # Relative variance of a variance by the median of n independent squares, times n: 2 over its
 # efficiency of 0.37.
 SPREAD = 5.4
-ROUNDS = 10  # most of noise and smoothness in turn; three to six are the rule
+ROUNDS = 10  # most of noise and smoothness in turn; six to ten are the rule
 SETTLED = 0.02  # 1, of the noise
 
 
