@@ -373,6 +373,7 @@ def test_other_packages_use_public_names_of_cosim(package, allowed):
 # Time, calibration and constants of single parts of the diagnosis.
 MEASURE_PARTS = (
     "benchmarks.calibration",
+    "benchmarks.error_budget",
     "benchmarks.fit_drivers",
     "benchmarks.foreign_parameters.coverage",
     "benchmarks.learning_time",

@@ -172,6 +172,19 @@ def test_rows_that_are_lost_are_counted_and_too_many_are_refused():
         prepare(replace(base(), time=time))
 
 
+def test_empty_rows_at_the_end_are_no_reason_to_refuse():
+    """A spreadsheet may end in as many as it likes."""
+    run = base()
+    empty = np.full((N, 3), np.nan)
+    longer = run.rows(np.tile(np.arange(N), 2))
+    time, pose = np.append(run.time, np.full(N, np.nan)), np.vstack([run.pose, empty])
+    nothing = {name: np.append(x, np.full(N, np.nan)) for name, x in run.measured.items()}
+    found = ordered(replace(longer, time=time, pose=pose, measured=nothing))
+    np.testing.assert_array_equal(found.time, run.time)
+    np.testing.assert_array_equal(found.pose, run.pose)
+    assert found.left_out == N
+
+
 @pytest.mark.parametrize("every", [2, 3, 4])
 def test_rows_that_straight_lines_have_filled_are_no_measurements(every):
     """The heading is measured in every row, the position in some of them alone."""

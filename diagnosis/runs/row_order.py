@@ -29,6 +29,7 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     """
     if np.isfinite(run.time).all() and (np.diff(run.time) > 0.0).all():
         return run
+    run = _without_empty(run)
     many = run.time.size
     found = _spread(_merged(continued(_sorted(run), scale)))
     kept = in_order(found.time)
@@ -38,6 +39,15 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     out = found.left_out + lost
     note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
+
+
+def _without_empty(run: Run) -> Run:
+    """The run without rows that have no time and no measured value, as at the end of a spreadsheet."""
+    cells = np.column_stack([run.time, run.pose, *run.measured.values()])
+    there = np.asarray(np.isfinite(cells).any(axis=1))
+    if there.all():
+        return run
+    return replace(run.rows(there), left_out=run.left_out + int((~there).sum()))
 
 
 def _sorted(run: Run) -> Run:

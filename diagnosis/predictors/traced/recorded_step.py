@@ -82,7 +82,9 @@ def recorded_step(b: Ready, i: Inputs, single: bool) -> Callable[..., Sequence[A
 
     def plain(*given: Any) -> vessel.State:
         flat = iter(given)
-        return _flat_step(*(None if n is None else tuple(islice(flat, n)) for n in counts), *b)
+        groups = [None if n is None else tuple(islice(flat, n)) for n in counts]
+        state, h = vessel.State._make(groups[0]), groups[-1][0]
+        return step(state, Inputs._make(groups[1:-1]), b, h)
 
     return plain
 

@@ -29,6 +29,7 @@ from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
+from .correlated_noise import with_correlated
 from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
@@ -36,6 +37,7 @@ from .spline import DEGREE, Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 QUICKEST = 0.5  # s, of a motion (chosen)
+LASTING = 4.0 * QUICKEST  # s, over which errors of a pose are looked for that last; chosen
 # [m, m, rad]; a smaller noise is implausible, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # 1, times what the samples scatter by, from which on a given noise is doubted. Chosen: with less,
@@ -255,6 +257,9 @@ def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
         resolved = bool(2.0 * track.periods.max() <= QUICKEST * track.scale.time)
         try:
             alone = robust(even, local, least, resolved)
+            even = even._replace(sigma=alone.problem.sigma)
+            free, longest = np.isnan(given_noise(track)), LASTING * track.scale.time
+            alone = with_correlated(alone, even, track.run.time[even.rows], longest, free)
             return rows, even._replace(sigma=alone.problem.sigma), origin, alone
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
