@@ -61,10 +61,10 @@ def step(s: vessel.State, i: Inputs, b: Ready, h: Any) -> vessel.State:
     )
 
 
-def _flat_step(
-    s: Sequence[Any], given: Any, acting: Any, power: Any, air: Any, h: Any, hull: Any, drive: Any
-) -> vessel.State:
-    return step(vessel.State._make(s), Inputs(given, acting, power, air), Ready(hull, drive), *h)
+def _flat_step(s: Any, *given: Any) -> vessel.State:
+    """A step of groups of numbers (state, the inputs, h), and the parts of a model."""
+    *inputs, h, hull, drive = given
+    return step(vessel.State._make(s), Inputs._make(inputs), Ready(hull, drive), *h)
 
 
 def recorded_step(b: Ready, i: Inputs, single: bool) -> Callable[..., Sequence[Any]]:
@@ -82,9 +82,7 @@ def recorded_step(b: Ready, i: Inputs, single: bool) -> Callable[..., Sequence[A
 
     def plain(*given: Any) -> vessel.State:
         flat = iter(given)
-        groups = [None if n is None else tuple(islice(flat, n)) for n in counts]
-        state, h = vessel.State._make(groups[0]), groups[-1][0]
-        return step(state, Inputs._make(groups[1:-1]), b, h)
+        return _flat_step(*(None if n is None else tuple(islice(flat, n)) for n in counts), *b)
 
     return plain
 
