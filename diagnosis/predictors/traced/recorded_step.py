@@ -63,8 +63,8 @@ def step(s: vessel.State, i: Inputs, b: Ready, h: Any) -> vessel.State:
 
 def _flat_step(s: Any, *given: Any) -> vessel.State:
     """A step of groups of numbers (state, the inputs, h), and the parts of a model."""
-    *inputs, h, hull, drive = given
-    return step(vessel.State._make(s), Inputs._make(inputs), Ready(hull, drive), *h)
+    *inputs, (h,), hull, drive = given
+    return step(vessel.State._make(s), Inputs._make(inputs), Ready(hull, drive), h)
 
 
 def recorded_step(b: Ready, i: Inputs, single: bool) -> Callable[..., Sequence[Any]]:
