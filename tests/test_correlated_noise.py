@@ -93,3 +93,11 @@ def test_given_noise_stays():
     pose = run.pose + 2e-3 * lasting(rng, 1.0, 0.6, run.time.size, 0.02)[:, None]
     found = smoothed(replace(run, pose=pose, noise={"x": 1e-3, "y": 1e-3, "psi": 1e-3}))
     np.testing.assert_allclose(found.noise, 1e-3)
+
+
+def test_a_gap_of_years_counts_as_one_of_minutes():
+    z = np.random.default_rng(4).standard_normal(N)
+    late = np.arange(N) >= N // 2
+    minutes, years = (hadamard(TIME + late * gap, z, LONGEST) for gap in (100.0, 1e9))
+    for a, b in zip(minutes, years, strict=True):
+        np.testing.assert_allclose(a, b)

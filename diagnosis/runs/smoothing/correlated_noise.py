@@ -77,6 +77,7 @@ def hadamard(
     counts = np.maximum(np.round(step / period), 1.0)
     if np.mean(np.abs(step - counts * period) <= ON_GRID * period) < 1.0 - ON_GRID:
         return np.zeros(0), np.zeros(0), np.zeros(0), period
+    counts = np.minimum(counts, int(3.0 * longest / period) + 1)  # none reaches over a longer gap
     place = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     even = np.full(place[-1] + 1, np.nan)
     even[place] = z
