@@ -285,7 +285,7 @@ def cell_rows(cell: Cell, kinds: Sequence[str], limits: Limits) -> Iterator[dict
 
 
 def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dict]:
-    """Designs of a ship, each run by fresh ships of every candidate above 5 %, and once with noise.
+    """Designs of a ship, each run by fresh ships of every candidate above 5 %, at the speed of the plan.
 
     The diagnosis that a design begins with is made up: the hidden effects, each with random rivals, at
     even odds. The ships are drawn from the posterior of each candidate anew.
@@ -302,7 +302,9 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
             except InputError as error:
                 yield base | {"result": f"no design: {error}"}
                 continue
-            yield base | {"planned": float(spread.margin.min()), "margin": float(fresh.margin.min())}
+            margins = [d.basin.margin(eta, d.outline).min() for eta in np.concatenate(fresh.eta)]
+            left = float(np.nan_to_num(np.min(margins), nan=-np.inf))
+            yield base | {"planned": float(spread.margin.min()), "margin": left, "ships": len(margins)}
 
 
 def _made_up(cell: Cell) -> dict:

@@ -193,7 +193,8 @@ def spread(
         # The controller of a ship that is close to diverging loses control at a higher speed: by two
         # prior standard deviations of a coefficient.
         every.append(followed(models, motion.faster(1.0 + 2.0 * MEASURED)))
-    least = [[basin.margin(track, outline).min() for track in each] for each in every]
+    with np.errstate(invalid="ignore"):  # of a ship that ran away
+        least = [[basin.margin(track, outline).min() for track in each] for each in every]
     margins = np.nan_to_num(np.min(least, axis=0), nan=-np.inf).reshape(len(ids), MEMBERS)
     return Spread(
         motion.time, eta.reshape(len(ids), MEMBERS, *eta.shape[1:]), list(ids), margins.min(axis=1)
