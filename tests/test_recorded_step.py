@@ -70,6 +70,20 @@ def test_compiled_steps_follow_each_other(name):
 
 
 @pytest.mark.skipif(not compiled_law.compiler(), reason="no binary for this: no C compiler")
+@pytest.mark.parametrize("name", SHIPS)
+def test_a_condition_that_holds_differs_from_one_of_each_model(name):
+    """A current acts on one model, then on each of three."""
+    one, other = (SHIPS[name].plus({"V_n": speed}) for speed in (0.1, 0.2))
+    for model in (one, stacked([one, other, one])):
+        s, i, b = at(model, np.random.default_rng(8))
+        given, acting = (np.array([x]) for x in i[:2])
+        found = recorded_step.compiled_states(b, s, [given, acting, None, None], H)
+        assert found is not None
+        wanted = np.stack([np.broadcast_to(x, found.shape[2:]) for x in step(s, i, b, H)])
+        np.testing.assert_allclose(found[1], wanted, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.skipif(not compiled_law.compiler(), reason="no binary for this: no C compiler")
 def test_what_diverges_is_not_finite():
     s, i, b = at(SHIPS["otter"], np.random.default_rng(6))
     s = s._replace(u=np.full((1, 5), 1e200))

@@ -70,10 +70,16 @@ void steps(const long long *size, const double *const *at, const long long *stri
 
 
 class CompiledLaw(NamedTuple):
-    """A law of a step, compiled, with so many numbers in its state."""
+    """A law of a step, compiled.
+
+    Attributes:
+        library: the machine code.
+        state, count: how many numbers its state has, and all arguments have.
+    """
 
     library: ctypes.CDLL
     state: int
+    count: int
 
     def states(
         self,
@@ -92,7 +98,12 @@ class CompiledLaw(NamedTuple):
 
         Returns:
             (steps + 1, kept, p, w).
+
+        Raises:
+            TypeError: not as many arguments as the law has.
         """
+        if len(start) + len(inputs) + len(numbers) != self.count:
+            raise TypeError(f"the law takes {self.count} numbers")
         still = [np.asarray(x, float) for x in (*start, *numbers)]
         steps, kept = len(inputs[0]), self.state if kept is None else kept
         moving = [
@@ -127,7 +138,7 @@ def compiled_law(
     text.append(writer.function(head, recording, [("after", recording.results)]))
     text.append(LOOP.format(state=state, inputs=inputs, count=count))
     library = _library("\n".join(text))
-    return None if library is None else CompiledLaw(library, state)
+    return None if library is None else CompiledLaw(library, state, count)
 
 
 @cache

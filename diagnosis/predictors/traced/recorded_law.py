@@ -49,7 +49,7 @@ def structure(
         law, counts, parts: as of :class:`Structure`.
         arrays: whether a number differs from an array of numbers.
     """
-    kind = _kind if arrays else _is_condition
+    kind = _kind if arrays else _meaning
     key = tuple([(_kinds(_numbers(part), kind), id(part.effects)) for part in parts])
     return Structure(law, key, tuple(counts), parts)
 
@@ -132,6 +132,11 @@ def _kind(x: Any) -> Hashable:
 
 def _is_condition(x: Any) -> bool:
     return _kind(x) == "b"
+
+
+def _meaning(x: Any) -> Hashable:
+    """What differs from a condition that is known, which is in the key as it is."""
+    return "condition" if _is_condition(x) else "number"
 
 
 def _kinds(x: Any, kind: Callable[[Any], Hashable]) -> Hashable:
