@@ -84,7 +84,8 @@ class Moving(NamedTuple):
 
     Attributes:
         pose, velocity, rates: of the ship; rates are those of its velocity.
-        vessel, thrusters, controller: states of the components; None, () before the first step.
+        vessel, thrusters, controller: states of the components; the last two are None before the first
+            step.
     """
 
     pose: tuple[Any, ...]
