@@ -270,6 +270,16 @@ def test_exponential_of_matrices_is_that_of_scipy(scale):
     assert pushes._exponential(np.zeros((3, 3))).tolist() == np.eye(3).tolist()
 
 
+@pytest.mark.parametrize("beyond", [np.nan, np.inf, 1e4])
+def test_exponential_of_what_runs_away_is_not_known_and_others_are(beyond):
+    A = np.random.default_rng(0).standard_normal((2, 3, 3, 3))
+    A[1, 2, 0, 0] = beyond
+    found = pushes._exponential(A)
+    assert np.isnan(found[1, 2]).all()
+    A[1, 2], found[1, 2] = 0.0, np.eye(3)
+    assert found == pytest.approx(expm(A), rel=1e-7, abs=1e-9)
+
+
 def test_covariance_of_a_windows_mean_is_the_double_integral():
     t = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, 401)
     w = kernel(2.0 * t / WIDTH)
