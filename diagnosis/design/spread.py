@@ -22,7 +22,9 @@ from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
 POSE = 3  # 1, numbers of a pose
-MEMBERS = 20  # 1, drawn from each hypothesis: of these the outermost is the 95 % spread on either side
+# 1, ships drawn from each hypothesis: if none of them leaves the basin, the next one does so with a
+# probability of 1 % (rule of succession).
+MEMBERS = 100
 
 
 @dataclass(frozen=True, eq=False)
