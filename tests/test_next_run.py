@@ -330,6 +330,19 @@ def test_a_cause_outside_the_candidates_makes_no_outcome_certain(rehearsed):
     assert other.sure([astern], 0, 2) < 0.5
 
 
+def test_what_a_confidence_without_a_rival_leaves_open_is_no_candidate(question):
+    """Other coefficients, or nothing: a plan cannot be more probable to decide than a candidate holds."""
+    prior = NominalPrior.of(question.start, 0.1, 0.1)
+    alone, among = content(others=("X_uu",)), content()
+    alone["effects"][0]["indistinguishable"] = []
+    for asked, listed in ((alone, 0.5), (among, 1.0)):
+        space, k = knowledge(question.data, question.start, prior, rivals(asked))
+        assert k.listed == listed
+        r = Rehearsal(question.data, space, k)
+        assert r.listed <= listed
+        assert any("listed candidate" in text for text in r.doubts) == (r.listed < 0.95)
+
+
 @pytest.mark.slow
 def test_the_trial_of_an_effect_is_that_of_the_search(question, rehearsed):
     """On the old runs alone a trial has the score differences and the evidence of the diagnosis."""

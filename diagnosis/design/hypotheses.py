@@ -213,7 +213,8 @@ def knowledge(
     """The hypotheses of a diagnosis on the runs that it was made of.
 
     Weights are the confidences of the diagnosis; what these leave open among the rivals of an effect is
-    shared by the evidence of the runs.
+    shared by the evidence of the runs. Of an effect without a rival they leave other coefficients, or
+    nothing, which are no hypotheses: then none may hold.
     """
     sets = [tuple(i for i in r.ids if usable(start, i)) for r in found]
     ids = [*dict.fromkeys(i for s in sets for i in s if i)]
@@ -233,7 +234,9 @@ def knowledge(
     weights = _weights(k, found)
     best = np.argsort(-weights, kind="stable")[:MOST]
     kept = weights[best] / weights[best].sum()
-    return space, Knowledge([hypotheses[n] for n in best], kept, k.G, k.b, precision, mean)
+    alone = [r.confidence for r in found if len(r.ids) == 1 and np.isfinite(r.confidence)]
+    listed = min(alone, default=1.0)
+    return space, Knowledge([hypotheses[n] for n in best], kept, k.G, k.b, precision, mean, listed)
 
 
 def _weights(k: Knowledge, found: Sequence[Rival]) -> np.ndarray:

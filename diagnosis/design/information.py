@@ -56,6 +56,7 @@ class Knowledge:
         G, b: (p, p) and (p,), of all data so far, in units of the noise.
         precision: (p, p), prior precision.
         prior: (p,), prior mean.
+        listed: probability that one of the hypotheses holds, by the diagnosis.
     """
 
     hypotheses: Sequence[Hypothesis]
@@ -64,6 +65,7 @@ class Knowledge:
     b: np.ndarray
     precision: np.ndarray
     prior: np.ndarray
+    listed: float = 1.0
 
     def plus(self, G: np.ndarray) -> "Knowledge":
         """The knowledge after a planned run whose data agree with what is expected."""

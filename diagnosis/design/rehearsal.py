@@ -31,7 +31,7 @@ from .information import SURE, Hypothesis, Knowledge
 DRAWS = 60  # 1, simulated outcomes, so that the standard error of a probability is at most 0.065
 CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
 LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
-UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by what the likeliest leaves."
+UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the diagnosis so far."
 UNIT = np.full(3, OVERLAP**-0.5)  # 1, noise of overlapping windows where that of one that counts is 1
 
 
@@ -95,10 +95,10 @@ class Rehearsal:
 
     @cached_property
     def listed(self) -> float:
-        """Probability that a candidate is the true cause, by what the likeliest leaves [1]."""
+        """Probability that a candidate is the cause, by the diagnosis and what the likeliest leaves."""
         h, old = self.k.hypotheses[int(np.argmax(self.k.weights))], self.measured
         trials = [RehearsedEffect.of(self.wide, old, old.y, h, i) for i in h.ids]
-        return min((probability(t.judged(old.y)[0]) for t in trials), default=1.0)
+        return min((probability(t.judged(old.y)[0]) for t in trials), default=1.0) * self.k.listed
 
     @property
     def doubts(self) -> list[str]:
