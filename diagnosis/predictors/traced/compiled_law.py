@@ -74,12 +74,13 @@ class CompiledLaw(NamedTuple):
 
     Attributes:
         library: the machine code.
-        state, count: how many numbers its state has, and all arguments have.
+        state: how many numbers its state has.
+        arguments: how many there are, the state's included.
     """
 
     library: ctypes.CDLL
     state: int
-    count: int
+    arguments: int
 
     def states(
         self,
@@ -102,8 +103,8 @@ class CompiledLaw(NamedTuple):
         Raises:
             TypeError: not as many arguments as the law has.
         """
-        if len(start) + len(inputs) + len(numbers) != self.count:
-            raise TypeError(f"the law takes {self.count} numbers")
+        if len(start) + len(inputs) + len(numbers) != self.arguments:
+            raise TypeError(f"the law takes {self.arguments} numbers")
         still = [np.asarray(x, float) for x in (*start, *numbers)]
         steps, kept = len(inputs[0]), self.state if kept is None else kept
         moving = [
