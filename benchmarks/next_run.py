@@ -303,8 +303,8 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
                 yield base | {"result": f"no design: {error}"}
                 continue
             margins = [d.basin.margin(eta, d.outline).min() for eta in np.concatenate(fresh.eta)]
-            left = float(np.nan_to_num(np.min(margins), nan=-np.inf))
-            yield base | {"planned": float(spread.margin.min()), "margin": left, "ships": len(margins)}
+            margin = {"planned": float(spread.margin.min()), "margin": float(min(margins))}
+            yield base | margin | {"ships": len(margins)}
 
 
 def _made_up(cell: Cell) -> dict:

@@ -255,6 +255,8 @@ def test_the_margin_is_that_of_the_corners_of_the_hull():
     hull = np.array([[1.0, 0.5], [-1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]])
     eta = np.array([[3.0, 0.0, 0.0], [3.0, 0.0, np.pi / 2.0], [5.5, 0.0, 0.0]])
     assert basin.margin(eta, hull) == pytest.approx([1.5, 1.0, -0.5])
+    gone = np.array([[0.0, 0.0, np.inf], [np.nan, 0.0, 0.0]])
+    assert (basin.margin(gone, hull) == -np.inf).all(), "a ship that ran away"
 
 
 def content(first="X_|u|u", others=("X_uu",), confidence=0.5):

@@ -33,18 +33,19 @@ class Basin:
         return np.array([self.north[1] - self.north[0], self.east[1] - self.east[0]])
 
     def margin(self, eta: np.ndarray, outline: np.ndarray) -> np.ndarray:
-        """(n,), least distance of a ship from the walls [m], negative where it is outside.
+        """(n,), least distance of a ship from the walls [m], negative where it is outside or ran away.
 
         Args:
             eta: (n, 3), pose.
             outline: (k, 2), corners of the hull in the body frame [m].
         """
-        c, s = np.cos(eta[:, 2:]), np.sin(eta[:, 2:])
-        north = eta[:, :1] + c * outline[:, 0] - s * outline[:, 1]
-        east = eta[:, 1:2] + s * outline[:, 0] + c * outline[:, 1]
-        walls = [north - self.north[0], self.north[1] - north]
-        walls += [east - self.east[0], self.east[1] - east]
-        return np.min(walls, axis=(0, 2))
+        with np.errstate(invalid="ignore"):  # of a ship that ran away
+            c, s = np.cos(eta[:, 2:]), np.sin(eta[:, 2:])
+            north = eta[:, :1] + c * outline[:, 0] - s * outline[:, 1]
+            east = eta[:, 1:2] + s * outline[:, 0] + c * outline[:, 1]
+            walls = [north - self.north[0], self.north[1] - north]
+            walls += [east - self.east[0], self.east[1] - east]
+        return np.nan_to_num(np.min(walls, axis=(0, 2)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -123,7 +124,7 @@ class Loop:
         vessel, thrusters = self.ship.vessel, self.ship.thrusters
         begins = now.thrusters is None
         h = 0.0 if begins else self.h
-        controller, request = self._request(now, given, h)
+        controller, request = self._request(now, given)
         velocity = vessel.outputs().velocity._make(now.velocity)
         asked = thrusters.inputs(thrusters.inputs().request._make(request), velocity)
         state = thrusters.init(asked, drive.params) if begins else now.thrusters
@@ -131,16 +132,20 @@ class Loop:
         acting = vessel.inputs(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
         return seen(*vessel.advance(now.vessel, acting, hull, self.h), state, controller)
 
-    def _request(self, now: Moving, given: Sequence[Any], h: float) -> tuple[Any, Sequence[Any]]:
+    def _request(self, now: Moving, given: Sequence[Any]) -> tuple[Any, Sequence[Any]]:
         """The state of the controller, and what it asks of the thrusters."""
         if not self.held:
             return (), given
-        component = self.ship.serving(adaptive.COMPONENT)
-        params = component.params()
         inputs = Inputs(Estimate(*now.pose, *now.velocity[:3], *now.rates), Target(*given))
-        state = component.init(inputs, params) if now.thrusters is None else now.controller
-        state, demand = component.advance(state, inputs, component.prepared(params), h)
+        if now.controller is None:
+            state, demand = self._controller.begin(inputs)
+        else:
+            state, demand = self._controller.advance(now.controller, inputs, self.h)
         return state, demand.tau
+
+    @cached_property
+    def _controller(self) -> LoopPart:
+        return LoopPart(self.ship.serving(adaptive.COMPONENT), {})
 
 
 def seen(state: Any, out: Any, thrusters: Any = None, controller: Any = None) -> Moving:
@@ -196,9 +201,8 @@ def spread(
         # The controller of a ship that is close to diverging loses control at a higher speed: by two
         # prior standard deviations of a coefficient.
         every.append(followed(models, motion.faster(1.0 + 2.0 * MEASURED)))
-    with np.errstate(invalid="ignore"):  # of a ship that ran away
-        least = [[basin.margin(track, outline).min() for track in each] for each in every]
-    margins = np.nan_to_num(np.min(least, axis=0), nan=-np.inf).reshape(len(ids), MEMBERS)
+    least = [[basin.margin(track, outline).min() for track in each] for each in every]
+    margins = np.min(least, axis=0).reshape(len(ids), MEMBERS)
     return Spread(
         motion.time, eta.reshape(len(ids), MEMBERS, *eta.shape[1:]), list(ids), margins.min(axis=1)
     )

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from filelock import FileLock
 
 from cybership.scratch_folder import scratch_folder
 from cybership.user_cache import cache_folder, is_whole, make_folder, refusal, store
@@ -162,6 +161,8 @@ def _library(text: str) -> ctypes.CDLL | None:
         if refusal(root, path):
             return None
         if not is_whole(path):
+            from filelock import FileLock  # only now: it takes a while to import
+
             with FileLock(f"{path}.lock"):
                 if not is_whole(path):
                     _compile(text, target, path)
