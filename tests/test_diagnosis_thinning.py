@@ -1,8 +1,14 @@
 """Thinning of long runs: what it keeps, what it says, and when it leaves a run alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support.measured import sail, smoothed
 
+from diagnosis.predictors import Model, omega, ship_with, weak_windows
+from diagnosis.predictors.uncertainty import omega_std
+from diagnosis.predictors.weak_form import modelled_force
 from diagnosis.runs import Run, clean, thinned, thinning
 
 
@@ -59,3 +65,54 @@ def test_parts_without_a_measurement_keep_what_they_were(run, monkeypatch):
     assert found.dropped.sum() >= 3
     assert not (found.frozen & found.dropped).any()
     assert np.isnan(found.pose[~found.valid]).all()
+
+
+@pytest.fixture(scope="module")
+def w():
+    """Windows of a run at 50 Hz."""
+    run, _ = sail(32.0)
+    return weak_windows(smoothed(run))
+
+
+def test_model_errors_by_fewer_rows_are_those_by_all(w):
+    model = Model({"delta_X_u": -1.0})
+    fewer = w.thinned
+    assert fewer.thinned is fewer
+    assert fewer.run.time.size == pytest.approx(w.run.time.size / 5, abs=2)
+    assert (fewer.middle == w.middle).all()
+    nu = w.motion[1]
+    by_all = w.slope @ nu @ model.reference_mass.T - modelled_force(w, model, nu)
+    assert omega(w, model) == pytest.approx(by_all, abs=1e-3 * np.abs(by_all).max())
+    assert np.abs(by_all).max() > omega_std(w).max()
+
+
+def test_the_mean_of_an_angle_goes_the_short_way_round():
+    craft = ship_with((), "gunnerus")
+    signals = craft.layout.commands
+    (k, *_) = [
+        k for k, unit in enumerate(craft.form_of(np.zeros((1, len(signals)))).values()) if unit == "rad"
+    ]
+    time, commands = np.arange(8) * 0.1, np.zeros((8, len(signals)))
+    commands[:, k] = np.where(np.arange(8) % 2, 3.1, -3.1)
+    run = Run(
+        "astern",
+        time,
+        np.zeros((8, 3)),
+        np.zeros((8, 3)),
+        commands,
+        signals=signals,
+        ship=craft.description,
+    )
+    mean = thinning._mean_commands(run, time[::2])["commands"][:-1, k]
+    assert np.cos(mean) == pytest.approx(-1.0)
+    assert (np.abs(mean + np.pi) < 0.1).all()
+
+
+def test_fewer_rows_end_where_the_motion_is_unknown(w):
+    nu = w.smoothed.nu.copy()
+    nu[333:777] = np.nan
+    fewer = thinning.thinned_motion(replace(w.smoothed, nu=nu))
+    time, known = fewer.time, np.isfinite(fewer.nu[:, 0])
+    ends = time[np.flatnonzero(np.diff(known))]
+    assert ends == pytest.approx(w.run.time[[332, 776]])
+    assert {w.run.time[0], w.run.time[-1]} <= set(time)

@@ -219,7 +219,7 @@ def test_effect_with_memory_acts_in_the_fmu_as_on_series(craft, tmp_path):
 def test_ships_with_and_without_a_users_effects_live_in_one_process(craft):
     one = craft(LINEAR, "a/mine.py")
     other = craft(MOMENT.format(formula="ship.u * ship.r").replace("N_mine", "N_uuv"), "b/mine.py")
-    w = windows(32.0)
+    w = windows(32.0).thinned
     nominal, value = omega(w, Model()), {"N_uuv": 400.0}
     u, v, r = np.where(w.known[:, None], w.smoothed.nu, 0.0).T
     for craft, product in ((one, u * u * v), (other, u * r), (one, u * u * v)):

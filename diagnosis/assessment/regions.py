@@ -8,6 +8,7 @@ Bonferroni's correction for the number of regions that were tried.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -203,6 +204,16 @@ class _Design:
         found = filter(None, (self._test(*ends, len(tried)) for ends in tried))
         return max(found, key=lambda region: region.contrast, default=None)
 
+    @cached_property
+    def _squares(self) -> np.ndarray:
+        """(bins,), sums of the squares over the clusters."""
+        return self.total.sum(axis=1)
+
+    @cached_property
+    def _windows(self) -> np.ndarray:
+        """(bins,), numbers of windows."""
+        return self.count.sum(axis=1)
+
     def _log_mean_square(self, bins: np.ndarray) -> ClusterMean:
         """Mean logarithm of the clusters' mean squares in some bins; the noise keeps it finite."""
         total, count = ((x[bins].sum(axis=0)) for x in (self.total + self.noise, self.count))
@@ -212,17 +223,16 @@ class _Design:
     def _test(self, first: int, after: int, tried: int) -> Region | None:
         """The region, if it is significantly worse than the rest among so many that were tried."""
         p, bins = self.profile, len(self.total)
-        inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
-        share = float(self.profile.share[inside].sum())
-        if share > SETTINGS.largest_region:
+        inside = (np.arange(bins) - first) % bins < after - first
+        share, parts = float(self.profile.share[inside].sum()), (inside, ~inside)
+        squares, windows = ([float(x[y].sum()) for y in parts] for x in (self._squares, self._windows))
+        clear = squares[0] * windows[1] >= SETTINGS.least_contrast**2 * squares[1] * windows[0]
+        if share > SETTINGS.largest_region or not clear:
             return None
-        parts = (inside, ~inside)
         a, b = map(self._log_mean_square, parts)
         if min(a.dof, b.dof) + 1 < SETTINGS.least_clusters:
             return None
-        inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
-        if inner < SETTINGS.least_contrast * outer:
-            return None
+        inner, outer = np.sqrt(np.divide(squares, windows)).tolist()
         p_value = min(1.0, tried * welch_p_value(a, b))  # Bonferroni
         if p_value > SETTINGS.chance:
             return None

@@ -4,8 +4,8 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..runs.cleaning import EVERY, WIDTH
 from ..runs.files.reading import Run
 from ..runs.run_constants import HORIZON
 from ..runs.smoothing.smoother import breaks
+from ..runs.thinning import thinned_motion
 from .prediction import at_rest, before_filters, true_motion
 from .ship_model import Model
 from .thrust import Response, inflow, thrust
@@ -112,6 +113,15 @@ class WeakWindows:
         eta, nu = (np.where(self.known[:, None], x, 0.0) for x in (self.smoothed.eta, self.smoothed.nu))
         return eta, nu
 
+    @cached_property
+    def thinned(self) -> "WeakWindows":
+        """The windows with fewer rows, by which model errors are computed."""
+        smoothed = thinned_motion(self.smoothed)
+        if smoothed is self.smoothed:
+            return self
+        smooth, slope, held = _integrals(smoothed.time, self.middle, 0.5 * self.width)
+        return replace(self, smoothed=smoothed, smooth=smooth, slope=slope, held=held, memory={})
+
     def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
@@ -170,9 +180,18 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         & (2 * number(smoothed.used | smoothed.track.between) >= count)
         & (number(np.abs(run.tau_cmd).max(axis=1) > 1e-6) > 0)
     )
-    middles, first, last = middles[kept], first[kept], last[kept]
+    middles = middles[kept]
+    block = np.floor((middles - t[0]) / max(BLOCK * scale.time, (t[-1] - t[0]) / BLOCKS)).astype(int)
+    horizon = horizon or HORIZON * scale.time
+    smooth, slope, held = _integrals(t, middles, half)
+    return WeakWindows(smoothed, middles, block, smooth, slope, held, horizon)
+
+
+def _integrals(t: np.ndarray, middles: np.ndarray, half: float) -> Iterator[csr_matrix]:
+    """Smooth, slope and held of :class:`WeakWindows`, of times (n,), middles and half a width [s]."""
     # A window may begin and end between two samples.
-    first, last = np.maximum(first - 1, 0), np.minimum(last + 1, t.size)
+    first = np.maximum(np.searchsorted(t, middles - half, side="left") - 1, 0)
+    last = np.minimum(np.searchsorted(t, middles + half, side="right") + 1, t.size)
     rows = np.repeat(np.arange(middles.size), last - first)
     columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
     starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
@@ -180,10 +199,7 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     area_before, share_before, step_before = _span(t, middles[rows], half, columns - 1)
     weights = area - share + share_before, area_before / step_before - area / step, area
     shape = middles.size, t.size
-    smooth, slope, held = (csr_matrix((values, columns, starts), shape=shape) for values in weights)
-    block = np.floor((middles - t[0]) / max(BLOCK * scale.time, (t[-1] - t[0]) / BLOCKS)).astype(int)
-    horizon = horizon or HORIZON * scale.time
-    return WeakWindows(smoothed, middles, block, smooth, slope, held, horizon)
+    yield from (csr_matrix((values, columns, starts), shape=shape) for values in weights)
 
 
 def _span(
@@ -217,7 +233,7 @@ def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
 
 def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     """The force that a motion needs, less that of the thrusters and what is given, if these count."""
-    model = model.during(w.run.name)
+    w, model = w.thinned, model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
     # The ship is part of each key: two may have effects of one name that are different functions.

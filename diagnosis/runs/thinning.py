@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from fmus.ship import ship
+
 from .cleaning import BRIEF, DIGITS, EVERY, Track, between, impulse, long_gap
+from .files.reading import Run
+from .smoothing.smoother import Smoothed
 
 # 1, rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
@@ -71,20 +75,24 @@ def thinned(track: Track) -> Track:
     gone = ~fresh[:, 0]
     frozen = gone & _by(part, track.frozen).max().to_numpy()[:, 0]
     dropped = gone & ~frozen & _by(part, track.dropped).max().to_numpy()[:, 0]
-    commands = {
-        name: _mean(run.time, values, time)
-        for name in ("tau_cmd", "commands", "power")
-        if (values := getattr(run, name)) is not None
-    }
     near = np.searchsorted(run.time, time).clip(0, run.time.size - 1)
     measured = {name: values[near] for name, values in run.measured.items()}
+    commands = _mean_commands(run, time)
     held = None if run.held is None else _by(part, run.held).mean().to_numpy()[:, 0] > 0.5
     note = (
         f"{run.time.size} rows, {row:.3g} s apart, thinned to {time.size}, {width:.3g} s apart: "
         "medians of the pose, means of the commands"
     )
     return Track(
-        replace(run, time=time, pose=pose, resolution=None, held=held, measured=measured, **commands),
+        replace(
+            run,
+            time=time,
+            pose=pose,
+            resolution=None,
+            held=held,
+            measured=measured,
+            **commands,
+        ),
         pose,
         fresh,
         frozen,
@@ -95,6 +103,40 @@ def thinned(track: Track) -> Track:
         (*track.notes, note),
         track.scale,
     )
+
+
+def thinned_motion(smoothed: Smoothed) -> Smoothed:
+    """A smoothed run with rows no closer than makes a difference to its motion, and mean commands.
+
+    What counts its samples, or smooths them again, needs the whole run.
+    """
+    track, time = smoothed.track, smoothed.time
+    width = BRIEF * smoothed.scale.time
+    if width < (2.0 - DIGITS) * float(np.median(np.diff(time))):
+        return smoothed
+    part = np.floor((time - time[0]) / width + DIGITS)
+    known = np.isfinite(smoothed.nu[:, 0])
+    begins = np.diff(part, prepend=-1.0) != 0.0
+    begins[1:] |= np.diff(known)
+    begins[:-1] |= np.diff(known)
+    begins[-1] = True
+    fewer = smoothed.rows(begins)
+    run = replace(fewer.track.run, **_mean_commands(track.run, fewer.time))
+    return replace(fewer, track=replace(fewer.track, run=run))
+
+
+def _mean_commands(run: Run, edges: np.ndarray) -> dict[str, np.ndarray]:
+    """What a run has of commands, each the mean from an edge (m,) to the next; the last as it is."""
+    found = {
+        name: c for name in ("tau_cmd", "commands", "power") if (c := getattr(run, name)) is not None
+    }
+    turns = {name: np.zeros_like(c) for name, c in found.items()}
+    if run.commands is not None:
+        units = ship(description=run.ship).form_of(run.commands)
+        angle = [units.get(signal) == "rad" for signal in run.signals]
+        turns["commands"][:, angle] = np.unwrap(run.commands[:, angle], axis=0) - run.commands[:, angle]
+    row = np.searchsorted(run.time, edges, side="right") - 1
+    return {n: _mean(run.time, c + turns[n], edges) - turns[n][row] for n, c in found.items()}
 
 
 def _by(part: np.ndarray, values: np.ndarray) -> Any:

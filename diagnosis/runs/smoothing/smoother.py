@@ -130,6 +130,12 @@ class Smoothed(ShortRepr):
         """Of the ship."""
         return self.track.scale
 
+    def rows(self, keep: np.ndarray) -> "Smoothed":
+        """The motion at some of its rows (n,) alone, as it was found by all."""
+        arrays = {n: x for n in self.__annotations__ if isinstance(x := getattr(self, n), np.ndarray)}
+        of_rows = {n: x[keep] for n, x in arrays.items() if len(x) == keep.size}
+        return replace(self, track=self.track.rows(keep), **of_rows)
+
     @cached_property
     def air(self) -> np.ndarray | None:
         """(n, 2), velocity of the air to north and east [m/s]; None: no wind was measured."""
