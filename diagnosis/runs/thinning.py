@@ -133,7 +133,7 @@ def _mean_commands(run: Run, edges: np.ndarray) -> dict[str, np.ndarray]:
     turns = {name: np.zeros_like(c) for name, c in found.items()}
     if run.commands is not None:
         units = ship(description=run.ship).form_of(run.commands)
-        angle = [units.get(signal) == "rad" for signal in run.signals]
+        angle = [unit == "rad" for unit in units.values()]
         turns["commands"][:, angle] = np.unwrap(run.commands[:, angle], axis=0) - run.commands[:, angle]
     row = np.searchsorted(run.time, edges, side="right") - 1
     return {n: _mean(run.time, c + turns[n], edges) - turns[n][row] for n, c in found.items()}
