@@ -120,6 +120,18 @@ def pytest_runtest_makereport():
     return report
 
 
+@pytest.fixture
+def scenario(ellipse, tmp_path):
+    """A function that writes a varied scenario and returns its path."""
+
+    def write(**changes):
+        path = tmp_path / "scenario.json"
+        path.write_text(json.dumps(ellipse | changes))
+        return path
+
+    return write
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory):
     """A folder that all worker processes of this session see."""

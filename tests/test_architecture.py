@@ -402,6 +402,12 @@ def test_nothing_of_the_product_imports_the_thesis(package):
         assert not [name for name in targets if name.partition(".")[0] == "thesis"], module
 
 
+def test_what_tests_share_is_in_support():
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        used = [n.module or "" for n in ast.walk(parsed(path)) if isinstance(n, ast.ImportFrom)]
+        assert not [name for name in used if name.split(".")[-1].startswith("test_")], path.name
+
+
 def test_the_thesis_takes_of_the_studies_what_they_share():
     used = {
         name for targets in graph("thesis").values() for name in targets if name.startswith("studies")

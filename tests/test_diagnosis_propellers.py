@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from support.cse1 import ASIDE, EFFECTS, FIVE, SHIP
-from support.measured import NOISE, smoothed
-from test_diagnosis_selection import learn
+from support.measured import NOISE, learn, smoothed
 
 from diagnosis import Model, Run, weak_windows
 from fmus.actuators.response import total

@@ -4,20 +4,15 @@ import numpy as np
 import pytest
 from support.cases import slow
 from support.cse1 import EFFECTS
-from support.measured import sail, smoothed
+from support.measured import learn, sail, smoothed
 
 from diagnosis.predictors import Model, omega, weak_windows
 from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
-from diagnosis.search import forward_selection, method
+from diagnosis.search import forward_selection
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
 from diagnosis.search.shortlist import NEW, novelty, rank
 from diagnosis.verdict.confidence import probability
-
-
-def learn(data, prior, model=None):
-    """What forward selection finds in windows of some runs."""
-    return method("selection").fit(data, model or Model(), prior, lambda _: None, 0)
 
 
 def data(seconds=96.0, **hidden):

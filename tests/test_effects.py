@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.cse1 import EFFECTS, SHIP, THRUSTERS, Inputs
 from support.cse1 import VESSEL as COMPONENT
+from support.own_effects import GOOD, OWN
 from support.project import ROOT
 
 from fmus.declare import flatten, packer, variables
@@ -371,18 +372,6 @@ def test_actuator_effects_leave_what_they_do_not_concern():
 
 
 # The registry from outside
-
-
-OWN = '''
-from typing import Annotated
-from fmus.effects import effect
-
-@effect("N_uuv", "force", "N", formula="N = k u u v")
-def N_uuv(ship, N_uuv: Annotated[float, "N.s3/m3", "moment by u u v"] = 0.0):
-    """A moment of my own."""
-    return 0.0, 0.0, {body}
-'''
-GOOD = "N_uuv * ship.u * ship.u * ship.v"
 
 
 def command(module, *arguments, cwd):

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from support.command import command
 from support.measured import DATA
-from test_diagnosis_commands import run
 
 from diagnosis import Model, propose_columns
 from diagnosis.assessment.command_check import contradicted_commands
@@ -40,8 +40,8 @@ def test_one_side_car_for_all(tmp_path):
     paths = [tmp_path / f"{name}.csv" for name in RUNS]
     for path in paths:
         path.write_bytes((ESSO / path.name).read_bytes())
-    code, shown = run(propose_columns.main, "--write", "--ship", "esso_osaka", *paths)
-    assert code == 0, shown
+    done = command(propose_columns.main, "--write", "--ship", "esso_osaka", *paths)
+    assert done.returncode == 0, done.stderr
     columns = json.loads((tmp_path / "columns.json").read_text())["columns"]
     assert columns.items() >= NAMES.items(), "all that its predictions need"
     craft = ship_with((), "esso_osaka")
@@ -54,7 +54,7 @@ def test_one_side_car_for_all(tmp_path):
         for name in POSE:  # as often as all of the pose is new at least, at most each row
             assert new * 0.99 <= rates[name] <= rows * 1.001, (path.stem, name)
         assert (min(rates[name] for name in POSE) < 9.9) == (path.stem == HELD)
-    (unusable,) = " ".join(shown.split()).split("not usable yet: ")[1:]
+    (unusable,) = " ".join(done.stdout.split()).split("not usable yet: ")[1:]
     assert unusable.startswith(f"run '{UNLOGGED}': all commands are zero for ")
 
 

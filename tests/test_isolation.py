@@ -9,11 +9,11 @@ import time
 from pathlib import Path
 
 import pytest
+from support.cosim_run import start
 from support.events import once_there
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 from support.plain import GAIN
 from support.project import ROOT
-from test_run import start
 
 import cosim
 from cosim.fmu.isolation.isolated import _reason

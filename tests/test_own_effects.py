@@ -1,12 +1,12 @@
 """A user's effects and methods, those of docs/own_effects.md: each in one file, and found."""
 
 import re
-from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
 from support.measured import sail, smoothed
+from support.own_effects import DECLARED, LEAST_SQUARES, LINEAR, SECOND_ORDER
 
 from cosim import InputError
 from diagnosis import Model, diagnose
@@ -22,22 +22,6 @@ from fmus.effects import STANDARD
 from fmus.effects.effect_set import is_linear
 from fmus.effects.text import Found
 from fmus.ship import ship
-
-BLOCKS = re.findall(
-    r"```python\n(.*?)```",
-    (Path(__file__).parents[1] / "docs" / "own_effects.md").read_text("utf-8"),
-    re.DOTALL,
-)
-
-
-def example(name):
-    """The example of docs/own_effects.md that declares something of this name."""
-    (block,) = [b for b in BLOCKS if re.search(rf"^(def|class) {name}\b", b, re.MULTILINE)]
-    return block
-
-
-LINEAR, DECLARED, SECOND_ORDER = map(example, ("N_uuv", "power_drag", "second_lag"))
-LEAST_SQUARES = example("LeastSquares")
 
 BELL = '''
 from typing import Annotated

@@ -14,17 +14,18 @@ from fmpy.ssp.ssd import read_ssv
 from fmpy.validation import validate_fmu
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.command import command as in_this_process
+from support.cosim_run import SSV, command, parameter
 from support.opened import Opened
+from support.own_effects import GOOD, OWN
 from support.project import ROOT
-from test_effects import GOOD, OWN
-from test_fmus import run_build
-from test_run import SSV, command, parameter, scenario  # noqa: F401 - a fixture
 
 import cosim
 from cosim import InputError, Parameter, ParameterSet, read_parameters, write_parameters
 from diagnosis.predictors import Model, read_model, write_model
 from diagnosis.runs import Fingerprint
 from fmus.build import build
+from fmus.build.__main__ import main as build_main
 from fmus.build.start_values_file import read_starts
 
 LEARNED = Model({"delta_X_u": -4.123456789012345, "V_n": 0.05}, {"loss_bow": 0.3}, {"clock_offset": 0.2})
@@ -226,13 +227,17 @@ def test_a_set_that_changes_nothing_gives_the_plain_fmu(fmus, tmp_path):
 
 
 def test_names_choose_and_what_is_not_used_is_told(learned, tmp_path):
-    done = run_build("vessel", "observer_mdf", "--parameters", learned, "--out", tmp_path / "fmu")
+    done = in_this_process(
+        build_main, "vessel", "observer_mdf", "--parameters", learned, "--out", tmp_path / "fmu"
+    )
     assert done.returncode == 0
     assert [Path(p).name for p in done.stdout.split()] == ["vessel.fmu", "observer_mdf.fmu"]
     assert "has values for thrusters, which is not built" in done.stderr
     assert "clock_offset" in done.stderr
     write_model(tmp_path / "empty.ssv", Model())
-    done = run_build("--parameters", tmp_path / "empty.ssv", "--out", tmp_path / "none")
+    done = in_this_process(
+        build_main, "--parameters", tmp_path / "empty.ssv", "--out", tmp_path / "none"
+    )
     assert (done.returncode, done.stdout) == (0, "")
     assert "holds no values" in done.stderr
 
@@ -258,7 +263,7 @@ def test_names_choose_and_what_is_not_used_is_told(learned, tmp_path):
 def test_a_set_that_cannot_be_baked_is_one_message(text, message, tmp_path):
     if text is not None:
         (tmp_path / "wrong.ssv").write_text(text)
-    done = run_build("--parameters", tmp_path / "wrong.ssv", "--out", tmp_path / "fmu")
+    done = in_this_process(build_main, "--parameters", tmp_path / "wrong.ssv", "--out", tmp_path / "fmu")
     assert done.returncode == 2
     assert message in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
@@ -266,7 +271,7 @@ def test_a_set_that_cannot_be_baked_is_one_message(text, message, tmp_path):
 
 
 @pytest.mark.slow
-def test_parameters_of_own_effects_need_the_fmu_that_has_them(scenario, ellipse, tmp_path):  # noqa: F811
+def test_parameters_of_own_effects_need_the_fmu_that_has_them(scenario, ellipse, tmp_path):
     (tmp_path / "mine.py").write_text(OWN.format(body=GOOD))
     (tmp_path / "model.ssv").write_text(SSV.format(parameter("vessel.N_uuv", 100.0)))
     arguments = ("--out", tmp_path / "out", "--no-plots", "--parameters", tmp_path / "model.ssv")
@@ -283,7 +288,7 @@ def test_parameters_of_own_effects_need_the_fmu_that_has_them(scenario, ellipse,
             "--out",
             tmp_path / "fmu",
         )
-        assert run_build(*built).returncode == 0
+        assert in_this_process(build_main, *built).returncode == 0
         ellipse["fmus"]["vessel"]["path"] = "./fmu/vessel.fmu"
         assert command(scenario(), *arguments).returncode == 0
         with_set = (tmp_path / "out" / "log.csv").read_bytes()

@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 import pytest
+from support.acceptance import validated
 from support.foreign import needs_compiler
 from support.measured import csv_of, sail
-from test_validation_record import validated
 
 import diagnosis
 from benchmarks.foreign_parameters.c_fmu import CSystem, Quantity, build_c_fmu

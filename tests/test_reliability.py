@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from support.command import command as in_this_process
 from support.command import main_of
+from support.cosim_run import in_a_process as command
 from support.plain import GAIN
 from support.project import ROOT
-from test_run import in_a_process as command
 
 import cosim
 from benchmarks.reliability import (

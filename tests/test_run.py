@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import support.command
+from support.command import command as in_this_process
+from support.cosim_run import SSV, command, in_a_process, parameter, start
 from support.events import once_there
 from support.plain import GAIN
 from support.project import ROOT
@@ -27,31 +28,6 @@ from fmucheck.checking import main as check_main
 from fmus.build.__main__ import main as build_main
 
 PICTURES = {"trajectory.png", "errors.png", "metrics.png", "forces.png", "model_error.png"}
-
-
-def command(*arguments, cwd=ROOT):
-    """``cosim.run`` in this process."""
-    return support.command.command(run.main, *arguments, cwd=cwd)
-
-
-def in_a_process(*arguments, **options):
-    """The same in a process of its own: what reaches its streams from wherever, and what it leaves."""
-    return subprocess.run(
-        [sys.executable, "-m", "cosim.run", *map(str, arguments)],
-        capture_output=True, text=True, check=False, **{"cwd": ROOT} | options,
-    )  # fmt: skip
-
-
-@pytest.fixture
-def scenario(ellipse, tmp_path):
-    """A function that writes a varied scenario and returns its path."""
-
-    def write(**changes):
-        path = tmp_path / "scenario.json"
-        path.write_text(json.dumps(ellipse | changes))
-        return path
-
-    return write
 
 
 def test_run_leaves_log_metrics_and_pictures(scenario, tmp_path):
@@ -93,7 +69,7 @@ def test_metrics_do_not_depend_on_what_is_logged(scenario, tmp_path):
 
 def test_metrics_of_a_log_are_those_of_its_run(scenario, tmp_path):
     command(scenario(metrics={"from": 0.5, "to": 1.5}), "--out", tmp_path / "out", "--no-plots")
-    done = support.command.command(metrics.main, tmp_path / "out", "--json")
+    done = in_this_process(metrics.main, tmp_path / "out", "--json")
     again, own = json.loads(done.stdout), json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert again == pytest.approx(own)
     assert (own["from"], own["to"]) == (0.5, 1.5)
@@ -102,10 +78,10 @@ def test_metrics_of_a_log_are_those_of_its_run(scenario, tmp_path):
 def test_runs_are_laid_over_each_other(scenario, tmp_path):
     for name in "ab":
         command(scenario(), "--out", tmp_path / name, "--no-plots")
-    done = support.command.command(plots.main, tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c")
+    done = in_this_process(plots.main, tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c")
     assert (done.returncode, done.stderr) == (0, "")
     assert {p.name for p in (tmp_path / "c").iterdir()} == PICTURES
-    done = support.command.command(plots.main, tmp_path / "nowhere")
+    done = in_this_process(plots.main, tmp_path / "nowhere")
     assert done.returncode == 2
     assert "no log in" in done.stderr
 
@@ -211,18 +187,6 @@ def test_failed_simulation_is_exit_3_with_the_log_kept(scenario, tmp_path):
     assert (tmp_path / "out" / "metrics.json").is_file()
 
 
-def start(path, out, *arguments):
-    """A run in the background, returned once its log has some rows."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "cosim.run", str(path), "--out", str(out), "--no-plots", *arguments],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
-    )  # fmt: skip
-    log = out / "log.csv"
-    once_there(lambda: process.poll() is not None or (log.is_file() and log.stat().st_size > 100_000))
-    assert process.poll() is None, process.communicate()
-    return process
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run_keeps_its_log_and_says_so(scenario, tmp_path, number):
     out = tmp_path / "out"
@@ -305,18 +269,6 @@ def test_parquet_holds_what_csv_holds(scenario, tmp_path):
     assert list(a) == list(b)
     assert all(np.array_equal(a[n], b[n], equal_nan=True) for n in a)
     assert list(cosim.read_log(tmp_path / "parquet", ["vessel.x"])) == ["time", "vessel.x"]
-
-
-SSV = """<?xml version="1.0" encoding="UTF-8"?>
-<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"
-                  version="1.0" name="learned">
-  <ssv:Parameters>{}</ssv:Parameters>
-</ssv:ParameterSet>
-"""
-
-
-def parameter(name, value):
-    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}"/></ssv:Parameter>'
 
 
 def test_parameter_set_beats_the_scenario_with_a_notice(scenario, ellipse, tmp_path):
@@ -404,7 +356,7 @@ def test_folder_without_permission_is_refused(scenario, tmp_path):
 
 @pytest.mark.parametrize("main", [run.main, metrics.main, plots.main, build_main, check_main])
 def test_help_has_examples_and_says_what_each_option_does(main):
-    done = support.command.command(main, "--help")
+    done = in_this_process(main, "--help")
     assert done.returncode == 0
     assert "example" in done.stdout
     for line, after in pairwise(f"{done.stdout}\n".splitlines()):
@@ -451,7 +403,7 @@ def test_full_disk_is_one_message(scenario, tmp_path):
 
 def test_metrics_never_overwrite_the_log(scenario, tmp_path):
     command(scenario(), "--out", tmp_path / "out", "--no-plots")
-    done = support.command.command(metrics.main, tmp_path / "out", "--out", tmp_path / "out" / "log.csv")
+    done = in_this_process(metrics.main, tmp_path / "out", "--out", tmp_path / "out" / "log.csv")
     assert done.returncode == 2
     assert "is the log itself" in done.stderr
 

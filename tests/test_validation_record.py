@@ -10,8 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from support.acceptance import EASY, validated
 from support.measured import csv_of, jumps, sail
-from test_own_effects import LINEAR
+from support.own_effects import LINEAR
 
 import diagnosis
 from cosim import InputError
@@ -31,7 +32,6 @@ from diagnosis.verify import main as verify_main
 from fmus.build import build, native_targets
 
 pypdf = pytest.importorskip("pypdf")
-EASY = {"quantity": "position", "horizon": 4.0, "tolerance": 0.5, "unit": "m", "coverage": 0.5}
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +48,6 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def comparison(folder):
     return diagnosis.compare([folder / f"{name}.csv" for name in ("a", "again", "b")])
-
-
-def validated(comparison, folder, *criteria, **more):
-    path = folder / "criteria.json"
-    content = {"criteria": [{**EASY, **c} for c in criteria]} | more
-    path.write_text(json.dumps(content))
-    return diagnosis.validate(comparison, path)
 
 
 def test_restrictions_and_counts_are_in_the_record(comparison, tmp_path):

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis import Run, clean, smooth
+from diagnosis import Model, Run, clean, smooth
 from diagnosis.predictors.ship_model import parameters
+from diagnosis.search import method
 from fmus.declare import variables
 from fmus.signals import Force
 from support.ccode import stepped
@@ -137,3 +138,8 @@ def changed(run, rows, pose):
     new = run.pose.copy()
     new[rows] = pose
     return replace(run, pose=new)
+
+
+def learn(data, prior, model=None):
+    """What forward selection finds in windows of some runs."""
+    return method("selection").fit(data, model or Model(), prior, lambda _: None, 0)
