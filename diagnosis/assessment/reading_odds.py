@@ -25,7 +25,7 @@ from scipy.optimize import lsq_linear
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OVERLAP, needed_force
-from .readings import Reading, inertial, reread
+from .readings import Reading, reread, undamped
 from .settings import SETTINGS
 
 ROUNDS = 5  # 1, of noise and explanation in turn; the density is then within 0.1 of its limit
@@ -96,10 +96,9 @@ class ReadingOdds:
         """Logarithm of the density of the run's motion by a reading."""
         with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
             w = reread(self.w, reading, self.model)
-            e, z, a = omega(w, self.model), needed_force(w, self.model), inertial(w, self.model)
-            each = [omega(w, self.model.plus({n: 1.0})) - e for n in self._thrusters]
-            steady = SETTINGS.steady * self.model.ship.scale.speed  # deviation of a current [m/s]
-            streams = [omega(w, self.model.plus({n: steady})) - e for n in ("V_n", "V_e")]
+            e, z = omega(w, self.model), needed_force(w, self.model)
+            a = needed_force(w, self._undamped)
+            each, streams = ([omega(w, m) - e for m in some] for some in (self._lost, self._streaming))
             found = np.concatenate([e, z, a, *each, *streams])
         if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
             return -np.inf
@@ -131,13 +130,23 @@ class ReadingOdds:
         return why
 
     @cached_property
-    def _thrusters(self) -> list[str]:
-        """Parameters by which a thruster loses its force; of a single one the axes tell as much."""
+    def _undamped(self) -> Model:
+        return undamped(self.model)
+
+    @cached_property
+    def _streaming(self) -> list[Model]:
+        """The model in a current to the north, and to the east, of its deviation."""
+        steady = SETTINGS.steady * self.model.ship.scale.speed
+        return [self.model.plus({n: steady}) for n in ("V_n", "V_e")]
+
+    @cached_property
+    def _lost(self) -> list[Model]:
+        """The model without each of its thrusters; of a single one the axes tell as much."""
         effects = self.model.ship.effects.of_kind("actuator")
         axes = {f"loss_{axis}" for axis in ("surge", "sway", "yaw")}
         names = [p.name for e in effects if e.id.startswith("loss_") for p in e.parameters]
         found = [name for name in names if name not in axes]
-        return found if len(found) > 1 else []
+        return [self.model.plus({n: 1.0}) for n in found] if len(found) > 1 else []
 
     @cached_property
     def _gain(self) -> float:

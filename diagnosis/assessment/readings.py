@@ -174,5 +174,10 @@ def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
 
 def inertial(w: WeakWindows, model: Model) -> np.ndarray:
     """The part (K, 3) of the needed force that is not damping: M nu_dot + C nu [N, N, N m]."""
+    return needed_force(w, undamped(model))
+
+
+def undamped(model: Model) -> Model:
+    """The model without damping of its hull."""
     none = {v.name: 0.0 for v in variables(type(model.hull.params.damping))}
-    return needed_force(w, replace(model, vessel=dict(model.vessel) | none))
+    return replace(model, vessel=dict(model.vessel) | none)
