@@ -116,7 +116,7 @@ def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
 
 @pytest.mark.parametrize("pace", [1.0, 4.0])
 def test_another_reading_changes_motion_and_density_by_its_factors(pace):
-    w = weak_windows(smoothed(base()))
+    w = weak_windows(smoothed(base())).thinned
     half = replace(of_pose("", (0.5, 0.5, 1.0)), pace=pace, turn=np.pi)
     meant = reread(w, half, Model())
     factors = np.array([0.5, 0.5, 1.0])

@@ -151,7 +151,7 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
 
 
 def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
-    """The windows of a run of a model's ship by another reading."""
+    """The thinned windows of a run of a model's ship by another reading."""
     w = w.thinned
     s, run = w.smoothed, w.run
     same = ["response"] if reading.commands is None and reading.pace == 1.0 else []
