@@ -26,7 +26,6 @@ from cosim.scenario import find_scenario
 from diagnosis import Model
 from diagnosis.design import (
     DIMENSIONS,
-    SURE,
     Designer,
     Knowledge,
     Limits,
@@ -42,6 +41,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.predictors.parameter_set import write_model
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.search.candidates import SMALL, model_error
+from diagnosis.search.most_likely import LEVEL
 from studies.study_command import progress
 
 from .hidden_effects.draw import LARGEST, SMALLEST
@@ -207,7 +207,7 @@ def first_runs(cell: Cell, work: Path) -> tuple[Path, list]:
 
 def judged(content: Mapping, hidden: Sequence[str]) -> dict[str, Any]:
     """Right, wrong or open; largest confidence, what was found, half width of the first interval."""
-    certain = [e for e in content["effects"] if (e["confidence"] or 0.0) >= SURE]
+    certain = [e for e in content["effects"] if (e["confidence"] or 0.0) >= LEVEL]
     first = max((e["confidence"] or 0.0 for e in content["effects"]), default=0.0)
     found = " + ".join(e["id"] for e in content["effects"])
     ids = {e["id"] for e in certain}
@@ -255,7 +255,7 @@ def cell_rows(cell: Cell, kinds: Sequence[str], limits: Limits) -> Iterator[dict
             yield base | {"kind": "first", "result": f"failed: {error}"}
             return
         yield (first := row("first", q.content))
-        if first["confidence"] >= SURE or not (q.content["effects"] or q.content["possibilities"]):
+        if first["confidence"] >= LEVEL or not (q.content["effects"] or q.content["possibilities"]):
             return
         for kind in kinds:
             try:

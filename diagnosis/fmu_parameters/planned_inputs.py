@@ -158,7 +158,7 @@ def plan_inputs(
         rows = [_slopes(old, setting)]
         h = Hypothesis(tuple(q.name for q in task.parameters), np.arange(p), np.arange(p))
         none = np.zeros((p, p))
-        k = Knowledge([h], np.ones(1), none, np.zeros(p), np.eye(p), np.zeros(p)).plus(
+        k = Knowledge([h], np.ones(1), none, np.zeros(p), np.eye(p), np.zeros(p), listed=1.0).plus(
             rows[0].T @ rows[0]
         )
         end = time.monotonic() + SECONDS * runs

@@ -18,9 +18,9 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from ..runs.cleaning import EVERY, WIDTH
+from ..runs.cleaning import WIDTH
 from ..runs.files.reading import Run
-from ..runs.run_constants import HORIZON
+from ..runs.run_constants import EVERY, HORIZON
 from ..runs.smoothing.smoother import breaks
 from .prediction import at_rest, before_filters, true_motion
 from .ship_model import Model

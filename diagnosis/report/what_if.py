@@ -26,6 +26,7 @@ from fmus.fmi.trace import TraceError
 from fmus.native.program import program
 from fmus.native.webassembly import component_module
 
+from ..execution.short_text import SHOWN
 from ..predictors import Evaluation, Model, Response, write_model
 from ..predictors.prediction import FAR_OFF, at_rest
 from ..predictors.ship_model import of_run, parameter_and_run
@@ -36,7 +37,6 @@ from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
 from ..session import Diagnosis
-from .finding_text import SHOWN
 from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 

@@ -12,24 +12,24 @@ from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
-from .columns.unit_check import GO_ON, refuse_time, refuse_units
+from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .row_order import ordered
-from .run_constants import HELD, HORIZON, LONG
+from .run_constants import EVERY, HORIZON, LONG
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
-EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
+
 RESPONSE = 3.0  # 1, time constants, after which 5 % of an unknown earlier command are left
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 # 1, of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts,
 # of which nothing can be differentiated.
 SPARSE = 0.05
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
-FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
+
 FEWEST = 4  # 1, samples, without which there is no third difference
-SHOWN = 3  # 1, items of a list that a message states one by one; chosen
+
 DIGITS = float(np.finfo(float).eps) ** 0.5  # 1, relative size of what rounding may have left
 # 1, standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
@@ -146,7 +146,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     where, run = f"run '{run.name}'", ordered(run, scale)
     notes = list(run.notes)
     run = replace(
-        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
+        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < LARGEST, run.pose, np.nan)
     )
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
@@ -206,7 +206,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
 
 def long_gap(period: float, scale: Scale) -> float:
     """Time [s] from which on a gap between samples some period [s] apart is one."""
-    return max(HELD * scale.time, LONG * period)
+    return max(EVERY * scale.time, LONG * period)
 
 
 def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:

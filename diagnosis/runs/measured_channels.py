@@ -9,7 +9,8 @@ import numpy as np
 
 from fmus.ops import wrap
 
-from .cleaning import FEWEST, SHOWN, noise, repeated
+from ..execution.short_text import SHOWN
+from .cleaning import FEWEST, noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
 from .sensors.evidence import SURE

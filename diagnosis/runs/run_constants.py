@@ -7,9 +7,10 @@ Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 # Enterprise 1 grow at up to 0.18 1/s.
 HORIZON = 8.0
 CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
-# s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
-# so that a command that is wrong there hardly counts.
-HELD, LONG = 0.5, 5.0
+# s between two windows of the weak form, of the quickest motion, and of a gap, or LONG sampling periods
+# of a gap if that is longer. Chosen: kernels over six of them average a velocity to 2 %, and a command
+# that is wrong in one hardly counts.
+EVERY, LONG = 0.5, 5.0
 # 1, standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).
 FAR_OFF = 3.0

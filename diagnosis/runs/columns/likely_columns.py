@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cleaning import SHOWN
+from ...execution.short_text import SHOWN
 from ..run_constants import FEWEST
 from .unit_check import UNITS, doubts
 

@@ -14,8 +14,9 @@ from ..run_constants import FEWEST
 
 SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 FAR = 8.0  # 1, times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
-AGREED = 0.7  # 1, correlation from which on two channels measure the same motion (chosen)
-ALIKE = 0.3  # 1, relative difference up to which two quantities may be the same but for a fault (chosen)
+# 1, correlation from which on two channels measure the same motion, and ratio of two quantities that may
+# be the same but for a fault (chosen).
+AGREED = 0.7
 LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)
 # 1, of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
 STRAIGHT = 0.25

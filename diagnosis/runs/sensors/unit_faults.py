@@ -13,7 +13,7 @@ from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
 from ..fingerprint import FEW
-from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
+from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
 WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
@@ -129,7 +129,7 @@ def _judged(
         note = f"{told} and the pose disagree about the motion: {told} is not used"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
-    if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
+    if abs(middle - 1.0) < 1.0 - AGREED:  # a scale, which is estimated with all else
         return found
     value = 1.0 / middle
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
