@@ -92,7 +92,7 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     """A clause about a force that a ship cannot give, on an axis that no actuator commands."""
     e, T = omega(w, model), w.held @ w.run.tau_cmd
     lacking, full = np.sqrt((e**2).mean(axis=0)), most_thrust(w, model)
-    idle = ~T.any(axis=0) & (lacking > SETTINGS.drift * full)
+    idle = ~T.any(axis=0) & (lacking > SETTINGS.much * full)
     if not idle.any():
         return None
     k = int(np.argmax(idle))
@@ -168,7 +168,7 @@ def likeliest_mistake(
     if not found.max() > as_read + asked:
         return None
     best = possible[int(np.argmax(found))]
-    lawful = [Reading("", turn=turn) for turn in TURNS]
+    lawful = [Reading("", {"psi": ColumnChange("psi", offset=turn)}) for turn in TURNS]
     if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
         lawful = []
     elif best.commands is not None:  # actuators that are dead show nothing of any command

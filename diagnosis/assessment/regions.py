@@ -214,7 +214,7 @@ class _Design:
         p, bins = self.profile, len(self.total)
         inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
         share = float(self.profile.share[inside].sum())
-        if share > SETTINGS.largest_region:
+        if share > SETTINGS.much:
             return None
         parts = (inside, ~inside)
         a, b = map(self._log_mean_square, parts)

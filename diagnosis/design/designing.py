@@ -17,6 +17,7 @@ from cosim.errors import nearest
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import NEGLIGIBLE
+from ..search.nonlinear.multistart import REFINED
 from .hypotheses import Space
 from .information import CRITERIA, Knowledge, inseparable
 from .manoeuvre_library import (
@@ -42,7 +43,7 @@ MOST_PIECES = 6  # 1, manoeuvres of a run; chosen: of more the search finds no g
 FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used beyond its data (chosen)
 # 1, shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
-TRIES = 3  # 1, best plans whose spread is computed, until one keeps the basin; chosen: within the minute
+
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
     "basin, fewer minutes or a smaller margin"
@@ -300,7 +301,7 @@ class Designer:
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
 
     def checked(
-        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = TRIES
+        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = REFINED
     ) -> tuple[ScoredPlan, Spread]:
         """The plan, or else the best of those that were tried, that keeps the basin with its spread.
 

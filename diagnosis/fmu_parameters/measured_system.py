@@ -16,14 +16,13 @@ from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.reading import LOGS
 from ..runs.files.tables import as_table, column_names, numbers, table_of_file
-from ..runs.sensors.evidence import FEWEST
+from ..runs.run_constants import FAR_OFF, FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
 MOST_STEPS = 20  # 1, between two samples; chosen, an FMU that wants more of them takes them itself
-DIGITS = 1e-5  # 1, of an output's spread: noise below that is rounding; chosen
-# 1, by which the standard deviation of a start value is larger than that of its parabola, which also
-# bends otherwise than the signal, by as much as the noise hides; chosen.
-UNSURE = 3.0
+# 1, of an output's spread, and of the squared length of a slope by differences: less is rounding; chosen
+ROUNDING = 1e-5
+
 WIDTHS = (5, 7, 11, 15, 21, 31, 45, 65)  # 1, samples of a parabola through the start of a window
 
 
@@ -150,7 +149,7 @@ def noises(runs: Sequence[MeasuredRun], given: SystemMap) -> np.ndarray:
             raise InputError(f"column {quoted(column)} has no samples in '{runs[0].name}'")
         noise = c.noise or max(
             float(np.median([noise_of(r.columns[column]) for r in runs])),
-            DIGITS * float(np.nanstd(every)),
+            ROUNDING * float(np.nanstd(every)),
             float(np.finfo(float).tiny ** 0.5),
         )
         found.append(abs(c.factor) * noise)
@@ -226,7 +225,8 @@ def _window(
         o = given.outputs[column]
         plain = (value - (0.0 if rate else o.offset)) / o.factor
         start[c.name] = c.factor * plain + (0.0 if rate else c.offset)
-        std[c.name] = UNSURE * abs(c.factor / o.factor) * sure
+        # A parabola also bends otherwise than the signal, by as much as the noise hides.
+        std[c.name] = FAR_OFF * abs(c.factor / o.factor) * sure
     counts = t >= given.run_in - 1e-9
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import hyp0f1
 
 from ..runs.cleaning import DIGITS
-from .filters import NO_FILTERS, Filters
+from .filters import Filters
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
@@ -51,15 +51,15 @@ MEASURED = 0.1
 
 
 @lru_cache  # filters; a fit asks for the same several times
-def noise_gain(filters: Filters = NO_FILTERS, time: float = 1.0) -> list[np.ndarray]:
+def noise_gain(filters: Filters | None = None, time: float = 1.0) -> list[np.ndarray]:
     """For order k = 0 to 3, each channel and w0, (3, w0), the integral of w^2k |kernel U|^2 H [s^-2k-1].
 
     Args:
-        filters: that are undone, which multiplies a pose by U.
+        filters: that are undone, which multiplies a pose by U; None: none.
         time: s at the ship's size for one at the size of CyberShip Enterprise 1.
     """
-    U = filters.undoing(FREQUENCIES / time)
-    return [(FREQUENCIES**k * U) ** 2 @ _passed() for k in range(4)]
+    U = 1.0 if filters is None else filters.undoing(FREQUENCIES / time)
+    return [np.atleast_2d(FREQUENCIES**k * U) ** 2 @ _passed() for k in range(4)]
 
 
 @cache

@@ -20,7 +20,7 @@ from fmus.vessel import vessel
 from ..runs import Smoothed
 from ..runs.cleaning import WIDTH
 from ..runs.files.reading import Run
-from ..runs.run_constants import EVERY, HORIZON
+from ..runs.run_constants import BLOCK, BLOCKS, EVERY, HORIZON
 from ..runs.smoothing.smoother import breaks
 from .prediction import at_rest, before_filters, true_motion
 from .ship_model import Model
@@ -30,8 +30,7 @@ from .thrust import Response, inflow, thrust
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up. Seconds are those of
 # CyberShip Enterprise 1, times the scale of the ship.
 OVERLAP = 4.0
-BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
-BLOCKS = 64  # 1; chosen: Gram matrices of more take memory, and no fold needs them
+
 SMALL = 1e-3  # 1, of its usual size: step of a finite difference where nothing is linear; chosen
 # bytes, for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.

@@ -17,8 +17,12 @@ FAR_OFF = 3.0
 # 1, samples, windows or parts of a run by which a correlation, a noise or a standard deviation is
 # estimated (chosen).
 FEWEST = 20
-# 1, samples that noise neither repeats nor leaves on a line (chosen).
+# 1, samples that noise neither repeats nor leaves on a line, and windows in which two channels do not
+# agree by chance (chosen).
 IN_A_ROW = 8
 # 1, correlation of two signals that are one. Copies of a motion have 0.9995 and more in the median, two
 # zig-zags of a tanker's model 0.9975 and less (tests/test_independence.py).
 SAME = 0.999
+# s, of a stretch by itself, or more where a run would have more than BLOCKS of them. Chosen: Gram
+# matrices of more take memory, and no fold needs them.
+BLOCK, BLOCKS = 15.0, 64

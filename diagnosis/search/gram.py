@@ -71,7 +71,7 @@ class Entry(NamedTuple):
     precision: np.ndarray
     offset: np.ndarray
     nonlinear: int
-    quieted: float = 0.0
+    quieted: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +179,7 @@ def gram_table(
 
     added(y[:, :, None], np.ones(1))
     entries = [[entry(s) for s in c.shapes] for c in candidates]
-    entries.append([Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)])
+    entries.append([Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0, 0.0)])
     indices = added(nuisance.columns, nuisance.unit)
     A = np.concatenate(columns, axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
     names, number, rows = np.unique(blocks, axis=0, return_inverse=True, return_counts=True)

@@ -31,8 +31,6 @@ GROWTH = 1.5  # from lag to lag, in samples
 
 ON_GRID = 0.2  # of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
 
-SETTLED = 0.02  # 1, of the noise
-
 
 class Correlated(NamedTuple):
     """Noise of a channel as white noise and parts that last.
@@ -152,7 +150,7 @@ def with_correlated(
         ]
         even = even._replace(sigma=np.array(sigma))
         smoothness = likeliest(even, found.weights, smoothness * (even.sigma / before) ** 2)
-        if np.allclose(even.sigma, before, rtol=SETTLED):
+        if np.allclose(even.sigma, before, rtol=CHANCE):
             break
     adapted, smooth = adapt(even, smoothness, found.weights)
     return Inliers(adapted, smooth, found.weights, smoothness)
