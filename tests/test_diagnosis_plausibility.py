@@ -117,7 +117,11 @@ def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
 @pytest.mark.parametrize("pace", [1.0, 4.0])
 def test_another_reading_changes_motion_and_density_by_its_factors(pace):
     w = weak_windows(smoothed(base()))
-    half = replace(of_pose("", (0.5, 0.5, 1.0)), pace=pace, turn=np.pi)
+    changes = {
+        "psi": ColumnChange("psi", offset=np.pi),
+        "time": ColumnChange("time", factor=pace),
+    }
+    half = replace(of_pose("", (0.5, 0.5, 1.0)), changes=changes)
     meant = reread(w, half, Model())
     factors = np.array([0.5, 0.5, 1.0])
     np.testing.assert_allclose(meant.smoothed.eta, w.smoothed.eta * factors + [0.0, 0.0, np.pi])
