@@ -75,7 +75,7 @@ PAIRS = 20  # of random effects
 TRIES = 4  # sizes of an effect, each LESS of the one before, until the ship stays on its path
 LESS = 0.6
 PATIENCE = 200  # random plans until one keeps the limits
-BRIEF = 4  # of the plans that are searched, to the base 2, where only the basin counts
+BRIEF = 16  # plans that are searched where only the basin counts
 RIVALS = 2  # random candidates next to the true one, where nothing is learned
 NUMBERS = ("confidence", "found", "sure", "half_width", "margin")
 COLUMNS = ("ship", "cell", "seed", "kind", "result", *NUMBERS)
@@ -297,7 +297,7 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
                 _, data = first_runs(cell, Path(scratch))
                 q = Question(data, _made_up(cell), cell.start, PRIOR, cell.limits(minutes), ship=ship)
                 d, k = prepared(q)
-                run, spread = d.checked(k, d.search(k, seed, log_points=BRIEF, evolved=0), seed)
+                run, spread = d.checked(k, d.search(k, seed, points=BRIEF, evolved=0), seed)
                 fresh = d.spread(k, run, seed + 1)
             except InputError as error:
                 yield base | {"result": f"no design: {error}"}

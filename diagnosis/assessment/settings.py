@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from ..predictors.uncertainty import MEASURED, NEGLIGIBLE
-from ..runs.run_constants import CHANCE
+from ..predictors.uncertainty import MEASURED
+from ..runs.run_constants import CHANCE, NEGLIGIBLE
 from ..search.gram import PARTS
 
 
@@ -40,12 +40,10 @@ class AssessmentSettings:
     blocks_per_cluster: int = 2
     least_contrast: float = 1.4  # 1, of the RMS in a region to that elsewhere; chosen
     least_clusters: int = PARTS  # 1, inside and outside, for three degrees of freedom of each variance
-    # 1, variance by noise of a mean over windows, as a share of that of independent ones: measured 0.04
-    # to 0.13 without a hidden cause, and doubled.
-    slow_noise: float = 0.25
+
     # 1, along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
     directions: int = 21
-    least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen
+
     limits: tuple[float, float, float] = (0.4, 0.2, 0.6)  # m/s, m/s, rad/s: 99 % of each published run
     runaway: float = 3.0  # 1, times the speeds of the region; chosen
     step: float = 0.08  # s, of simulations; chosen, distances agree with those at 0.01 s to 3 %

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from ..predictors.uncertainty import NEGLIGIBLE, SHARE_OF_COMMAND
-from ..runs.run_constants import CHANCE
+from ..predictors.uncertainty import SHARE_OF_COMMAND
+from ..runs.run_constants import CHANCE, NEGLIGIBLE
 from ..search.gram import FOLDS
 from .measured_system import Window
 from .residuals import WindowResiduals

@@ -41,9 +41,7 @@ NOISE_TOLERANCE = 1.3
 # from how a simulator integrates. Contract, for the residual; the same for findings, there also of the
 # squares of the first model error.
 SHARE_OF_COMMAND = 0.02
-# 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
-# from a limit; the same for commands and windows, and for what must be explained.
-NEGLIGIBLE = 0.05
+
 # 1, relative standard deviation of a measured coefficient. The search has no more for any coefficient;
 # one prior for all has no more for masses, thrusters' forces and places, which no other ship had to
 # lend. So much of the inertial force a model lacks at the least.

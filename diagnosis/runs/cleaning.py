@@ -16,16 +16,14 @@ from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .row_order import ordered
-from .run_constants import EVERY, HORIZON, LONG
+from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
 
-RESPONSE = 3.0  # 1, time constants, after which 5 % of an unknown earlier command are left
+
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
-# 1, of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts,
-# of which nothing can be differentiated.
-SPARSE = 0.05
+
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 
 FEWEST = 4  # 1, samples, without which there is no third difference
@@ -89,7 +87,7 @@ class Track(ShortRepr):
     @property
     def responded(self) -> float:
         """Time [s] from which commands before the run, which are not known, hardly act any more."""
-        return float(self.run.time[0]) + RESPONSE * self.lag
+        return float(self.run.time[0]) - float(np.log(NEGLIGIBLE)) * self.lag
 
     @cached_property
     def periods(self) -> np.ndarray:
@@ -167,7 +165,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
     steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
-    if SPARSE * steps.sum() > row * run.time.size:
+    # With a few of the samples that regular sampling would give, nothing can be differentiated.
+    if NEGLIGIBLE * steps.sum() > row * run.time.size:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
         )

@@ -7,6 +7,10 @@ Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 # Enterprise 1 grow at up to 0.18 1/s.
 HORIZON = 8.0
 CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
+# 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
+# from a limit; the same for commands and windows, for what must be explained, for a command that is
+# forgotten, and for what numbers are above their limits.
+NEGLIGIBLE = 0.05
 # s between two windows of the weak form, of the quickest motion, and of a gap, or LONG sampling periods
 # of a gap if that is longer. Chosen: kernels over six of them average a velocity to 2 %, and a command
 # that is wrong in one hardly counts.

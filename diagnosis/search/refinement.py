@@ -18,8 +18,8 @@ from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
-from ..predictors.uncertainty import NEGLIGIBLE
 from ..predictors.weak_form import OVERLAP
+from ..runs.run_constants import NEGLIGIBLE
 from .candidates import SMALL, CandidateShape, model_error, quieted
 from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge

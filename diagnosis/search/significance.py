@@ -4,7 +4,8 @@ import numpy as np
 
 from fmus.ship import Ship
 
-from ..predictors.uncertainty import NEGLIGIBLE, SHARE_OF_COMMAND
+from ..predictors.uncertainty import SHARE_OF_COMMAND
+from ..runs.run_constants import NEGLIGIBLE
 from .candidates import LEAST_SHARE
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist

@@ -1,5 +1,6 @@
 """Which columns of a measurement a signal is likely to be: by name, unit, range and motion."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
@@ -8,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...execution.short_text import SHOWN
-from ..run_constants import EVERY, FEWEST
+from ..run_constants import EVERY, FEWEST, NEGLIGIBLE
 from .unit_check import UNITS, doubts
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -43,8 +44,11 @@ MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("co
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
 
 LIKELY = 0.4  # 1, correlation or likeness of names from which on it counts (chosen)
-# [deg, %] largest numbers of an angle and of a command in any unit, with what overshoots (chosen).
-LARGEST = {"angle": 400.0, "command": 105.0}
+# Largest numbers of an angle and of a command in any unit, with what overshoots.
+LARGEST = {
+    quantity: (1.0 + NEGLIGIBLE) * most / min(UNITS[quantity].values())
+    for quantity, most in (("angle", math.tau), ("command", 1.0))
+}
 
 
 class LikelyColumn(NamedTuple):

@@ -25,9 +25,7 @@ from .sensor_finding import Examined, SensorFinding
 CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
 CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
 CLOCK_OR_RATE = "no speed is measured: a clock at this rate has the same effect"
-# 1, of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
-# differ by beyond noise. Chosen: with more, most of it is not common to both.
-MOST_APART = 0.5
+
 TWO_CLOCKS = (
     "position and speed imply another clock than heading and yaw rate: there is another fault, "
     "such as a filter or held values, and only a delay is repaired"
@@ -292,7 +290,7 @@ def _two_clocks(path: Path) -> bool:
     rates = np.array([way.mean - turn.mean, _blocks(path).mean])
     rates -= np.average(rates, axis=1, weights=weight)[:, None]
     apart, off = (weight * rates**2).sum(axis=1).tolist()
-    return apart - weight.size > MOST_APART * off
+    return 2.0 * (apart - weight.size) > off  # beyond noise, most of it is not common to both
 
 
 def _stretches(path: Path) -> list[tuple[float, float, float, float]]:

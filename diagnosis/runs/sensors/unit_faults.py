@@ -16,7 +16,6 @@ from ..run_constants import HORIZON, IN_A_ROW
 from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
-NEAR = 0.15  # 1, relative distance within which a factor is that of a unit (chosen)
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is reversed"
 
@@ -145,7 +144,8 @@ def _nearest(value: float, quantity: str) -> tuple[str, float]:
     """The mistake of units that is nearest to a factor, and its factor; no name: it is none."""
     pairs = permutations(UNITS[quantity].items(), 2)
     known = {f"{a} in place of {b}": of_b / of_a for (a, of_a), (b, of_b) in pairs if of_a != of_b}
-    if abs(value - 1.0) <= NEAR:
+    near = 1.0 - AGREED
+    if abs(value - 1.0) <= near:
         known = {SIGN: 1.0}
     best = min(known, key=lambda name: abs(np.log(value / known[name])))
-    return (best, known[best]) if abs(np.log(value / known[best])) < NEAR else ("", value)
+    return (best, known[best]) if abs(np.log(value / known[best])) < near else ("", value)

@@ -26,7 +26,6 @@ from .outliers import REWEIGHTINGS, Inliers
 from .penalised import Problem
 from .spline import DEGREE, ORDER
 
-MOTION = (3.0, 4.0, 5.0, 6.0)  # powers of h
 GROWTH = 1.5  # from lag to lag, in samples
 
 ON_GRID = 0.2  # of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
@@ -99,7 +98,8 @@ def correlated(time: np.ndarray, z: np.ndarray, longest: float) -> Correlated | 
     It is known if it is likelier than white noise and motion alone by the chance of a false report.
     """
     h, variance, std, period = hadamard(time, z, longest)
-    few = 1 + len(MOTION)
+    powers = np.arange(ORDER, 2 * ORDER + 1)  # of h, by a motion
+    few = 1 + powers.size
     if h.size <= few:  # they determine no more than white noise and motion
         return None
     times = np.geomspace(period, h[-1], h.size)
@@ -107,7 +107,7 @@ def correlated(time: np.ndarray, z: np.ndarray, longest: float) -> Correlated | 
     white, *further = np.correlate(difference, difference, "full")[ORDER:]  # by lags
     r = [np.exp(-k * h[:, None] / times) for k in range(1, ORDER + 1)]
     lasting = white + 2.0 * sum(factor * at for factor, at in zip(further, r, strict=True))
-    motion = (h[:, None] / h[-1]) ** np.array(MOTION)
+    motion = (h[:, None] / h[-1]) ** powers
     terms = np.column_stack([np.full(h.size, white), motion, lasting]) / (variance * std)[:, None]
     size = np.linalg.norm(terms, axis=0)
     target = 1.0 / std
