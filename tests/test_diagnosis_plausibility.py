@@ -30,8 +30,7 @@ from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
 from diagnosis.assessment.readings import AS_READ, of_commands, of_pose, reread, swapped
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
-from diagnosis.runs.columns.columns import POSE
-from diagnosis.runs.columns.side_car import ColumnChange
+from diagnosis.runs.columns.columns import POSE, Named
 from fmus.signals import Force
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -118,8 +117,8 @@ def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
 def test_another_reading_changes_motion_and_density_by_its_factors(pace):
     w = weak_windows(smoothed(base()))
     changes = {
-        "psi": ColumnChange("psi", offset=np.pi),
-        "time": ColumnChange("time", factor=pace),
+        "psi": Named(name="psi", offset=np.pi),
+        "time": Named(name="time", factor=pace),
     }
     half = replace(of_pose("", (0.5, 0.5, 1.0)), changes=changes)
     meant = reread(w, half, Model())
@@ -276,9 +275,7 @@ def test_late_clock_is_no_mistake():
 
 def of_units(found):
     """Whether nothing but units seems to be wrong."""
-    return all(
-        c == ColumnChange(s, factor=c.factor) for r in found.readings for s, c in r.changes.items()
-    )
+    return all(c == Named(name=s, factor=c.factor) for r in found.readings for s, c in r.changes.items())
 
 
 def test_ship_of_another_size_is_a_unit_alone():

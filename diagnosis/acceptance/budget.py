@@ -26,8 +26,7 @@ from fmus.frames import rotate_to_body
 from ..predictors import Model
 from ..predictors.shooting import Shooting
 from ..runs import Fingerprint, Smoothed, fingerprints
-from ..runs.cleaning import DIGITS
-from ..runs.files.resolution import FUZZ
+from ..runs.run_constants import DIGITS
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
 from .criterion import JUDGED, InputStd
 from .predictions import Predictions, difference, judged
@@ -66,7 +65,7 @@ class Learned(NamedTuple):
         p, known = self.posterior, model.values
         names = [name.partition(".")[2] for name in p.names]
         values = np.array([model.value(n) if "@" in n or n in known else np.nan for n in names])
-        reach = FUZZ * np.maximum(p.std, np.abs(p.mean))
+        reach = DIGITS * np.maximum(p.std, np.abs(p.mean))
         return bool(np.all(np.abs(values - p.mean) <= reach))
 
 

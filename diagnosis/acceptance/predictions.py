@@ -12,7 +12,7 @@ from fmus.ops import wrap
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..runs import Smoothed
-from ..runs.run_constants import NEGLIGIBLE
+from ..runs.run_constants import DIGITS, NEGLIGIBLE
 from .criterion import JUDGED
 
 
@@ -45,7 +45,7 @@ class Predictions:
             raise none
         self.windows, begin = windows, self.predictor.run_in(self.smoothed)
         until = begin + horizon
-        place = np.flatnonzero(self.windows.since <= until + 1e-9)
+        place = np.flatnonzero(self.windows.since <= until + DIGITS)
         window = self.windows.sample_window[place]
         last = place[np.append(window[1:] != window[:-1], True)] if place.size else place
         late = max(NEGLIGIBLE * horizon, 1.5 * self.smoothed.track.period)

@@ -12,8 +12,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OF_MOTION, needed_force
 from ..runs import Run
-from ..runs.columns.columns import OF_UNIT, POSE, TAU
-from ..runs.columns.side_car import ColumnChange
+from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
 from ..runs.columns.unit_check import SI_UNIT, UNITS
 
 
@@ -30,7 +29,7 @@ class Reading:
     """
 
     mistake: str
-    changes: Mapping[str, ColumnChange] = field(default_factory=dict)
+    changes: Mapping[str, Named] = field(default_factory=dict)
     motion: np.ndarray = field(default_factory=lambda: np.eye(3))
     commands: np.ndarray | None = None
 
@@ -63,9 +62,9 @@ def of_commands(mistake: str, factors: Sequence[float], signals: Sequence[str] =
     return Reading(mistake, _scaled(signals, factors), commands=np.diag(factors))
 
 
-def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, ColumnChange]:
+def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, Named]:
     pairs = zip(signals, factors, strict=True)
-    return {s: ColumnChange(s, f) for s, f in pairs if f != 1.0}
+    return {s: Named(name=s, factor=f) for s, f in pairs if f != 1.0}
 
 
 def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
@@ -73,7 +72,7 @@ def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
     order = np.eye(len(signals))
     order[[i, k]] = order[[k, i]]
     pair = signals[i], signals[k]
-    changes = {a: ColumnChange(b) for a, b in (pair, pair[::-1])}
+    changes = {a: Named(name=b) for a, b in (pair, pair[::-1])}
     mistake = f"{pair[0]} and {pair[1]} are swapped"
     if signals is POSE:
         return Reading(mistake, changes, motion=order)
@@ -90,7 +89,7 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
     )
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
-    half = ColumnChange("psi", offset=np.pi)
+    half = Named(name="psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half})
     for unit, m in UNITS["length"].items():
         if m == 1.0:
@@ -155,7 +154,7 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
     yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
-    clock = {"time": ColumnChange("time", factor=k**0.5)}
+    clock = {"time": Named(name="time", factor=k**0.5)}
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock)
 
 

@@ -16,7 +16,7 @@ from cosim.errors import nearest
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
-from ..runs.run_constants import NEGLIGIBLE
+from ..runs.run_constants import DIGITS, NEGLIGIBLE
 from ..search.nonlinear.multistart import POINTS, REFINED
 from .hypotheses import Space
 from .information import CRITERIA, Knowledge, inseparable
@@ -266,7 +266,7 @@ class Designer:
             if time.monotonic() > end or len(found) >= points + evolved:
                 raise _OutOfTimeError
             self.advance(f"searching a plan: {len(found)} of {points + evolved}")
-            each = np.clip(some.T.reshape(-1, cube.shape[1]), 0.0, 1.0 - 1e-9)
+            each = np.clip(some.T.reshape(-1, cube.shape[1]), 0.0, 1.0 - DIGITS)
             plans = [sequence(point, T, self.library) for point in each]
             found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))
             costs = np.array([-s.score for s in scored])

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import independent, omega_std
 from ..predictors.weak_form import OVERLAP
-from ..runs.cleaning import DIGITS
+from ..runs.run_constants import DIGITS
 from ..search.candidates import SMALL, CandidateShape, candidate, model_error
 from ..search.prior import NominalPrior
 from ..search.shortlist import LENGTH

@@ -16,7 +16,7 @@ from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.reading import LOGS
 from ..runs.files.tables import as_table, column_names, numbers, table_of_file
-from ..runs.run_constants import FAR_OFF, FEWEST
+from ..runs.run_constants import DIGITS, FAR_OFF, FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
 MOST_STEPS = 20  # 1, between two samples; chosen, an FMU that wants more of them takes them itself
@@ -173,11 +173,11 @@ def windows_of(
     """
     whole = float(run.time[-1] - run.time[0])
     length = min(length or whole, whole)
-    count = max(1, int(whole / length + 1e-9))
+    count = max(1, int(whole / length + DIGITS))
     found = []
     for k in range(count):
         begin = run.time[0] + k * length
-        rows = np.flatnonzero((run.time >= begin - 1e-9) & (run.time <= begin + length + 1e-9))
+        rows = np.flatnonzero((run.time >= begin - DIGITS) & (run.time <= begin + length + DIGITS))
         if rows.size >= FEWEST:
             found.append(_window(run, given, model, noise, rows))
     if not found:
@@ -190,7 +190,7 @@ def step_of(model: FmuModel, period: float) -> float:
     own, told = model.suggested_step or period, model.description.coSimulation
     if told is not None and not told.canHandleVariableCommunicationStepSize:
         return own * max(1.0, round(period / own))
-    return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - 1e-6))))
+    return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - DIGITS))))
 
 
 def _window(
@@ -198,7 +198,7 @@ def _window(
 ) -> Window:
     t = run.time[rows] - run.time[rows[0]]
     h = step_of(model, float(np.median(np.diff(t))))
-    steps = int(np.ceil(t[-1] / h - 1e-6))
+    steps = int(np.ceil(t[-1] / h - DIGITS))
     middle = run.time[rows[0]] + (np.arange(steps) + 0.5) * h
     inputs = np.zeros((steps, len(given.inputs)))
     for k, (column, c) in enumerate(given.inputs.items()):
@@ -227,7 +227,7 @@ def _window(
         start[c.name] = c.factor * plain + (0.0 if rate else c.offset)
         # A parabola also bends otherwise than the signal, by as much as the noise hides.
         std[c.name] = FAR_OFF * abs(c.factor / o.factor) * sure
-    counts = t >= given.run_in - 1e-9
+    counts = t >= given.run_in - DIGITS
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])

@@ -24,7 +24,7 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.special import hyp0f1
 
-from ..runs.cleaning import DIGITS
+from ..runs.run_constants import DIGITS
 from .filters import Filters
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force

@@ -20,7 +20,7 @@ from fmus.vessel import vessel
 from ..runs import Smoothed
 from ..runs.cleaning import WIDTH
 from ..runs.files.reading import Run
-from ..runs.run_constants import BLOCK, BLOCKS, EVERY, HORIZON
+from ..runs.run_constants import BLOCK, BLOCKS, DIGITS, EVERY, HORIZON
 from ..runs.smoothing.smoother import breaks
 from .prediction import at_rest, before_filters, true_motion
 from .ship_model import Model
@@ -129,7 +129,7 @@ class WeakWindows:
 def places(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
     """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
     width, every = WIDTH * scale.time, EVERY * scale.time
-    last = np.floor((t[-1] - t[0] - width + 1e-9) / every)
+    last = np.floor((t[-1] - t[0] - width + DIGITS) / every)
     reach = np.ceil(width / 2 / every)
     near = np.unique(np.round((t - t[0] - width / 2) / every))
     found = np.unique(near[:, None] + np.arange(-reach, reach + 1.0))
@@ -162,7 +162,7 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole
-        & (middles - half >= smoothed.track.responded - 1e-9)
+        & (middles - half >= smoothed.track.responded - DIGITS)
         & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
         & (number(~np.all(np.isfinite(smoothed.nu), axis=1, keepdims=False)) == 0)

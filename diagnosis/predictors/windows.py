@@ -18,6 +18,7 @@ from fmus.ops import wrap
 from ..execution.short_text import ShortRepr
 from ..runs import Smoothed
 from ..runs.cleaning import BRIEF
+from ..runs.run_constants import DIGITS
 from .prediction import WindowStarts, by_measurement, predict, predict_each
 from .ship_model import Model
 from .thrust import LONGEST_STEP
@@ -109,7 +110,7 @@ class Windows:
         for kind in sorted({kinds[k] for k in np.unique(self.run)}):
             members = [k for k in np.unique(self.run).tolist() if kinds[k] == kind]
             starts = tuple((runs[k], parts[k].first_rows) for k in members)
-            group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
+            group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - DIGITS)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     @property
@@ -228,7 +229,7 @@ class RunWindows(NamedTuple):
 def step_of(smoothed: Smoothed) -> float:
     """Step of predictions [s], which divides the sample period."""
     row = round(float(np.median(np.diff(smoothed.time))), 9)
-    parts = int(np.ceil(row / (LONGEST_STEP * smoothed.scale.time) - 1e-6))
+    parts = int(np.ceil(row / (LONGEST_STEP * smoothed.scale.time) - DIGITS))
     return row / parts
 
 
@@ -321,7 +322,7 @@ def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) 
         predicted: (steps + 1, 3, p, w), in w windows at each step.
         column, place: (samples,), the window of each sample, and steps from its start to it.
     """
-    first = np.clip(np.floor(place + 1e-6).astype(int) - 1, 0, max(len(predicted) - 4, 0))
+    first = np.clip(np.floor(place + DIGITS).astype(int) - 1, 0, max(len(predicted) - 4, 0))
     nodes = range(min(4, len(predicted)))
     poses = [predicted[first + k, :, :, column] for k in nodes]
     with np.errstate(invalid="ignore", over="ignore"):

@@ -16,7 +16,7 @@ from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .row_order import ordered
-from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE
+from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE, ORDER
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
@@ -26,9 +26,7 @@ BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to 
 
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 
-FEWEST = 4  # 1, samples, without which there is no third difference
 
-DIGITS = float(np.finfo(float).eps) ** 0.5  # 1, relative size of what rounding may have left
 # 1, standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
 
@@ -150,7 +148,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
     turned, constant, lined = updates(run, HEADING, gone)
-    if turned.sum() < FEWEST <= min(seen.sum(), constant.sum()):
+    if turned.sum() <= ORDER < min(seen.sum(), constant.sum()):
         if not anyway:
             raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
         turned = turned | constant
@@ -158,7 +156,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     apart = max(WIDTH * scale.time, LONG * row)
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
     fresh = np.flatnonzero(seen & ~dropped)
-    if fresh.size < FEWEST or turned.sum() < FEWEST:
+    if min(fresh.size, turned.sum()) <= ORDER:  # there is no third difference
         raise InputError(f"{where} does not move: its pose is frozen or missing in all rows")
     if between.any() or lined.any():
         notes.append("rows between two measurements were linearly interpolated: they are not counted")
@@ -308,5 +306,6 @@ def noise(values: np.ndarray) -> np.ndarray:
 
     That some steps are longer than others does little harm, as the median is taken.
     """
-    third = np.abs(np.diff(values, 3, axis=0))
-    return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(np.diff(np.eye(4), 3, axis=0))
+    third = np.abs(np.diff(values, ORDER, axis=0))
+    factors = np.diff(np.eye(ORDER + 1), ORDER, axis=0)
+    return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(factors)

@@ -10,9 +10,10 @@ import numpy as np
 from fmus.ops import wrap
 
 from ..execution.short_text import SHOWN
-from .cleaning import FEWEST, Z95, noise, repeated
+from .cleaning import Z95, noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
+from .run_constants import ORDER
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
@@ -118,7 +119,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
     for name, values in {**s.sensors.run.measured, **s.sensors.aside}.items():
         there = np.isfinite(values) & np.isfinite(time)
         new = there & ~repeated(values[:, None], there)
-        if new.sum() >= FEWEST:
+        if new.sum() > ORDER:
             yield MeasuredChannel(
                 name,
                 _rate(time[new]),
@@ -155,7 +156,7 @@ def _rate(time: np.ndarray) -> float:
 def _correlation(time: np.ndarray, off: np.ndarray) -> float:
     """Time constant [s] of residuals (n,) at times (n,) [s], if their correlation is significant."""
     step = np.diff(time)
-    if time.size < FEWEST:
+    if time.size <= ORDER:
         return 0.0
     period = float(np.median(step))
     near = step < 1.5 * period

@@ -3,6 +3,8 @@
 Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 """
 
+import sys
+
 # s, of predictions, and of the shortest run. Chosen: motions of the unstable nominal hull of CyberShip
 # Enterprise 1 grow at up to 0.18 1/s.
 HORIZON = 8.0
@@ -11,6 +13,8 @@ CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked 
 # from a limit; the same for commands and windows, for what must be explained, for a command that is
 # forgotten, and for what numbers are above their limits.
 NEGLIGIBLE = 0.05
+DIGITS = sys.float_info.epsilon**0.5  # 1, relative size of what rounding may have left
+ORDER = 3  # 1, of the derivative with a penalty, and of the differences that noise is estimated by
 # s between two windows of the weak form, of the quickest motion, and of a gap, or LONG sampling periods
 # of a gap if that is longer. Chosen: kernels over six of them average a velocity to 2 %, and a command
 # that is wrong in one hardly counts.

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .cleaning import BRIEF, DIGITS, Track, between, impulse, long_gap
-from .run_constants import EVERY
+from .cleaning import BRIEF, Track, between, impulse, long_gap
+from .run_constants import DIGITS, EVERY
 
 # 1, rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000

@@ -20,7 +20,7 @@ from cosim import InputError
 
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
-from ..runs.cleaning import DIGITS
+from ..runs.run_constants import DIGITS
 from .candidates import Candidate, CandidateShape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import FOLDS, block_numbers

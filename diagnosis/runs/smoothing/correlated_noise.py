@@ -20,11 +20,11 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ..cleaning import NORMAL_MAD
-from ..run_constants import CHANCE
+from ..run_constants import CHANCE, DIGITS, ORDER
 from .likelihood import adapt, likeliest
 from .outliers import REWEIGHTINGS, Inliers
 from .penalised import Problem
-from .spline import DEGREE, ORDER
+from .spline import DEGREE
 
 GROWTH = 1.5  # from lag to lag, in samples
 
@@ -75,7 +75,7 @@ def hadamard(
     even = np.full(place[-1] + 1, np.nan)
     even[place] = z
     most = min(int(longest / period), (even.size - 1) // 3)
-    powers = np.arange(np.log(max(most, 1)) / np.log(GROWTH) + 1e-9)
+    powers = np.arange(np.log(max(most, 1)) / np.log(GROWTH) + DIGITS)
     lags = np.unique(np.round(GROWTH**powers).astype(int))
     found = []
     median = NORMAL_MAD**-2.0  # of the square of a standard normal variable

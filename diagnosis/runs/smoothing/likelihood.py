@@ -34,10 +34,9 @@ from scipy.linalg import LinAlgError
 from scipy.optimize import brentq
 from scipy.special import chdtrc
 
-from ..cleaning import DIGITS
-from ..run_constants import CHANCE
+from ..run_constants import CHANCE, DIGITS, ORDER
 from .penalised import JERK, POSE, Equations, Fit, LinearSystem, Problem, solve
-from .spline import ORDER, third
+from .spline import third
 
 # 1, of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise
 # (chosen).

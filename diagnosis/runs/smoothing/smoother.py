@@ -21,10 +21,9 @@ from fmus.scale import Scale
 
 from ...execution.short_text import ShortRepr
 from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise, repeated
-from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
 from ..measured_wind import air_along
-from ..run_constants import CHANCE, EVERY, HORIZON, LONG
+from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
@@ -370,8 +369,7 @@ def measured_rates(
         z[:, 2] = run.measured["r"][at]
         sigma[2] = max(agreeing["r"], run.noise.get("r", 0.0))
     scatter = [
-        noise(z[new, k : k + 1])[0] if new.sum() >= OF_CHANNEL else 0.0
-        for k, new in enumerate(share.T > 0.0)
+        noise(z[new, k : k + 1])[0] if new.sum() > ORDER else 0.0 for k, new in enumerate(share.T > 0.0)
     ]
     z = np.where(share > 0.0, z, 0.0)
     return at, Rates(z, basis(grid, run.time[at] - run.time[0], 1), np.maximum(sigma, scatter), share)
@@ -394,7 +392,7 @@ def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
     # A heading may be measured in rows of its own.
     until = np.vstack([np.zeros((1, 3), int), np.cumsum(track.fresh, axis=0)])
     of_channel = (until[rows[last] + 1] - until[rows[first]]).min(axis=1)
-    enough = (last - first + 1 >= FEWEST) & (of_channel >= OF_CHANNEL)
+    enough = (last - first + 1 >= FEWEST) & (of_channel > ORDER)
     if not enough.any():
         raise InputError(f"run '{track.run.name}': fewer than {FEWEST} samples between long gaps")
     return time[first[enough]], time[last[enough]]

@@ -31,7 +31,7 @@ from ...execution.parallel import for_each
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
-from ...runs.cleaning import DIGITS
+from ...runs.run_constants import DIGITS
 from ..candidates import SMALL, model_error
 from ..gram import OTHER_RUN, run_folds
 from ..most_likely import STEPS, Quadratic, most_likely, ridge
