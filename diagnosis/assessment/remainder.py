@@ -104,6 +104,11 @@ def remaining(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[s
     return axis_remainders(runs, before, after, noise_of(runs, start, model), start)
 
 
+def remains(runs: Sequence[WeakWindows], start: Model, model: Model) -> bool:
+    """Whether a model leaves a significant residual."""
+    return any(axis.significant for axis in remaining(runs, start, model).values())
+
+
 def noise_of(runs: Sequence[WeakWindows], start: Model, model: Model) -> list[np.ndarray]:
     """Of each run the std (K, 3) of the first model's error by noise, behind a model's measurement."""
     return [omega_std(w, replace(start, measurement=model.measurement)) for w in runs]

@@ -8,7 +8,8 @@ from ..predictors.uncertainty import SHARE_OF_COMMAND
 from ..runs.run_constants import NEGLIGIBLE
 from .candidates import LEAST_SHARE
 from .map_regression import Scored
-from .shortlist import NEW, TIE, Shortlist
+from .paired_errors import worse
+from .shortlist import NEW, Shortlist
 
 
 def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
@@ -27,39 +28,6 @@ def harmful(nothing: Scored, best: Scored) -> bool:
     What the prior charges for nominal coefficients that moved is counted on both sides.
     """
     return worse(best.runs, nothing.runs, best.prior - nothing.prior)
-
-
-def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
-    """Whether a loss by blocks (blocks,) exceeds another by more than two paired standard errors.
-
-    Args:
-        its, others: losses; infinite where a model runs away.
-        charge: added to the difference.
-    """
-    known = np.isfinite(others)
-    if not np.isfinite(its[known]).all():
-        return True
-    d = its[known] - others[known]
-    if not d.size:
-        return charge > 0.0
-    return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())
-
-
-def lower_throughout(its: np.ndarray, others: np.ndarray) -> bool:
-    """Whether a loss by blocks (blocks,) is below another, in most blocks or by its mean.
-
-    One block with most of the loss makes a standard error as large as the mean; ranks do not mind
-    (Wilcoxon's signed-rank test, at the level of two standard errors).
-    """
-    if worse(others, its):
-        return True
-    d = others - its
-    if not np.isfinite(d).all() or not np.any(d) or d.sum() < 0.0:
-        return False
-    from scipy.stats import norm, wilcoxon  # half a second of import, and seldom asked for
-
-    _, p = wilcoxon(d, alternative="greater")
-    return bool(p < norm.sf(TIE))
 
 
 def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: np.ndarray) -> bool:
