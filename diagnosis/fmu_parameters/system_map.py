@@ -67,7 +67,7 @@ class SystemMap(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     inputs: dict[str, DrivenInput] = Field(default_factory=dict)
-    outputs: dict[str, MeasuredOutput] = Field(min_length=1)
+    outputs: Annotated[dict[str, MeasuredOutput], Field(min_length=1)]
     start: dict[str, MappedVariable] = Field(
         default_factory=dict, description="start values, by measured outputs or their derivatives"
     )

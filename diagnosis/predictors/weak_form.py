@@ -305,10 +305,12 @@ def arriving(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def _response(w: WeakWindows, model: Model) -> np.ndarray:
+    key = Response.key(model)
+
     def between() -> np.ndarray:
         return Response(w.run, model, not at_rest(w.smoothed)).between_samples
 
-    return w.recall("response", Response.key(model), between)
+    return w.recall("response", key, between)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:

@@ -29,9 +29,8 @@ FREE_STEP = BRIEF  # the mean of the commands acts in it
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 ANY_TIME = (-np.inf, np.inf)  # s
 # m, times the scale of the ship, and rad; where predictions begin a velocity is known if its standard
-# deviation displaces the ship by no more over a window. Chosen: a tenth of its length.
+# deviation displaces the ship by no more over a window, or is as usual. Chosen: a tenth of its length.
 DISPLACED = 0.1
-SETTLED = 2.0  # 1, times the median of a run, or so well; chosen: at its ends it is three to four
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -276,7 +275,7 @@ def settled_time(smoothed: Smoothed, begin: float, length: float) -> float:
     size = np.array([smoothed.scale.length, smoothed.scale.length, 1.0])
     used = smoothed.used & (smoothed.time >= begin)
     usual = np.median(smoothed.nu_std[smoothed.used], axis=0)
-    most = np.maximum(SETTLED * usual, DISPLACED * size / length)
+    most = np.maximum(usual, DISPLACED * size / length)
     rows = np.flatnonzero(used)
     known = (smoothed.nu_std[rows] <= most).all(axis=1)
     return float(smoothed.time[rows[known.argmax()]]) if known.any() else begin
