@@ -21,7 +21,7 @@ from diagnosis.search.gram import (
     run_folds,
 )
 from diagnosis.search.most_likely import beyond, ridge, rise
-from diagnosis.search.paired_errors import Losses, gain, harm, predicts_worse
+from diagnosis.search.significance import Losses, gain, harm, predicts_worse
 
 seeds = st.integers(0, 10**6)
 

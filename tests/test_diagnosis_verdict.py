@@ -24,8 +24,8 @@ from diagnosis.search.effect_evidence import credible
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
-from diagnosis.search.paired_errors import harm, lower_throughout, worse
 from diagnosis.search.refinement import at_limit
+from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.verdict.confidence import confidence_of
 from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.pruning import overfits, proven, prune, without

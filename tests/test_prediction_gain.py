@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis import Finding, Findings, Model
-from diagnosis.search.paired_errors import Losses
+from diagnosis.search.significance import Losses
 from diagnosis.verdict.prediction_gain import gain_of_search, prediction_gain
 
 START, BETTER = Model(), Model().plus({"delta_X_u": -1.0})

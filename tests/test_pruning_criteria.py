@@ -7,7 +7,7 @@ import pytest
 from support.project import ROOT
 
 from cosim import InputError
-from diagnosis.search.paired_errors import Losses
+from diagnosis.search.significance import Losses
 from diagnosis.verdict.pruning_criteria import CRITERIA, criterion
 
 BLOCKS = 40

@@ -25,7 +25,7 @@ from scipy.optimize import lsq_linear
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OVERLAP, needed_force
-from ..search.most_likely import STEPS
+from ..runs.run_constants import STEPS
 from .readings import Reading, inertial, reread
 from .settings import SETTINGS
 

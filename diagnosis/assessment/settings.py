@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from ..predictors.uncertainty import MEASURED
-from ..runs.run_constants import CHANCE, NEGLIGIBLE
-from ..search.gram import PARTS
+from ..runs.run_constants import CHANCE, NEGLIGIBLE, PARTS
 
 
 @dataclass(frozen=True)

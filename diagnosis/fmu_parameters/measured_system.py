@@ -227,7 +227,7 @@ def _window(
         start[c.name] = c.factor * plain + (0.0 if rate else c.offset)
         # A parabola also bends otherwise than the signal, by as much as the noise hides.
         std[c.name] = FAR_OFF * abs(c.factor / o.factor) * sure
-    counts = t >= given.run_in - DIGITS
+    counts = t >= (given.run_in or 0.0) - DIGITS
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
-from ..search.most_likely import STEPS
+from ..runs.run_constants import STEPS
 from ..search.prediction_fit.joint_posterior import TOGETHER, connected
 from .measured_system import ROUNDING
 from .parameter_file import CalibratedParameter

@@ -75,8 +75,8 @@ class SystemMap(BaseModel):
         default=None, description="inputs where an additional force may act (those in N, N.m, m/s2)"
     )
     window: Positive | None = Field(default=None, description="length of the windows [s] (whole runs)")
-    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] = Field(
-        default=0.0, description="time before a prediction is compared [s]"
+    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] | None = Field(
+        default=None, description="time before a prediction is compared [s] (none)"
     )
 
     @property

@@ -34,3 +34,7 @@ SAME = 0.999
 # s, of a stretch by itself, or more where a run would have more than BLOCKS of them. Chosen: Gram
 # matrices of more take memory, and no fold needs them.
 BLOCK, BLOCKS = 15.0, 64
+STEPS = 6  # 1, of whatever is iterated, and halvings of a step, at the most; two or three are usual
+# 1, least number of parts that are compared, or left out in turn: stretches of fewer runs. Each stretch
+# of a single run is as long as the shortest that can be learned from; chosen.
+PARTS = 4

@@ -14,15 +14,12 @@ import numpy as np
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
+from ..runs.run_constants import PARTS
 from .candidates import SLIGHT, Candidate, CandidateShape
 from .most_likely import ridge
 
 FOLDS = 8  # of cross-validation over blocks
 WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
-OTHER_RUN = 2  # runs, from which on a model can be fitted to other runs than it predicts
-# Least number of parts that are left out in turn: stretches of fewer runs.
-# Each stretch of a single run is as long as the shortest that can be learned from; chosen.
-PARTS = 4
 
 
 @dataclass(frozen=True, eq=False)

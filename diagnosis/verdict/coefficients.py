@@ -12,10 +12,10 @@ from ..predictors.evaluation import quantile
 from ..runs.run_constants import CHANCE
 from ..search.findings import Finding, Findings
 from ..search.gram import WHOLE_RUNS
-from ..search.paired_errors import gain, harm
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
+from ..search.significance import gain, harm
 from .confidence import confidence_of
 from .pruning import without
 from .validation_data import ValidationData

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 from ..predictors import Model
 from ..search.findings import Finding, Findings
-from ..search.paired_errors import gain, lower_throughout, predicts_worse
-from ..search.paired_errors import harm as paired_harm
 from ..search.refinement import at_limit
+from ..search.significance import gain, lower_throughout, predicts_worse
+from ..search.significance import harm as paired_harm
 from .confidence import confidence_of
 from .pruning_criteria import Harm
 from .validation_data import ValidationData

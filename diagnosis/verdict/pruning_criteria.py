@@ -7,7 +7,7 @@ from cosim import InputError
 from ..execution.user_files import chosen
 
 if TYPE_CHECKING:
-    from ..search.paired_errors import Losses
+    from ..search.significance import Losses
 
 
 class Harm(Protocol):
@@ -31,7 +31,7 @@ class Harm(Protocol):
 
 
 # Name -> module of the package and its function.
-CRITERIA = {"paired": ("search.paired_errors", "harm"), "bic": ("verdict.information_criterion", "harm")}
+CRITERIA = {"paired": ("search.significance", "harm"), "bic": ("verdict.information_criterion", "harm")}
 USUAL = "paired"
 PACKAGE = __name__.partition(".")[0]
 

@@ -16,8 +16,8 @@ from ..execution.parallel import in_halves
 from ..predictors import Model, WeakWindows, Windows, omega
 from ..predictors.windows import ANY_TIME
 from ..search.findings import Findings
-from ..search.gram import OTHER_RUN, WHOLE_RUNS, run_folds
-from ..search.paired_errors import Losses
+from ..search.gram import WHOLE_RUNS, run_folds
+from ..search.significance import Losses
 
 
 class Fold:
@@ -103,7 +103,7 @@ class ValidationData:
         """The same data, each of two runs left out as a whole: what holds in one may not in another."""
         if self.validate:
             return self
-        return ValidationData(self.train, [], self.start, self.sigma, OTHER_RUN)
+        return ValidationData(self.train, [], self.start, self.sigma, WHOLE_RUNS - 1)
 
     @property
     def runs(self) -> list[WeakWindows]:

@@ -34,7 +34,8 @@ from ...predictors.ship_model import of_run
 from ...predictors.uncertainty import FLOOR
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
 from ...runs.cleaning import BRIEF
-from ..most_likely import ENOUGH, STEPS, ridge, rise
+from ...runs.run_constants import STEPS
+from ..most_likely import ENOUGH, ridge, rise
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
