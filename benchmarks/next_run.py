@@ -26,7 +26,6 @@ from cosim.scenario import find_scenario
 from diagnosis import Model
 from diagnosis.design import (
     DIMENSIONS,
-    SURE,
     Designer,
     Knowledge,
     Limits,
@@ -42,6 +41,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.predictors.parameter_set import write_model
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.search.candidates import SMALL, model_error
+from diagnosis.search.most_likely import LEVEL
 from studies.study_command import progress
 
 from .hidden_effects.draw import LARGEST, SMALLEST
@@ -75,7 +75,7 @@ PAIRS = 20  # of random effects
 TRIES = 4  # sizes of an effect, each LESS of the one before, until the ship stays on its path
 LESS = 0.6
 PATIENCE = 200  # random plans until one keeps the limits
-BRIEF = 4  # of the plans that are searched, to the base 2, where only the basin counts
+BRIEF = 16  # plans that are searched where only the basin counts
 RIVALS = 2  # random candidates next to the true one, where nothing is learned
 NUMBERS = ("confidence", "found", "sure", "half_width", "margin")
 COLUMNS = ("ship", "cell", "seed", "kind", "result", *NUMBERS)
@@ -207,7 +207,7 @@ def first_runs(cell: Cell, work: Path) -> tuple[Path, list]:
 
 def judged(content: Mapping, hidden: Sequence[str]) -> dict[str, Any]:
     """Right, wrong or open; largest confidence, what was found, half width of the first interval."""
-    certain = [e for e in content["effects"] if (e["confidence"] or 0.0) >= SURE]
+    certain = [e for e in content["effects"] if (e["confidence"] or 0.0) >= LEVEL]
     first = max((e["confidence"] or 0.0 for e in content["effects"]), default=0.0)
     found = " + ".join(e["id"] for e in content["effects"])
     ids = {e["id"] for e in certain}
@@ -255,7 +255,7 @@ def cell_rows(cell: Cell, kinds: Sequence[str], limits: Limits) -> Iterator[dict
             yield base | {"kind": "first", "result": f"failed: {error}"}
             return
         yield (first := row("first", q.content))
-        if first["confidence"] >= SURE or not (q.content["effects"] or q.content["possibilities"]):
+        if first["confidence"] >= LEVEL or not (q.content["effects"] or q.content["possibilities"]):
             return
         for kind in kinds:
             try:
@@ -297,7 +297,7 @@ def basin_rows(ship: str, count: int, minutes: float, seed: int) -> Iterator[dic
                 _, data = first_runs(cell, Path(scratch))
                 q = Question(data, _made_up(cell), cell.start, PRIOR, cell.limits(minutes), ship=ship)
                 d, k = prepared(q)
-                run, spread = d.checked(k, d.search(k, seed, log_points=BRIEF, evolved=0), seed)
+                run, spread = d.checked(k, d.search(k, seed, points=BRIEF, evolved=0), seed)
                 fresh = d.spread(k, run, seed + 1)
             except InputError as error:
                 yield base | {"result": f"no design: {error}"}

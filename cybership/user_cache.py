@@ -7,14 +7,52 @@ import hashlib
 import os
 import shutil
 import stat
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from .scratch_folder import atomic_write
+from .scratch_folder import atomic_write, scratch_folder, sweep_parts
 
 SEAL = ".sha256"  # ends the name of the file next to an entry with its size [bytes] and SHA-256
+
+
+class RefusedError(Exception):
+    """An entry must not be used; the message says why."""
+
+
+def kept(cache: Path, path: Path, make: Callable[[Path], Path], patience: float | None = None) -> Path:
+    """An entry of the cache, which is made if it is not there or not whole.
+
+    Of processes that ask at once one makes it, and the others wait for that one.
+
+    Args:
+        cache: the cache.
+        path: of the entry.
+        make: returns a file, which it may make in the scratch folder that it is given.
+        patience: longest wait for another process [s]; None: without end.
+
+    Raises:
+        RefusedError: another user may have written it.
+        filelock.Timeout: another process takes longer.
+        OSError: the cache cannot be written.
+    """
+    if not _is_usable(cache, path):
+        from filelock import FileLock  # only now: most calls find the entry, and this takes a while
+
+        make_folder(cache, path.parent)
+        with FileLock(path.with_name(f"{path.name}.lock"), -1 if patience is None else patience):
+            if not _is_usable(cache, path):
+                with scratch_folder() as work:
+                    store(make(work), path)
+    return path
+
+
+def _is_usable(cache: Path, path: Path) -> bool:
+    if why := refusal(cache, path):
+        raise RefusedError(why)
+    return is_whole(path)
 
 
 def cache_folder() -> Path | None:
@@ -28,10 +66,14 @@ def cache_folder() -> Path | None:
 
 
 def make_folder(cache: Path, folder: Path) -> None:
-    """Make the cache and a folder of it, in which only this user may write."""
+    """Make the cache and a folder of it, in which only this user may write.
+
+    What killed processes have left in the cache is removed.
+    """
     cache.parent.mkdir(parents=True, exist_ok=True)
     for place in (cache, folder):
         place.mkdir(mode=0o755, exist_ok=True)
+    sweep_parts(cache.glob("**/.*.part"))
 
 
 def refusal(cache: Path, path: Path) -> str:

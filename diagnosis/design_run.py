@@ -9,7 +9,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, Field
 
@@ -34,7 +34,7 @@ NO_RUNS = (
 class Task(BaseModel):
     """What a diagnosis was made of, in ``posterior.json``; paths are absolute."""
 
-    runs: list[Path] = Field(min_length=1)
+    runs: Annotated[list[Path], Field(min_length=1)]
     model: Path | None = None
     map: Path | None = None
     parameters: Path | None = None

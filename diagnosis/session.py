@@ -32,8 +32,8 @@ from .predictors import (
 from .predictors.evaluation import DataUse
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
+from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
-from .search.gram import PARTS
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
 from .search.prediction_fit.refit import RefitOutcome

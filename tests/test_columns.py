@@ -12,9 +12,8 @@ from cosim import InputError
 from diagnosis import propose_columns
 from diagnosis.predictors import ship_with
 from diagnosis.runs import FOLDER_FILE, line_beside, prepare, propose, read
-from diagnosis.runs.columns.columns import quantities
+from diagnosis.runs.columns.columns import Named, quantities
 from diagnosis.runs.columns.likely_columns import meaning_of_words
-from diagnosis.runs.columns.side_car import ColumnChange
 
 TANKER = ship_with((), "kvlcc2")
 NAMES = {
@@ -347,7 +346,7 @@ def test_the_line_that_mends_a_column_keeps_the_name_and_unit_it_was_read_by(tmp
     table = boat().rename(columns={"psi": "psi [deg]", "x": "x [mm]"})
     path = written(tmp_path / "a.csv", table)
     run = read(path, of=OTTER)
-    mend = {"y": ColumnChange("y", -1.0), "psi": ColumnChange("psi", -1.0)}
+    mend = {name: Named(name=name, factor=-1.0) for name in ("y", "psi")}
     line = line_beside(path, run.layout, mend)
     content = json.loads(line.partition("put ")[2].rpartition(" into ")[0])
     assert content["columns"] == {

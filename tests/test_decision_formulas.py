@@ -21,8 +21,7 @@ from diagnosis.search.gram import (
     run_folds,
 )
 from diagnosis.search.most_likely import beyond, ridge, rise
-from diagnosis.verdict.paired_errors import gain, harm, predicts_worse
-from diagnosis.verdict.validation_data import Losses
+from diagnosis.search.significance import Losses, gain, harm, predicts_worse
 
 seeds = st.integers(0, 10**6)
 

@@ -30,8 +30,7 @@ from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
 from diagnosis.assessment.readings import AS_READ, of_commands, of_pose, reread, swapped
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
-from diagnosis.runs.columns.columns import POSE
-from diagnosis.runs.columns.side_car import ColumnChange
+from diagnosis.runs.columns.columns import POSE, Named
 from fmus.signals import Force
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -117,7 +116,11 @@ def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
 @pytest.mark.parametrize("pace", [1.0, 4.0])
 def test_another_reading_changes_motion_and_density_by_its_factors(pace):
     w = weak_windows(smoothed(base())).thinned
-    half = replace(of_pose("", (0.5, 0.5, 1.0)), pace=pace, turn=np.pi)
+    changes = {
+        "psi": Named(name="psi", offset=np.pi),
+        "time": Named(name="time", factor=pace),
+    }
+    half = replace(of_pose("", (0.5, 0.5, 1.0)), changes=changes)
     meant = reread(w, half, Model())
     factors = np.array([0.5, 0.5, 1.0])
     np.testing.assert_allclose(meant.smoothed.eta, w.smoothed.eta * factors + [0.0, 0.0, np.pi])
@@ -272,9 +275,7 @@ def test_late_clock_is_no_mistake():
 
 def of_units(found):
     """Whether nothing but units seems to be wrong."""
-    return all(
-        c == ColumnChange(s, factor=c.factor) for r in found.readings for s, c in r.changes.items()
-    )
+    return all(c == Named(name=s, factor=c.factor) for r in found.readings for s, c in r.changes.items())
 
 
 def test_ship_of_another_size_is_a_unit_alone():

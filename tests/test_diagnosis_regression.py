@@ -9,7 +9,7 @@ from scipy import optimize
 from scipy.linalg import block_diag
 
 from diagnosis.predictors.weak_form import OVERLAP
-from diagnosis.runs.cleaning import DIGITS
+from diagnosis.runs.run_constants import DIGITS
 from diagnosis.search import candidates
 from diagnosis.search.candidates import Candidate, CandidateShape, scaled, smoothness
 from diagnosis.search.gram import Nuisance, gram_table

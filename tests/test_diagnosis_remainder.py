@@ -122,7 +122,7 @@ def test_the_two_p_values_are_those_of_chi_square(seed, level, sizes):
         z = after[:, k] / std[:, k] / NOISE_TOLERANCE
         by_size = chi2.sf(z @ z / OVERLAP, count / OVERLAP)
         means = after[:, k].reshape(-1, SPAN).mean(axis=1)
-        variance = (std[:, k] ** 2).reshape(-1, SPAN).mean(axis=1) * SETTINGS.slow_noise * OVERLAP / SPAN
+        variance = (std[:, k] ** 2).reshape(-1, SPAN).mean(axis=1) / SPAN
         by_slowness = chi2.sf(np.sum(means**2 / variance) / NOISE_TOLERANCE**2, 10)
         assert found[axis].p_value == pytest.approx(min(by_size, by_slowness), rel=1e-9, abs=1e-300)
         assert found[axis].slow == pytest.approx(

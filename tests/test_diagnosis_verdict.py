@@ -25,10 +25,9 @@ from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.refinement import at_limit
-from diagnosis.search.significance import lower_throughout, worse
+from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.verdict.confidence import confidence_of
 from diagnosis.verdict.judging import verdict_name, with_confidence
-from diagnosis.verdict.paired_errors import harm
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 

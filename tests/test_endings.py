@@ -22,6 +22,7 @@ from cosim.campaign import run_table
 from cosim.campaign.__main__ import main as campaign_main
 from cosim.campaign.conduct import SUMMARY
 from cosim.campaign.run_table import JOURNAL, TABLE
+from cosim.compiled.library import entry_of
 from cosim.export.__main__ import main as export_main
 from cosim.master.recorder import demand_memory
 from cosim.results.performance import needed, read
@@ -260,7 +261,7 @@ def test_one_interrupt_ends_a_command_that_waits_for_another_process(ellipse, tm
     (tmp_path / "cache").mkdir()
     (tmp_path / "s.json").write_text(json.dumps(ellipse))
     fmus = {"CYBERSHIP_CACHE": str(tmp_path / "cache")}
-    with FileLock(tmp_path / "cache" / "loop.lock"):
+    with FileLock(f"{entry_of(tmp_path / 'cache')}.lock"):
         process = started(
             "cosim.run", tmp_path / "s.json", "--out", tmp_path / "out", "--no-plots", **fmus
         )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from diagnosis import Finding, Findings, Model
+from diagnosis.search.significance import Losses
 from diagnosis.verdict.prediction_gain import gain_of_search, prediction_gain
-from diagnosis.verdict.validation_data import Losses
 
 START, BETTER = Model(), Model().plus({"delta_X_u": -1.0})
 WINDOWS = 40

@@ -7,8 +7,8 @@ import pytest
 from support.project import ROOT
 
 from cosim import InputError
+from diagnosis.search.significance import Losses
 from diagnosis.verdict.pruning_criteria import CRITERIA, criterion
-from diagnosis.verdict.validation_data import Losses
 
 BLOCKS = 40
 

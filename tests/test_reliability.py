@@ -34,7 +34,7 @@ from cosim.command import printable
 from cosim.results.log import LogWriter
 from cybership import scratch_folder
 from cybership.message_text import LONGEST_WORD
-from fmus.build.building import prepare_folder
+from cybership.user_cache import make_folder
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no binary for this test here")
 
@@ -328,7 +328,7 @@ def test_scratch_folders_of_a_process_that_nobody_has_waited_for_are_swept(tmp_p
     assert process.wait() == 0
 
 
-def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_path, monkeypatch):
+def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_path):
     """A young file stays, as its process may be alive in another container, and that of a living one."""
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
@@ -349,8 +349,7 @@ def test_what_a_killed_process_has_left_of_a_file_goes_with_its_next_write(tmp_p
         part.write_text("whole")
     assert (tmp_path / "a.fmu").read_text() == "whole"
     assert {*tmp_path.iterdir()} == {tmp_path / "a.fmu", other, young, alive}
-    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
-    prepare_folder(tmp_path / "hash")
+    make_folder(tmp_path, tmp_path / "hash")
     assert {*tmp_path.glob(".*")} == {young, alive}
 
 

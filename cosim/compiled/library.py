@@ -20,10 +20,10 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
-from cybership.scratch_folder import environment_with, scratch_folder
-from cybership.user_cache import cache_folder, is_whole, make_folder, refusal, store
+from cybership.scratch_folder import environment_with
+from cybership.user_cache import RefusedError, cache_folder, kept
 
 SOURCE = Path(__file__).parent / "loop.c"
 # No product and sum in one rounding, no operation left out: the bits are to be those of Python.
@@ -117,57 +117,60 @@ class FoundLibrary(NamedTuple):
     note: str = ""
 
 
+def entry_of(cache: Path) -> Path:
+    """Where the library is kept in a cache, for this source and computer."""
+    key = repr((SOURCE.read_bytes(), OPTIONS, platform.machine(), sysconfig.get_platform()))
+    name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+    return cache / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
+
+
 @cache
 def _found(with_zig: bool) -> FoundLibrary:
     """The library, or why there is none: asked once in a process."""
-    key = repr((SOURCE.read_bytes(), OPTIONS, platform.machine(), sysconfig.get_platform()))
-    name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     if (folder := cache_folder()) is None:
         return FoundLibrary(
             None, "this user has no home folder; set CYBERSHIP_CACHE to a folder for the loop"
         )
-    path = folder / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
-    note = ""
+    path, note = entry_of(folder), ""
+
+    def make(work: Path) -> Path:
+        nonlocal note
+        if path.exists():
+            note = f"the step loop in the cache was damaged, and is compiled again: '{path}'"
+        return _compiled(work, with_zig)
+
     try:
-        make_folder(folder, folder)
-        if why := refusal(folder, path):
-            return FoundLibrary(None, why, f"{why}; the plain step loop runs")
-        if not is_whole(path):
-            with FileLock(folder / "loop.lock", timeout=PATIENCE):
-                if not is_whole(path):
-                    if path.exists():
-                        note = f"the step loop in the cache was damaged, and is compiled again: '{path}'"
-                    _compile(path, with_zig)
-        return FoundLibrary(ctypes.CDLL(str(path)), note=note)
+        return FoundLibrary(ctypes.CDLL(str(kept(folder, path, make, PATIENCE))), note=note)
+    except RefusedError as error:
+        return FoundLibrary(None, str(error), f"{error}; the plain step loop runs")
     except NoLibraryError as error:
         return FoundLibrary(None, str(error), note)
     except (OSError, Timeout, subprocess.SubprocessError) as error:
         return FoundLibrary(None, f"the library of C functions cannot be made or loaded: {error}", note)
 
 
-def _compile(path: Path, with_zig: bool) -> None:
+def _compiled(work: Path, with_zig: bool) -> Path:
     command = _compiler(with_zig)
-    with scratch_folder() as work:
-        built = work / "built"
-        linked = [] if os.name == "nt" else ["-lm"]
-        done = subprocess.run(
-            [*command, *OPTIONS, "-o", str(built), str(SOURCE), *linked],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            check=False,
-            timeout=PATIENCE,
-            cwd=work,
-            env=environment_with(work),
-        )
-        if done.returncode != 0 or not built.is_file():
-            said = [line for line in done.stderr.splitlines() if "error" in line.lower()]
-            raise NoLibraryError(f"compiler '{command[0]}' fails: {said[0] if said else 'no message'}")
-        try:
-            ctypes.CDLL(str(built))
-        except OSError as error:
-            raise NoLibraryError(f"compiler '{command[0]}' wrote no library: {error}") from None
-        store(built, path)
+    built = work / "built"
+    linked = [] if os.name == "nt" else ["-lm"]
+    done = subprocess.run(
+        [*command, *OPTIONS, "-o", str(built), str(SOURCE), *linked],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+        timeout=PATIENCE,
+        cwd=work,
+        env=environment_with(work),
+    )
+    if done.returncode != 0 or not built.is_file():
+        said = [line for line in done.stderr.splitlines() if "error" in line.lower()]
+        raise NoLibraryError(f"compiler '{command[0]}' fails: {said[0] if said else 'no message'}")
+    try:
+        ctypes.CDLL(str(built))
+    except OSError as error:
+        raise NoLibraryError(f"compiler '{command[0]}' wrote no library: {error}") from None
+    return built
 
 
 def _compiler(with_zig: bool) -> list[str]:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import betaincinv, stdtrit
 
+from ..runs.run_constants import DIGITS
+
 
 class Interval(NamedTuple):
     """An estimate between two bounds, each at a one-sided confidence."""
@@ -70,4 +72,4 @@ def root_mean_square(errors: np.ndarray, n: float, confidence: float) -> Interva
 
 def needed(share: float, confidence: float) -> int:
     """Independent windows, all of them within, from which on a share is sure."""
-    return int(np.ceil(np.log(1.0 - confidence) / np.log(share) - 1e-9))
+    return int(np.ceil(np.log(1.0 - confidence) / np.log(share) - DIGITS))

@@ -19,8 +19,7 @@ from cosim import InputError
 
 from ..predictors import Model, WeakWindows, omega
 from ..runs import Run, line_beside
-from ..runs.columns.columns import POSE, TAU
-from ..runs.columns.side_car import ColumnChange
+from ..runs.columns.columns import POSE, TAU, Named
 from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import gains
@@ -38,7 +37,7 @@ class Misreading(NamedTuple):
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
 
     seen: str
-    changes: Mapping[str, ColumnChange] = MappingProxyType({})
+    changes: Mapping[str, Named] = MappingProxyType({})
     name: str | None = None
     sure: bool = True
 
@@ -72,7 +71,7 @@ def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
     if twice:
         wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} have the same values"
     if wrong_one:
-        return Misreading(seen, {wrong_one: ColumnChange(wrong_one)}, "the name of its column")
+        return Misreading(seen, {wrong_one: Named(name=wrong_one)}, "the name of its column")
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
         return Misreading(silent)
@@ -92,7 +91,7 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     """A clause about a force that a ship cannot give, on an axis that no actuator commands."""
     e, T = omega(w, model), w.held @ w.run.tau_cmd
     lacking, full = np.sqrt((e**2).mean(axis=0)), most_thrust(w, model)
-    idle = ~T.any(axis=0) & (lacking > SETTINGS.drift * full)
+    idle = ~T.any(axis=0) & (lacking > SETTINGS.much * full)
     if not idle.any():
         return None
     k = int(np.argmax(idle))
@@ -168,7 +167,7 @@ def likeliest_mistake(
     if not found.max() > as_read + asked:
         return None
     best = possible[int(np.argmax(found))]
-    lawful = [Reading("", turn=turn) for turn in TURNS]
+    lawful = [Reading("", {"psi": Named(name="psi", offset=turn)}) for turn in TURNS]
     if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
         lawful = []
     elif best.commands is not None:  # actuators that are dead show nothing of any command

@@ -12,8 +12,8 @@ likely b give the density of the motion; densities are of the file's numbers, so
 is less dense than one in metres.
 
 So many windows tell one reading from another with any certainty, if only the model were true. It is
-not, and counts as if it had been drawn from :data:`WINDOWS` independent ones at the most (J. W. Miller,
-D. B. Dunson, Robust Bayesian inference via coarsening, J. Am. Stat. Assoc. 114, 2019).
+not, and counts as if it had been drawn from ``windows`` (:mod:`.settings`) independent ones at the most
+(J. W. Miller, D. B. Dunson, Robust Bayesian inference via coarsening, J. Am. Stat. Assoc. 114, 2019).
 """
 
 from dataclasses import dataclass, field
@@ -25,10 +25,9 @@ from scipy.optimize import lsq_linear
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OVERLAP, needed_force
+from ..runs.run_constants import STEPS
 from .readings import Reading, reread, undamped
 from .settings import SETTINGS
-
-ROUNDS = 5  # 1, of noise and explanation in turn; the density is then within 0.1 of its limit
 
 
 @dataclass
@@ -59,7 +58,7 @@ class Explanation:
         # (3, s + 1, s + 1), of each axis: as good as its rows, and few.
         axes = np.linalg.qr(columns.transpose(2, 1, 0)).R
         b, design = np.zeros(s.size), unit
-        for _ in range(ROUNDS):
+        for _ in range(STEPS):  # noise and explanation in turn
             weight = np.sqrt(windows / len(e)) / _noise(axes, b, len(e), least)
             R = np.linalg.qr((axes * weight[:, None, None]).reshape(-1, s.size + 1)).R
             design, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
@@ -109,7 +108,7 @@ class ReadingOdds:
         axes = np.eye(3)
         for part, gain in zip([*each, *(T * axis for axis in axes)], gains, strict=True):
             why.may(part, gain, 0.0)  # an inertia that is less is as well a force that is more
-            why.may(-part, SETTINGS.lost, 0.0, 1.0)
+            why.may(-part, SETTINGS.much, 0.0, 1.0)
         for axis in axes:
             why.may((a - z) * axis, 1.0, -1.0)
         return why.density(e, SETTINGS.inexact * np.sqrt((a**2).mean(axis=0)), self.windows) + (
@@ -123,10 +122,10 @@ class ReadingOdds:
             for f in (np.cos, np.sin)
         )
         zero, one, why = np.zeros_like(north), np.ones_like(north), Explanation()
-        for j, size in enumerate(SETTINGS.steady * self._full):
+        for j, size in enumerate(SETTINGS.inexact * self._full):
             why.may(np.column_stack([one if k == j else zero for k in range(3)]), size)
         for column in ([north, -east, zero], [east, north, zero]):
-            why.may(np.column_stack(column), SETTINGS.steady * float(self._full[0]))
+            why.may(np.column_stack(column), SETTINGS.inexact * float(self._full[0]))
         return why
 
     @cached_property
@@ -136,7 +135,7 @@ class ReadingOdds:
     @cached_property
     def _streaming(self) -> list[Model]:
         """The model in a current to the north, and to the east, of its deviation."""
-        steady = SETTINGS.steady * self.model.ship.scale.speed
+        steady = SETTINGS.inexact * self.model.ship.scale.speed
         return [self.model.plus({n: steady}) for n in ("V_n", "V_e")]
 
     @cached_property

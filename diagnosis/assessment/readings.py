@@ -12,9 +12,8 @@ from ..predictors import Model, WeakWindows
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OF_MOTION, needed_force
 from ..runs import Run
-from ..runs.columns.columns import OF_UNIT, POSE, TAU
-from ..runs.columns.side_car import ColumnChange
-from ..runs.columns.unit_check import OTHERS, UNITS
+from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
+from ..runs.columns.unit_check import SI_UNIT, UNITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,16 +25,23 @@ class Reading:
         changes: signal -> what its column should be read as.
         motion: (3, 3), from the pose as it was read to the pose as it was meant.
         commands: (k, k), the same of the run's commands, or of its commanded force; None: as read.
-        turn: what is added to the heading [rad].
-        pace: of the clock, seconds meant for a second read.
+
     """
 
     mistake: str
-    changes: Mapping[str, ColumnChange] = field(default_factory=dict)
+    changes: Mapping[str, Named] = field(default_factory=dict)
     motion: np.ndarray = field(default_factory=lambda: np.eye(3))
     commands: np.ndarray | None = None
-    turn: float = 0.0
-    pace: float = 1.0
+
+    @property
+    def turn(self) -> float:
+        """What is added to the heading [rad]."""
+        return self.changes["psi"].offset if "psi" in self.changes else 0.0
+
+    @property
+    def pace(self) -> float:
+        """Of the clock, seconds meant for a second read."""
+        return self.changes["time"].factor if "time" in self.changes else 1.0
 
     @property
     def density(self) -> float:
@@ -56,9 +62,9 @@ def of_commands(mistake: str, factors: Sequence[float], signals: Sequence[str] =
     return Reading(mistake, _scaled(signals, factors), commands=np.diag(factors))
 
 
-def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, ColumnChange]:
+def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, Named]:
     pairs = zip(signals, factors, strict=True)
-    return {s: ColumnChange(s, f) for s, f in pairs if f != 1.0}
+    return {s: Named(name=s, factor=f) for s, f in pairs if f != 1.0}
 
 
 def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
@@ -66,7 +72,7 @@ def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
     order = np.eye(len(signals))
     order[[i, k]] = order[[k, i]]
     pair = signals[i], signals[k]
-    changes = {a: ColumnChange(b) for a, b in (pair, pair[::-1])}
+    changes = {a: Named(name=b) for a, b in (pair, pair[::-1])}
     mistake = f"{pair[0]} and {pair[1]} are swapped"
     if signals is POSE:
         return Reading(mistake, changes, motion=order)
@@ -83,9 +89,11 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
     )
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
-    half = ColumnChange("psi", offset=np.pi)
-    yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
-    for unit, m in OTHERS["length"][1].items():
+    half = Named(name="psi", offset=np.pi)
+    yield Reading("its heading is off by 180 deg", {"psi": half})
+    for unit, m in UNITS["length"].items():
+        if m == 1.0:
+            continue
         for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
             yield of_pose(f"{name} is in {unit}", factors)
     yield from _of_force(model) if run.commands is None else _of_actuators(run, run.commands, model)
@@ -124,7 +132,7 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
             yield of_commands(f"{who} the wrong sign", factors.tolist(), names)
     yield from (swapped(names, *pair) for pair in combinations(range(len(names)), 2))
     for si, quantity in OF_UNIT.items():
-        for size, other in {size: other for other, size in OTHERS[quantity][1].items()}.items():
+        for size, other in {x: n for n, x in UNITS[quantity].items() if n != SI_UNIT[quantity]}.items():
             factors = np.where(unit == si, size, 1.0)
             if (factors != 1.0).any():
                 yield of_commands(
@@ -146,8 +154,8 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
     yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
-    clock = {"time": ColumnChange("time", factor=k**0.5)}
-    yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock, pace=k**0.5)
+    clock = {"time": Named(name="time", factor=k**0.5)}
+    yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock)
 
 
 def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:

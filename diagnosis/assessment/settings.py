@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from ..predictors.uncertainty import MEASURED, NEGLIGIBLE
-from ..runs.run_constants import CHANCE
+from ..predictors.uncertainty import MEASURED
+from ..runs.run_constants import CHANCE, NEGLIGIBLE, PARTS
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,13 @@ class AssessmentSettings:
     # gives a tenth, or none, is a matter of the diagnosis.
     least_gain: float = 0.1
     windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
-    inexact: float = MEASURED  # 1, of the inertial force, that a model lacks at the least
-    lost: float = 0.5  # 1, deviation of the share of a thruster's force that is lost; chosen
-    drift: float = 0.5  # 1, of the full thrust, that nothing but an actuator gives all the time; chosen
-    steady: float = 0.1  # 1, of the full thrust, deviation of a force that is steady; chosen
+    # 1, of the inertial force, that a model lacks at the least, and of the full thrust, deviation of a
+    # force that is steady
+    inexact: float = MEASURED
+    # 1, share of a thrust: deviation of what of it is lost, and what of the full one nothing but an
+    # actuator gives all the time; share of the windows, above which they are no region; chosen
+    much: float = 0.5
+
     # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no
     # coefficient is known to 1 %.
     hardly: float = 0.01
@@ -35,14 +38,11 @@ class AssessmentSettings:
     # found where an error depends on no covariate.
     blocks_per_cluster: int = 2
     least_contrast: float = 1.4  # 1, of the RMS in a region to that elsewhere; chosen
-    largest_region: float = 0.6  # 1, share of the windows; chosen
-    least_clusters: int = 4  # 1, inside and outside, for three degrees of freedom of each variance
-    # 1, variance by noise of a mean over windows, as a share of that of independent ones: measured 0.04
-    # to 0.13 without a hidden cause, and doubled.
-    slow_noise: float = 0.25
+    least_clusters: int = PARTS  # 1, inside and outside, for three degrees of freedom of each variance
+
     # 1, along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
     directions: int = 21
-    least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen
+
     limits: tuple[float, float, float] = (0.4, 0.2, 0.6)  # m/s, m/s, rad/s: 99 % of each published run
     runaway: float = 3.0  # 1, times the speeds of the region; chosen
     step: float = 0.08  # s, of simulations; chosen, distances agree with those at 0.01 s to 3 %

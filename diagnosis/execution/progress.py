@@ -16,7 +16,6 @@ from .remaining_time import RemainingTime
 Advance = Callable[[str], None]
 # s between two lines where there is no terminal; chosen: nobody thinks that it hangs.
 EVERY = 30.0
-WIDTH = 20  # 1, of the bar, characters; chosen
 
 
 def silent(what: str) -> None:
@@ -32,7 +31,7 @@ class _Bar(ProgressColumn):
 
     def render(self, task: Task) -> ProgressBar | Text:
         share = self._time.share
-        return Text("") if share is None else ProgressBar(total=1.0, completed=share, width=WIDTH)
+        return Text("") if share is None else ProgressBar(total=1.0, completed=share)
 
 
 class ProgressLine:

@@ -5,6 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+# 1, names in a sentence, rows of a summary, figures of tracks in a record; of values, of sliders of an
+# effect, and of outlines along a track twice as many. Chosen: more are not read.
+SHOWN = 4
 WIDTH = 80  # 1, characters, of a line of a terminal; the longest value that is shown as it is
 PLAIN = (bool, int, float, str, Path, type(None))
 

@@ -33,6 +33,7 @@ from fmus.ops import wrap
 
 from ..runs import Fingerprint, Run, Smoothed
 from ..runs.cleaning import between
+from ..runs.run_constants import DIGITS
 from .described_ship import DescribedShip, windows_of
 from .prediction import WindowStarts, at_rest
 from .predictor import Predictor, PredictorDescription
@@ -164,7 +165,7 @@ class BlackBox(ABC):
         start = 0 if self.whole else row
         steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
         since = smoothed.time[row] - smoothed.time[start]
-        first = int(np.ceil(since / h - 1e-6))
+        first = int(np.ceil(since / h - DIGITS))
         motion = self.motion(smoothed, np.array([start]), h, steps)
         pose = self._placed_at(motion, h, np.array([since]), smoothed.eta[[row]])[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
@@ -203,7 +204,7 @@ class BlackBox(ABC):
         found, h = [], starts.h
         for smoothed, rows in starts.runs:
             time = smoothed.time
-            onto = np.searchsorted(time, time[rows] + self.run_in(smoothed) - 1e-9)
+            onto = np.searchsorted(time, time[rows] + self.run_in(smoothed) - DIGITS)
             motion = self.motion(smoothed, rows, h, starts.steps)
             since = time[onto] - time[rows]  # a sample, which need not be a step
             found.append(self._placed_at(motion, h, since, smoothed.eta[onto]))

@@ -71,9 +71,6 @@ class Filters(NamedTuple):
         return found
 
 
-NO_FILTERS = Filters((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # s, of most measurements
-
-
 @lru_cache  # a fit asks for the same runs several times
 def _undone(f: Filters, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """See :meth:`Filters.undone`: y + T dy/dt of a low-pass, and y + b of a tracker.

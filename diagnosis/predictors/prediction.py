@@ -19,8 +19,8 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
-from ..runs.cleaning import DIGITS, WIDTH
-from ..runs.run_constants import FAR_OFF
+from ..runs.cleaning import WIDTH
+from ..runs.run_constants import DIGITS, FAR_OFF
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
 from .traced.compiled_law import compiler

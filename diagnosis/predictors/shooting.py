@@ -15,7 +15,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from ..runs.cleaning import DIGITS
+from ..runs.run_constants import DIGITS
 from .prediction import WindowStarts, arriving, filtered, propagate, stacked
 from .ship_model import Model
 from .thrust import Response

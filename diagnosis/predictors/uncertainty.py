@@ -24,8 +24,8 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.special import hyp0f1
 
-from ..runs.cleaning import DIGITS
-from .filters import NO_FILTERS, Filters
+from ..runs.run_constants import DIGITS
+from .filters import Filters
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
@@ -41,9 +41,7 @@ NOISE_TOLERANCE = 1.3
 # from how a simulator integrates. Contract, for the residual; the same for findings, there also of the
 # squares of the first model error.
 SHARE_OF_COMMAND = 0.02
-# 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
-# from a limit; the same for commands and windows, and for what must be explained.
-NEGLIGIBLE = 0.05
+
 # 1, relative standard deviation of a measured coefficient. The search has no more for any coefficient;
 # one prior for all has no more for masses, thrusters' forces and places, which no other ship had to
 # lend. So much of the inertial force a model lacks at the least.
@@ -51,15 +49,15 @@ MEASURED = 0.1
 
 
 @lru_cache  # filters; a fit asks for the same several times
-def noise_gain(filters: Filters = NO_FILTERS, time: float = 1.0) -> list[np.ndarray]:
+def noise_gain(filters: Filters | None = None, time: float = 1.0) -> list[np.ndarray]:
     """For order k = 0 to 3, each channel and w0, (3, w0), the integral of w^2k |kernel U|^2 H [s^-2k-1].
 
     Args:
-        filters: that are undone, which multiplies a pose by U.
+        filters: that are undone, which multiplies a pose by U; None: none.
         time: s at the ship's size for one at the size of CyberShip Enterprise 1.
     """
-    U = filters.undoing(FREQUENCIES / time)
-    return [(FREQUENCIES**k * U) ** 2 @ _passed() for k in range(4)]
+    U = 1.0 if filters is None else filters.undoing(FREQUENCIES / time)
+    return [np.atleast_2d(FREQUENCIES**k * U) ** 2 @ _passed() for k in range(4)]
 
 
 @cache

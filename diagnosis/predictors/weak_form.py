@@ -18,9 +18,9 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed
-from ..runs.cleaning import EVERY, WIDTH
+from ..runs.cleaning import WIDTH
 from ..runs.files.reading import Run
-from ..runs.run_constants import HORIZON
+from ..runs.run_constants import BLOCK, BLOCKS, DIGITS, EVERY, HORIZON
 from ..runs.smoothing.smoother import breaks
 from ..runs.thinning import thinned_motion
 from .prediction import at_rest, before_filters, true_motion
@@ -31,8 +31,7 @@ from .thrust import Response, inflow, thrust
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up. Seconds are those of
 # CyberShip Enterprise 1, times the scale of the ship.
 OVERLAP = 4.0
-BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
-BLOCKS = 64  # 1; chosen: Gram matrices of more take memory, and no fold needs them
+
 SMALL = 1e-3  # 1, of its usual size: step of a finite difference where nothing is linear; chosen
 # bytes, for each part of the model error of a run that is remembered: commands that thrusters with a
 # memory respond to, of 700 s with two sets of thrusters those of 15 such models.
@@ -140,7 +139,7 @@ class WeakWindows:
 def places(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
     """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
     width, every = WIDTH * scale.time, EVERY * scale.time
-    last = np.floor((t[-1] - t[0] - width + 1e-9) / every)
+    last = np.floor((t[-1] - t[0] - width + DIGITS) / every)
     reach = np.ceil(width / 2 / every)
     near = np.unique(np.round((t - t[0] - width / 2) / every))
     found = np.unique(near[:, None] + np.arange(-reach, reach + 1.0))
@@ -173,7 +172,7 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole
-        & (middles - half >= smoothed.track.responded - 1e-9)
+        & (middles - half >= smoothed.track.responded - DIGITS)
         & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
         & (number(~np.all(np.isfinite(smoothed.nu), axis=1, keepdims=False)) == 0)
@@ -322,10 +321,12 @@ def arriving(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def _response(w: WeakWindows, model: Model) -> np.ndarray:
+    key = Response.key(model)
+
     def between() -> np.ndarray:
         return Response(w.run, model, not at_rest(w.smoothed)).between_samples
 
-    return w.recall("response", Response.key(model), between)
+    return w.recall("response", key, between)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:

@@ -7,11 +7,8 @@ import numpy as np
 from fmus.effects import Effect, EffectSet
 from fmus.effects.text import Found
 
+from ..execution.short_text import SHOWN
 from ..predictors.ship_model import parameter_and_run
-
-# 1, names in a sentence, rows of a summary, figures of tracks in a record; of values, of sliders of an
-# effect, and of outlines along a track twice as many. Chosen: more are not read.
-SHOWN = 4
 
 
 def sentence(found: Found) -> str:

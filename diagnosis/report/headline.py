@@ -6,10 +6,11 @@ from math import degrees
 import numpy as np
 
 from ..assessment.stability import Stability
+from ..execution.short_text import SHOWN
 from ..session import CalibratedModel
 from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
-from .finding_text import SHOWN, listed
+from .finding_text import listed
 from .formatting import number, percent
 from .report_data import ReportData
 from .reported_effect import ReportedEffect

@@ -10,10 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
-from ..execution.short_text import WIDTH
+from ..execution.short_text import SHOWN, WIDTH
 from ..runs import MeasuredChannel, by_name, sensor_lines
 from ..session import CalibratedModel
-from .finding_text import SHOWN
 from .formatting import number, percent
 from .headline import (
     boundedness,

@@ -26,6 +26,7 @@ from fmus.fmi.trace import TraceError
 from fmus.native.program import program
 from fmus.native.webassembly import component_module
 
+from ..execution.short_text import SHOWN
 from ..predictors import Evaluation, Model, Response, write_model
 from ..predictors.prediction import FAR_OFF, at_rest
 from ..predictors.ship_model import of_run, parameter_and_run
@@ -35,9 +36,8 @@ from ..predictors.traced.prediction_component import START, allocation_component
 from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
+from ..search.shortlist import LENGTH
 from ..session import Diagnosis
-from .finding_text import SHOWN
-from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ class MovableModel:
             if effect.id not in done and any(self.learned.value(n) != self.start.value(n) for n in free):
                 done.add(effect.id)
                 yield self._choice(effect, "calibrated", {}, True)
-        for ranked in self.r.ranking[:MOST_RANKED]:
+        for ranked in self.r.ranking[:LENGTH]:
             effect = effects[ranked.id]
             if ranked.id not in done and len(effect.parameters) <= 2 * SHOWN and effect.function:
                 yield self._choice(effect, "candidate", {}, False)

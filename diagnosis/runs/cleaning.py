@@ -12,25 +12,21 @@ from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
-from .columns.unit_check import GO_ON, refuse_time, refuse_units
+from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .row_order import ordered
-from .run_constants import HELD, HORIZON, LONG
+from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE, ORDER
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
-EVERY = 0.5  # s, between two windows; with six rows in each, kernels average a velocity to 2 %
-RESPONSE = 3.0  # 1, time constants, after which 5 % of an unknown earlier command are left
+
+
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
-# 1, of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts,
-# of which nothing can be differentiated.
-SPARSE = 0.05
+
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
-FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
-FEWEST = 4  # 1, samples, without which there is no third difference
-SHOWN = 3  # 1, items of a list that a message states one by one; chosen
-DIGITS = float(np.finfo(float).eps) ** 0.5  # 1, relative size of what rounding may have left
+
+
 # 1, standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
 
@@ -89,7 +85,7 @@ class Track(ShortRepr):
     @property
     def responded(self) -> float:
         """Time [s] from which commands before the run, which are not known, hardly act any more."""
-        return float(self.run.time[0]) + RESPONSE * self.lag
+        return float(self.run.time[0]) - float(np.log(NEGLIGIBLE)) * self.lag
 
     @cached_property
     def periods(self) -> np.ndarray:
@@ -146,13 +142,13 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     where, run = f"run '{run.name}'", ordered(run, scale)
     notes = list(run.notes)
     run = replace(
-        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
+        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < LARGEST, run.pose, np.nan)
     )
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
     turned, constant, lined = updates(run, HEADING, gone)
-    if turned.sum() < FEWEST <= min(seen.sum(), constant.sum()):
+    if turned.sum() <= ORDER < min(seen.sum(), constant.sum()):
         if not anyway:
             raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
         turned = turned | constant
@@ -160,14 +156,15 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     apart = max(WIDTH * scale.time, LONG * row)
     dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
     fresh = np.flatnonzero(seen & ~dropped)
-    if fresh.size < FEWEST or turned.sum() < FEWEST:
+    if min(fresh.size, turned.sum()) <= ORDER:  # there is no third difference
         raise InputError(f"{where} does not move: its pose is frozen or missing in all rows")
     if between.any() or lined.any():
         notes.append("rows between two measurements were linearly interpolated: they are not counted")
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
     steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
-    if SPARSE * steps.sum() > row * run.time.size:
+    # With a few of the samples that regular sampling would give, nothing can be differentiated.
+    if NEGLIGIBLE * steps.sum() > row * run.time.size:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
         )
@@ -206,7 +203,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
 
 def long_gap(period: float, scale: Scale) -> float:
     """Time [s] from which on a gap between samples some period [s] apart is one."""
-    return max(HELD * scale.time, LONG * period)
+    return max(EVERY * scale.time, LONG * period)
 
 
 def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
@@ -309,5 +306,6 @@ def noise(values: np.ndarray) -> np.ndarray:
 
     That some steps are longer than others does little harm, as the median is taken.
     """
-    third = np.abs(np.diff(values, 3, axis=0))
-    return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(np.diff(np.eye(4), 3, axis=0))
+    third = np.abs(np.diff(values, ORDER, axis=0))
+    factors = np.diff(np.eye(ORDER + 1), ORDER, axis=0)
+    return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(factors)

@@ -17,14 +17,13 @@ import numpy as np
 
 from cosim import InputError
 
-from .run_constants import FAR_OFF, SAME
+from .run_constants import FAR_OFF, FEWEST, SAME
 
 if TYPE_CHECKING:  # at run time it takes a while to import
     from .smoothing.smoother import Smoothed
 
 POINTS = 512  # 1, of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
 PIECES, SHIFTS = 4, 8  # 1, of the shorter run; within a step of the course; chosen
-FEW = 8  # 1, points, or windows, by which a correlation is looked for; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
             at = np.arange(begin + shift, begin + short.seconds / PIECES, period)
             grid = short.period * np.arange(len(short.course))
             piece = np.column_stack([np.interp(at, grid, x) for x in short.course.T])
-            if len(piece) >= FEW and len(piece) <= len(long.course):
+            if FEWEST <= len(piece) <= len(long.course):
                 found.append(_correlation(piece, long.course, short.certain))
         if found and not np.isnan(best := float(np.max(found))):
             yield best

@@ -9,15 +9,14 @@ import numpy as np
 
 from fmus.ops import wrap
 
-from .cleaning import FEWEST, SHOWN, noise, repeated
+from ..execution.short_text import SHOWN
+from .cleaning import Z95, noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
+from .run_constants import ORDER
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
-# 1, relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
-# begins below half of it.
-HARDLY_KNOWN = 0.3
 GIVEN, ESTIMATED = "given", "estimated"
 UNUSED = "not used for the motion"
 
@@ -64,7 +63,7 @@ class MeasuredChannel:
     @property
     def known(self) -> bool:
         """Whether the noise is known so well that it tells anything."""
-        return self.noise_rel_std < HARDLY_KNOWN
+        return Z95 * self.noise_rel_std < 0.5  # its 95 % interval does not reach half of it
 
     def content(self) -> dict[str, Any]:
         """What a result file has of it, beside its name."""
@@ -120,7 +119,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
     for name, values in {**s.sensors.run.measured, **s.sensors.aside}.items():
         there = np.isfinite(values) & np.isfinite(time)
         new = there & ~repeated(values[:, None], there)
-        if new.sum() >= FEWEST:
+        if new.sum() > ORDER:
             yield MeasuredChannel(
                 name,
                 _rate(time[new]),
@@ -157,7 +156,7 @@ def _rate(time: np.ndarray) -> float:
 def _correlation(time: np.ndarray, off: np.ndarray) -> float:
     """Time constant [s] of residuals (n,) at times (n,) [s], if their correlation is significant."""
     step = np.diff(time)
-    if time.size < FEWEST:
+    if time.size <= ORDER:
         return 0.0
     period = float(np.median(step))
     near = step < 1.5 * period

@@ -8,8 +8,9 @@ import pandas as pd
 
 from fmus.ship import ship
 
-from .cleaning import BRIEF, DIGITS, EVERY, Track, between, impulse, long_gap
+from .cleaning import BRIEF, Track, between, impulse, long_gap
 from .files.reading import Run
+from .run_constants import DIGITS, EVERY
 from .smoothing.smoother import Smoothed
 
 # 1, rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.

@@ -16,10 +16,10 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from ..predictors.uncertainty import undone_variance
+from ..predictors.uncertainty import FLOOR, undone_variance
 from ..predictors.weak_form import SMALL
 from .nonlinear.multistart import MULTIPLES, Landscape, best_values, limits
-from .nonlinear.segmentation import FLOOR, intervals, problem
+from .nonlinear.segmentation import intervals, problem
 
 # Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
 LEAST_SHARE = 0.003  # of a sum of squares: what is less changes no prediction; chosen

@@ -13,7 +13,7 @@ from .candidates import model_error
 from .coefficient_rival import LinearProblem, probability_beside_coefficients
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
-from .gram import OTHER_RUN, WHOLE_RUNS, Nuisance, block_folds, gram_table
+from .gram import WHOLE_RUNS, Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, score
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
@@ -119,9 +119,9 @@ class Selection:
             return self.at.plus(step, change[len(fitted) :]).model(t.prior)
 
         usual = [without(held) for held in block_folds(t.data, WHOLE_RUNS)]
-        if not OTHER_RUN <= len(t.data) < WHOLE_RUNS:
+        if len(t.data) != WHOLE_RUNS - 1:
             return usual, usual
-        return usual, [without(held) for held in block_folds(t.data, OTHER_RUN)]
+        return usual, [without(held) for held in block_folds(t.data, WHOLE_RUNS - 1)]
 
     def _of(self, at: RefinedModel) -> Nuisance:
         """Nuisance parameters of a part of the effects, by slopes beside all of them."""

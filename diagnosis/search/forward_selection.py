@@ -17,10 +17,10 @@ import numpy as np
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import commanded
+from ..runs.run_constants import STEPS
 from .conclusion import AcceptedEffect, Selection
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
 from .map_regression import Scored, first_share
-from .most_likely import STEPS
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior

@@ -14,15 +14,12 @@ import numpy as np
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
+from ..runs.run_constants import PARTS
 from .candidates import SLIGHT, Candidate, CandidateShape
 from .most_likely import ridge
 
 FOLDS = 8  # of cross-validation over blocks
 WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
-OTHER_RUN = 2  # runs, from which on a model can be fitted to other runs than it predicts
-# Least number of parts that are left out in turn: stretches of fewer runs.
-# Each stretch of a single run is as long as the shortest that can be learned from; chosen.
-PARTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +68,7 @@ class Entry(NamedTuple):
     precision: np.ndarray
     offset: np.ndarray
     nonlinear: int
-    quieted: float = 0.0
+    quieted: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +176,7 @@ def gram_table(
 
     added(y[:, :, None], np.ones(1))
     entries = [[entry(s) for s in c.shapes] for c in candidates]
-    entries.append([Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)])
+    entries.append([Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0, 0.0)])
     indices = added(nuisance.columns, nuisance.unit)
     A = np.concatenate(columns, axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
     names, number, rows = np.unique(blocks, axis=0, return_inverse=True, return_counts=True)

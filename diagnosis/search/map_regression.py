@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..runs.cleaning import DIGITS
+from ..runs.run_constants import DIGITS
 from .candidates import SLIGHT
 from .gram import Folds, GramTable
 from .most_likely import ridge

@@ -14,10 +14,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ..predictors.evaluation import quantile
-from ..runs.cleaning import DIGITS
-from ..runs.run_constants import CHANCE
+from ..runs.run_constants import CHANCE, DIGITS, STEPS
 
-STEPS = 6  # of whatever is iterated, and halvings of a step, at the most; two or three are usual
 ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
 LEVEL = 0.95  # probability of the intervals of values, and of the sets of ids; contract
 

@@ -20,14 +20,13 @@ from cosim import InputError
 
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
-from ..runs.cleaning import DIGITS
+from ..runs.run_constants import DIGITS
 from .candidates import Candidate, CandidateShape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import FOLDS, block_numbers
 from .prior import Prior
 
 THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
-COMPONENTS = (1, 2, 3, 5, 8)  # latent variables to try; chosen
 
 
 class Features(NamedTuple):
@@ -194,7 +193,7 @@ class PartialLeastSquares(Peer):
     """
 
     name = "pls"
-    settings = COMPONENTS
+    settings = tuple(range(1, FOLDS + 1))  # latent variables to try
 
     def coefficients(self, A: np.ndarray, y: np.ndarray, setting: float) -> np.ndarray:
         """See :class:`Peer`."""

@@ -18,11 +18,11 @@ from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
-from ..predictors.uncertainty import NEGLIGIBLE
 from ..predictors.weak_form import OVERLAP
+from ..runs.run_constants import NEGLIGIBLE, STEPS
 from .candidates import SMALL, CandidateShape, model_error, quieted
 from .gram import Nuisance, block_numbers
-from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
+from .most_likely import ENOUGH, Quadratic, most_likely, ridge
 from .nonlinear.multistart import limits
 from .nonlinear.segmentation import likely, problem, segmented
 from .prior import NominalPrior

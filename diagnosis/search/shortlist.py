@@ -11,13 +11,13 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ..execution.parallel import for_each
-from ..predictors.uncertainty import independent
+from ..predictors.uncertainty import FLOOR, independent
 from ..predictors.weak_form import ROOM
+from ..runs.run_constants import STEPS
 from .candidates import SLIGHT, Candidate, candidates, lasts, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
 from .map_regression import Scored, regression, score
-from .most_likely import STEPS, ridge
-from .nonlinear.segmentation import FLOOR
+from .most_likely import ridge
 from .refinement import (
     CandidateStart,
     Refined,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..assessment.remainder import remains
 from ..predictors import Model
 from ..predictors.evaluation import quantile
 from ..runs.run_constants import CHANCE
@@ -14,8 +15,8 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
+from ..search.significance import gain, harm
 from .confidence import confidence_of
-from .paired_errors import gain, harm
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -53,7 +54,12 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
     judged = alone.plausible_by(prior) and unseen.judges(alone)
-    if other is not None and judged and data.remains(start) and not data.remains(other):
+    if (
+        other is not None
+        and judged
+        and remains(data.runs, start, start)
+        and not remains(data.runs, start, other)
+    ):
         now, *others = unseen.losses(alone, *([found, start] if found.effects else [start]))
         if not any(harm(now, each) for each in others):
             return Conclusion(replace(alone, model=other), True, found.effects)
@@ -73,7 +79,7 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         return None
     runs = ValidationData(train, [], start, found.sigma)
     calibrator = Calibrator(found, train, start, prior)
-    if not runs.remains(start) or not calibrator.windows:
+    if not remains(train, start, start) or not calibrator.windows:
         return None
     best = calibrator.still()
     other, first = runs.losses(found if found.effects else start, start)

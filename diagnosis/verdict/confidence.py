@@ -13,7 +13,7 @@ from scipy.special import expit
 
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import MEASURED
-from ..runs.cleaning import DIGITS, EVERY
+from ..runs.run_constants import DIGITS, EVERY
 from ..search.effect_evidence import EffectEvidence
 from ..search.findings import Finding
 from ..search.refinement import at_limit

@@ -8,7 +8,7 @@ are not asked.
 
 import numpy as np
 
-from .validation_data import Losses
+from ..search.significance import Losses
 
 CHARGED = "the model fits {where} worse, or not better by the cost of its parameters (BIC)"
 

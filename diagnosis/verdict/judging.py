@@ -24,7 +24,6 @@ from ..search.prediction_fit.refit import prediction_bands, to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
 from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
-from .paired_errors import harm
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
@@ -128,11 +127,7 @@ def judge(
     advance("fit to predictions")
     changed = bool(learned.effects) or refitted
     fit = to_predictions(learned, train, prior, changed)
-    if data.validate:
-        its, others = data.losses(fit.findings.model, start)
-        if harm(its, others):  # the fit by the model error was compared with these runs already
-            fit = fit.about(learned)
-    elif changed and overfits(fit.findings, learned, data, criterion):
+    if changed and overfits(fit.findings, learned, data, criterion):
         fit = fit.about(learned)
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]

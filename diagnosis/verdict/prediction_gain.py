@@ -8,7 +8,7 @@ import numpy as np
 from ..predictors import Model
 from ..search.findings import Findings
 from ..search.shortlist import TIE
-from .paired_errors import predicts_worse
+from ..search.significance import predicts_worse
 from .validation_data import ValidationData
 
 

@@ -16,9 +16,9 @@ from typing import NamedTuple
 from ..predictors import Model
 from ..search.findings import Finding, Findings
 from ..search.refinement import at_limit
-from ..search.significance import lower_throughout
+from ..search.significance import gain, lower_throughout, predicts_worse
+from ..search.significance import harm as paired_harm
 from .confidence import confidence_of
-from .paired_errors import gain, predicts_worse
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
 
@@ -198,9 +198,11 @@ def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) 
 
     Args:
         fit, before: the same findings, fitted to predictions and to the model error.
-        data: the training runs; validation runs judge the fit by themselves.
+        data: that decide; validation runs were compared with the fit to the model error already.
         harm: the criterion of pruning.
     """
+    if data.validate:
+        return bool(paired_harm(*data.losses(fit.model, data.start)))
     data = data.of_other_runs
     if not (data.judges(fit) and data.judges(before)):
         return False

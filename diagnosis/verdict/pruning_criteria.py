@@ -7,7 +7,7 @@ from cosim import InputError
 from ..execution.user_files import chosen
 
 if TYPE_CHECKING:
-    from .validation_data import Losses
+    from ..search.significance import Losses
 
 
 class Harm(Protocol):
@@ -30,9 +30,10 @@ class Harm(Protocol):
         ...
 
 
-# Name -> module of this room and its function.
-CRITERIA = {"paired": ("paired_errors", "harm"), "bic": ("information_criterion", "harm")}
+# Name -> module of the package and its function.
+CRITERIA = {"paired": ("search.significance", "harm"), "bic": ("verdict.information_criterion", "harm")}
 USUAL = "paired"
+PACKAGE = __name__.partition(".")[0]
 
 
 def criterion(name: str = USUAL) -> Harm:
@@ -45,7 +46,7 @@ def criterion(name: str = USUAL) -> Harm:
     Raises:
         InputError: there is none of this name, or the file fails.
     """
-    found = chosen(name, CRITERIA, __package__, "criterion of pruning", "harm")
+    found = chosen(name, CRITERIA, PACKAGE, "criterion of pruning", "harm")
     if not callable(found):
         raise InputError(f"'{name}' has no function harm(its, others, more)")
     return cast(Harm, found)

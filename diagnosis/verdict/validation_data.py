@@ -6,31 +6,18 @@ the model error, by blocks, and the error of the window predictions, by windows.
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cosim import InputError
 
-from ..assessment.remainder import remaining
 from ..execution.parallel import in_halves
 from ..predictors import Model, WeakWindows, Windows, omega
 from ..predictors.windows import ANY_TIME
 from ..search.findings import Findings
-from ..search.gram import OTHER_RUN, WHOLE_RUNS, run_folds
-
-
-class Losses(NamedTuple):
-    """Losses of a model on the data that decide.
-
-    Attributes:
-        omega: (blocks,), sum of squares of the model error in each block, axes weighted by noise.
-        position, heading: (windows,), mean square error of prediction in each window [m2], [rad2].
-    """
-
-    omega: np.ndarray
-    position: np.ndarray
-    heading: np.ndarray
+from ..search.gram import WHOLE_RUNS, run_folds
+from ..search.significance import Losses
 
 
 class Fold:
@@ -116,7 +103,7 @@ class ValidationData:
         """The same data, each of two runs left out as a whole: what holds in one may not in another."""
         if self.validate:
             return self
-        return ValidationData(self.train, [], self.start, self.sigma, OTHER_RUN)
+        return ValidationData(self.train, [], self.start, self.sigma, WHOLE_RUNS - 1)
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -129,10 +116,6 @@ class ValidationData:
 
     def _fold_models(self, found: Findings) -> Sequence[Model]:
         return found.fold_models if self.least == WHOLE_RUNS else found.run_models
-
-    def remains(self, model: Model) -> bool:
-        """Whether a model leaves a significant residual."""
-        return any(a.significant for a in remaining(self.runs, self.start, model).values())
 
     def losses(self, *found: Findings | Model) -> list[Losses]:
         """Losses of models, each fitted without the fold that it is judged on."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from threading import Timer
 from typing import Any
 
-from cybership.scratch_folder import scratch_folder, sweep_parts
-from cybership.user_cache import cache_folder, is_whole, make_folder, place, refusal, store
+from cybership.scratch_folder import scratch_folder
+from cybership.user_cache import RefusedError, cache_folder, kept, place
 
 from ..declare import Component
 from ..effects import STANDARD, EffectSet
@@ -171,36 +171,48 @@ def _cached(
 ) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
     stem, own_file = which(name)
-    folder = fmu_cache() / _source_hash(own_file, of, {}, native)
-    fmu = folder / f"{stem}.fmu"
-    if starts is None and _is_usable(fmu):
-        return fmu
-    from filelock import FileLock  # only now: most calls find what they need, and this takes a while
+    cache, values = fmu_cache(), {}
+    if starts is not None or own_file is not None:  # whose name and values the FMU has
+        component = _loaded(stem, own_file, of, starts)[1]
+        stem, values = component.name, component.starts if starts is not None else {}
+    fmu = cache / _source_hash(own_file, of, values, native) / f"{stem}.fmu"
 
-    module, component = load(stem, own_file, of)
-    if starts is not None:
-        component = starts.baked(component)
-        folder = fmu_cache() / _source_hash(own_file, of, component.starts, native)
-    prepare_folder(folder)
-    fmu = folder / f"{component.name}.fmu"
-    python = _cached(name, of, starts, note=note) if native is not None and native.python else None
-    with FileLock(folder / "lock"):
-        if not _is_usable(fmu):
-            if fmu.exists():
-                note(f"'{fmu}' in the cache was damaged, and is built again")
-            with scratch_folder() as work, _told_if_long(component.name, note):
-                as_released = starts is None and own_file is None and of is make_ship()
-                if native is None:
-                    built = pack(component, module, own_file, work, of)
-                elif as_released and (fits := released(stem, own_source(), native, work)):
-                    built = fits
-                else:
-                    code_hash = hash_of(sources(module, own_file, of), component.starts, of)
-                    built = _compiled(component, code_hash, native, work, python)
-                with FileLock(fmu_cache() / "ledger.lock"):
-                    ledger.record(built, fmu_cache())
-                store(built, fmu)
-    return fmu
+    def make(work: Path) -> Path:
+        from filelock import FileLock  # only now: it takes a while to import
+
+        module, component = _loaded(stem, own_file, of, starts)
+        if fmu.exists():
+            note(f"'{fmu}' in the cache was damaged, and is built again")
+        python = _cached(name, of, starts, note=note) if native is not None and native.python else None
+        with _told_if_long(component.name, note):
+            as_released = starts is None and own_file is None and of is make_ship()
+            if native is None:
+                built = pack(component, module, own_file, work, of)
+            elif as_released and (fits := released(stem, own_source(), native, work)):
+                built = fits
+            else:
+                code_hash = hash_of(sources(module, own_file, of), component.starts, of)
+                built = _compiled(component, code_hash, native, work, python)
+        with FileLock(cache / "ledger.lock"):
+            ledger.record(built, cache)
+        return built
+
+    try:
+        return kept(cache, fmu, make)
+    except RefusedError as error:
+        raise BuildError(str(error)) from None
+    except OSError as error:
+        raise BuildError(
+            f"cannot keep FMUs in '{fmu.parent}' ({error.strerror}); set CYBERSHIP_CACHE to another folder"
+        ) from None
+
+
+def _loaded(
+    name: str, own_file: Path | None, of: Ship, starts: StartValues | None
+) -> tuple[str, Component]:
+    """Module name and component of an FMU, with its start values."""
+    module, component = load(name, own_file, of)
+    return module, component if starts is None else starts.baked(component)
 
 
 def fmu_cache() -> Path:
@@ -214,22 +226,6 @@ def fmu_cache() -> Path:
     return folder
 
 
-def _is_usable(fmu: Path) -> bool:
-    """Whether an FMU in the cache is there and whole."""
-    if why := refusal(fmu_cache(), fmu):
-        raise BuildError(why)
-    return is_whole(fmu)
-
-
-def prepare_folder(folder: Path) -> None:
-    """Make a folder of the cache; what killed processes have left in the cache is removed."""
-    try:
-        make_folder(fmu_cache(), folder)
-        sweep_parts(fmu_cache().glob("**/.*.part"))
-    except OSError as error:
-        raise BuildError(
-            f"cannot keep FMUs in '{folder}' ({error.strerror}); set CYBERSHIP_CACHE to another folder"
-        ) from None
 
 
 @contextmanager

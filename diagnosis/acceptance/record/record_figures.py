@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...execution.short_text import SHOWN
 from ...predictors.evaluation import Evaluation
 from ...report.document import Plot
-from ...report.finding_text import SHOWN
 from ...report.pictures.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Chart, ChartAxis, Panel
 from ...report.pictures.tracks import track
 from ..criterion import Criterion

@@ -28,8 +28,6 @@ from cosim.fmu import (
 
 from ..predictor import Execution
 
-PROCESSES = 2  # 1, chosen: as everywhere in the diagnosis
-
 
 def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
     """An FMU, and the process that makes those of its instances, whose calls are whole predictions.
@@ -168,14 +166,14 @@ class Processes:
         self, fmu: ConfinedFmu, inputs: Sequence[str], outputs: Sequence[str], fresh: bool = False
     ) -> None:
         self._fmu, self.name, self.inputs, self.outputs = fmu, fmu.model.path.name, inputs, outputs
-        self._playbacks = [Playback(fmu, inputs, outputs, fresh) for _ in range(PROCESSES)]
+        self._playbacks = [Playback(fmu, inputs, outputs, fresh) for _ in range(2)]
         self._free = SimpleQueue[Playback]()
         for playback in self._playbacks:
             self._free.put(playback)
 
     def run(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
         """Some predictions, in their order."""
-        with ThreadPoolExecutor(PROCESSES, "playback") as threads:
+        with ThreadPoolExecutor(len(self._playbacks), "playback") as threads:
             try:
                 return [*threads.map(self._one, predictions)]
             except BaseException:  # such as Ctrl-C: predictions that are under way end with the FMU

@@ -8,7 +8,7 @@ velocity halfway to the next sample.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from fmus.declare import Component, Fields, Variable, group_of
 from fmus.effects.linear_map import AXES, parameter
@@ -40,14 +40,6 @@ class ByHull(NamedTuple):
     met_r: Number
 
 
-class ByThrusters(NamedTuple):
-    """Acceleration by the thrusters."""
-
-    u_dot: Annotated[float, "m/s2", "surge acceleration"] = 0.0
-    v_dot: Annotated[float, "m/s2", "sway acceleration"] = 0.0
-    r_dot: Annotated[float, "rad/s2", "yaw acceleration"] = 0.0
-
-
 def balance_component(model: Model, names: Sequence[str], run: Run, points: int) -> Component:
     """The signals of the weak form at a sample of a run.
 
@@ -64,6 +56,7 @@ def balance_component(model: Model, names: Sequence[str], run: Run, points: int)
     first = len(START) + len(MET)
     last = first + (1 + points) * width
     commands = range(first, last, width)
+    by_thrusters = group_of("ByThrusters", [Variable(f"{n}_dot", "1", n, 0.0) for n in "uvr"])
     named = [*START, *MET, *(f"signal_{k}" for k in range(last + settings - first))]
 
     def ready(p: Fields) -> tuple[Ready, tuple[tuple[Number, ...], ...]]:
@@ -82,7 +75,7 @@ def balance_component(model: Model, names: Sequence[str], run: Run, points: int)
 
     def prepared_step(
         s: ByHull, i: Fields, b: tuple[Ready, tuple[tuple[Number, ...], ...]], h: Number
-    ) -> tuple[ByHull, ByThrusters]:
+    ) -> tuple[ByHull, Fields]:
         (hull, drive), gains = b
         drive = layout.powered(drive, i[last:]) if settings else drive
         given, *acting = (i[k : k + width] for k in commands)
@@ -94,9 +87,9 @@ def balance_component(model: Model, names: Sequence[str], run: Run, points: int)
             own + sum(gain * x for gain, x in zip(row, tau, strict=True))
             for own, row in zip(tau, gains, strict=True)
         ]
-        return s, ByThrusters._make(accelerated(hull.hull.inverse, force[0], force[1], force[2]))
+        return s, by_thrusters(*accelerated(hull.hull.inverse, force[0], force[1], force[2]))
 
-    def step(s: ByHull, i: Fields, p: Fields, h: Number) -> tuple[ByHull, ByThrusters]:
+    def step(s: ByHull, i: Fields, p: Fields, h: Number) -> tuple[ByHull, Fields]:
         return prepared_step(s, i, ready(p), h)
 
     return Component(
@@ -105,7 +98,7 @@ def balance_component(model: Model, names: Sequence[str], run: Run, points: int)
         params=group_of("Moved", [replace(model.declared(n), name=n) for n in names]),
         state=ByHull,
         inputs=group_of("Signals", [Variable(n, "1", n, 0.0) for n in named]),
-        outputs=ByThrusters,
+        outputs=by_thrusters,
         init=init,
         step=step,
         sampled=False,

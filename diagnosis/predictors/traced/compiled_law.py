@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cybership.scratch_folder import scratch_folder
-from cybership.user_cache import cache_folder, is_whole, make_folder, refusal, store
+from cybership.user_cache import RefusedError, cache_folder, kept
 from fmus.native.c_text import PREAMBLE, Writer
 from fmus.native.compilers import OPTIONS, SYSTEM, TARGETS, CompilerError, compiled, this_platform
 from fmus.native.tape import Kernels, RecordedFunction
@@ -154,26 +153,17 @@ def _library(text: str) -> ctypes.CDLL | None:
     if not compiler() or (root := cache_folder()) is None:
         return None
     key = repr((text, OPTIONS, target))
-    folder = root / "predictions"
-    path = folder / f"{hashlib.sha256(key.encode()).hexdigest()[:24]}{TARGETS[target].suffix}"
-    try:
-        make_folder(root, folder)
-        if refusal(root, path):
-            return None
-        if not is_whole(path):
-            from filelock import FileLock  # only now: it takes a while to import
+    path = (
+        root / "predictions" / f"{hashlib.sha256(key.encode()).hexdigest()[:24]}{TARGETS[target].suffix}"
+    )
 
-            with FileLock(f"{path}.lock"):
-                if not is_whole(path):
-                    _compile(text, target, path)
-        return ctypes.CDLL(str(path))
-    except (OSError, CompilerError):
-        return None
-
-
-def _compile(text: str, target: str, path: Path) -> None:
-    with scratch_folder() as work:
+    def make(work: Path) -> Path:
         source, built = work / "step.c", work / "built"
         source.write_text(text)
         built.write_bytes(compiled(source, target, work))
-        store(built, path)
+        return built
+
+    try:
+        return ctypes.CDLL(str(kept(root, path, make)))
+    except (OSError, CompilerError, RefusedError):
+        return None

@@ -20,7 +20,6 @@ from .compiled_law import CompiledLaw, compiled_law
 
 # Of groups of numbers, the prepared vessel and the prepared thrusters, the numbers that follow.
 Law = Callable[..., Sequence[Any]]
-ARRAY = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ def in_machine_code(of: Structure) -> CompiledLaw | None:
 
 
 def _recording(of: Structure, tape: Tape, variable: Callable[[Any], Any]) -> RecordedFunction | None:
-    groups = [None if n is None else tuple([variable(ARRAY) for _ in range(n)]) for n in of.counts]
+    groups = [None if n is None else tuple([variable(np.zeros(0)) for _ in range(n)]) for n in of.counts]
     parts = _mapped(of.parts, variable)
     try:
         return tape.recording([*of.law(*groups, *parts)])

@@ -9,9 +9,9 @@ from fmus.ops import wrap
 from fmus.ship import Ship
 
 from ...assessment.covariates import means_of_run
+from ...execution.short_text import SHOWN
 from ...predictors.evaluation import LEVELS, Evaluation, PredictionError
 from ...predictors.shooting import INSTANTS
-from ..finding_text import SHOWN
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Chart, ChartAxis, Panel
 from .figures import interrupted
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .columns import Column
 from .likely_columns import words_of
-from .unit_check import OTHERS
+from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
@@ -30,7 +30,7 @@ def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
         signal: [
             column
             for column, (bare, unit) in named.items()
-            if words & {*words_of(bare)} and unit in ("", "-", *OTHERS["angle"][1])
+            if words & {*words_of(bare)} and unit in ("", "-", *UNITS["angle"]) and unit != "rad"
         ]
         for signal, words in WORDS.items()
     }

@@ -1,5 +1,6 @@
 """Which columns of a measurement a signal is likely to be: by name, unit, range and motion."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
@@ -7,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cleaning import SHOWN
-from ..run_constants import FEWEST
+from ...execution.short_text import SHOWN
+from ..run_constants import EVERY, FEWEST, NEGLIGIBLE
 from .unit_check import UNITS, doubts
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -41,10 +42,13 @@ ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "a
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
-SMOOTHED = 1.0  # s, over which speeds are taken (chosen)
+
 LIKELY = 0.4  # 1, correlation or likeness of names from which on it counts (chosen)
-# [deg, %] largest numbers of an angle and of a command in any unit, with what overshoots (chosen).
-LARGEST = {"angle": 400.0, "command": 105.0}
+# Largest numbers of an angle and of a command in any unit, with what overshoots.
+LARGEST = {
+    quantity: (1.0 + NEGLIGIBLE) * most / min(UNITS[quantity].values())
+    for quantity, most in (("angle", math.tau), ("command", 1.0))
+}
 
 
 class LikelyColumn(NamedTuple):
@@ -132,7 +136,7 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         return {}
     t = known["time"]
     apart = float(np.nanmedian(np.diff(t)))
-    width = max(int(SMOOTHED / apart), 1) if apart > 0.0 else 1
+    width = max(int(EVERY / apart), 1) if apart > 0.0 else 1
 
     def rate(values: np.ndarray) -> np.ndarray:
         half = (width + 1) // 2

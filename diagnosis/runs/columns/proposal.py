@@ -13,10 +13,11 @@ from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..cleaning import lost, repeated
-from ..files.reading import MOST_COMMAND, Run, column_names, read
+from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..row_order import in_order
+from ..run_constants import NEGLIGIBLE
 from .columns import (
     POSE,
     QUANTITY,
@@ -331,7 +332,7 @@ def _percent(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict
         return {}
     table = table_of_file(path, layout, _names_of(named))
     most = max(float(np.nanmax(np.abs(_numbers(table[n], "")), initial=0.0)) for n in _names_of(named))
-    if not MOST_COMMAND < most <= LARGEST["command"]:
+    if not 1.0 + NEGLIGIBLE < most <= LARGEST["command"]:
         return {}
     return {s: column.model_copy(update={"unit": "%"}) for s, column in named.items()}
 

@@ -5,7 +5,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
@@ -13,30 +13,16 @@ from cosim import InputError
 from cybership.message_text import quoted
 
 from ..files.text_layout import text_layout
-from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, stated_layout
+from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, Named, stated_layout
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,")  # how one of NMEA 0183 begins
 
 
-class ColumnChange(NamedTuple):
-    """What a signal should be read as.
-
-    Attributes:
-        source: the signal whose column it should have.
-        factor: of its unit, negative where its axis points the other way.
-        offset: what is added then [SI].
-    """
-
-    source: str
-    factor: float = 1.0
-    offset: float = 0.0
-
-
 def line_beside(
     path: Path | None,
     read_as: Layout,
-    changes: Mapping[str, ColumnChange],
+    changes: Mapping[str, Named],
     name: str | None = None,
 ) -> str:
     """What to put into the file beside a measurement so that columns are read otherwise.
@@ -44,7 +30,8 @@ def line_beside(
     Args:
         path: of the measurement; None if it is in no file.
         read_as: how it was read, by that file, by units in its names, or by a proposal.
-        changes: signal -> what it should be read as.
+        changes: signal -> the signal whose column it should have, with a factor of its unit (negative
+            where its axis points the other way) and what is added then [SI].
         name: of the column; None: as it is.
 
     Returns:
@@ -56,8 +43,9 @@ def line_beside(
     told = stated_layout(path) == read_as
     text = Layout() if told else read_as
     columns = {} if told else as_json(read_as).get("columns", {})
-    for signal, (source, signed, offset) in changes.items():
-        column, sign, factor = read_as.column(source), math.copysign(1.0, signed), abs(signed)
+    for signal, change in changes.items():
+        column, offset = read_as.column(change.name), change.offset
+        sign, factor = math.copysign(1.0, change.factor), abs(change.factor)
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if math.isclose(size, wanted)), None)

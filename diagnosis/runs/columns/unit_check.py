@@ -11,23 +11,21 @@ from scipy import constants as c
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
-# Quantity -> its unit in SI, and other units -> factor to that [1].
-OTHERS: dict[str, tuple[str, dict[str, float]]] = {
-    "time": ("s", {"ms": c.milli, "us": c.micro, "ns": c.nano, "min": c.minute}),
-    "length": ("m", {"mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch}),
-    "angle": ("rad", {"deg": c.degree, "°": c.degree}),
-    "force": ("N", {"mN": c.milli, "kN": c.kilo}),
-    "moment": ("N.m", {"N.mm": c.milli, "N.cm": c.centi, "kN.m": c.kilo}),
-    "command": ("1", {"%": c.centi}),
-    "shaft speed": ("1/s", {"rps": 1.0, "rpm": 1.0 / c.minute, "rad/s": 1.0 / math.tau}),
-    "speed": ("m/s", {"mm/s": c.milli, "cm/s": c.centi, "km/h": c.kmh, "kn": c.knot}),
-    "rate": ("rad/s", {"deg/s": c.degree, "°/s": c.degree, "deg/min": c.degree / c.minute}),
-    "acceleration": ("m/s2", {"mm/s2": c.milli, "g": c.g}),
-    "angular acceleration": ("rad/s2", {"deg/s2": c.degree}),
+# Quantity -> its units, that of SI first -> factor to that [1].
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": c.milli, "us": c.micro, "ns": c.nano, "min": c.minute},
+    "length": {"m": 1.0, "mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch},
+    "angle": {"rad": 1.0, "deg": c.degree, "°": c.degree},
+    "force": {"N": 1.0, "mN": c.milli, "kN": c.kilo},
+    "moment": {"N.m": 1.0, "N.mm": c.milli, "N.cm": c.centi, "kN.m": c.kilo},
+    "command": {"1": 1.0, "%": c.centi},
+    "shaft speed": {"1/s": 1.0, "rps": 1.0, "rpm": 1.0 / c.minute, "rad/s": 1.0 / math.tau},
+    "speed": {"m/s": 1.0, "mm/s": c.milli, "cm/s": c.centi, "km/h": c.kmh, "kn": c.knot},
+    "rate": {"rad/s": 1.0, "deg/s": c.degree, "°/s": c.degree, "deg/min": c.degree / c.minute},
+    "acceleration": {"m/s2": 1.0, "mm/s2": c.milli, "g": c.g},
+    "angular acceleration": {"rad/s2": 1.0, "deg/s2": c.degree},
 }
-SI_UNIT = {quantity: unit for quantity, (unit, _) in OTHERS.items()}
-# 1, of all units, that of SI first.
-UNITS = {quantity: {unit: 1.0, **others} for quantity, (unit, others) in OTHERS.items()}
+SI_UNIT = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"
 # s between two samples, times the scale of the ship, whose own time constants are shorter (chosen)
@@ -91,7 +89,7 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
     speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
     if speed > FASTEST:
-        slow = (u for u, size in OTHERS["length"][1].items() if speed * size < FASTEST)
+        slow = (u for u, size in UNITS["length"].items() if speed * size < FASTEST)
         units = sorted(slow, key=UNITS["length"].__getitem__)
         reason = f"goes {speed:.3g} m/s: is its position in {' or '.join(units)}?"
         yield Doubt(("x", "y"), units[0] if units else "mm", reason)

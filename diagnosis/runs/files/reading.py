@@ -37,14 +37,13 @@ from ..columns.columns import (
     to_si,
 )
 from ..columns.unit_check import LARGEST, UNITS, remedy
+from ..run_constants import NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
 from .tables import as_table, column_names, date_stamps, is_cell, numbers, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
-# Real commands overshoot by rounding; far beyond they are in another unit.
-MOST_COMMAND = 1.05  # 1, of the full command
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -250,7 +249,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     power = None if power is None else np.maximum(power, 0.0)
     if units == {"1"} and commands is not None:
         most = float(np.abs(commands).max(initial=0.0))
-        if most > MOST_COMMAND:
+        if most > 1.0 + NEGLIGIBLE:  # far beyond rounding they are in another unit
             raise InputError(
                 f"{where}: commands reach {most:g}; allowed is -1 to 1; are they in percent? "
                 f"{remedy(own, '%')}"

@@ -4,10 +4,10 @@ import numpy as np
 
 from ..cleaning import Z95
 from ..files.telegrams import groups_of
-from ..run_constants import HELD, LONG
+from ..run_constants import EVERY, LONG
 from ..thinning import MOST_ROWS
 from .constants import LEAST
-from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
+from .evidence import AGREED, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
 from .sensor_finding import SensorFinding
 
 FAST = 3.0  # 1, times the log's step, or its inverse: what is less is a clock that runs fast (chosen)
@@ -34,7 +34,7 @@ def gaps(e: Evidence) -> list[SensorFinding]:
     # Position and heading jump together in time alone, however the ship went meanwhile.
     missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN)))
     ahead = (FAST * (late + step) < step) & (step > LONG * period)
-    shortest = max(HELD, 2.0 * period)
+    shortest = max(EVERY, 2.0 * period)
     jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > shortest)
     jumps &= going & (missing | ahead)
     found = []
@@ -90,9 +90,10 @@ def _elsewhere(
         inside = (last < time.size) & ((starts > a) | (last < b))
         i, j = starts[inside], last[inside]
         turned = e.psi[rows[j]] - e.psi[rows[i]]
-        alike = np.abs(np.angle(np.exp(1j * (turned - turn)))) < max(LEAST_TURN, ALIKE * abs(turn))
+        unlike = 1.0 - AGREED
+        alike = np.abs(np.angle(np.exp(1j * (turned - turn)))) < max(LEAST_TURN, unlike * abs(turn))
         for k, end in zip((i, j), ends, strict=True):
-            alike &= np.abs(speed[k] - end) < ALIKE * end
+            alike &= np.abs(speed[k] - end) < unlike * end
         i, j = i[alike], j[alike]
         if i.size < FEWEST:
             continue

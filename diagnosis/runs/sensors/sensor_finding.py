@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..cleaning import SHOWN, Z95
+from ...execution.short_text import SHOWN
+from ..cleaning import Z95
 from ..files.reading import Run
 from .constants import Kind
 

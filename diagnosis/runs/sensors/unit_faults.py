@@ -12,12 +12,10 @@ from ..cleaning import between
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
-from ..fingerprint import FEW
-from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
+from ..run_constants import HORIZON, IN_A_ROW
+from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
-WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
-NEAR = 0.15  # 1, relative distance within which a factor is that of a unit (chosen)
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is reversed"
 
@@ -82,7 +80,7 @@ def sway(run: Run, scale: Scale) -> Examined:
     ahead = integral(e.time, np.column_stack(rotate_to_earth(e.psi, surge, still)))
     places = (np.column_stack(rotate_to_earth(e.psi, *at)) for at in ((one, still), (still, one)))
     way, *said = _windows(e, _position(e), ahead, e.gone - ahead, *places)
-    if len(way) < FEW:
+    if len(way) < IN_A_ROW:
         return Examined(run)
     columns = np.column_stack([x.T.ravel() for x in said])
     value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
@@ -101,9 +99,9 @@ def _position(e: Evidence) -> np.ndarray:
 
 
 def _windows(e: Evidence, *paths: np.ndarray) -> list[np.ndarray]:
-    """What pose and channels say of each window, (k, d) each."""
+    """What pose and channels say of each window of prediction, or of more samples, (k, d) each."""
     rows = e.rows
-    apart = max(1, round(WINDOW / float(np.median(np.diff(e.time[rows])))), 10)
+    apart = max(round(HORIZON / float(np.median(np.diff(e.time[rows])))), IN_A_ROW)
     return [np.diff(path[rows[::apart]], axis=0) for path in paths]
 
 
@@ -118,7 +116,7 @@ def _judged(
     """What the ratio of a channel to the pose says, and the run with the channel in its right unit."""
     size = np.hypot.reduce(said, axis=1) if said.shape[1] > 1 else np.abs(said[:, 0])
     much = large(size)
-    if much.sum() < FEW:
+    if much.sum() < IN_A_ROW:
         return found
     pose, said, size = pose[much], said[much], size[much]
     ratio = (pose * said).sum(axis=1) / size**2
@@ -129,7 +127,7 @@ def _judged(
         note = f"{told} and the pose disagree about the motion: {told} is not used"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
-    if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
+    if abs(middle - 1.0) < 1.0 - AGREED:  # a scale, which is estimated with all else
         return found
     value = 1.0 / middle
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
@@ -146,7 +144,8 @@ def _nearest(value: float, quantity: str) -> tuple[str, float]:
     """The mistake of units that is nearest to a factor, and its factor; no name: it is none."""
     pairs = permutations(UNITS[quantity].items(), 2)
     known = {f"{a} in place of {b}": of_b / of_a for (a, of_a), (b, of_b) in pairs if of_a != of_b}
-    if abs(value - 1.0) <= NEAR:
+    near = 1.0 - AGREED
+    if abs(value - 1.0) <= near:
         known = {SIGN: 1.0}
     best = min(known, key=lambda name: abs(np.log(value / known[name])))
-    return (best, known[best]) if abs(np.log(value / known[best])) < NEAR else ("", value)
+    return (best, known[best]) if abs(np.log(value / known[best])) < near else ("", value)

@@ -19,23 +19,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from ..run_constants import CHANCE
+from ..cleaning import NORMAL_MAD
+from ..run_constants import CHANCE, DIGITS, ORDER
 from .likelihood import adapt, likeliest
-from .outliers import Inliers
+from .outliers import REWEIGHTINGS, Inliers
 from .penalised import Problem
 from .spline import DEGREE
 
-WHITE = 20.0  # variance of the third difference of white noise, of that of the noise
-MOTION = (3.0, 4.0, 5.0, 6.0)  # powers of h
 GROWTH = 1.5  # from lag to lag, in samples
-FEWEST = 6  # lags; fewer determine no more than white noise and motion (chosen)
+
 ON_GRID = 0.2  # of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
-NORMAL = 0.4549  # median of the square of a standard normal variable
-# Relative variance of a variance by the median of n independent squares, times n: 2 over its
-# efficiency of 0.37.
-SPREAD = 5.4
-ROUNDS = 10  # most of noise and smoothness in turn; six to ten are the rule
-SETTLED = 0.02  # 1, of the noise
 
 
 class Correlated(NamedTuple):
@@ -82,14 +75,18 @@ def hadamard(
     even = np.full(place[-1] + 1, np.nan)
     even[place] = z
     most = min(int(longest / period), (even.size - 1) // 3)
-    powers = np.arange(np.log(max(most, 1)) / np.log(GROWTH) + 1e-9)
+    powers = np.arange(np.log(max(most, 1)) / np.log(GROWTH) + DIGITS)
     lags = np.unique(np.round(GROWTH**powers).astype(int))
     found = []
+    median = NORMAL_MAD**-2.0  # of the square of a standard normal variable
+    density = np.exp(-median / 2.0) / np.sqrt(2.0 * np.pi * median)
+    # Relative variance of a variance by the median of n independent squares, times n.
+    spread = 1.0 / (2.0 * density * median) ** 2
     for h in lags:
         d = even[3 * h :] - 3.0 * even[2 * h : -h] + 3.0 * even[h : -2 * h] - even[: -3 * h]
         d = d[np.isfinite(d)]
         if d.size > h and d.any():
-            found.append((h * period, np.median(d**2) / NORMAL, np.sqrt(SPREAD * h / d.size)))
+            found.append((h * period, np.median(d**2) / median, np.sqrt(spread * h / d.size)))
     lag, variance, std = np.array(found).reshape(-1, 3).T
     positive = variance > 0.0
     return lag[positive], variance[positive], std[positive], period
@@ -101,15 +98,19 @@ def correlated(time: np.ndarray, z: np.ndarray, longest: float) -> Correlated | 
     It is known if it is likelier than white noise and motion alone by the chance of a false report.
     """
     h, variance, std, period = hadamard(time, z, longest)
-    if h.size < FEWEST:
+    powers = np.arange(ORDER, 2 * ORDER + 1)  # of h, by a motion
+    few = 1 + powers.size
+    if h.size <= few:  # they determine no more than white noise and motion
         return None
     times = np.geomspace(period, h[-1], h.size)
-    r = [np.exp(-k * h[:, None] / times) for k in (1.0, 2.0, 3.0)]
-    lasting = WHITE - 30.0 * r[0] + 12.0 * r[1] - 2.0 * r[2]
-    motion = (h[:, None] / h[-1]) ** np.array(MOTION)
-    terms = np.column_stack([np.full(h.size, WHITE), motion, lasting]) / (variance * std)[:, None]
+    (difference,) = np.diff(np.eye(ORDER + 1), ORDER, axis=0)
+    white, *further = np.correlate(difference, difference, "full")[ORDER:]  # by lags
+    r = [np.exp(-k * h[:, None] / times) for k in range(1, ORDER + 1)]
+    lasting = white + 2.0 * sum(factor * at for factor, at in zip(further, r, strict=True))
+    motion = (h[:, None] / h[-1]) ** powers
+    terms = np.column_stack([np.full(h.size, white), motion, lasting]) / (variance * std)[:, None]
     size = np.linalg.norm(terms, axis=0)
-    target, few = 1.0 / std, 1 + len(MOTION)
+    target = 1.0 / std
     share, left = nnls(terms / size, target)
     _, without = nnls((terms / size)[:, :few], target)
     if 0.5 * (without**2 - left**2) < -np.log(CHANCE):
@@ -138,7 +139,7 @@ def with_correlated(
     if not any(parts):
         return found
     white, smoothness = even.sigma, found.even
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         before = even.sigma
         # The density of the jerk is that of the noise, sigma^2 P, over s h^5 P.
         sigma = [
@@ -149,7 +150,7 @@ def with_correlated(
         ]
         even = even._replace(sigma=np.array(sigma))
         smoothness = likeliest(even, found.weights, smoothness * (even.sigma / before) ** 2)
-        if np.allclose(even.sigma, before, rtol=SETTLED):
+        if np.allclose(even.sigma, before, rtol=CHANCE):
             break
     adapted, smooth = adapt(even, smoothness, found.weights)
     return Inliers(adapted, smooth, found.weights, smoothness)

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
-from ..cleaning import BRIEF, DIGITS, WIDTH, between
-from ..run_constants import CHANCE
+from ..cleaning import BRIEF, WIDTH, between
+from ..run_constants import CHANCE, DIGITS
 from .command_motion import FORGETTING, Commands
 from .penalised import Fit, Problem
 from .spline import middles

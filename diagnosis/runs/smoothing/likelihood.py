@@ -34,9 +34,9 @@ from scipy.linalg import LinAlgError
 from scipy.optimize import brentq
 from scipy.special import chdtrc
 
-from ..run_constants import CHANCE
+from ..run_constants import CHANCE, DIGITS, ORDER
 from .penalised import JERK, POSE, Equations, Fit, LinearSystem, Problem, solve
-from .spline import ORDER, third
+from .spline import third
 
 # 1, of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise
 # (chosen).
@@ -46,7 +46,6 @@ LEAST_JERK = 0.2  # 1, of the mean square: where there is none, it may yet begin
 # of 0.05 s.
 DECADES = 8.0
 STEP = 0.05  # 1, of log s, for the derivative (chosen: its error is a thousandth)
-EXACT = 1e-10  # 1, decades; the logarithm of the roughness is rounded to 1e-11
 
 
 def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
@@ -124,7 +123,7 @@ class Likelihood:
                 beyond = float(np.clip(before + step, -DECADES, DECADES))
                 if excess(beyond) * step >= 0.0:
                     low, high = sorted((before, beyond))
-                    root: Any = brentq(excess, low, high, xtol=EXACT)
+                    root: Any = brentq(excess, low, high, xtol=DIGITS)
                     return float(root)
             except LinAlgError:  # so little smoothing that the spline is not determined
                 break

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, get_lapack_funcs
 from scipy.sparse import csr_array
 
-from ..cleaning import DIGITS
+from ..run_constants import DIGITS
 from .spline import Basis, Knots, basis, inverse_band, roughness
 
 # Cholesky factors of a banded matrix, and the solution by them.

@@ -21,10 +21,9 @@ from fmus.scale import Scale
 
 from ...execution.short_text import ShortRepr
 from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise, repeated
-from ..cleaning import FEWEST as OF_CHANNEL
 from ..columns.columns import POSE
 from ..measured_wind import air_along
-from ..run_constants import CHANCE, HORIZON, LONG
+from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
@@ -36,8 +35,7 @@ from .penalised import Problem, Rates, Spline, solve
 from .spline import DEGREE, Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
-QUICKEST = 0.5  # s, of a motion (chosen)
-LASTING = 4.0 * QUICKEST  # s, over which errors of a pose are looked for that last; chosen
+
 # [m, m, rad]; a smaller noise is implausible, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # 1, times what the samples scatter by, from which on a given noise is doubted. Chosen: with less,
@@ -214,7 +212,7 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     time, scale = track.run.time - track.run.time[0], track.scale
     with np.errstate(over="ignore"):  # of poses that are no place on earth
         origin = np.nanmedian(track.pose, axis=0)
-    spacing = max(0.1 * QUICKEST * scale.time, float(np.median(np.diff(time[rows]))))
+    spacing = max(0.1 * EVERY * scale.time, float(np.median(np.diff(time[rows]))))
     grid = knots(*stretches(rows[track.valid[rows]], track), spacing)
     dense = rows[within(grid, time[rows])]
     z = track.pose[dense] - origin
@@ -260,11 +258,11 @@ def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
         even, origin = _problem(track, rows)
         # A spline that follows a few samples: its time constant is two sampling periods.
         local = 2.0 * (2.0 * track.periods / even.spline.grid.spacing) ** DEGREE
-        resolved = bool(2.0 * track.periods.max() <= QUICKEST * track.scale.time)
+        resolved = bool(2.0 * track.periods.max() <= EVERY * track.scale.time)
         try:
             alone = robust(even, local, least, resolved)
             even = even._replace(sigma=alone.problem.sigma)
-            free, longest = np.isnan(given_noise(track)), LASTING * track.scale.time
+            free, longest = np.isnan(given_noise(track)), WIDTH * track.scale.time
             alone = with_correlated(alone, even, track.run.time[even.rows], longest, free)
             return rows, even._replace(sigma=alone.problem.sigma), origin, alone
         except TooFewError as stretch:
@@ -377,8 +375,7 @@ def measured_rates(
         z[:, 2] = run.measured["r"][at]
         sigma[2] = max(agreeing["r"], run.noise.get("r", 0.0))
     scatter = [
-        noise(z[new, k : k + 1])[0] if new.sum() >= OF_CHANNEL else 0.0
-        for k, new in enumerate(share.T > 0.0)
+        noise(z[new, k : k + 1])[0] if new.sum() > ORDER else 0.0 for k, new in enumerate(share.T > 0.0)
     ]
     z = np.where(share > 0.0, z, 0.0)
     return at, Rates(z, basis(grid, run.time[at] - run.time[0], 1), np.maximum(sigma, scatter), share)
@@ -401,7 +398,7 @@ def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
     # A heading may be measured in rows of its own.
     until = np.vstack([np.zeros((1, 3), int), np.cumsum(track.fresh, axis=0)])
     of_channel = (until[rows[last] + 1] - until[rows[first]]).min(axis=1)
-    enough = (last - first + 1 >= FEWEST) & (of_channel >= OF_CHANNEL)
+    enough = (last - first + 1 >= FEWEST) & (of_channel > ORDER)
     if not enough.any():
         raise InputError(f"run '{track.run.name}': fewer than {FEWEST} samples between long gaps")
     return time[first[enough]], time[last[enough]]

@@ -19,9 +19,8 @@ from scipy.interpolate import BSpline, PPoly
 from scipy.linalg import cholesky_banded, hilbert
 from scipy.sparse import csr_array
 
-from ..cleaning import DIGITS
+from ..run_constants import DIGITS, ORDER
 
-ORDER = 3  # 1, of the derivative with the penalty
 DEGREE = 2 * ORDER - 1  # 1, of the smoothing spline
 # 1, coefficients after which the recursion of the inverse has forgotten its start: its memory falls as
 # exp(-n / (2 s^(1/6))), to 5e-5 at the smoothness s = 1e6, to 1e-2 at the largest one, 1e8.

@@ -41,7 +41,7 @@ class ForceDisturbance:
     size: np.ndarray
     time: np.ndarray
     growth: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    speed: float = 1.0
+    speed: float = np.inf
 
     def at(self, speed: np.ndarray) -> "ForceDisturbance":
         """That of ships at some speeds (w,) [m/s]."""

@@ -31,10 +31,10 @@ from ...execution.parallel import for_each
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
-from ...runs.cleaning import DIGITS
+from ...runs.run_constants import DIGITS, STEPS
 from ..candidates import SMALL, model_error
-from ..gram import OTHER_RUN, run_folds
-from ..most_likely import STEPS, Quadratic, most_likely, ridge
+from ..gram import WHOLE_RUNS, run_folds
+from ..most_likely import Quadratic, most_likely, ridge
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
@@ -124,7 +124,7 @@ class PredictionFit:
         least: number of runs from which on a fold is a whole one.
     """
 
-    least = OTHER_RUN
+    least = WHOLE_RUNS - 1
 
     def __init__(
         self,
