@@ -235,7 +235,8 @@ def test_methods_in_the_table_of_ships_meet_the_measured_wind(measured):
     assert errors == pytest.approx(windows.errors(wrong).over_all(), rel=0.02)
     t = table(run, 0.5)
     assert t.given.shape[1] == len(COMMANDS) + 2
-    forces = nominal.inputs("forces", t.nu, t.given)
+    part = t.parts[0]
+    forces = nominal.inputs("forces", t.nu[part], t.given[part])
     assert forces.shape[1] == 6
     assert np.abs(forces[:, 4]).max() > 1e-4, "the wind accelerates the ship at rest to the side"
 
