@@ -14,6 +14,7 @@ from support.ships import SHIPS
 
 import cosim
 import diagnosis
+from benchmarks.ships.same_windows import Continuous, Nominal, law_errors, table
 from diagnosis import Model
 from diagnosis.predictors import weak_windows
 from diagnosis.predictors.weak_form import omega
@@ -222,6 +223,22 @@ def test_predictions_take_the_measured_wind(measured):
     assert missed(true, without)[0] > 5.0 * with_wind
     left, blown = (np.abs(omega(weak_windows(true), m)).mean(axis=0) for m in (nominal, without))
     assert (left[1:] < 0.3 * blown[1:]).all()
+
+
+@pytest.mark.slow
+def test_methods_in_the_table_of_ships_meet_the_measured_wind(measured):
+    """Their nominal model predicts as the project's does; in forces they see that of the wind."""
+    run = smoothed(measured, "wind_speed_relative", "wind_direction_relative")
+    wrong = Model(ship=SHIP).plus({"wind_Y_1": SHIP.parameters["vessel"]["wind_Y_1"].start})
+    nominal, windows = Nominal(wrong, run.track.run.commands), diagnosis.Windows([run], 15.0)
+    errors = law_errors(Continuous(nominal.acceleration, 0.05), windows)
+    assert errors == pytest.approx(windows.errors(wrong).over_all(), rel=0.02)
+    t = table(run, 0.5)
+    assert t.given.shape[1] == len(COMMANDS) + 2
+    part = t.parts[0]
+    forces = nominal.inputs("forces", t.nu[part], t.given[part])
+    assert forces.shape[1] == 6
+    assert np.abs(forces[:, 4]).max() > 1e-4, "the wind accelerates the ship at rest to the side"
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -245,6 +246,35 @@ def test_hashes_are_those_of_the_public_files():
     for data in DATASETS.values():
         files = [f for pattern in data.files for f in (DATA / data.folder).glob(pattern)]
         assert not files or digest_of(files) == data.digest, data.folder
+
+
+def run_named(name):
+    return SimpleNamespace(run=SimpleNamespace(name=name))
+
+
+def test_runs_of_one_log_are_never_in_training_and_test():
+    kinds = [run_named(n) for n in ("a_11_00_00_1", "a_11_00_00_2", "b_12_00_00", "c_13_00_00")]
+    folds = replace(DATASETS["esso_osaka"], folds=2).split(kinds)
+    a1, a2, b, c = kinds
+    assert folds == [([b], [a1, a2, c]), ([a1, a2, c], [b])]
+    listed = replace(DATASETS["esso_osaka"], train=("a_11_00_00_1", "b_12_00_00")).split(kinds)
+    assert listed == [([a1, b], [c])]
+
+
+def test_errors_of_another_environment_are_compared(tmp_path):
+    def answered(folder, position):
+        (folder / "cse1").mkdir(parents=True)
+        answer = {"a": {"scores": [[position, 0.2, -1.0, 0.9]], "seconds": 1.0}}
+        (folder / "cse1" / "ridge.json").write_text(json.dumps(answer))
+        return ships.stored_means(ships.write(folder, ["cse1"]).with_name("results.json"))
+
+    first, near, far = (answered(tmp_path / n, x) for n, x in (("1", 0.5), ("2", 0.504), ("3", 0.51)))
+    assert ships.differing(first, near) == []
+    assert ships.differing(first, far) == ["cse1, 8 s, ridge: position 0.51 in place of 0.5"]
+    with pytest.raises(InputError, match="in common"):
+        ships.differing(first, {})
+    with pytest.raises(InputError, match="no results of this table"):
+        ships.stored_means(tmp_path / "1" / "cse1" / "ridge.json")
 
 
 def test_table_compares_with_the_nominal_model(tmp_path):

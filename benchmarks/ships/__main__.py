@@ -9,11 +9,12 @@ import argparse
 import json
 import resource
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, entry_points, version
 from math import degrees
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -22,7 +23,7 @@ import cosim
 from cosim.command import complain, run_command
 from cosim.errors import nearest
 from diagnosis import Windows
-from studies.study_report import Report
+from studies.study_report import RESULTS, Report
 
 from .chosen_settings import SEED
 from .datasets import DATASETS, DataSet, Runs
@@ -42,7 +43,7 @@ OWN = {
     "neural": "scikit-learn",
 }
 
-
+SAME = 0.01  # 1, by which an error may differ in another environment
 PROJECT = ("calibrated", "learned")  # methods of this project; nominal is what all begin with
 
 
@@ -74,9 +75,8 @@ def seconds() -> float:
 def answers(data: DataSet, loaded: Runs, fit: Entry) -> Iterator[tuple[str, list[Score], float]]:
     """Of each run, left out with its fold: its scores by horizon, and the time of the fit [s]."""
     runs, model = loaded
-    for out in data.split(runs):
+    for rest, out in data.split(runs):
         begin = seconds()
-        rest = [w for w in runs if w not in out]
         predictor = fit(Training(rest, model, data.horizons[-1]))
         took = seconds() - begin
         usual = [spread(predictor, [*_windows(rest, h)]) for h in data.horizons]
@@ -98,42 +98,103 @@ def _windows(runs: Sequence, horizon: float) -> Iterator[Windows]:
             continue
 
 
-def rows(folder: Path, horizon: int) -> Iterator[list[str]]:
-    """Of each method with answers in a folder: means over the runs in windows of a horizon."""
+class Means(NamedTuple):
+    """Of a method: means over the runs in windows of a horizon, of errors geometric ones.
+
+    Attributes:
+        runs: number of them.
+        position, heading: [m], [rad].
+        likelihood, inside: see :class:`.entry_predictor.Score`.
+        seconds: of a fit.
+    """
+
+    runs: int
+    position: float
+    heading: float
+    likelihood: float
+    inside: float
+    seconds: float
+
+
+def means(folder: Path, horizon: int) -> dict[str, Means]:
+    """By method, of all answers in a folder."""
     read = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
+    found = {}
+    for name, answer in sorted(read.items(), key=lambda item: [*OWN, item[0]].index(item[0])):
+        scored = [r for r in answer.values() if len(r["scores"]) > horizon]
+        if not scored:
+            continue
+        scores = np.array([r["scores"][horizon] for r in scored])
+        errors = np.exp(np.mean(np.log(scores[:, :2]), axis=0))
+        took = float(np.mean([r["seconds"] for r in scored]))
+        found[name] = Means(len(scored), *errors.tolist(), *scores[:, 2:].mean(axis=0).tolist(), took)
+    return found
 
-    def scores(name: str, runs: Sequence[str]) -> np.ndarray:
-        return np.array([read[name][r]["scores"][horizon] for r in runs])
 
-    for name, found in sorted(read.items(), key=lambda item: [*OWN, item[0]].index(item[0])):
-        runs = [r for r in found if len(found[r]["scores"]) > horizon]
-        own = scores(name, runs)
-        position, heading = np.exp(np.mean(np.log(own[:, :2]), axis=0))
+def rows(folder: Path, horizon: int) -> Iterator[list[str]]:
+    """The table of a folder's answers in windows of a horizon."""
+    found = means(folder, horizon)
+    nominal = found.get("nominal")
+    for name, m in found.items():
         falls = ["–", "–"]
-        if {*runs} <= {*read.get("nominal", {})}:
-            ratio = scores("nominal", runs)[:, :2] / own[:, :2]
-            falls = [f"{x:.2f}x" for x in np.exp(np.mean(np.log(ratio), axis=0))]
-        took = np.mean([found[r]["seconds"] for r in runs])
-        cells = [f"{position:.3g}", f"{degrees(heading):.3g}", *falls]
-        likelihood, inside = own[:, 2:].mean(axis=0)
-        yield [name, str(len(runs)), *cells, f"{likelihood:.3g}", f"{100 * inside:.0f}", f"{took:.3g}"]
+        if nominal is not None and nominal.runs == m.runs:
+            falls = [f"{nominal.position / m.position:.2f}x", f"{nominal.heading / m.heading:.2f}x"]
+        cells = [f"{m.position:.3g}", f"{degrees(m.heading):.3g}", *falls]
+        yield [
+            name,
+            str(m.runs),
+            *cells,
+            f"{m.likelihood:.3g}",
+            f"{100 * m.inside:.0f}",
+            f"{m.seconds:.3g}",
+        ]
 
 
 def lost(folder: Path, horizon: int) -> Iterator[tuple[str, str, str]]:
     """Position or heading, this project's best method, and those that have a smaller error."""
-    read = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
-    for k, quantity in enumerate(("position", "heading")):
-        errors = {
-            name: float(np.mean([np.log(r["scores"][horizon][k]) for r in found.values()]))
-            for name, found in read.items()
-            if found and all(len(r["scores"]) > horizon for r in found.values())
-        }
+    found = means(folder, horizon)
+    for quantity in ("position", "heading"):
+        errors = {name: getattr(m, quantity) for name, m in found.items()}
         own = {name: error for name, error in errors.items() if name in PROJECT}
         if own:
             best = min(own, key=lambda name: own[name])
             better = [n for n, e in errors.items() if n not in PROJECT and e < own[best]]
             if better:
                 yield quantity, best, ", ".join(better)
+
+
+def stored_means(file: Path) -> dict[str, Any]:
+    """``means`` of a file ``results.json`` beside a page.
+
+    Raises:
+        InputError: it has none.
+    """
+    try:
+        return json.loads(file.read_text("utf-8"))["means"]
+    except (OSError, ValueError, KeyError) as error:
+        raise cosim.InputError(f"no results of this table in '{file}': {error!r}") from None
+
+
+def differing(earlier: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]:
+    """Errors that differ by more than ``SAME`` from those of an earlier page, a line each.
+
+    Args:
+        earlier, found: ``means`` of two files ``results.json``; what one alone has is not compared.
+
+    Raises:
+        InputError: they have nothing in common.
+    """
+    lines, compared = [], 0
+    for table in [t for t in found if t in earlier]:
+        for method in [m for m in found[table] if m in earlier[table]]:
+            for quantity in ("position", "heading"):
+                before, after = (x[table][method][quantity] for x in (earlier, found))
+                compared += 1
+                if not abs(after / before - 1.0) <= SAME:
+                    lines.append(f"{table}, {method}: {quantity} {after:.4g} in place of {before:.4g}")
+    if not compared:
+        raise cosim.InputError("the two pages have no method on the same data in common")
+    return lines
 
 
 def write(folder: Path, names: Sequence[str]) -> Path:
@@ -152,6 +213,13 @@ def write(folder: Path, names: Sequence[str]) -> Path:
         processor for a fit, search included. A method that states no uncertainty has that of its errors
         in training. """
         f"{', '.join(f'{p} {_version(p)}' for p in sorted(packages))}."
+    )
+    report.result(
+        "means",
+        {
+            f"{n}, {h:g} s": {m: x._asdict() for m, x in means(folder / n, k).items()}
+            for n, k, h in horizons
+        },
     )
     head = ["method", "runs", "position [m]", "heading [°]", "position", "heading", "NLL", "inside [%]"]
     for name in names:
@@ -182,7 +250,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--out", type=Path, default=Path("results/ships"), help="folder of answers and report"
     )
+    parser.add_argument(
+        "--compare",
+        type=Path,
+        metavar="FILE",
+        help="results.json of an earlier page: exit code 1 if an error differs by more than 1 %%",
+    )
     options = parser.parse_args(arguments)
+    earlier = stored_means(options.compare) if options.compare else None
     warnings.simplefilter("ignore")  # of fits that fail, which the search sees
     with threadpool_limits(1):
         for dataset in options.datasets:
@@ -197,8 +272,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     print(f"{dataset}, {name}, without {run}: {scores}", flush=True)
                     found[run] = {"scores": scores, "seconds": took}
                 (folder / f"{name}.json").write_text(json.dumps(found, indent=1) + "\n")
-    print(write(options.out, options.datasets).read_text())
-    return 0
+    page = write(options.out, options.datasets)
+    print(page.read_text())
+    if earlier is None:
+        return 0
+    lines = differing(earlier, stored_means(page.with_name(RESULTS)))
+    print("\n".join(lines or [f"all errors are within {SAME:.0%} of '{options.compare}'"]))
+    return 1 if lines else 0
 
 
 if __name__ == "__main__":

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from diagnosis import Model, Smoothed, Windows
+from fmus.frames import rotate_to_body
 from fmus.ops import wrap
 from fmus.signals import Force
-from fmus.vessel.vessel import State, nominal
+from fmus.vessel.vessel import State, blown, disturbed
 
 DELAYS = (0.0, 0.4)  # s, of the commands; a search goes on beyond the last
 UNSURE = 3.0  # times the median standard deviation of acceleration: there none is known; chosen
@@ -36,14 +37,15 @@ class Law(Protocol):
 
         Args:
             nu: (lags, w, 3), the last ones [m/s, m/s, rad/s], the present one at the end.
-            given: (lags, w, k), mean commands of the steps up to the one ahead.
+            given: (lags, w, k), mean commands of the steps up to the one ahead; behind them, where the
+                wind is measured, the body-fixed velocity of the air over ground [m/s, m/s].
         """
         ...
 
 
 @dataclass(frozen=True)
 class Continuous:
-    """A law that tells nu_dot (w, 3) of nu (w, 3) and commands (w, k)."""
+    """A law that gives nu_dot (w, 3) of nu (w, 3) and what is given (w, k)."""
 
     acceleration: Any
     h: float
@@ -57,27 +59,40 @@ class Continuous:
 
 
 class Nominal:
-    """The nominal model as functions of velocity (n, 3) and commands (n, k)."""
+    """The nominal model as functions of velocity (n, 3) and what is given (n, k), see :class:`Law`."""
 
     def __init__(self, model: Model, layout: np.ndarray) -> None:
-        drive, self.hull = model.drive, model.hull.hull
-        self.layout = model.ship.layout_of(layout)
+        drive, self.hull = model.drive, model.hull
+        self.layout, self.width = model.ship.layout_of(layout), layout.shape[1]
         self.drive = drive._replace(effects=drive.effects._replace(layout=self.layout))
 
     def push(self, nu: np.ndarray, given: np.ndarray) -> np.ndarray:
         """(n, 3), force of the actuators [N, N, N m]."""
-        commands = tuple(given.T)
+        commands = tuple(given[:, : self.width].T)
         now = self.layout.running(0.0, *nu.T, commands, self.drive)
         return np.column_stack(np.broadcast_arrays(*self.layout.act(commands, now, self.drive)))
 
     def acceleration(self, nu: np.ndarray, given: np.ndarray) -> np.ndarray:
         """nu_dot (n, 3) [m/s2, m/s2, rad/s2]."""
-        tau = Force(*self.push(nu, given).T)
-        return np.column_stack(nominal(State(0.0, 0.0, 0.0, *nu.T, 0.0), tau, self.hull))
+        return self._moved(nu, given, self.push(nu, given))
+
+    def _moved(self, nu: np.ndarray, given: np.ndarray, push: np.ndarray) -> np.ndarray:
+        s, air = State(0.0, 0.0, 0.0, *nu.T, 0.0), given[:, self.width :].T  # seen from aboard
+        hull = blown(self.hull, s, *air) if air.size else self.hull
+        return np.column_stack(np.broadcast_arrays(*disturbed(s, Force(*push.T), hull)))
 
     def inputs(self, kind: str, nu: np.ndarray, given: np.ndarray) -> np.ndarray:
-        """What a method is told of the actuators: ``commands``, or the nominal ``forces`` of them."""
-        return given if kind == "commands" else self.push(nu, given)
+        """What a method learns from: ``commands`` with the air, or their nominal ``forces``.
+
+        The force of the wind is one at rest [m/s2, m/s2, rad/s2].
+        """
+        if kind == "commands":
+            return given
+        push = self.push(nu, given)
+        if given.shape[1] == self.width:
+            return push
+        still = np.zeros_like(nu)
+        return np.hstack([push, self._moved(still, given, still)])
 
 
 class Table(NamedTuple):
@@ -86,7 +101,7 @@ class Table(NamedTuple):
     Attributes:
         h: distance of the rows [s].
         nu, nu_dot: (n, 3), velocity and acceleration, body-fixed, from the smoother that knows no model.
-        given: (n, k), mean commands from a row to the next.
+        given: (n, k), mean commands from a row to the next, and air, see :class:`Law`.
         pose: (n, 3), the nearest raw sample [m, m, rad], heading continuous.
         noise: (3,), standard deviation of ``pose``.
     """
@@ -118,11 +133,15 @@ def table(smoothed: Smoothed, h: float, delay: float = 0.0) -> Table:
     row = np.clip(np.searchsorted(smoothed.time, time), 0, smoothed.time.size - 1)
     raw = np.where(smoothed.used[:, None], smoothed.track.pose, np.nan)
     raw[:, 2] = psi + wrap(raw[:, 2] - psi)
+    given = mean_commands(smoothed, time - delay, h)
+    if smoothed.air is not None:
+        heading = at(smoothed.time, psi[:, None], time)[:, 0]
+        given = np.hstack([given, seen_from_aboard(at(smoothed.time, smoothed.air, time), heading)])
     return Table(
         h,
         at(smoothed.time, nu, time),
         at(smoothed.time, known, time),
-        mean_commands(smoothed, time - delay, h),
+        given,
         raw[row],
         smoothed.noise,
     )
@@ -158,6 +177,11 @@ def mean_commands(smoothed: Smoothed, start: np.ndarray, h: float) -> np.ndarray
     return (at(edges, sums, start + h) - at(edges, sums, start)) / h
 
 
+def seen_from_aboard(air: np.ndarray, heading: np.ndarray) -> np.ndarray:
+    """Velocity of the air (..., 2) along the ship's axes, from one to north and east [m/s]."""
+    return np.stack(rotate_to_body(heading, air[..., 0], air[..., 1]), axis=-1)
+
+
 def law_residuals(law: Law, w: Windows) -> np.ndarray:
     """Measured minus predicted pose (samples, 3) [m, m, rad] of windows, by a law."""
     h, runs = law.h, enumerate(w.runs)
@@ -169,10 +193,17 @@ def law_residuals(law: Law, w: Windows) -> np.ndarray:
     )
     nu = np.concatenate([at(s.time, s.nu, start + back[:, None]) for s, start in parts], axis=1)
     eta = np.concatenate([at(s.time, s.eta, start) for s, start in parts])
+    winds = [at(s.time, s.air, start + ahead[:, None]) for s, start in parts if s.air is not None]
+    air = np.concatenate(winds, axis=1) if winds else None
+    if air is not None:
+        given = np.concatenate([given, seen_from_aboard(air, eta[:, 2])], axis=-1)
     nu = np.where(np.isfinite(nu), nu, nu[-1:])  # before the first sample: as at the start
     poses, place = [eta], w.since / h
     with np.errstate(all="ignore"):
         for k in range(steps):
+            if air is not None:
+                now = k + law.lags - 1
+                given[now, :, -2:] = seen_from_aboard(air[now], poses[-1][:, 2])
             after = np.clip(np.nan_to_num(law.step(nu, given[k : k + law.lags]), nan=1e6), -1e6, 1e6)
             poses.append(moved(poses[-1], 0.5 * (nu[-1] + after), h))
             nu = np.concatenate([nu[1:], after[None]])

@@ -1,10 +1,11 @@
 """Sparse regression of accelerations on a library of functions (PySINDy)."""
 
 from collections.abc import Sequence
+from functools import cache
+from itertools import combinations_with_replacement
 
 import numpy as np
 import pysindy
-from sklearn.preprocessing import PolynomialFeatures
 
 from diagnosis import Smoothed
 
@@ -34,10 +35,22 @@ def functions(library: str) -> pysindy.feature_library.base.BaseFeatureLibrary:
     return pysindy.ConcatLibrary([polynomials, squares])
 
 
+@cache
+def _factors(variables: int, degree: int) -> np.ndarray:
+    """(degree, terms): numbers of the factors of each term from one on, 0 where it has fewer."""
+    terms = [
+        (*chosen, *[0] * (degree - k))
+        for k in range(degree + 1)
+        for chosen in combinations_with_replacement(range(1, variables + 1), k)
+    ]
+    return np.array(terms).T
+
+
 def columns(library: str, x: np.ndarray) -> np.ndarray:
     """What that library makes of rows x, in the same order and in less time."""
     degree, drag = LIBRARIES[library]
-    polynomials = PolynomialFeatures(degree).fit_transform(x)
+    one = np.column_stack([np.ones(len(x)), x])
+    polynomials = one[:, _factors(x.shape[1], degree)].prod(axis=1)
     return np.hstack([polynomials, np.abs(x) * x]) if drag else polynomials
 
 
