@@ -26,11 +26,13 @@ class ColumnChange(NamedTuple):
         source: the signal whose column it should have.
         factor: of its unit, negative where its axis points the other way.
         offset: what is added then [SI].
+        late: time by which its stamps are later than those of the pose [s].
     """
 
     source: str
     factor: float = 1.0
     offset: float = 0.0
+    late: float = 0.0
 
 
 def line_beside(
@@ -56,13 +58,14 @@ def line_beside(
     told = stated_layout(path) == read_as
     text = Layout() if told else read_as
     columns = {} if told else as_json(read_as).get("columns", {})
-    for signal, (source, signed, offset) in changes.items():
+    for signal, (source, signed, offset, late) in changes.items():
         column, sign, factor = read_as.column(source), math.copysign(1.0, signed), abs(signed)
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if math.isclose(size, wanted)), None)
         changed = {"name": name or column.name, "flip": column.flip != (sign < 0.0)}
         changed |= {"unit": unit, "offset": sign * column.offset}
+        changed["late"] = float(f"{column.late + late:.4g}")
         if unit is None:
             changed |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
         if offset:
