@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from diagnosis import Model
-from diagnosis.assessment.remainder import axis_remainders, level, span_windows, spans
+from diagnosis.assessment.remainder import (
+    axis_remainders,
+    chance,
+    level,
+    noise_freedom,
+    span_windows,
+    spans,
+)
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
 from diagnosis.predictors.weak_form import EVERY, OVERLAP
@@ -18,21 +25,23 @@ SPAN = span_windows()
 K, NOISE = 100 * SPAN, 0.02
 
 
-def windows(count=K, first=0.0, command=0.1):
+def windows(count=K, first=0.0, command=0.1, uncertain=(0.0, 0.0, 0.0), at_most=False):
     tau = np.full((count, 3), command)
     middle = first + EVERY * np.arange(count)
     run = SimpleNamespace(tau_cmd=tau)
-    return SimpleNamespace(middle=middle, every=EVERY, held=np.eye(count), run=run)
+    known = {"noise_rel_std": np.array(uncertain), "noise_at_most": np.full(3, at_most)}
+    smoothed = SimpleNamespace(**known)
+    return SimpleNamespace(middle=middle, every=EVERY, held=np.eye(count), run=run, smoothed=smoothed)
 
 
 def noise(count=K, seed=0):
     return NOISE * np.random.default_rng(seed).normal(size=(count, 3))
 
 
-def left(after, before=0.1, command=0.1):
+def left(after, before=0.1, command=0.1, **known):
     """The remainders of one run by axis, whose first model error is constant."""
     std = np.full_like(after, NOISE)
-    data = [windows(len(after), command=command)]
+    data = [windows(len(after), command=command, **known)]
     return axis_remainders(data, [np.full_like(after, before)], [after], [std], Model())
 
 
@@ -79,6 +88,34 @@ def test_a_force_below_the_noise_is_told_if_it_lasts(force):
     assert found["Y"].rms < 1.3 * NOISE, "its size is not what tells it"
     hardly = left(noise() + 0.1 * force)
     assert not any(r.significant for r in hardly.values())
+
+
+def test_a_residual_is_compared_with_a_noise_as_uncertain_as_it_is():
+    """Noise that was estimated three times too small, from samples that hardly determine it."""
+    after = 3.0 * noise()
+    assert all(r.significant for r in left(after).values())
+    found = left(after, uncertain=(0.05, 0.05, 0.6))
+    assert [r.significant for r in found.values()] == [True, True, False]
+    assert not any(r.significant for r in left(after, uncertain=[np.inf] * 3).values())
+    # A place by one channel that is uncertain is as uncertain as that.
+    found = left(after, uncertain=(0.6, 0.05, 0.05))
+    assert [r.significant for r in found.values()] == [False, False, True]
+    assert all(r.significant for r in left(after, uncertain=[np.inf] * 3, at_most=True).values())
+
+
+def test_the_noise_of_several_runs_is_better_known_than_that_of_one():
+    data, std = [windows(uncertain=[0.4] * 3)] * 4, [np.full((K, 3), NOISE)] * 4
+    of_one, of_four = noise_freedom(data[:1], std[:1]), noise_freedom(data, std)
+    np.testing.assert_allclose(of_one, 0.5 / 0.4**2)
+    np.testing.assert_allclose(of_four, 4.0 * of_one)
+
+
+def test_a_variance_of_normal_samples_has_the_freedom_that_its_uncertainty_gives():
+    sigma = np.random.default_rng(0).normal(size=(20000, 9)).std(axis=1, ddof=1)
+    v = float(np.std(sigma**2) / np.mean(sigma**2)) / 2.0
+    assert 0.5 / v**2 == pytest.approx(8.0, rel=0.1)
+    assert chance(5.0, 3.0, 8.0) > chance(5.0, 3.0, 800.0) > chance(5.0, 3.0, np.inf)
+    assert chance(5.0, 3.0, np.inf) == pytest.approx(chi2.sf(15.0, 5))
 
 
 def test_a_force_that_changes_sign_from_span_to_span_lasts_too():

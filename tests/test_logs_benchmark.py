@@ -60,7 +60,14 @@ def test_each_aim_is_counted():
     """A filter is a right finding where the way of recording has it."""
     known: dict[str, Any] = {"noise": (1.0, 1.5, np.nan), "rel_std": (0.1, 0.1, 0.0)}
     found = [
-        Recorded("clean", verdict="found", found={"X_u": 0.95}, error=1.0, **known),
+        Recorded(
+            "clean",
+            verdict="found",
+            found={"X_u": 0.95},
+            listed={"X_u": 0.9, "Y_v": 0.05, "mass": None},
+            error=1.0,
+            **known,
+        ),
         Recorded(
             "heading filtered 1 s",
             noise=(1.0, 2.0, 0.5),
@@ -68,9 +75,12 @@ def test_each_aim_is_counted():
             at_most=(False, False, True),
             verdict="found",
             found={"X_u": 0.9, "heading_lag": 0.95},
+            listed={"heading_lag": 0.9, "X_u": None},
             error=1.2,
         ),
-        Recorded("2 Hz held in 10", verdict="found", found={"mass": 0.85}, error=3.0),
+        Recorded(
+            "2 Hz held in 10", verdict="found", found={"mass": 0.85}, listed={"mass": 0.9}, error=3.0
+        ),
         Recorded("clock jumps +1 s", misstated=("x",), doubted=("x",), verdict="none", error=9.0),
         Recorded("d", refused="no"),
     ]
@@ -81,6 +91,7 @@ def test_each_aim_is_counted():
         "0 of 1 channels",
         "1 of 1",
         "0 channels of 9",
+        "1 of 2",
         "1 of 2",
         "1 of 3: 2 Hz held in 10",
         "2.10, worst 3.00 (2 Hz held in 10)",

@@ -1,4 +1,11 @@
-"""What is aimed at in reading logs as they come, and how much of it is reached."""
+"""What is aimed at in reading logs as they come, and how much of it is reached.
+
+A log that was recorded in some way keeps verdict and cause of the clean one if its verdict is the same
+and the same effects are found, but for those that the way itself has. Where one run determines no cause,
+that says little: then the effect counts that explains most of the clean log's error, of those that the
+diagnosis lists as found or possible. It is kept if it is listed again, be it as one that is
+indistinguishable from another.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -60,6 +67,13 @@ def aims(found: Sequence[Recorded], there: Sequence[str] | None) -> Iterator[tup
     limited = [o for o in others if not o.misstated]
     kept = sum(o.verdict == clean.verdict and o.physics == {*clean.found} for o in limited)
     yield f"{KEPT:.0%} keep verdict and cause", f"{kept} of {len(limited)}"
+    if listed := {e: share for e, share in clean.listed.items() if share is not None}:
+        leading = max(listed, key=lambda e: listed[e])
+        again = sum(leading in o.listed for o in limited)
+        yield (
+            f"list the effect that explains most of the clean log ({leading})",
+            f"{again} of {len(limited)}",
+        )
     true = {e for e, c in clean.found.items() if (c or 0.0) >= SURE} if there is None else {*there}
     sure = [o.way for o in others if {e for e in o.physics if (o.found[e] or 0.0) >= SURE} - true]
     yield f"none sure ({SURE}) of an absent cause", f"{len(sure)} of {len(others)}: {', '.join(sure)}"

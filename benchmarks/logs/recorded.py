@@ -67,6 +67,8 @@ class Recorded:
         doubted: channels of whose given noise a line says that it is wrong.
         verdict: of ``learn``; empty where nothing was learned.
         found: effects and their confidences.
+        listed: effects that the diagnosis lists, found, possible or indistinguishable from one of these,
+            and the share of the squared error that each explains; those that are not fitted have none.
         error: of the prediction of the test run by the learned model [m]; NaN without one.
         seconds: processor time.
     """
@@ -80,6 +82,7 @@ class Recorded:
     doubted: tuple[str, ...] = ()
     verdict: str = ""
     found: Mapping[str, float | None] = field(default_factory=dict)
+    listed: Mapping[str, float | None] = field(default_factory=dict)
     error: float = np.nan
     seconds: float = 0.0
 
@@ -157,4 +160,6 @@ def _learned(o: Recorded, file: Path, ship: str | None, seed: int, test: Good | 
     model = replace(d.learned.model, measurement={})
     error = diagnosis.compare(tests, model).evaluations[-1].before.position if tests else np.nan
     effects = {e.id: e.confidence for e in d.content.effects}
-    return replace(o, verdict=d.content.verdict, found=effects, error=error)
+    listed = {i: None for e in d.content.accepted for i in e.indistinguishable}
+    listed |= {e.id: e.share_of_error for e in d.content.accepted}
+    return replace(o, verdict=d.content.verdict, found=effects, listed=listed, error=error)

@@ -68,18 +68,12 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
     """The acceleration that the commands of a run give, as shares of what they give by a model."""
     a, z, T = inertial(w, model), needed_force(w, model), w.held @ commanded_force(w, model)
     moves = T.std(axis=0) > DIGITS * np.abs(T).max()
-    psi = w.smoothed.eta[:, 2]
-    u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
-    north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
-    earth = ([north, east], [-east, north], [])
+    surroundings = other_forces(w, a, z)
     value, error = np.full((2, 3), np.nan)
     left, told = np.zeros_like(a), np.zeros(3, bool)
     for j in np.flatnonzero(moves):
         others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
-        states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v, *earth[j]]
-        x = np.column_stack(
-            [T[:, j], *others, (z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]
-        )
+        x = np.column_stack([T[:, j], *others, surroundings[j]])
         few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
         if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.hardly:
             continue
@@ -95,6 +89,23 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         least = max(unexplained, SETTINGS.inexact**2 * (a[:, j] @ a[:, j]))
         told[j] = beta[0] ** 2 * own > least
     return ThrustGains(value, error * np.sqrt(correlated_windows([w], left)), told)
+
+
+def other_forces(w: WeakWindows, a: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
+    """What may act on a hull in addition to its thrusters, columns (K, m) for each axis.
+
+    Args:
+        w: windows of a run.
+        a, z: (K, 3), inertial force and that which the motion needs.
+    """
+    psi = w.smoothed.eta[:, 2]
+    u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
+    north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
+    found = []
+    for j, earth in enumerate(([north, east], [-east, north], [])):
+        states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v, *earth]
+        found.append(np.column_stack([(z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]))
+    return found
 
 
 def _own(command: np.ndarray, others: Sequence[np.ndarray]) -> float:

@@ -19,10 +19,11 @@ from cosim import InputError
 
 from ..predictors import Model, WeakWindows, omega
 from ..runs import Run, line_beside
-from ..runs.columns.columns import POSE, TAU, Named
+from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import gains
+from .late_commands import late_commands
 from .reading_odds import ReadingOdds, most_thrust
 from .readings import AS_READ, Reading, other_factors, readings, reread
 from .settings import SETTINGS
@@ -54,7 +55,7 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWi
     found = []
     for w in runs:
         with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
-            doubt = _doubt(w, model)
+            doubt = _doubt(w, model) or _late(w, model)
         if doubt:
             remedy = line_beside(w.run.file, w.run.layout, doubt.changes, doubt.name)
             if doubt.sure:
@@ -85,6 +86,19 @@ def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
         clause = f"{beyond}; {found.clause}" if beyond else found.clause
         return Misreading(clause, found.readings[0].changes, sure=found.sure)
     return Misreading(seen) if seen else None
+
+
+def _late(w: WeakWindows, model: Model) -> Misreading | None:
+    """Commands that are logged late; a line, as the actuators may be faster than their description."""
+    late = late_commands(w, model)
+    if late is None:
+        return None
+    return Misreading(
+        f"{' and '.join(late.signals)}: probably logged {late.seconds:.2g} s late "
+        f"(odds {odds_of(late.log_odds)})",
+        {s: Column(name=s, late=round(late.seconds, 6)) for s in late.signals},
+        sure=False,
+    )
 
 
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:
@@ -135,10 +149,14 @@ class Mistake(NamedTuple):
     @property
     def clause(self) -> str:
         """What seems to be wrong, and how sure that is."""
-        ten = self.log_odds / np.log(10.0)
-        odds = f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
         how = "probably" if self.sure else "perhaps"
-        return f"{how} {', or '.join(r.mistake for r in self.readings)} (odds {odds})"
+        return f"{how} {', or '.join(r.mistake for r in self.readings)} (odds {odds_of(self.log_odds)})"
+
+
+def odds_of(logarithm: float) -> str:
+    """Odds in words, by their logarithm."""
+    ten = logarithm / np.log(10.0)
+    return f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
 
 
 def likeliest_mistake(

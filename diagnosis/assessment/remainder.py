@@ -8,14 +8,17 @@ noise, over K windows of which OVERLAP count as one:
   window. omega is a second derivative of the pose, so noise hardly gives any:
   var m <= s^2 slow_noise OVERLAP / n, and sum m^2 / var m is chi-square too.
 
-The first sees any error that is larger than the noise, the second a smaller one that lasts.
+The first sees any error that is larger than the noise, the second a smaller one that lasts. An estimated
+noise is itself uncertain: with the relative standard deviation v its variance has 1 / (2 v^2) degrees of
+freedom, and the ratio of the two variances is F-distributed (Fisher). Where samples say nothing of the
+noise, nothing is significant. An upper bound of the noise needs no such allowance.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, fdtrc
 
 from fmus.scale import REFERENCE, Scale
 
@@ -127,12 +130,12 @@ def axis_remainders(
     """
     command = commanded(data, model)
     first, left, noise = (np.concatenate(x) for x in (before, after, std))
-    groups = spans(data)
+    groups, freedom = spans(data), noise_freedom(data, std)
     found = {}
     for k, axis in enumerate(AXES):
         size, dof = _rms(left[:, k] / noise[:, k]) / NOISE_TOLERANCE, len(left) / OVERLAP
-        by_size = float(chdtrc(dof, dof * size**2))
-        slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups)
+        by_size = chance(dof, size**2, freedom[k])
+        slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups, freedom[k])
         rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
         least = max(SETTINGS.negligible * start, SHARE_OF_COMMAND * _rms(command[:, k]))
         matters = (by_size < level() and rms > least) or (by_slowness < level() and slow > least)
@@ -140,6 +143,36 @@ def axis_remainders(
         p_value = min(by_size, by_slowness)
         found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters)
     return found
+
+
+def noise_freedom(data: Sequence[WeakWindows], std: Sequence[np.ndarray]) -> np.ndarray:
+    """Degrees of freedom (3,) of the variance by noise on each axis; infinite where it is known.
+
+    Args:
+        data: windows of every run.
+        std: of each run, (K, 3), standard deviation of the model error by noise.
+    """
+    power = np.array([np.sum(each**2, axis=0) for each in std])
+    share = power / np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+    channels = [np.where(w.smoothed.noise_at_most, 0.0, w.smoothed.noise_rel_std) for w in data]
+    of_axis = np.array([(max(v[:2]), max(v[:2]), v[2]) for v in channels])
+    with np.errstate(divide="ignore"):
+        return 0.5 / np.sum((share * of_axis) ** 2, axis=0)
+
+
+def chance(dof: float, ratio: float, freedom: float) -> float:
+    """Chance of so large a ratio of a variance to that of the noise, or a larger one.
+
+    Args:
+        dof: degrees of freedom of the variance.
+        ratio: of the two.
+        freedom: degrees of freedom of that of the noise.
+    """
+    if not freedom:
+        return 1.0
+    if np.isinf(freedom):
+        return float(chdtrc(dof, dof * ratio))
+    return float(fdtrc(dof, freedom, ratio))
 
 
 def spans(data: Sequence[WeakWindows]) -> np.ndarray:
@@ -158,7 +191,9 @@ def span_windows() -> int:
     return round(2 * WIDTH / EVERY)
 
 
-def _slow_part(left: np.ndarray, noise: np.ndarray, groups: np.ndarray) -> tuple[float, float]:
+def _slow_part(
+    left: np.ndarray, noise: np.ndarray, groups: np.ndarray, freedom: float
+) -> tuple[float, float]:
     """RMS of the means over spans, less that of noise, and the p-value that they are noise."""
     count = np.bincount(groups)
     full = 2 * count >= span_windows()
@@ -169,8 +204,8 @@ def _slow_part(left: np.ndarray, noise: np.ndarray, groups: np.ndarray) -> tuple
     variance = (np.bincount(groups, noise**2) / count / count)[full]
     weight = count[full] / count[full].sum()
     slow = float(np.sqrt(max(weight @ (mean**2 - variance), 0.0)))
-    p_value = float(chdtrc(full.sum(), np.sum(mean**2 / variance) / NOISE_TOLERANCE**2))
-    return slow, p_value
+    ratio = float(np.mean(mean**2 / variance)) / NOISE_TOLERANCE**2
+    return slow, chance(int(full.sum()), ratio, freedom)
 
 
 def _rms(x: np.ndarray) -> float:

@@ -30,6 +30,7 @@ from pydantic import (
     ConfigDict,
     Field,
     FiniteFloat,
+    NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
     StringConstraints,
@@ -126,6 +127,7 @@ class Column(Named):
     noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
     sign: str | None = None  # another column, which holds the sign
     negative: str = "-1"  # the cell of that in rows with a negative value
+    late: NonNegativeFloat = Field(default=0.0, allow_inf_nan=False)  # s, of a command, behind the pose
 
 
 class Layout(BaseModel):
@@ -166,6 +168,8 @@ class Layout(BaseModel):
             if column.factor == 0.0:
                 raise ValueError(f"{key}.factor is 0; give another number")
             own = QUANTITY | outputs([key])
+            if column.late and key in own and key not in TAU:
+                raise ValueError(f"{key}.late is {column.late:g}; allowed is the time [s] of a command")
             # Which commands there are is known with the ship.
             possible = [own[key]] if key in own else OF_UNIT.values()
             units = [unit for quantity in possible for unit in UNITS[quantity]]

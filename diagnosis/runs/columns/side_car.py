@@ -46,11 +46,13 @@ def line_beside(
     for signal, change in changes.items():
         column, offset = read_as.column(change.name), change.offset
         sign, factor = math.copysign(1.0, change.factor), abs(change.factor)
+        late = change.late if isinstance(change, Column) else 0.0
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if math.isclose(size, wanted)), None)
         changed = {"name": name or column.name, "flip": column.flip != (sign < 0.0)}
         changed |= {"unit": unit, "offset": sign * column.offset}
+        changed["late"] = float(f"{column.late + late:.4g}")
         if unit is None:
             changed |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
         if offset:

@@ -37,7 +37,7 @@ from ..columns.columns import (
     to_si,
 )
 from ..columns.unit_check import LARGEST, UNITS, remedy
-from ..run_constants import NEGLIGIBLE
+from ..run_constants import DIGITS, NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
 from .tables import as_table, column_names, date_stamps, is_cell, numbers, table_of_file
@@ -215,6 +215,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         columns[signal] = values
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
+    late = {s: c.late for s, c in layout.columns.items() if c.late and s in columns}
+    columns |= {s: _earlier(columns[s], columns["time"], by) for s, by in late.items()}
     run = _run(name, columns, where, of)
     rounded = np.column_stack([steps[name] for name in POSE])
     called = {s: c.name for s, c in layout.columns.items() if c.name != s}
@@ -281,6 +283,13 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         ship=of.description,
         measured={s: c for s, c in columns.items() if s in {*BESIDE, *outputs(own)}},
     )
+
+
+def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
+    """A command (n,) that is logged late by some seconds, at the times (n,) at which it acted."""
+    order = np.argsort(time, kind="stable")
+    at = np.searchsorted(time[order], time + late * (1.0 + DIGITS), side="right") - 1
+    return command[order][at]
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:

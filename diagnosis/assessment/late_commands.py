@@ -1,0 +1,167 @@
+"""Commands that are logged late: the motion follows them before they are there, as no ship does.
+
+On each axis the inertial force of a motion is regressed on the forces of the thrusters and on all else
+that may act on a hull, as in :mod:`.gains`, with the commands of one column, or of all, taken earlier by
+a time. Residuals r over K windows, s their standard deviation by noise, of which n are independent, have
+the likelihood
+
+    2 log L = -sum_axes n log sum (r^2 + s^2).
+
+A column is late if that is far likelier than commands as they are, later, or of actuators with a
+smaller lag than in the ship's file, and if the blocks of the run agree (Student's test). Of one column
+and all of them the first is reported, unless all are far likelier.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..predictors import Model, WeakWindows, omega
+from ..predictors.thrust import Integral
+from ..predictors.uncertainty import correlated_windows, omega_std
+from ..predictors.weak_form import OF_MOTION, OVERLAP, needed_force
+from ..runs import Run
+from ..runs.cleaning import BRIEF
+from ..runs.columns.columns import TAU
+from ..runs.run_constants import CHANCE
+from ..runs.smoothing.delay import LONGEST, least_squares, surely_positive
+from .gains import other_forces
+from .readings import inertial
+
+COARSE = 3  # 1, times in one that is tried at first
+FASTER = (0.5, 1.0)  # 1, shares of the lags that actuators may not have
+
+
+class Late(NamedTuple):
+    """Signals whose commands are logged late, by how much [s], and the logarithm of the odds."""
+
+    signals: Sequence[str]
+    seconds: float
+    log_odds: float
+
+
+class _Score(NamedTuple):
+    """Logarithm of the likelihood, size (3,) of the residual, and its squares of blocks (blocks, 3)."""
+
+    total: float
+    size: np.ndarray
+    squares: np.ndarray
+
+
+def earlier(run: Run, columns: Sequence[int], seconds: float, model: Model) -> Run:
+    """A run with some columns of its commands earlier by a time [s]; the last one is held."""
+    given = run.tau_cmd if run.commands is None else run.commands
+    steps = np.diff(run.time)
+    edges = np.append(run.time, run.time[-1] + np.median(steps))
+    moved = given.copy()
+    whole = Integral(edges, given[:, columns], given[0, columns])(edges + seconds)
+    moved[:, columns] = np.diff(whole, axis=0) / np.diff(edges)[:, None]
+    if run.commands is None:
+        return replace(run, tau_cmd=moved)
+    return replace(run, commands=moved, tau_cmd=model.ship.commanded_force(moved, run.power))
+
+
+class Timing:
+    """The likelihood of times by which columns of a run's commands are earlier than they are logged.
+
+    Args:
+        w: windows of the run.
+        model: of its ship.
+    """
+
+    def __init__(self, w: WeakWindows, model: Model) -> None:
+        self._noise = np.sum(omega_std(w, model) ** 2, axis=0)
+        self.w, self.model = w.thinned, model
+        self._a, self._needed = inertial(w, model), needed_force(w, model)
+        self._others = other_forces(w, self._a, self._needed)
+        self._block = np.unique(w.block, return_inverse=True)[1]
+
+    def force(self, columns: Sequence[int], seconds: float, model: Model | None = None) -> np.ndarray:
+        """(K, 3), force of the thrusters, of another model if one is given, with columns earlier."""
+        run, memory = self.w.run, {part: self.w.memory.setdefault(part, {}) for part in OF_MOTION}
+        if seconds:
+            run = earlier(run, columns, seconds, self.model)
+        s = self.w.smoothed
+        w = replace(self.w, smoothed=replace(s, track=replace(s.track, run=run)), memory=memory)
+        return np.nan_to_num(self._needed - omega(w, model or self.model))
+
+    @property
+    def unknowns(self) -> int:
+        """Factors that are fitted on an axis, at the most."""
+        return self._a.shape[1] + max(x.shape[1] for x in self._others)
+
+    @cached_property
+    def as_logged(self) -> np.ndarray:
+        """(K, 3), force of the thrusters by the commands as they are logged."""
+        return self.force((), 0.0)
+
+    def _left(self, force: np.ndarray) -> np.ndarray:
+        """(K, 3), what a force of the thrusters leaves of the inertial force."""
+        left = np.zeros_like(self._a)
+        for j, others in enumerate(self._others):
+            x = np.column_stack([force, others])
+            left[:, j] = self._a[:, j] - x @ least_squares(x, self._a[:, j])
+        return left
+
+    @cached_property
+    def independent(self) -> np.ndarray:
+        """(3,), independent windows by the residual of the commands as they are logged."""
+        left = self._left(self.as_logged)
+        return len(left) / np.maximum(OVERLAP, correlated_windows([self.w], left))
+
+    def score(self, force: np.ndarray) -> _Score:
+        """The likelihood of a force of the thrusters."""
+        left = self._left(force) ** 2
+        size = left.sum(axis=0) + self._noise
+        squares = np.stack([np.bincount(self._block, each) for each in left.T], axis=1)
+        return _Score(-0.5 * float(self.independent @ np.log(size)), size, squares)
+
+    def likeliest(self, columns: Sequence[int], times: np.ndarray) -> tuple[float, _Score]:
+        """The likeliest of some even times [s] for columns; coarse first, then next to the best."""
+
+        @cache
+        def at(k: int) -> _Score:
+            return self.score(self.force(columns, float(times[k])))
+
+        best = max(range(0, len(times), COARSE), key=lambda k: at(k).total)
+        near = range(max(best - 1, 0), min(best + 2, len(times)))
+        best = max(near, key=lambda k: at(k).total)
+        return float(times[best]), at(best)
+
+    def rivals(self, columns: Sequence[int], times: np.ndarray) -> Iterator[_Score]:
+        """Commands as they are, later by some times [s], or of actuators that follow faster."""
+        yield self.score(self.as_logged)
+        yield self.likeliest(columns, -times)[1]
+        model = self.model
+        lags = {n: model.value(n) for n in model.ship.coefficients if model.declared(n).unit == "s"}
+        if any(lags.values()):
+            for share in FASTER:
+                faster = model.plus({n: -share * lag for n, lag in lags.items()})
+                yield self.score(self.force((), 0.0, faster))
+
+
+def late_commands(w: WeakWindows, model: Model) -> Late | None:
+    """The commands of a run that are logged late; None: none surely is, or the run does not show it."""
+    run, scale = w.run, w.scale
+    given = run.tau_cmd if run.commands is None else run.commands
+    names = TAU if run.commands is None else run.signals
+    varied = [k for k in range(len(names)) if np.ptp(given[:, k]) > 0.0]
+    times = BRIEF * scale.time * np.arange(1, round(LONGEST / BRIEF) + 1)
+    with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
+        timing = Timing(w, model)
+        if not varied or len(w.middle) < OVERLAP * timing.unknowns:
+            return None
+        groups = [[k] for k in varied] + ([varied] if len(varied) > 1 else [])
+        found = [(*timing.likeliest(columns, times), columns) for columns in groups]
+        as_given = max(timing.rivals(varied, times), key=lambda score: score.total)
+    asked, tries = -np.log(CHANCE), len(groups) * len(times)
+    highest = max(score.total for _, score, _ in found)
+    seconds, best, columns = next(f for f in found if f[1].total > highest - asked)
+    odds = best.total - as_given.total - np.log(tries)
+    fall = (as_given.squares - best.squares) @ (timing.independent / best.size)
+    if not (odds > asked and surely_positive(fall, CHANCE / tries)):
+        return None
+    return Late([names[k] for k in columns], seconds, float(odds))

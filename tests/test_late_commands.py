@@ -1,0 +1,95 @@
+"""Commands that are logged late: the column, the time and the line that mends it; else nothing."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from support.measured import jumps, sail, slow_swings, table_of
+
+import diagnosis
+from benchmarks.ship_effects import causes
+from benchmarks.ship_effects import sail as sail_of
+from diagnosis import InputError, Model
+from diagnosis.assessment.gathering import gather
+from diagnosis.predictors import ship_with
+
+H, LATE = 0.1, 4  # s, rows
+
+
+@cache
+def made(given=jumps, **ship):
+    """A run of three minutes, with a drag that its model has not."""
+    return table_of(sail(180.0, H, ship={"delta_X_u": -2.0, **ship}, given=given)[0])
+
+
+@cache
+def otter(cause):
+    ship = ship_with((), "otter")
+    return sail_of(ship, causes(ship)[cause], np.random.default_rng(1), None, seconds=240.0)
+
+
+def late(table, *names, rows=LATE):
+    """The table, some columns of which are logged so many rows late."""
+    return table.assign(**{n: table[n].shift(rows).bfill().ffill() for n in names})
+
+
+def lines(folder, table, ship=None):
+    path = folder / "a.csv"
+    table.to_csv(path, index=False)
+    (w,) = gather([path], model=Model(ship=ship_with((), ship)) if ship else None)
+    return path, [line for line in w.smoothed.notes if " late (odds" in line]
+
+
+@pytest.mark.parametrize("names", [["tau_X"], ["tau_N"], ["tau_X", "tau_Y", "tau_N"]])
+def test_late_commands_are_reported_with_odds_and_the_line_that_mends_them(names, tmp_path):
+    path, (line,) = lines(tmp_path, late(made(), *names))
+    assert line.startswith(
+        f"{' and '.join(names)}: probably logged 0.4 s late (odds more than 10^6 : 1)"
+    )
+    told = json.loads(line[line.index("put ") + 4 : line.rindex(" into ")])
+    assert told["columns"].keys() == {*names}
+    path.with_name("a.csv.json").write_text(json.dumps(told))
+    (mended,) = gather([path])
+    assert not any(" late (odds" in note for note in mended.smoothed.notes)
+    given = made()[["tau_X", "tau_Y", "tau_N"]].to_numpy()
+    np.testing.assert_allclose(mended.run.tau_cmd[:-LATE], given[:-LATE])
+
+
+def test_a_late_actuator_of_a_described_ship_is_named(tmp_path):
+    table = otter("drag")
+    names = [*table.columns[4:]]
+    h = float(np.median(np.diff(table["time"])))
+    _, (line,) = lines(tmp_path, late(table, names[1], rows=LATE), "otter")
+    assert line.startswith(f"{names[1]}: probably logged {LATE * h:.2g} s late")
+
+
+@pytest.mark.parametrize("rows", [0, -LATE])
+def test_of_commands_in_time_or_early_nothing_is_reported(rows, tmp_path):
+    assert not lines(tmp_path, late(made(), "tau_X", rows=rows))[1]
+
+
+def test_commands_that_change_slowly_do_not_show_it(tmp_path):
+    assert not lines(tmp_path, late(made(slow_swings), "tau_X"))[1]
+
+
+@pytest.mark.parametrize("cause", ["none", "lag", "current"])
+def test_effects_are_not_late_commands(cause, tmp_path):
+    assert not lines(tmp_path, otter(cause), "otter")[1]
+
+
+def test_a_pose_is_not_late(tmp_path):
+    path = tmp_path / "a.csv"
+    made().to_csv(path, index=False)
+    path.with_name("a.csv.json").write_text(json.dumps({"columns": {"x": {"name": "x", "late": 0.4}}}))
+    with pytest.raises(InputError, match=r"x\.late is 0\.4"):
+        diagnosis.load(path)
+
+
+def test_with_the_line_that_mends_them_the_verdict_is_that_of_commands_in_time(tmp_path):
+    path = tmp_path / "a.csv"
+    late(made(), "tau_X").to_csv(path, index=False)
+    columns = {"tau_X": {"name": "tau_X", "late": H * LATE}}
+    path.with_name("a.csv.json").write_text(json.dumps({"columns": columns}))
+    found = diagnosis.diagnose(diagnosis.load(path))
+    assert (found.content.verdict, [e.id for e in found.content.effects]) == ("found", ["X_u"])
