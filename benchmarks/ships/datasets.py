@@ -149,6 +149,7 @@ DATASETS = {
     # Train-TZRB of Wakita et al. (2022): one of its eight, cut from a turn, is not in the files.
     "esso_osaka_tzrb": replace(
         _ESSO_OSAKA,
+        source=f"{_ESSO_OSAKA.source}; training list Train-TZRB of Wakita et al. (2022)",
         train=(
             "random_06-Aug-2020_16_24_25_4",
             "random_06-Aug-2020_16_24_25_6",
