@@ -31,8 +31,8 @@ from ..runs.smoothing.delay import LONGEST, least_squares, surely_positive
 from .gains import other_forces
 from .readings import inertial
 
-COARSE = 3  # 1, times in one that is tried at first
-FASTER = (0.5, 1.0)  # 1, shares of the lags that actuators may not have
+COARSE = 3  # 1, times of which one is tried at first; chosen
+FASTER = (0.5, 1.0)  # 1, shares of the described lags that actuators may not have; chosen
 
 
 class Late(NamedTuple):
