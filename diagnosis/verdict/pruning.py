@@ -202,7 +202,8 @@ def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) 
         harm: the criterion of pruning.
     """
     if data.validate:
-        return bool(paired_harm(*data.losses(fit.model, data.start)))
+        its, first = data.losses(fit.model, data.start)
+        return bool(paired_harm(its, first))
     data = data.of_other_runs
     if not (data.judges(fit) and data.judges(before)):
         return False
