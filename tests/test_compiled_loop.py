@@ -56,7 +56,7 @@ def test_a_compiler_that_fails_is_told_with_what_it_says(does, why, tmp_path, mo
     compiler = [sys.executable, "-c", f"import sys; {does}"]
     monkeypatch.setattr(library, "_compiler", lambda with_zig: compiler)
     with pytest.raises(library.NoLibraryError) as told:
-        library._compile(tmp_path / "loop.so", False)
+        library._compiled(tmp_path, False)
     assert str(told.value).startswith(f"compiler '{sys.executable}' {why}")
 
 

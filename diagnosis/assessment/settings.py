@@ -26,7 +26,7 @@ class AssessmentSettings:
     # force that is steady
     inexact: float = MEASURED
     # 1, share of a thrust: deviation of what of it is lost, and what of the full one nothing but an
-    # actuator gives all the time; share of the windows, above which they are no region; chosen
+    # actuator gives all the time. Chosen; the same share of the windows is the most for a region.
     much: float = 0.5
 
     # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no

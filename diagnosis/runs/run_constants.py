@@ -10,14 +10,14 @@ import sys
 HORIZON = 8.0
 CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
 # 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
-# from a limit; the same for commands and windows, for what must be explained, for a command that is
-# forgotten, and for what numbers are above their limits.
+# from a limit. The same for commands and windows, what must be explained, a command before the run, and
+# numbers above their limits.
 NEGLIGIBLE = 0.05
 DIGITS = sys.float_info.epsilon**0.5  # 1, relative size of what rounding may have left
 ORDER = 3  # 1, of the derivative with a penalty, and of the differences that noise is estimated by
-# s between two windows of the weak form, of the quickest motion, and of a gap, or LONG sampling periods
-# of a gap if that is longer. Chosen: kernels over six of them average a velocity to 2 %, and a command
-# that is wrong in one hardly counts.
+# s between two windows of the weak form, of the quickest motion, and of a gap. A gap is LONG sampling
+# periods if that is longer. Chosen: kernels over six of them average a velocity to 2 %. A command that
+# is wrong in one of them hardly counts.
 EVERY, LONG = 0.5, 5.0
 # 1, standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).

@@ -202,8 +202,8 @@ def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) 
         harm: the criterion of pruning.
     """
     if data.validate:
-        fitted, first = data.losses(fit.model, data.start)
-        return bool(paired_harm(fitted, first))
+        its, first = data.losses(fit.model, data.start)
+        return bool(paired_harm(its, first))
     data = data.of_other_runs
     if not (data.judges(fit) and data.judges(before)):
         return False
