@@ -14,7 +14,7 @@ and all of them the first is reported, unless all are far likelier.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -26,13 +26,10 @@ from ..predictors.weak_form import OF_MOTION, OVERLAP, needed_force
 from ..runs import Run
 from ..runs.cleaning import BRIEF
 from ..runs.columns.columns import TAU
-from ..runs.run_constants import CHANCE
+from ..runs.run_constants import CHANCE, PARTS
 from ..runs.smoothing.delay import LONGEST, least_squares, surely_positive
 from .gains import other_forces
 from .readings import inertial
-
-COARSE = 3  # 1, times of which one is tried at first; chosen
-FASTER = (0.5, 1.0)  # 1, shares of the described lags that actuators may not have; chosen
 
 
 class Late(NamedTuple):
@@ -120,16 +117,9 @@ class Timing:
         return _Score(-0.5 * float(self.independent @ np.log(size)), size, squares)
 
     def likeliest(self, columns: Sequence[int], times: np.ndarray) -> tuple[float, _Score]:
-        """The likeliest of some even times [s] for columns; coarse first, then next to the best."""
-
-        @cache
-        def at(k: int) -> _Score:
-            return self.score(self.force(columns, float(times[k])))
-
-        best = max(range(0, len(times), COARSE), key=lambda k: at(k).total)
-        near = range(max(best - 1, 0), min(best + 2, len(times)))
-        best = max(near, key=lambda k: at(k).total)
-        return float(times[best]), at(best)
+        """The likeliest of some times [s] for columns."""
+        scores = [(float(t), self.score(self.force(columns, float(t)))) for t in times]
+        return max(scores, key=lambda each: each[1].total)
 
     def rivals(self, columns: Sequence[int], times: np.ndarray) -> Iterator[_Score]:
         """Commands as they are, later by some times [s], or of actuators that follow faster."""
@@ -138,7 +128,7 @@ class Timing:
         model = self.model
         lags = {n: model.value(n) for n in model.ship.coefficients if model.declared(n).unit == "s"}
         if any(lags.values()):
-            for share in FASTER:
+            for share in np.arange(1, PARTS + 1) / PARTS:
                 faster = model.plus({n: -share * lag for n, lag in lags.items()})
                 yield self.score(self.force((), 0.0, faster))
 

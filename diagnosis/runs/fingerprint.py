@@ -17,13 +17,13 @@ import numpy as np
 
 from cosim import InputError
 
-from .run_constants import FAR_OFF, FEWEST, SAME
+from .run_constants import FAR_OFF, FEWEST, PARTS, SAME
 
 if TYPE_CHECKING:  # at run time it takes a while to import
     from .smoothing.smoother import Smoothed
 
 POINTS = 512  # 1, of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
-PIECES, SHIFTS = 4, 8  # 1, of the shorter run; within a step of the course; chosen
+SHIFTS = 8  # 1, within a step of the course; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +101,10 @@ def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
     """Of each piece of a course, as far as it moves, its best correlation with a part of a longer "
     "one."""
     period = long.period
-    for begin in short.seconds / PIECES * np.arange(PIECES):
+    for begin in short.seconds / PARTS * np.arange(PARTS):
         found = []
         for shift in period * np.arange(SHIFTS) / SHIFTS:
-            at = np.arange(begin + shift, begin + short.seconds / PIECES, period)
+            at = np.arange(begin + shift, begin + short.seconds / PARTS, period)
             grid = short.period * np.arange(len(short.course))
             piece = np.column_stack([np.interp(at, grid, x) for x in short.course.T])
             if FEWEST <= len(piece) <= len(long.course):
