@@ -228,11 +228,13 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
     found = replace(alone, effects=effects if case["effects"] else [], refit=(lambda ids: alone) if case["refit"] else None)  # fmt: skip
     names = {id(found): "found", id(START): "first"}
     monkeypatch.setattr(coefficients, "without", lambda f, ids, start: alone)
+    left = {START: case["left_at_first"], OTHER: case["left_with"]}
+    monkeypatch.setattr(coefficients, "remains", lambda runs, start, model: left[model])
     monkeypatch.setattr(coefficients, "harm", lambda now, each: each in case["harms"])
     data = SimpleNamespace(
         start=START,
         judges=lambda f: case["judges"],
-        remains=lambda m: case["left_at_first" if m is START else "left_with"],
+        runs=[],
         losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
     )
     data.of_other_runs = data

@@ -20,6 +20,7 @@ from diagnosis.assessment.plausibility import refuse_implausible
 from diagnosis.assessment.readings import Reading, of_commands, of_pose, reread
 from diagnosis.predictors.thrust import full_thrust
 from diagnosis.runs import channels_of
+from diagnosis.runs.columns.columns import Named
 from diagnosis.search import shortlist
 
 RATE = 20  # Hz
@@ -180,7 +181,7 @@ def test_gains_are_one_and_follow_units_and_clock():
     for reading, expected in (
         (of_pose("", (3.0, 3.0, 1.0)), [3.0, 3.0, 1.0]),
         (of_commands("", (10.0, 10.0, 0.1)), [0.1, 0.1, 10.0]),
-        (Reading("", pace=0.5), [4.0, 4.0, 4.0]),
+        (Reading("", {"time": Named(name="time", factor=0.5)}), [4.0, 4.0, 4.0]),
     ):
         found = gains(reread(windows(), reading, Model()), Model())
         assert found.value == pytest.approx(expected, rel=0.1)

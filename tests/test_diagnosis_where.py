@@ -9,9 +9,8 @@ from support.cases import slow
 from support.measured import NOISE, sail, smoothed
 
 from diagnosis import Model, omega_std
-from diagnosis.assessment.clusters import cluster_mean, welch_p_value
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME, YAW_RATE
-from diagnosis.assessment.regions import Region, _Design, find_regions
+from diagnosis.assessment.regions import Region, _Design, cluster_mean, find_regions, welch_p_value
 from diagnosis.predictors import omega, weak_windows
 from diagnosis.predictors.ship_model import SampledForce
 from diagnosis.predictors.weak_form import halfway

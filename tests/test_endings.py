@@ -361,7 +361,7 @@ def test_a_compiler_that_makes_nothing_leaves_nothing(tmp_path, monkeypatch):
     path = os.environ["PATH"]
     monkeypatch.setenv("PATH", f"{fake.parent}:{path}")
     loop_library()
-    assert not list((tmp_path / "cache").glob("loop_*"))
+    assert not list((tmp_path / "cache").glob("loop_*.so"))
     monkeypatch.setenv("PATH", path)
     loop_library()
     assert len(list((tmp_path / "cache").glob("loop_*.so"))) == 1

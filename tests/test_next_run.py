@@ -26,7 +26,6 @@ from diagnosis.design import (
     Basin,
     Limits,
     Question,
-    designing,
     plan_next,
     prepared,
     rehearsal,
@@ -464,11 +463,7 @@ def test_no_simulated_ship_leaves_the_basin(designer):
 
 
 @pytest.mark.slow
-def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path, monkeypatch):
-    for module, name, few in (
-        (designing, "LOG_POINTS", 4), (designing, "EVOLVED", 24), (rehearsal, "DRAWS", 20),
-    ):  # fmt: skip
-        monkeypatch.setattr(module, name, few)
+def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path):
     plan = plan_next(question)
     assert plan.runs[0].sure > 0.9
     assert plan.runs[0].spread.margin.min() > 0.0

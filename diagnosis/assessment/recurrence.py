@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import correlated_windows
 from ..predictors.weak_form import BLOCK, EVERY
-from .clusters import numbered
+from .regions import numbered
 from .settings import SETTINGS
 
 

@@ -25,10 +25,9 @@ from fmus.scale import REFERENCE, Scale
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
 from ..predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
-from .clusters import numbered
 from .covariates import AXES
 from .recurrence import Recurrence
-from .regions import NAMES, UNITS, Region
+from .regions import NAMES, UNITS, Region, numbered
 from .settings import SETTINGS
 
 NOTHING_LEFT = "The residual of the model is within the uncertainty of the measurement."

@@ -386,7 +386,7 @@ class MovableModel:
 
     def _between(self, e: Evaluation) -> np.ndarray:
         """(points, k, n): commands that arrive, then shares that act; or one for both."""
-        w = e.weak_windows
+        w = e.weak_windows.thinned
         return Response(w.run, self.learned.during(e.name), not at_rest(w.smoothed)).between_samples
 
     @property
@@ -396,7 +396,7 @@ class MovableModel:
 
     def _force(self, e: Evaluation, store: "ArrayStore") -> dict[str, Any]:
         """What the page needs for the model error of a run, see :mod:`..predictors.weak_form`."""
-        w, between = e.weak_windows, self._between(e)
+        w, between = e.weak_windows.thinned, self._between(e)
         given, *acting = between if len(between) > 1 else [between[0]] * 2
         acting = [acting[k % len(acting)] for k in range(self._points)]
         power = [] if w.run.power is None else [*w.run.power.T]

@@ -23,7 +23,6 @@ if TYPE_CHECKING:  # at run time it takes a while to import
     from .smoothing.smoother import Smoothed
 
 POINTS = 512  # 1, of a course; chosen: 2 kB of text, and some points in each manoeuvre of a trial
-SHIFTS = 8  # 1, within a step of the course; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +102,7 @@ def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
     period = long.period
     for begin in short.seconds / PARTS * np.arange(PARTS):
         found = []
-        for shift in period * np.arange(SHIFTS) / SHIFTS:
+        for shift in np.linspace(0.0, period, 8, endpoint=False):
             at = np.arange(begin + shift, begin + short.seconds / PARTS, period)
             grid = short.period * np.arange(len(short.course))
             piece = np.column_stack([np.interp(at, grid, x) for x in short.course.T])

@@ -37,9 +37,9 @@ from ..columns.columns import (
     to_si,
 )
 from ..columns.unit_check import LARGEST, UNITS, remedy
-from ..run_constants import DIGITS, NEGLIGIBLE
+from ..run_constants import NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
-from .resolution import resolution
+from .resolution import FUZZ, resolution
 from .tables import as_table, column_names, date_stamps, is_cell, numbers, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
@@ -288,7 +288,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
 def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
     """A command (n,) that is logged late by some seconds, at the times (n,) at which it acted."""
     order = np.argsort(time, kind="stable")
-    at = np.searchsorted(time[order], time + late * (1.0 + DIGITS), side="right") - 1
+    at = np.searchsorted(time[order], time + late * (1.0 + FUZZ), side="right") - 1
     return command[order][at]
 
 

@@ -6,11 +6,12 @@ where a telegram arrived the lines meet, mostly between two rows.
 
 import numpy as np
 
-from ..run_constants import CHANCE, IN_A_ROW
+from ..run_constants import IN_A_ROW
 
 # 1, a row is on a line to rounding, which must be less than this share of the distance of the other
 # rows. With normal noise in two channels one row in two thousand is then on a line by chance. Chosen.
 ON_LINE = 0.03
+FEWEST = 0.15  # 1, share of rows on lines from which on a log counts as filled; chosen, far above chance
 
 
 def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndarray:
@@ -34,7 +35,7 @@ def filled(time: np.ndarray, position: np.ndarray, step: float = 0.0) -> np.ndar
     # A long line is a ship's steady motion, unless what is on no line are single kinks.
     too_long = _often(on, IN_A_ROW) and _often(~on[1:-1], 2)  # the rows about a telegram are on no line
     kinks = off[~on[1:-1]]
-    if not kinks.size or rounding > ON_LINE * np.median(kinks) or on.mean() < CHANCE or too_long:
+    if not kinks.size or rounding > ON_LINE * np.median(kinks) or on.mean() < FEWEST or too_long:
         return none
     first = np.flatnonzero(~on & np.concatenate([[True], on[:-1]]))  # of each block of rows on no line
     rows = np.flatnonzero(~on)

@@ -39,9 +39,9 @@ ANCHOR = 0.5
 # [1, m, rad] the same of a clock that may not be off; of a noise; inverse of the prior deviation of a
 # pose. It keeps the equations well-posed.
 NEGLIGIBLE = 1e-6
-
+SLOWEST = 0.1  # 1, true seconds in a second of the log, at the least: time does not fall; chosen
 BEGIN = 0.1  # 1, of the walks in a second, times the noise or the rate; first guess
-
+LEAST = 1e-3  # 1, of the noise, and of the walks over the whole run; less changes no path (chosen)
 SWEEPS = 25  # 1, of the fixed point; chosen: the likelihood then changes by less than 0.1
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
@@ -160,7 +160,7 @@ class PathProblem:
         place, angle = self.noise
         samples, walk = np.array([place, place, angle]), np.array([place, angle, 1.0])
         std = np.array([*samples, *(BEGIN * walk), NEGLIGIBLE if fixed_clock else ANCHOR, 1.0])
-        least = NEGLIGIBLE * np.array([*samples, *(walk / np.sqrt(self.edges[-1] - self.edges[0]))])
+        least = LEAST * np.array([*samples, *(walk / np.sqrt(self.edges[-1] - self.edges[0]))])
         path = Path(self, constants, std, np.ones(self.nodes.size - 1))
         for _ in range(SWEEPS):
             std = path.std.copy()
@@ -250,6 +250,6 @@ def integral_of(edges: np.ndarray, clock: np.ndarray) -> np.ndarray:
 
     Between two nodes that noise has made fall the later one is put off: all others keep their time.
     """
-    least = NEGLIGIBLE * (edges - edges[0])  # time does not fall
+    least = SLOWEST * (edges - edges[0])
     true = np.concatenate([[0.0], np.cumsum(clock * np.diff(edges))])
     return np.maximum.accumulate(true - least) + least

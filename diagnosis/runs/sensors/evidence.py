@@ -14,11 +14,11 @@ from ..run_constants import FEWEST
 
 SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 FAR = 8.0  # 1, times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
-# 1, correlation from which on two channels measure the same motion, and ratio of two quantities that may
-# be the same but for a fault (chosen).
-AGREED = 0.7
+AGREED = 0.7  # 1, correlation from which on two channels measure the same motion (chosen)
+ALIKE = 0.3  # 1, relative difference up to which two quantities may be the same but for a fault (chosen)
 LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)
-
+# 1, of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
+STRAIGHT = 0.25
 # Channels that give the velocity over ground, best first: with the heading, or without it.
 VELOCITIES = (("u", "v"), ("x_dot", "y_dot"), ("speed", "course"))
 
@@ -107,6 +107,11 @@ def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.n
     if by == ("speed", "course"):
         return np.column_stack([first * np.cos(second), first * np.sin(second)])
     return np.column_stack(rotate_to_earth(psi, first, second))
+
+
+def straight(rate: np.ndarray) -> np.ndarray:
+    """(n,): rows with a yaw rate (n,) of straight legs."""
+    return np.abs(rate) < STRAIGHT * np.quantile(np.abs(rate), 0.95)
 
 
 def large(values: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ from .constants import LEAST, Kind, least_place
 from .evidence import FEWEST, SURE, blocked_fit, evidence, integral
 from .sensor_finding import Examined, SensorFinding
 
+LEAST_OFFSET = 1e-3  # m/s2, the same on a ship of any size: a tenth of a millig (chosen)
 WATER = ("u_water", "v_water")
 
 
@@ -131,8 +132,8 @@ def accelerations(run: Run, scale: Scale) -> Examined:
         _Fault(
             "a_x", "scale", "1", LEAST, "a_x and a_y are {:.4g} times the acceleration by the velocity"
         ),
-        _Fault("a_x", "offset", "m/s2", 0.0, "a_x is {:.3g} m/s2 too large"),
-        _Fault("a_y", "offset", "m/s2", 0.0, "a_y is {:.3g} m/s2 too large"),
+        _Fault("a_x", "offset", "m/s2", LEAST_OFFSET, "a_x is {:.3g} m/s2 too large"),
+        _Fault("a_y", "offset", "m/s2", LEAST_OFFSET, "a_y is {:.3g} m/s2 too large"),
         _Fault("a_y", "offset", "rad", LEAST, axes),
         _Fault("a_x", "place", "m", least, place + "ahead of the place of the velocity"),
         _Fault("a_y", "place", "m", least, place + "to starboard of the place of the velocity"),

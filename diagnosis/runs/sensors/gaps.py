@@ -7,7 +7,7 @@ from ..files.telegrams import groups_of
 from ..run_constants import EVERY, LONG
 from ..thinning import MOST_ROWS
 from .constants import LEAST
-from .evidence import AGREED, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
+from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
 from .sensor_finding import SensorFinding
 
 FAST = 3.0  # 1, times the log's step, or its inverse: what is less is a clock that runs fast (chosen)
@@ -90,10 +90,9 @@ def _elsewhere(
         inside = (last < time.size) & ((starts > a) | (last < b))
         i, j = starts[inside], last[inside]
         turned = e.psi[rows[j]] - e.psi[rows[i]]
-        unlike = 1.0 - AGREED
-        alike = np.abs(np.angle(np.exp(1j * (turned - turn)))) < max(LEAST_TURN, unlike * abs(turn))
+        alike = np.abs(np.angle(np.exp(1j * (turned - turn)))) < max(LEAST_TURN, ALIKE * abs(turn))
         for k, end in zip((i, j), ends, strict=True):
-            alike &= np.abs(speed[k] - end) < unlike * end
+            alike &= np.abs(speed[k] - end) < ALIKE * end
         i, j = i[alike], j[alike]
         if i.size < FEWEST:
             continue

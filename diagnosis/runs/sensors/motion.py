@@ -14,18 +14,20 @@ from fmus.scale import Scale
 
 from ..cleaning import noise
 from ..files.reading import Run
-from ..run_constants import BLOCK, BLOCKS
 from .clock_path import DRIFT, HEADING, NEGLIGIBLE, TURN, Path, PathProblem, integral_of
 from .constants import DEVIATIONS, LEAST, FaultColumn, columns, deviations
-from .evidence import FEWEST, SURE, Evidence, evidence, large, spread_of
+from .evidence import FEWEST, SURE, Evidence, evidence, large, spread_of, straight
 from .gaps import gaps
 from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
+STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to locate its error; chosen
 CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
 CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
 CLOCK_OR_RATE = "no speed is measured: a clock at this rate has the same effect"
-
+# 1, of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
+# differ by beyond noise. Chosen: with more, most of it is not common to both.
+MOST_APART = 0.5
 TWO_CLOCKS = (
     "position and speed imply another clock than heading and yaw rate: there is another fault, "
     "such as a filter or held values, and only a delay is repaired"
@@ -255,7 +257,7 @@ class _Blocks(NamedTuple):
 def _blocks(path: Path) -> _Blocks:
     edges = path.problem.edges
     steps = np.where(path.problem.cut, 0.0, np.diff(edges))
-    wide = max(BLOCK, (edges[-1] - edges[0]) / BLOCKS)
+    wide = max(STRETCH, (edges[-1] - edges[0]) / MOST_STRETCHES)
     part = ((edges[:-1] - edges[0]) / wide).astype(int)
     weights = np.zeros((part.max() + 1, edges.size))
     weights[part, np.arange(part.size)] = steps
@@ -290,7 +292,7 @@ def _two_clocks(path: Path) -> bool:
     rates = np.array([way.mean - turn.mean, _blocks(path).mean])
     rates -= np.average(rates, axis=1, weights=weight)[:, None]
     apart, off = (weight * rates**2).sum(axis=1).tolist()
-    return 2.0 * (apart - weight.size) > off  # beyond noise, most of it is not common to both
+    return apart - weight.size > MOST_APART * off
 
 
 def _stretches(path: Path) -> list[tuple[float, float, float, float]]:
@@ -312,7 +314,7 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
     if e.by != ("u", "v") or e.rate is None:
         return ()
     u, v = e.run.measured["u"][e.rows], e.run.measured["v"][e.rows]
-    legs = large(u) & ~large(e.rate[e.rows])
+    legs = large(u) & straight(e.rate[e.rows])
     if legs.sum() < FEWEST:
         return ()
     angle = np.arctan2(v[legs], np.abs(u[legs]))

@@ -10,7 +10,7 @@ from fmus.frames import rotate_to_body, rotate_to_earth
 
 from ..files.reading import Run
 from .constants import DEVIATIONS
-from .evidence import Evidence, large
+from .evidence import Evidence, straight
 from .sensor_finding import SensorFinding
 
 
@@ -71,7 +71,7 @@ def heading_is_off(e: Evidence, offset: float) -> bool:
     axes, has clearly less leeway on straight legs is right.
     """
     assert e.velocity is not None
-    legs = ~large(np.gradient(e.psi, e.time) if e.rate is None else e.rate)
+    legs = straight(np.gradient(e.psi, e.time) if e.rate is None else e.rate)
     u, v = rotate_to_body(e.psi, *e.velocity.T)
     leeway = float(np.median(np.arctan2(v, np.abs(u))[legs]))
     return 2.0 * abs(leeway) < abs(leeway - offset)

@@ -12,10 +12,12 @@ from ..cleaning import between
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
-from ..run_constants import HORIZON, IN_A_ROW
-from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
+from ..run_constants import IN_A_ROW
+from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
+WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
+NEAR = 0.15  # 1, relative distance within which a factor is that of a unit (chosen)
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is reversed"
 
@@ -99,9 +101,9 @@ def _position(e: Evidence) -> np.ndarray:
 
 
 def _windows(e: Evidence, *paths: np.ndarray) -> list[np.ndarray]:
-    """What pose and channels say of each window of prediction, or of more samples, (k, d) each."""
+    """What pose and channels say of each window, (k, d) each."""
     rows = e.rows
-    apart = max(round(HORIZON / float(np.median(np.diff(e.time[rows])))), IN_A_ROW)
+    apart = max(1, round(WINDOW / float(np.median(np.diff(e.time[rows])))), 10)
     return [np.diff(path[rows[::apart]], axis=0) for path in paths]
 
 
@@ -127,7 +129,7 @@ def _judged(
         note = f"{told} and the pose disagree about the motion: {told} is not used"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
-    if abs(middle - 1.0) < 1.0 - AGREED:  # a scale, which is estimated with all else
+    if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
         return found
     value = 1.0 / middle
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
@@ -144,8 +146,7 @@ def _nearest(value: float, quantity: str) -> tuple[str, float]:
     """The mistake of units that is nearest to a factor, and its factor; no name: it is none."""
     pairs = permutations(UNITS[quantity].items(), 2)
     known = {f"{a} in place of {b}": of_b / of_a for (a, of_a), (b, of_b) in pairs if of_a != of_b}
-    near = 1.0 - AGREED
-    if abs(value - 1.0) <= near:
+    if abs(value - 1.0) <= NEAR:
         known = {SIGN: 1.0}
     best = min(known, key=lambda name: abs(np.log(value / known[name])))
-    return (best, known[best]) if abs(np.log(value / known[best])) < near else ("", value)
+    return (best, known[best]) if abs(np.log(value / known[best])) < NEAR else ("", value)
