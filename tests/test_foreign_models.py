@@ -11,7 +11,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from support.foreign import needs_compiler
+from support.foreign import needs_compiler, without_numbers
 from support.measured import csv_of, sail
 
 import diagnosis
@@ -146,7 +146,7 @@ def test_our_vessel_as_a_foreign_one_misses_by_the_same(folder, runs, plain, nom
     found = diagnosis.compare(runs, model=folder / "vessel.fmu")
     assert errors(found) == pytest.approx(nominal, rel=1e-6)
     assert np.abs(lacking(found) - lacking(plain)).max() < 1e-4  # at fewer rows
-    assert found.before.sentences == plain.before.sentences
+    assert without_numbers(found.before.sentences) == without_numbers(plain.before.sentences)
     assert not found.predictor.whole
     assert not found.predictor.placed
 

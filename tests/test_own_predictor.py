@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from support.command import command
+from support.foreign import without_numbers
 from support.measured import csv_of, sail
 from support.project import ROOT
 
@@ -66,7 +67,7 @@ def test_a_function_of_the_nominal_equations_predicts_as_the_described_ship(runs
         assert error(found).residuals == pytest.approx(error(plain).residuals, abs=1e-9)
         # The described ship's is evaluated at fewer rows.
         assert np.abs(error(found).omega - error(plain).omega).max() < 1e-4
-        assert found.before.sentences == plain.before.sentences
+        assert without_numbers(found.before.sentences) == without_numbers(plain.before.sentences)
         assert found.predictor.model.mass == pytest.approx(Model().mass)
 
 
