@@ -27,7 +27,7 @@ from diagnosis.assessment.plausibility import (
     same_columns,
 )
 from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
-from diagnosis.assessment.readings import AS_READ, of_commands, of_pose, reread, swapped
+from diagnosis.assessment.readings import AS_READ, Reading, of_commands, of_pose, reread, swapped
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs.columns.columns import POSE, Named
@@ -109,6 +109,7 @@ def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
         swapped(POSE, 0, 1),
     ):
         assert odds.log_density(reading) < right
+    assert odds.log_density(Reading("", motion=np.diag([np.nan, 1.0, 1.0]))) == -np.inf
     assert odds.log_density(of_pose("", (1e200, 1.0, 1.0))) == -np.inf
 
 

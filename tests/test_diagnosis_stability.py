@@ -244,9 +244,8 @@ def test_a_region_of_data_holds_nearly_all_of_them():
     region = OperatingRegion.of(nu)
     inside = (np.abs(nu[~np.isnan(nu[:, 0])]) <= region).mean(axis=0)
     assert inside[:2] == pytest.approx(0.99, abs=1e-3)
-    assert region.r == pytest.approx(0.6 * SETTINGS.negligible)
-    still = OperatingRegion.of(np.full((3, 3), np.nan))
-    assert still == pytest.approx(SETTINGS.negligible * np.array(OPERATING))
+    assert region.r == pytest.approx(0.06)
+    assert OperatingRegion.of(np.full((3, 3), np.nan)) == pytest.approx(0.1 * np.array(OPERATING))
 
 
 @pytest.mark.parametrize("harmful", [False, True])

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.measured import sail, smoothed
+from support.measured import lacking_at_all_rows, sail, smoothed
 
 from diagnosis.predictors import Model, omega, ship_with, weak_windows
 from diagnosis.predictors.uncertainty import omega_std
-from diagnosis.predictors.weak_form import modelled_force
 from diagnosis.runs import Run, clean, thinned, thinning
 
 
@@ -80,8 +79,7 @@ def test_model_errors_by_fewer_rows_are_those_by_all(w):
     assert fewer.thinned is fewer
     assert fewer.run.time.size == pytest.approx(w.run.time.size / 5, abs=2)
     assert (fewer.middle == w.middle).all()
-    nu = w.motion[1]
-    by_all = w.slope @ nu @ model.reference_mass.T - modelled_force(w, model, nu)
+    by_all = lacking_at_all_rows(w, model)
     assert omega(w, model) == pytest.approx(by_all, abs=1e-3 * np.abs(by_all).max())
     assert np.abs(by_all).max() > omega_std(w).max()
 

@@ -19,6 +19,7 @@ from diagnosis.runs.sensors.evidence import (
     integral,
     large,
     spread_of,
+    straight,
 )
 from diagnosis.runs.sensors.gaps import gaps
 from diagnosis.runs.sensors.repairing import Correction, corrected
@@ -276,6 +277,7 @@ def test_a_spread_is_that_of_normal_values_wherever_they_are(a, b):
     x = np.random.default_rng(0).normal(size=4001)
     assert spread_of(a * x + b) == pytest.approx(a, rel=0.05)
     legs = np.concatenate([np.full(80, 0.24), np.full(20, 1.0)])
+    assert straight(a * legs).tolist() == (legs < 0.25).tolist()
     assert large(-a * legs).tolist() == (legs > 0.5).tolist()
 
 

@@ -26,6 +26,7 @@ from diagnosis.design import (
     Basin,
     Limits,
     Question,
+    designing,
     plan_next,
     prepared,
     rehearsal,
@@ -78,7 +79,7 @@ def linear(seed=0, rows=12, alike=False):
     h = [Hypothesis((n,), np.concatenate([nuisance, o]), o) for n, o in zip("ab", own, strict=True)]
     precision = np.diag([*[1.0] * Q, *[0.1] * (2 * OWN)])
     prior = np.zeros(len(precision))
-    return Knowledge(h, np.array([0.5, 0.5]), X.T @ X, X.T @ y, precision, prior, 1.0), X, y, rng
+    return Knowledge(h, np.array([0.5, 0.5]), X.T @ X, X.T @ y, precision, prior), X, y, rng
 
 
 def gram(rng, rows=20, alike=False):
@@ -192,7 +193,7 @@ def test_precision_criteria_agree_with_pyomo_doe():
     information = np.array(doe.compute_FIM(method="sequential"))
     X = np.column_stack([np.ones(places.size), places]) / std
     h = Hypothesis(("line",), np.arange(2), np.arange(2))
-    k = Knowledge([h], np.ones(1), np.zeros((2, 2)), np.zeros(2), before, np.zeros(2), 1.0)
+    k = Knowledge([h], np.ones(1), np.zeros((2, 2)), np.zeros(2), before, np.zeros(2))
     grown = np.linalg.slogdet(information)[1] - np.linalg.slogdet(before)[1]
     assert d_optimal(k, X.T @ X) == pytest.approx(0.5 * grown, rel=1e-6)
     ratio = np.diag(np.linalg.inv(information)) / np.diag(np.linalg.inv(before))
@@ -463,7 +464,11 @@ def test_no_simulated_ship_leaves_the_basin(designer):
 
 
 @pytest.mark.slow
-def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path):
+def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path, monkeypatch):
+    for module, name, few in (
+        (designing, "LOG_POINTS", 4), (designing, "EVOLVED", 24), (rehearsal, "DRAWS", 20),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, few)
     plan = plan_next(question)
     assert plan.runs[0].sure > 0.9
     assert plan.runs[0].spread.margin.min() > 0.0

@@ -240,7 +240,7 @@ def test_ranking_is_from_the_best_down_with_what_ties_hollow():
     assert far.x.spaced(1e-3) / 1e-3 == pytest.approx(far.x.spaced(2e-3) / 2e-3, rel=1e-4), "linear"
     assert far.x.spaced(1e6) - far.x.spaced(1e5) == pytest.approx(np.log(10.0)), "logarithmic"
     (many,) = figures.ranking([ranked(f"c{k}", float(k), 1.0) for k in range(40)]).panels
-    assert len(many.y.names) == figures.LENGTH
+    assert len(many.y.names) == 2 * figures.LENGTH
     unpaired = [ranked(n, np.nan, np.nan, score=x) for n, x in (("a", 2.0), ("b", 3.5))]
     assert [m.x[0] for m in figures.ranking(unpaired).panels[0].marks if m.dots] == [0.0, 1.5]
 

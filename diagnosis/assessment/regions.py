@@ -277,7 +277,7 @@ class _Design:
         share, parts = float(self.profile.share[inside].sum()), (inside, ~inside)
         squares, windows = ([float(x[y].sum()) for y in parts] for x in (self._squares, self._windows))
         clear = squares[0] * windows[1] >= SETTINGS.least_contrast**2 * squares[1] * windows[0]
-        if share > SETTINGS.much or not clear:
+        if share > SETTINGS.largest_region or not clear:
             return None
         a, b = map(self._log_mean_square, parts)
         if min(a.dof, b.dof) + 1 < SETTINGS.least_clusters:

@@ -26,9 +26,8 @@ class AssessmentSettings:
     # force that is steady
     inexact: float = MEASURED
     # 1, share of a thrust: deviation of what of it is lost, and what of the full one nothing but an
-    # actuator gives all the time. Chosen; the same share of the windows is the most for a region.
+    # actuator gives all the time; chosen
     much: float = 0.5
-
     # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no
     # coefficient is known to 1 %.
     hardly: float = 0.01
@@ -38,11 +37,11 @@ class AssessmentSettings:
     # found where an error depends on no covariate.
     blocks_per_cluster: int = 2
     least_contrast: float = 1.4  # 1, of the RMS in a region to that elsewhere; chosen
+    largest_region: float = 0.6  # 1, share of the windows; chosen
     least_clusters: int = PARTS  # 1, inside and outside, for three degrees of freedom of each variance
-
     # 1, along an edge of a region, and speeds; chosen, within 1 % of the eigenvalues
     directions: int = 21
-
+    least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen
     limits: tuple[float, float, float] = (0.4, 0.2, 0.6)  # m/s, m/s, rad/s: 99 % of each published run
     runaway: float = 3.0  # 1, times the speeds of the region; chosen
     step: float = 0.08  # s, of simulations; chosen, distances agree with those at 0.01 s to 3 %

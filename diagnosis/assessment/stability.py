@@ -50,7 +50,7 @@ class OperatingRegion(NamedTuple):
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
         known = np.abs(nu[np.isfinite(nu).all(axis=1)])
         most = np.quantile(known, 1.0 - SETTINGS.chance, axis=0) if len(known) else np.zeros(3)
-        return cls(*map(float, np.maximum(most, SETTINGS.negligible * np.array(cls.at(scale)))))
+        return cls(*map(float, np.maximum(most, SETTINGS.least_region * np.array(cls.at(scale)))))
 
 
 OPERATING = OperatingRegion()

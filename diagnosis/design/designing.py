@@ -16,8 +16,7 @@ from cosim.errors import nearest
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
-from ..runs.run_constants import DIGITS, NEGLIGIBLE
-from ..search.nonlinear.multistart import POINTS, REFINED
+from ..runs.run_constants import NEGLIGIBLE
 from .hypotheses import Space
 from .information import CRITERIA, Knowledge, inseparable
 from .manoeuvre_library import (
@@ -36,14 +35,14 @@ from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows
 from .spread import MEMBERS, Spread, spread
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
-
+LOG_POINTS = 6  # 1, of the number of Sobol points, to the base 2; chosen: a few seconds
 EVOLVED = 160  # 1, points tried by evolution at the most; chosen: some ten seconds
 POPULATION = 12  # 1, best points that evolve; chosen: each some ten times
 MOST_PIECES = 6  # 1, manoeuvres of a run; chosen: of more the search finds no good ones in its time
 FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used beyond its data (chosen)
 # 1, shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
-
+TRIES = 3  # 1, best plans whose spread is computed, until one keeps the basin; chosen: within the minute
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
     "basin, fewer minutes or a smaller margin"
@@ -244,14 +243,14 @@ class Designer:
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
     def search(
-        self, k: Knowledge, seed: int, points: int = 2 * POINTS, evolved: int = EVOLVED
+        self, k: Knowledge, seed: int, log_points: int = LOG_POINTS, evolved: int = EVOLVED
     ) -> ScoredPlan:
         """The best plan that is found, by the same seed the same unless time is short.
 
         Args:
             k: what is known.
             seed: of the points.
-            points: number of Sobol points, a power of 2.
+            log_points: of the number of Sobol points, to the base 2.
             evolved: points that evolution tries at the most.
 
         Raises:
@@ -259,14 +258,14 @@ class Designer:
         """
         T, end = self.limits.seconds, time.monotonic() + SECONDS
         pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
-        cube = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random(points)
+        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(log_points)
         found: list[tuple[ScoredPlan, np.ndarray]] = []
 
         def cost(some: np.ndarray) -> np.ndarray | float:
-            if time.monotonic() > end or len(found) >= points + evolved:
+            if time.monotonic() > end or len(found) >= len(points) + evolved:
                 raise _OutOfTimeError
-            self.advance(f"searching a plan: {len(found)} of {points + evolved}")
-            each = np.clip(some.T.reshape(-1, cube.shape[1]), 0.0, 1.0 - DIGITS)
+            self.advance(f"searching a plan: {len(found)} of {len(points) + evolved}")
+            each = np.clip(some.T.reshape(-1, points.shape[1]), 0.0, 1.0 - 1e-9)
             plans = [sequence(point, T, self.library) for point in each]
             found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))
             costs = np.array([-s.score for s in scored])
@@ -275,10 +274,10 @@ class Designer:
         # Simulated tracks take a fraction of the time at once; targets need no simulation.
         at_once = self.orders is not None
         with suppress(_OutOfTimeError):
-            for part in [cube] if at_once else cube:
+            for part in [points] if at_once else points:
                 cost(part.T)
             first: Any = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:POPULATION]])
-            spans: Any = [(0.0, 1.0)] * cube.shape[1]
+            spans: Any = [(0.0, 1.0)] * len(points[0])
             how: Any = {"vectorized": True, "updating": "deferred"} if at_once else {}
             differential_evolution(cost, spans, init=first, rng=seed, polish=False, **how)
         best = max((s for s, _ in found), key=lambda s: s.score)
@@ -301,7 +300,7 @@ class Designer:
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
 
     def checked(
-        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = REFINED
+        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = TRIES
     ) -> tuple[ScoredPlan, Spread]:
         """The plan, or else the best of those that were tried, that keeps the basin with its spread.
 

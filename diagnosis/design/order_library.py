@@ -16,7 +16,6 @@ from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.black_box import TAU
-from ..runs.run_constants import DIGITS
 from .manoeuvre_library import PIECE, SOFT, TEXTS, PlanStep, between
 from .planned_motion import MOST_THRUST, Basin, PlannedMotion
 from .spread import driven
@@ -176,7 +175,7 @@ class Orders:
     def _asked(self, plan: Sequence[PlanStep], t: np.ndarray, pace: float, model: Model) -> np.ndarray:
         """(n, k), the orders of a plan."""
         ends = np.cumsum([s.seconds for s in plan])
-        which = np.minimum(np.searchsorted(ends - DIGITS, t, side="right"), len(plan) - 1)
+        which = np.minimum(np.searchsorted(ends - 1e-9, t, side="right"), len(plan) - 1)
         parts = [
             ORDERS[s.name](
                 t[which == k] - (end - s.seconds), s.seconds, s.numbers, model.ship.scale.time

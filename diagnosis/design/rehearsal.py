@@ -23,16 +23,16 @@ from ..search.effect_evidence import EffectEvidence, evidence
 from ..search.findings import Finding
 from ..search.gram import GramTable, Nuisance, block_numbers, gram_table
 from ..search.map_regression import first_share, regression, score
-from ..search.most_likely import LEVEL
 from ..search.shortlist import LENGTH
 from ..verdict.confidence import confidence_of, doubt_of_data, probability
 from .hypotheses import Space, block_of
-from .information import Hypothesis, Knowledge
-from .spread import MEMBERS
+from .information import SURE, Hypothesis, Knowledge
 
+DRAWS = 60  # 1, simulated outcomes, so that the standard error of a probability is at most 0.065
 CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
 LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
 UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the diagnosis so far."
+UNIT = np.full(3, OVERLAP**-0.5)  # 1, noise of overlapping windows where that of one that counts is 1
 
 
 class RowsOfRuns(NamedTuple):
@@ -102,19 +102,19 @@ class Rehearsal:
 
     @property
     def doubts(self) -> list[str]:
-        """What keeps the confidence below LEVEL after any run, a line each."""
+        """What keeps the confidence below SURE after any run, a line each."""
         effects, text = self.space.start.ship.effects, doubt_of_data(self.data)
         found = [CAPPED.format(text)] if text else []
         for h, axes in zip(self.k.hypotheses, self.residual, strict=True):
             if any(axes & set(effects[i].axis) for i in h.ids):
                 found.append(LEFT.format(h.name, ", ".join(sorted(axes))))
-        return found if self.listed >= LEVEL else [*found, UNLISTED.format(self.listed)]
+        return found if self.listed >= SURE else [*found, UNLISTED.format(self.listed)]
 
-    def sure(self, planned: Sequence[WeakWindows], seed: int, draws: int = MEMBERS) -> float:
-        """Probability that the true hypothesis has LEVEL or more after planned runs [1]."""
-        return float(self.listed * np.mean(self.confidences(planned, seed, draws) >= LEVEL))
+    def sure(self, planned: Sequence[WeakWindows], seed: int, draws: int = DRAWS) -> float:
+        """Probability that the true hypothesis has SURE or more after planned runs [1]."""
+        return float(self.listed * np.mean(self.confidences(planned, seed, draws) >= SURE))
 
-    def confidences(self, planned: Sequence[WeakWindows], seed: int, draws: int = MEMBERS) -> np.ndarray:
+    def confidences(self, planned: Sequence[WeakWindows], seed: int, draws: int = DRAWS) -> np.ndarray:
         """(draws,), least confidence in an effect of the true hypothesis after planned runs [1]."""
         old, new = self.measured, self.rows(planned)
         both = RowsOfRuns(*(np.concatenate(pair) for pair in zip(old, new, strict=True)))
@@ -177,14 +177,14 @@ class RehearsedEffect:
         known = sum((rows.X[..., places[i][0]] for i in others), np.zeros_like(like))
         effects = s.start.ship.effects
         every = [Candidate(effects[i], [shapes[i]]) for i in (effect, *(shapes.keys() - h.ids))]
-        table = _table(like - known, rows.blocks, every, nuisance)
+        table = gram_table(like - known, rows.blocks, every, nuisance, UNIT)
         order = sorted(range(1, len(every)), key=lambda c: (_charged(table, c), every[c].effect.id))
         chosen = [every[c] for c in (0, *order[: LENGTH - 1])]
         return cls(chosen, nuisance, known, rows, s.blocks[effect].steps)
 
     def finding(self, y: np.ndarray, rng: np.random.Generator) -> Finding:
         """The effect as it is found for a model error (K, 3), with its evidence."""
-        table = _table(y - self.known, self.rows.blocks, self.rivals, self.nuisance)
+        table = gram_table(y - self.known, self.rows.blocks, self.rivals, self.nuisance, UNIT)
         each = [score(table, c, 1) for c in (*range(len(self.rivals)), -1)]  # -1: none of them
         share = float(first_share(each, rng)[0])
         seen, values, std = self.judged(y)
@@ -196,7 +196,7 @@ class RehearsedEffect:
     def judged(self, y: np.ndarray) -> tuple[EffectEvidence, dict[str, float], dict[str, float]]:
         """Evidence of the effect without rivals, its values, and their standard deviations, SI."""
         y, s, nuisance = y - self.known, self.rivals[0].shapes[0], self.nuisance
-        table = _table(y, self.rows.blocks, self.rivals[:1], nuisance)
+        table = gram_table(y, self.rows.blocks, self.rivals[:1], nuisance, UNIT)
         given = [] if s.offset is None else [s.offset[..., None]]
         A = np.concatenate([y[..., None], *given, s.columns, nuisance.columns], axis=2)
         r = regression(table, 0, 0)
@@ -213,13 +213,6 @@ class RehearsedEffect:
             values[name] = values.get(name, 0.0) + float(x) * step
             deviations[name] = float(deviation) * step
         return seen, values, deviations
-
-
-def _table(
-    y: np.ndarray, blocks: np.ndarray, every: Sequence[Candidate], nuisance: Nuisance
-) -> GramTable:
-    """Of overlapping windows, with forces in units of the noise of one that counts."""
-    return gram_table(y, blocks, every, nuisance, np.ones(y.shape[1]) / np.sqrt(OVERLAP))
 
 
 def _charged(t: GramTable, c: int) -> float:

@@ -22,6 +22,7 @@ from .hypotheses import Space
 from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
+POSE = 3  # 1, numbers of a pose
 # 1, ships drawn from each hypothesis: if none of them leaves the basin, the next one does so with a
 # probability of 1 % (rule of succession).
 MEMBERS = 100
@@ -165,11 +166,11 @@ def _tracks(models: Sequence[Model], start: np.ndarray, given: np.ndarray, loop:
     with np.errstate(all="ignore"):  # a ship that runs away gives infinities, which count as outside
         first = seen(*ship.begin(craft.vessel.inputs()))
         now = loop.step(first, rows[0], *parts)
-        further = stepped(replace(loop, like=now), flatten(now), given[1:-1], parts, len(start))
+        further = stepped(replace(loop, like=now), flatten(now), given[1:-1], parts, POSE)
     count = max(len(models), given.shape[2], np.size(start[0]))
     poses = [np.broadcast_to(x, count) for x in first.pose]
     tracks = np.concatenate(
-        [np.stack(poses)[None], np.broadcast_to(further, (len(further), len(poses), count))]
+        [np.stack(poses)[None], np.broadcast_to(further, (len(further), POSE, count))]
     )
     return tracks.transpose(2, 0, 1)
 

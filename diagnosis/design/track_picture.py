@@ -6,7 +6,7 @@ import numpy as np
 
 from cosim.results import hulls
 
-from ..execution.short_text import SHOWN
+from ..report.finding_text import SHOWN
 from .designing import Designer
 from .information import Knowledge
 from .planned_motion import PlannedMotion

@@ -36,6 +36,8 @@ LAST = [*USUAL][[*USUAL].index(AGAIN) + 1 :]  # steps behind the search
 # search that finds none at all, one, two or three effects is within a factor of two from its first round
 # on.
 MORE = 1.6
+# 1, share of its time that a step is taken to go on for where it takes longer than usual; chosen.
+LATE = 0.3
 
 
 class RemainingTime:
@@ -64,7 +66,7 @@ class RemainingTime:
             return None
         spent = self._now() - self._begun
         rest = sum(number * self._usual(name) for name, number in self._left.items())
-        return max(self._number * self._usual(self._step) - spent, 0.0) + rest
+        return max(self._number * self._usual(self._step) - spent, LATE * spent) + rest
 
     @property
     def share(self) -> float | None:

@@ -16,13 +16,14 @@ from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.reading import LOGS
 from ..runs.files.tables import as_table, column_names, numbers, table_of_file
-from ..runs.run_constants import DIGITS, FAR_OFF, FEWEST
+from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
 MOST_STEPS = 20  # 1, between two samples; chosen, an FMU that wants more of them takes them itself
-# 1, of an output's spread, and of the squared length of a slope by differences: less is rounding; chosen
-ROUNDING = 1e-5
-
+DIGITS = 1e-5  # 1, of an output's spread: noise below that is rounding; chosen
+# 1, by which the standard deviation of a start value is larger than that of its parabola, which also
+# bends otherwise than the signal, by as much as the noise hides; chosen.
+UNSURE = 3.0
 WIDTHS = (5, 7, 11, 15, 21, 31, 45, 65)  # 1, samples of a parabola through the start of a window
 
 
@@ -149,7 +150,7 @@ def noises(runs: Sequence[MeasuredRun], given: SystemMap) -> np.ndarray:
             raise InputError(f"column {quoted(column)} has no samples in '{runs[0].name}'")
         noise = c.noise or max(
             float(np.median([noise_of(r.columns[column]) for r in runs])),
-            ROUNDING * float(np.nanstd(every)),
+            DIGITS * float(np.nanstd(every)),
             float(np.finfo(float).tiny ** 0.5),
         )
         found.append(abs(c.factor) * noise)
@@ -173,11 +174,11 @@ def windows_of(
     """
     whole = float(run.time[-1] - run.time[0])
     length = min(length or whole, whole)
-    count = max(1, int(whole / length + DIGITS))
+    count = max(1, int(whole / length + 1e-9))
     found = []
     for k in range(count):
         begin = run.time[0] + k * length
-        rows = np.flatnonzero((run.time >= begin - DIGITS) & (run.time <= begin + length + DIGITS))
+        rows = np.flatnonzero((run.time >= begin - 1e-9) & (run.time <= begin + length + 1e-9))
         if rows.size >= FEWEST:
             found.append(_window(run, given, model, noise, rows))
     if not found:
@@ -190,7 +191,7 @@ def step_of(model: FmuModel, period: float) -> float:
     own, told = model.suggested_step or period, model.description.coSimulation
     if told is not None and not told.canHandleVariableCommunicationStepSize:
         return own * max(1.0, round(period / own))
-    return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - DIGITS))))
+    return period / min(MOST_STEPS, max(1, int(np.ceil(period / own - 1e-6))))
 
 
 def _window(
@@ -198,7 +199,7 @@ def _window(
 ) -> Window:
     t = run.time[rows] - run.time[rows[0]]
     h = step_of(model, float(np.median(np.diff(t))))
-    steps = int(np.ceil(t[-1] / h - DIGITS))
+    steps = int(np.ceil(t[-1] / h - 1e-6))
     middle = run.time[rows[0]] + (np.arange(steps) + 0.5) * h
     inputs = np.zeros((steps, len(given.inputs)))
     for k, (column, c) in enumerate(given.inputs.items()):
@@ -225,9 +226,8 @@ def _window(
         o = given.outputs[column]
         plain = (value - (0.0 if rate else o.offset)) / o.factor
         start[c.name] = c.factor * plain + (0.0 if rate else c.offset)
-        # A parabola also bends otherwise than the signal, by as much as the noise hides.
-        std[c.name] = FAR_OFF * abs(c.factor / o.factor) * sure
-    counts = t >= (given.run_in or 0.0) - DIGITS
+        std[c.name] = UNSURE * abs(c.factor / o.factor) * sure
+    counts = t >= given.run_in - 1e-9
     if counts.sum() < FEWEST:
         raise InputError(f"run '{run.name}' has fewer than {FEWEST} samples after its run_in")
     begin = float(run.time[rows[0]])

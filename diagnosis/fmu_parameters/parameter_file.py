@@ -159,7 +159,7 @@ class ParameterFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    parameters: Annotated[list[CalibratedParameter], Field(min_length=1)]
+    parameters: list[CalibratedParameter] = Field(min_length=1)
 
     @model_validator(mode="after")
     def _different(self) -> "ParameterFile":

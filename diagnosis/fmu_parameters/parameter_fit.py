@@ -9,8 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..runs.cleaning import Z95
-from ..runs.run_constants import STEPS
-from ..search.most_likely import ENOUGH
+from ..search.most_likely import ENOUGH, STEPS
 from .additional_force import AdditionalForce
 from .residuals import Setting, WindowResiduals
 

@@ -24,12 +24,12 @@ from ..execution.progress import Advance, silent
 from ..execution.result_folder import together
 from ..report.formatting import write_json
 from ..runs.cleaning import Z95
-from ..search.nonlinear.multistart import POINTS
 from .measured_system import MeasuredRun, windows_of
 from .residuals import Setting, WindowResiduals
 from .sensitivity import confounded
 from .system_task import SystemTask
 
+LOG_COURSES = 5  # 1, of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
 NUMBERS = 4  # 1, of an input: form, least and largest value, period
 SHORTEST, LONGEST = 0.02, 0.5  # 1, of the length of a run: period of a course; chosen
 PAGE, JSON = "plan.md", "next.json"
@@ -158,13 +158,13 @@ def plan_inputs(
         rows = [_slopes(old, setting)]
         h = Hypothesis(tuple(q.name for q in task.parameters), np.arange(p), np.arange(p))
         none = np.zeros((p, p))
-        k = Knowledge([h], np.ones(1), none, np.zeros(p), np.eye(p), np.zeros(p), listed=1.0).plus(
+        k = Knowledge([h], np.ones(1), none, np.zeros(p), np.eye(p), np.zeros(p)).plus(
             rows[0].T @ rows[0]
         )
         end = time.monotonic() + SECONDS * runs
         for n in range(runs):
             best: tuple[float, MeasuredRun, np.ndarray] | None = None
-            points = qmc.Sobol(NUMBERS * len(task.map.inputs), rng=seed + n).random(POINTS)
+            points = qmc.Sobol(NUMBERS * len(task.map.inputs), rng=seed + n).random_base2(LOG_COURSES)
             for tried, point in enumerate(points):
                 if best is not None and time.monotonic() > end:
                     break

@@ -7,15 +7,17 @@ import numpy as np
 
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
-from ..runs.run_constants import STEPS
+from ..search.most_likely import STEPS
 from ..search.prediction_fit.joint_posterior import TOGETHER, connected
-from .measured_system import ROUNDING
 from .parameter_file import CalibratedParameter
 from .residuals import Setting, WindowResiduals
 
-# 1, of its prior standard deviation: by what the runs reduce that of a value which they can tell, at the
-# least; of a direction: part of a parameter in it, and cosine of two parts. Chosen: less is hardly news.
-SHARED = 0.1
+# 1, share of its prior standard deviation that a value keeps with the runs, from which on they cannot
+# tell it. Chosen: a tenth less is hardly news.
+UNTOLD = 0.9
+# 1, of the squared length of a slope by differences, below which it is not known; chosen
+ROUNDING = 1e-5
+SHARED = 0.1  # 1, of a direction: part of a parameter in it, and cosine of two parts; chosen
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Sensitivity:
     @property
     def known(self) -> bool:
         """Whether the runs can tell it."""
-        return self.std_share < 1.0 - SHARED
+        return self.std_share < UNTOLD
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from scipy.stats import chi2, norm
 from ..execution.progress import Advance, silent
 from ..predictors.prediction import FAR_OFF
 from ..runs.run_constants import CHANCE
-from ..search.findings import MOST_REPORTED
 from ..search.prediction_fit.joint_posterior import together
 from ..search.shortlist import TIE
 from ..verdict.confidence import EVEN_ODDS, FOUND
@@ -21,6 +20,7 @@ from .parameter_fit import ParameterFit, fit, fitted, intervals
 from .residuals import Setting, WindowResiduals, rms_of
 from .system_remainder import SystemRemainder, change_of_squares, inflation, remainder
 
+MOST_FORCES = 3  # 1, in one model; chosen
 Verdict = Literal["found", "ambiguous", "parameters", "unexplained", "none"]
 
 
@@ -121,7 +121,7 @@ def calibrate(
     def temper(f: ParameterFit) -> float:
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
-    while possible and len(accepted) < MOST_REPORTED and (left(best).significant or far(best)):
+    while possible and len(accepted) < MOST_FORCES and (left(best).significant or far(best)):
         # Parameters that imitate a force may be far from where they are with it.
         held = Setting(start.z, best.setting.forces)
         others = [fit(train, held, best.sizes, range(len(start.z)))] if far(best) else []

@@ -67,7 +67,7 @@ class SystemMap(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     inputs: dict[str, DrivenInput] = Field(default_factory=dict)
-    outputs: Annotated[dict[str, MeasuredOutput], Field(min_length=1)]
+    outputs: dict[str, MeasuredOutput] = Field(min_length=1)
     start: dict[str, MappedVariable] = Field(
         default_factory=dict, description="start values, by measured outputs or their derivatives"
     )
@@ -75,8 +75,8 @@ class SystemMap(BaseModel):
         default=None, description="inputs where an additional force may act (those in N, N.m, m/s2)"
     )
     window: Positive | None = Field(default=None, description="length of the windows [s] (whole runs)")
-    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] | None = Field(
-        default=None, description="time before a prediction is compared [s] (none)"
+    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] = Field(
+        default=0.0, description="time before a prediction is compared [s]"
     )
 
     @property

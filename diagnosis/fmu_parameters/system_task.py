@@ -16,13 +16,16 @@ from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, POSE
 from ..predictors.fmu.fmu_playback import confined
 from ..runs import stated_layout
-from ..search.findings import MOST_REPORTED
 from .additional_force import AdditionalForce
 from .calibration_task import CalibrationTask
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
 from .parameter_file import CalibratedParameter, proposed, read_parameters, unit_of
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
+
+# 1, outputs that are no measured ones, of which an additional force may be a function; chosen: the more
+# are tried, the more alike they are.
+MOST_OUTPUTS = 6
 
 
 def is_system(runs: Sequence[Path], map: Path | None) -> bool:  # noqa: A002
@@ -76,7 +79,7 @@ class SystemTask(CalibrationTask):
         self.units = [unit_of(model.variables[n]) for n in self.names]
         self.forces_on = force_inputs(map, model)
         others = [v.name for v in model.reals("output") if v.name not in self.names]
-        self.outputs = [*self.names, *(others[:MOST_REPORTED] if self.forces_on else [])]
+        self.outputs = [*self.names, *(others[:MOST_OUTPUTS] if self.forces_on else [])]
 
     @cached_property
     def confined(self) -> ConfinedFmu:

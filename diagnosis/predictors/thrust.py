@@ -18,7 +18,6 @@ from fmus.vessel.vessel import PreparedVessel, State, water_velocity
 
 from ..runs.files.reading import Run
 from ..runs.linear_filter import filtered
-from ..runs.run_constants import DIGITS
 from .ship_model import Model
 
 # s, times the scale of the ship; longest step of thrusters and vessel, where the error of the
@@ -187,9 +186,7 @@ class Response:
     @property
     def step(self) -> float:
         """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
-        fine = self._period / np.ceil(
-            self._period / (LONGEST_STEP * self.model.ship.scale.time) - DIGITS
-        )
+        fine = self._period / np.ceil(self._period / (LONGEST_STEP * self.model.ship.scale.time) - 1e-6)
         kept = [
             self._lasts(member, memory) / (memory.keeps - 1)
             for member, memory in self._memories

@@ -232,8 +232,9 @@ def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
 
 def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     """The force that a motion needs, less that of the thrusters and what is given, if these count."""
-    # A force that is given along a run has all of its rows.
-    w, model = w if w.run.name in model.given else w.thinned, model.during(w.run.name)
+    if w.run.name not in model.given:  # a force along a run has all of its rows
+        w = w.thinned
+    model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
     # The ship is part of each key: two may have effects of one name that are different functions.

@@ -18,7 +18,6 @@ from fmus.ops import wrap
 from ..execution.short_text import ShortRepr
 from ..runs import Smoothed
 from ..runs.cleaning import BRIEF
-from ..runs.run_constants import DIGITS
 from .prediction import WindowStarts, by_measurement, predict, predict_each
 from .ship_model import Model
 from .thrust import LONGEST_STEP
@@ -29,8 +28,9 @@ FREE_STEP = BRIEF  # the mean of the commands acts in it
 LONGEST_FREE = BLOCKS * BLOCK  # as long as blocks of the weak form do not grow; takes some seconds
 ANY_TIME = (-np.inf, np.inf)  # s
 # m, times the scale of the ship, and rad; where predictions begin a velocity is known if its standard
-# deviation displaces the ship by no more over a window, or is as usual. Chosen: a tenth of its length.
+# deviation displaces the ship by no more over a window. Chosen: a tenth of its length.
 DISPLACED = 0.1
+SETTLED = 2.0  # 1, times the median of a run, or so well; chosen: at its ends it is three to four
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,7 +109,7 @@ class Windows:
         for kind in sorted({kinds[k] for k in np.unique(self.run)}):
             members = [k for k in np.unique(self.run).tolist() if kinds[k] == kind]
             starts = tuple((runs[k], parts[k].first_rows) for k in members)
-            group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - DIGITS)))
+            group = WindowStarts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     @property
@@ -228,7 +228,7 @@ class RunWindows(NamedTuple):
 def step_of(smoothed: Smoothed) -> float:
     """Step of predictions [s], which divides the sample period."""
     row = round(float(np.median(np.diff(smoothed.time))), 9)
-    parts = int(np.ceil(row / (LONGEST_STEP * smoothed.scale.time) - DIGITS))
+    parts = int(np.ceil(row / (LONGEST_STEP * smoothed.scale.time) - 1e-6))
     return row / parts
 
 
@@ -275,7 +275,7 @@ def settled_time(smoothed: Smoothed, begin: float, length: float) -> float:
     size = np.array([smoothed.scale.length, smoothed.scale.length, 1.0])
     used = smoothed.used & (smoothed.time >= begin)
     usual = np.median(smoothed.nu_std[smoothed.used], axis=0)
-    most = np.maximum(usual, DISPLACED * size / length)
+    most = np.maximum(SETTLED * usual, DISPLACED * size / length)
     rows = np.flatnonzero(used)
     known = (smoothed.nu_std[rows] <= most).all(axis=1)
     return float(smoothed.time[rows[known.argmax()]]) if known.any() else begin
@@ -321,7 +321,7 @@ def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) 
         predicted: (steps + 1, 3, p, w), in w windows at each step.
         column, place: (samples,), the window of each sample, and steps from its start to it.
     """
-    first = np.clip(np.floor(place + DIGITS).astype(int) - 1, 0, max(len(predicted) - 4, 0))
+    first = np.clip(np.floor(place + 1e-6).astype(int) - 1, 0, max(len(predicted) - 4, 0))
     nodes = range(min(4, len(predicted)))
     poses = [predicted[first + k, :, :, column] for k in nodes]
     with np.errstate(invalid="ignore", over="ignore"):

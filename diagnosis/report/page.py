@@ -13,7 +13,6 @@ import cosim
 from ..assessment.covariates import EAST, NORTH
 from ..execution.progress import Advance, silent
 from ..predictors.evaluation import Evaluation
-from ..search.shortlist import LENGTH
 from . import formatting
 from .content import coefficients, versions
 from .error_change import error_changes
@@ -214,7 +213,7 @@ def _profiles(r: ReportData) -> Iterator[Drawing]:
 
 def _ranking(r: ReportData) -> Iterator[Drawing]:
     if r.ranking:
-        shown = min(len(r.ranking), LENGTH)
+        shown = min(len(r.ranking), figures.MOST_RANKED)
         caption = f"The best {shown} of {len(r.ranking)} candidates."
         label = "Candidates in the order of their score"
         yield drawing(figures.ranking(r.ranking), "ranking", caption, label)

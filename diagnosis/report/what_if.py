@@ -36,8 +36,8 @@ from ..predictors.traced.prediction_component import START, allocation_component
 from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
-from ..search.shortlist import LENGTH
 from ..session import Diagnosis
+from .pictures.figures import MOST_RANKED
 from .report_data import ReportData
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ class MovableModel:
             if effect.id not in done and any(self.learned.value(n) != self.start.value(n) for n in free):
                 done.add(effect.id)
                 yield self._choice(effect, "calibrated", {}, True)
-        for ranked in self.r.ranking[:LENGTH]:
+        for ranked in self.r.ranking[:MOST_RANKED]:
             effect = effects[ranked.id]
             if ranked.id not in done and len(effect.parameters) <= 2 * SHOWN and effect.function:
                 yield self._choice(effect, "candidate", {}, False)

@@ -12,7 +12,7 @@ from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
-from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
+from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .row_order import ordered
@@ -22,6 +22,7 @@ from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE, ORDER
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
 
 
+FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
@@ -142,7 +143,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     where, run = f"run '{run.name}'", ordered(run, scale)
     notes = list(run.notes)
     run = replace(
-        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < LARGEST, run.pose, np.nan)
+        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
     )
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)

@@ -17,7 +17,7 @@ import numpy as np
 
 from cosim import InputError
 
-from .run_constants import FAR_OFF, FEWEST, PARTS, SAME
+from .run_constants import FAR_OFF, IN_A_ROW, PARTS, SAME
 
 if TYPE_CHECKING:  # at run time it takes a while to import
     from .smoothing.smoother import Smoothed
@@ -106,7 +106,7 @@ def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
             at = np.arange(begin + shift, begin + short.seconds / PARTS, period)
             grid = short.period * np.arange(len(short.course))
             piece = np.column_stack([np.interp(at, grid, x) for x in short.course.T])
-            if FEWEST <= len(piece) <= len(long.course):
+            if IN_A_ROW <= len(piece) <= len(long.course):
                 found.append(_correlation(piece, long.course, short.certain))
         if found and not np.isnan(best := float(np.max(found))):
             yield best

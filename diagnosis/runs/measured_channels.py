@@ -10,13 +10,16 @@ import numpy as np
 from fmus.ops import wrap
 
 from ..execution.short_text import SHOWN
-from .cleaning import Z95, noise, repeated
+from .cleaning import noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
 from .run_constants import ORDER
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
+# 1, relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
+# begins below half of it.
+HARDLY_KNOWN = 0.3
 GIVEN, ESTIMATED = "given", "estimated"
 UNUSED = "not used for the motion"
 
@@ -63,7 +66,7 @@ class MeasuredChannel:
     @property
     def known(self) -> bool:
         """Whether the noise is known so well that it tells anything."""
-        return Z95 * self.noise_rel_std < 0.5  # its 95 % interval does not reach half of it
+        return self.noise_rel_std < HARDLY_KNOWN
 
     def content(self) -> dict[str, Any]:
         """What a result file has of it, beside its name."""

@@ -27,6 +27,7 @@ from .gram import FOLDS, block_numbers
 from .prior import Prior
 
 THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
+COMPONENTS = (1, 2, 3, 5, 8)  # latent variables to try; chosen
 
 
 class Features(NamedTuple):
@@ -193,7 +194,7 @@ class PartialLeastSquares(Peer):
     """
 
     name = "pls"
-    settings = tuple(range(1, FOLDS + 1))  # latent variables to try
+    settings = COMPONENTS
 
     def coefficients(self, A: np.ndarray, y: np.ndarray, setting: float) -> np.ndarray:
         """See :class:`Peer`."""

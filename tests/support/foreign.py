@@ -1,6 +1,5 @@
 """An FMU that is no Python: a first-order lag in C, compiled here, with whatever habits a test wants."""
 
-import re
 import subprocess
 import zipfile
 
@@ -136,8 +135,3 @@ def build_lag(folder, name="lag", habit="", capabilities=ANY_STEP, before=""):
         archive.writestr("modelDescription.xml", DESCRIPTION.replace("CAPABILITIES", capabilities))
         archive.write(library, f"binaries/{fmpy.platform}/lag{fmpy.sharedLibraryExtension}")
     return folder / f"{name}.fmu"
-
-
-def without_numbers(sentences):
-    """Sentences without their numbers, which differ in the last digit between two ways to evaluate a force."""
-    return [re.sub(r"[\d.]+", "", sentence) for sentence in sentences]

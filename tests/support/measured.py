@@ -11,6 +11,7 @@ import pytest
 
 from diagnosis import Model, Run, clean, smooth
 from diagnosis.predictors.ship_model import parameters
+from diagnosis.predictors.weak_form import modelled_force
 from diagnosis.search import method
 from fmus.declare import variables
 from fmus.signals import Force
@@ -143,3 +144,9 @@ def changed(run, rows, pose):
 def learn(data, prior, model=None):
     """What forward selection finds in windows of some runs."""
     return method("selection").fit(data, model or Model(), prior, lambda _: None, 0)
+
+
+def lacking_at_all_rows(w, model):
+    """The model error (K, 3) of a run, evaluated at each row of it."""
+    nu = w.motion[1]
+    return w.slope @ nu @ model.reference_mass.T - modelled_force(w, model, nu)

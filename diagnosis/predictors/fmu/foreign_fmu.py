@@ -23,7 +23,6 @@ from fmus.ship import Ship, ship
 from ...execution.progress import Advance, silent
 from ...execution.result_folder import sha256
 from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
-from ...runs.run_constants import DIGITS
 from ..black_box import (
     MOTION,
     POSE,
@@ -255,7 +254,7 @@ class FmuPredictor(BlackBox):
 
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
         own = self.fmu.fixed_step or h
-        count = steps if own == h else int(np.ceil(steps * h / own - DIGITS))
+        count = steps if own == h else int(np.ceil(steps * h / own - 1e-9))
         motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
         for signal, told in self._told(smoothed, rows, own, max(count, 3 if self.late else 1)).items():
             x = np.unwrap(told, axis=0) if signal == "psi" else told

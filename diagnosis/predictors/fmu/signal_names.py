@@ -7,14 +7,13 @@ the default, and ENU, whose x is east and whose heading goes from east to north.
 
 import re
 from collections.abc import Mapping
-from math import pi, tau
+from math import pi
 from typing import NamedTuple
 
 from cosim.fmu import FmuVariable
 
 from ...runs import UNITS, meaning
 from ...runs.columns.likely_columns import words_of
-from ...runs.run_constants import NEGLIGIBLE
 
 # Words that say which frame or whose variable it is, and nothing of which signal.
 NOTHING = frozenset(
@@ -53,7 +52,7 @@ VECTORS = {"eta": ("x", "y", "psi"), "nu": ("u", "v", "r"), "tau": ("tau_X", "ta
 VECTOR = re.compile(r"(eta|nu|tau)_?\[?([1-6])\]?", re.IGNORECASE)
 # Largest of an angle [rad] and of a rate of turn [rad/s] that are in radians; chosen: a turn with some
 # to spare, and a rate that no ship has.
-LARGEST = {"angle": tau + NEGLIGIBLE * tau, "rate": pi}
+LARGEST = {"angle": 2.1 * pi, "rate": pi}
 
 
 class Meant(NamedTuple):

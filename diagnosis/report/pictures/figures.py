@@ -19,7 +19,7 @@ from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Chart, ChartAxis, Panel
 from .shape import Curve
 
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
-
+MOST_RANKED = 2 * LENGTH  # 1, candidates that are shown: the shortlist, and as many again
 RESIDUALS = ("x [mm]", "y [mm]", "ψ [°]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {
@@ -114,7 +114,7 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     The percentage is the share of the model error that each explains beyond other values of the nominal
     coefficients, where a method tells that. Hollow: so near that only chance decides. Grey: further.
     """
-    shown = ranked[:LENGTH]
+    shown = ranked[:MOST_RANKED]
     behind = np.array([_behind(r, shown[0]) for r in shown])
     linear = TIE * float(np.median(behind[:, 1]))
     # Linear below what may be a tie, logarithmic far above.

@@ -1,6 +1,5 @@
 """Which columns of a measurement a signal is likely to be: by name, unit, range and motion."""
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
@@ -9,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...execution.short_text import SHOWN
-from ..run_constants import EVERY, FEWEST, NEGLIGIBLE
+from ..run_constants import FEWEST
 from .unit_check import UNITS, doubts
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -42,13 +41,10 @@ ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "a
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
-
+SMOOTHED = 1.0  # s, over which speeds are taken (chosen)
 LIKELY = 0.4  # 1, correlation or likeness of names from which on it counts (chosen)
-# Largest numbers of an angle and of a command in any unit, with what overshoots.
-LARGEST = {
-    quantity: (1.0 + NEGLIGIBLE) * most / min(UNITS[quantity].values())
-    for quantity, most in (("angle", math.tau), ("command", 1.0))
-}
+# [deg, %] largest numbers of an angle and of a command in any unit, with what overshoots (chosen).
+LARGEST = {"angle": 400.0, "command": 105.0}
 
 
 class LikelyColumn(NamedTuple):
@@ -136,7 +132,7 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         return {}
     t = known["time"]
     apart = float(np.nanmedian(np.diff(t)))
-    width = max(int(EVERY / apart), 1) if apart > 0.0 else 1
+    width = max(int(SMOOTHED / apart), 1) if apart > 0.0 else 1
 
     def rate(values: np.ndarray) -> np.ndarray:
         half = (width + 1) // 2
