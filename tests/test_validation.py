@@ -22,7 +22,7 @@ from diagnosis.acceptance.budget import (
     read_learned,
     sources_of,
 )
-from diagnosis.acceptance.criterion import Criterion
+from diagnosis.acceptance.criterion import Criterion, InputStd
 from diagnosis.acceptance.judged_criterion import (
     JudgedErrors,
     Judgement,
@@ -232,6 +232,28 @@ def test_the_initial_state_in_closed_form(comparison):
     seconds = p.smoothed.time[p.rows] - p.start
     assert np.sqrt(faster["position"]) == pytest.approx(5e-3 * seconds, rel=0.2)
     assert np.sqrt(faster["heading"]) == pytest.approx(2e-3 * seconds, rel=0.35)  # yaw is damped
+
+
+def test_the_measurement_is_as_uncertain_as_its_channels(comparison):
+    """Of the position both coordinates, whose errors are independent; of each velocity its own."""
+    p = Predictions(comparison.evaluations[0], 1.0)
+    s, std = p.smoothed, np.array([0.1, 0.2, 0.3])
+    p.smoothed = replace(s, noise=np.array([3e-3, 4e-3, 5e-3]), nu_std=np.tile(std, (s.time.size, 1)))
+    found = sources_of(p, None)["measurement"]
+    expected = {"position": 5e-3, "heading": 5e-3, **dict(zip("uvr", std, strict=True))}
+    for quantity, u in expected.items():
+        assert np.sqrt(found[quantity]) == pytest.approx(np.full(p.rows.size, u))
+
+
+def test_what_acts_from_north_and_from_east_adds_in_quadrature(predictions):
+    found = sources_of(predictions, None, InputStd(current=0.02))
+    north, east = (
+        difference(predictions.with_addition({name: 0.02}), predictions.motion) for name in ("V_n", "V_e")
+    )
+    squares = np.sum(north[:, :2] ** 2 + east[:, :2] ** 2, axis=1)
+    assert found["current"]["position"] == pytest.approx(squares, rel=1e-9)
+    assert squares.min() > 0.0
+    assert isinstance(found["wind"], str), "its uncertainty is not given"
 
 
 def test_parameters_and_process_noise(predictions):
