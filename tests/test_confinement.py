@@ -1,5 +1,6 @@
 """An FMU in a confined process finds nothing of the user's, and the process says what confines it."""
 
+import math
 import os
 import re
 import signal
@@ -8,6 +9,7 @@ import sys
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.events import once_there
 from support.foreign import build_lag, needs_compiler
@@ -16,6 +18,7 @@ from support.spy import build_spy, found
 
 from cosim import InputError, SimulationError
 from cosim.fmu import ConfinedFmu, DoubleMemory, FmuModel, Port
+from cosim.fmu.isolation.channel import FeedbackTerm
 from cosim.fmu.isolation.confinement import needed_folders
 from cosim.fmu.isolation.worker_process import LONGEST_PRINTED, MOST_PRINTED, cleaned
 
@@ -118,6 +121,39 @@ def test_numbers_are_those_of_the_same_process(tmp_path):
         assert stepped(confined, 3) == pytest.approx([0.1, 0.19, 0.271], rel=1e-15)
     finally:
         confined.close()
+
+
+FED_THROUGH = f"""{GAIN}
+self.exit_initialization_mode = lambda: setattr(self, "y", 10.0 * self.x)
+"""
+TERMS = {
+    "none": ([], lambda y, before: 0.0),
+    "constant": ([FeedbackTerm(0, 0, 0, False, 0.5)], lambda y, before: 0.5),
+    "linear": ([FeedbackTerm(0, 0, 1, False, -2.0)], lambda y, before: -2.0 * y),
+    "quadratic": ([FeedbackTerm(0, 0, 2, False, -0.1)], lambda y, before: -0.1 * y * abs(y)),
+    "rate": ([FeedbackTerm(0, 0, 1, True, -0.3)], lambda y, before: -0.3 * (y - before) / 0.1),
+    "turned": ([FeedbackTerm(0, 0, 1, False, 2.0, 3.0, 0.4)], lambda y, before: 2.0 * math.cos(3 * y + 0.4)),
+}
+
+
+@pytest.mark.parametrize("kind", TERMS)
+def test_a_whole_run_adds_to_its_inputs_what_follows_from_its_outputs(plain_fmu, kind):
+    """The first output follows from the first input; each next one from the input and what is added to it."""
+    terms, added = TERMS[kind]
+    confined = opened(plain_fmu("Fed", FED_THROUGH, "self.y += h * self.x\nreturn True"))
+    inputs, h = [-1.0, 0.5, 2.0, 0.0], 0.1
+    try:
+        known, instance = confined.model.variables, confined.instance()
+        instance.bind([Port(known["x"], 0)], [Port(known["y"], 1)], DoubleMemory(2), h)
+        told = np.frombuffer(instance.whole_run({}, np.array(inputs).tobytes(), len(inputs), h, terms))
+    finally:
+        confined.close()
+    outputs, before = [10.0 * inputs[0]], 10.0 * inputs[0]
+    for x in inputs:
+        y = outputs[-1]
+        outputs.append(y + h * (x + added(y, before)))
+        before = y
+    assert told == pytest.approx(outputs, rel=1e-12)
 
 
 def test_an_instance_knows_nothing_of_another_one(tmp_path):
