@@ -132,7 +132,10 @@ TERMS = {
     "linear": ([FeedbackTerm(0, 0, 1, False, -2.0)], lambda y, before: -2.0 * y),
     "quadratic": ([FeedbackTerm(0, 0, 2, False, -0.1)], lambda y, before: -0.1 * y * abs(y)),
     "rate": ([FeedbackTerm(0, 0, 1, True, -0.3)], lambda y, before: -0.3 * (y - before) / 0.1),
-    "turned": ([FeedbackTerm(0, 0, 1, False, 2.0, 3.0, 0.4)], lambda y, before: 2.0 * math.cos(3 * y + 0.4)),
+    "turned": (
+        [FeedbackTerm(0, 0, 1, False, 2.0, 3.0, 0.4)],
+        lambda y, before: 2.0 * math.cos(3 * y + 0.4),
+    ),
 }
 
 

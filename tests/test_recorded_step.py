@@ -3,12 +3,16 @@
 In machine code it gives those of libm, of which a sine or an exponential of numpy may differ in the last.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support.measured import sail
 
 from diagnosis import Model
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.prediction import stacked
+from diagnosis.predictors.thrust import drive_of
 from diagnosis.predictors.traced import compiled_law, recorded_law, recorded_step
 from diagnosis.predictors.traced.recorded_step import Inputs, Ready, step
 from diagnosis.predictors.traced.recorded_step import recorded_step as recorded
@@ -115,6 +119,19 @@ def test_models_of_one_structure_share_the_recording():
     s, i, b = at(model.plus({"V_n": 0.1}), rng)  # flows: another structure
     recorded(b, i, single=False)
     assert recorded_law.in_python.cache_info().misses == 2
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_thrusters_of_a_run_have_the_same_structure_each_time(apart):
+    """By the effects' identity a recording is known again; without it each prediction would record anew."""
+    model = SHIPS["cse1"]
+    run = sail(10.0, h=0.1)[0]
+    if apart:
+        layout = next(one for one in model.ship.layouts if one.apart)
+        run = replace(run, commands=np.zeros((run.time.size, len(layout.commands))))
+    one, other = (drive_of(run, m) for m in (model, model.plus({"delta_X_u": -1.0})))
+    assert one.effects is other.effects
+    assert one.effects.layout.apart is apart
 
 
 def test_what_cannot_be_recorded_is_called(monkeypatch):

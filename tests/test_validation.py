@@ -248,7 +248,8 @@ def test_the_measurement_is_as_uncertain_as_its_channels(comparison):
 def test_what_acts_from_north_and_from_east_adds_in_quadrature(predictions):
     found = sources_of(predictions, None, InputStd(current=0.02))
     north, east = (
-        difference(predictions.with_addition({name: 0.02}), predictions.motion) for name in ("V_n", "V_e")
+        difference(predictions.with_addition({name: 0.02}), predictions.motion)
+        for name in ("V_n", "V_e")
     )
     squares = np.sum(north[:, :2] ** 2 + east[:, :2] ** 2, axis=1)
     assert found["current"]["position"] == pytest.approx(squares, rel=1e-9)

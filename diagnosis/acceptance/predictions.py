@@ -86,7 +86,7 @@ class Predictions:
         return self._at_end(self.predictor.residuals(self.windows.finer(parts), self._learned)[-1])
 
     def with_addition(self, changes: Mapping[str, float]) -> np.ndarray:
-        """The predicted motion (w, 6) with additions to parameters of effects, also of a foreign model."""
+        """The predicted motion (w, 6) with additions to parameters of effects."""
         added = [m.plus(changes) for m in self._learned or [self.predictor.model]]
         return self._at_end(self.predictor.residuals(self.windows, added)[-1])
 

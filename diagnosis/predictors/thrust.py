@@ -12,7 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from fmus.actuators.response import PreparedThrusters, at_rest, command_response, force_response
+from fmus.actuators.response import (
+    PreparedThrusters,
+    at_rest,
+    command_response,
+    force_response,
+    thruster_effects,
+)
 from fmus.effects import Memory
 from fmus.vessel.vessel import PreparedVessel, State, water_velocity
 
@@ -31,8 +37,8 @@ FORGOTTEN = 60.0
 
 def drive_of(run: Run, model: Model) -> PreparedThrusters:
     """The thrusters of a model, in the layout of a run's commands."""
-    drive, layout = model.drive, model.ship.layout_of(run.commands)
-    return drive._replace(effects=drive.effects._replace(layout=layout))
+    layout = model.ship.layout_of(run.commands)
+    return model.drive._replace(effects=thruster_effects(model.ship.effects, layout))
 
 
 def commanded_shares(run: Run, model: Model) -> np.ndarray:
