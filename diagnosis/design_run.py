@@ -141,7 +141,9 @@ def _of_fmu(
 
 
 def _diagnosis(path: Path) -> dict[str, Any]:
-    content = json_content(path, "a diagnosis (give the result folder of cybership learn)")
+    if not path.is_file():
+        raise InputError(f"no diagnosis in '{path.parent}': give the result folder of cybership learn")
+    content = json_content(path, "a diagnosis")
     if not isinstance(content, dict) or not {"effects", "possibilities", "verdict"} <= content.keys():
         raise InputError(f"'{path}' is not the result of cybership learn")
     return content

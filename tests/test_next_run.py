@@ -521,6 +521,16 @@ def test_bad_input_is_one_message(folder, task, options, words):
     assert not (folder / "plan").exists()
 
 
+def test_a_folder_without_a_diagnosis_is_named(tmp_path):
+    (tmp_path / "log.json").write_text("{}")
+    for given in (tmp_path, tmp_path / "log.json"):
+        done = command(design_run.main, given, "--out", tmp_path / "plan")
+        assert done.returncode == 2
+        assert done.stderr.endswith(
+            f"no diagnosis in '{given}': give the result folder of cybership learn\n"
+        )
+
+
 def test_parameters_of_an_fmu_without_its_runs_are_refused(tmp_path):
     told = {"verdict": "ambiguous", "parameters": [], "effects": [], "possibilities": []}
     (tmp_path / "diagnosis.json").write_text(json.dumps(told))
