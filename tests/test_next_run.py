@@ -592,12 +592,6 @@ def test_rivals_of_two_effects_are_pairs_of_candidates(question):
     assert k.weights.sum() == pytest.approx(1.0)
 
 
-def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
-    done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
-    assert done.returncode == 2
-    assert "diagnosis.json" in done.stderr
-
-
 def test_basins_by_size_and_by_file(tmp_path):
     assert limits_of(4.0, "6x4").size == (6.0, 4.0)
     assert limits_of(4.0, (6, 4)).size == (6.0, 4.0)

@@ -227,7 +227,7 @@ def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "fate, told",
+    ("fate", "told"),
     [
         ({}, "u reads 5 % too little"),
         ({"repaired": False}, "u reads 5 % too little (not repaired)"),

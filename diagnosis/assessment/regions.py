@@ -145,8 +145,8 @@ class Region:
         unit = UNITS[self.axis]
         return (
             f"{NAMES[self.axis]}: the error is largest {self.phrase}: {number(self.rms, 2)} {unit}, "
-            f"compared with {number(self.elsewhere, 2)} {unit} elsewhere, for {100.0 * self.share:.0f} % "
-            "of the time."
+            f"compared with {number(self.elsewhere, 2)} {unit} elsewhere, "
+            f"for {100.0 * self.share:.0f} % of the time."
         )
 
 

@@ -272,7 +272,8 @@ def remainder_sentence(
 def _amount(axis: str, r: AxisRemainder) -> str:
     share = 100.0 * np.sqrt(r.share)
     of_first = f", {share:.2g} % of the initial model error" if share < 99.5 else ""
-    return f"{NAMES[axis]}: {number(r.rms, 2)} {UNITS[axis]} (uncertainty {number(r.uncertainty, 1)}{of_first})"
+    size = f"{NAMES[axis]}: {number(r.rms, 2)} {UNITS[axis]}"
+    return f"{size} (uncertainty {number(r.uncertainty, 1)}{of_first})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:

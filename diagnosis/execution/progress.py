@@ -85,9 +85,9 @@ def progress(console: Console) -> Iterator[ProgressLine]:
     time_left = RemainingTime()
     columns = (
         SpinnerColumn(),
+        TimeElapsedColumn(),  # first, so that no long name of a run cuts it off
         TextColumn("{task.description}", markup=False),
         _Bar(time_left),
-        TimeElapsedColumn(),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         yield ProgressLine(console, bar, time_left)
