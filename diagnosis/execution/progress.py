@@ -17,7 +17,7 @@ from .remaining_time import RemainingTime
 Advance = Callable[[str], None]
 # s between two lines where there is no terminal; chosen: nobody thinks that it hangs.
 EVERY = 30.0
-BESIDE = 16  # 1, characters of a line for spinner, elapsed time and a short bar
+MARGIN = 16  # 1, characters of a line for spinner, elapsed time and a short bar
 
 
 def silent(what: str) -> None:
@@ -86,7 +86,7 @@ def progress(console: Console) -> Iterator[ProgressLine]:
     """A progress callback that is shown until the end."""
     time_left = RemainingTime()
     # Long names of runs leave room for the time and the bar.
-    described = Column(no_wrap=True, overflow="ellipsis", max_width=max(console.width - BESIDE, 1))
+    described = Column(no_wrap=True, overflow="ellipsis", max_width=max(console.width - MARGIN, 1))
     columns = (
         SpinnerColumn(),
         TimeElapsedColumn(),
