@@ -196,8 +196,8 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--basin",
         metavar="NORTHxEAST|FILE",
-        help="length to the north and to the east [m], as 6x4, about the middle of the measured tracks, "
-        "or a JSON file with the walls (default: what the runs have used, and a ship's length more)",
+        help="length to the north and to the east [m] about the middle of the measured tracks, or a "
+        "JSON file with the walls (default: what the runs have used, and a ship's length more)",
     )
     made.add_argument(
         "--runs",
