@@ -1,11 +1,12 @@
-"""The two ways in which a run can go wrong, hints for messages, and keys that occur twice."""
+"""The two ways in which a run can go wrong, parts of messages, and keys that occur twice."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from cybership.message_text import PrintableError, most_alike, nearest, quoted
 
-__all__ = ["InputError", "SimulationError", "most_alike", "nearest", "unique_keys"]
+__all__ = ["InputError", "SimulationError", "most_alike", "nearest", "not_written", "unique_keys"]
 
 
 class InputError(PrintableError):
@@ -14,6 +15,13 @@ class InputError(PrintableError):
 
 class SimulationError(PrintableError):
     """The simulation itself failed; what was logged is kept. Exit code 3."""
+
+
+def not_written(folder: Path, error: OSError) -> str:
+    """The message about a result folder that cannot be written to."""
+    if folder.is_file():
+        return f"cannot write to '{folder}': it is a file, not a folder"
+    return f"cannot write to '{folder}': {error.strerror or error}"
 
 
 def unique_keys(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:

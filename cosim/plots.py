@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .command import BAD_INPUT, command_parser, complain, printable, run_command
-from .errors import InputError
+from .errors import InputError, not_written
 from .results.drawing import draw
 from .results.log import read_log
 from .results.picture_files import FORMATS, PictureOptions
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(error)
         return BAD_INPUT
     except OSError as error:
-        complain(f"cannot write to '{options.out}': {error.strerror}")
+        complain(not_written(options.out, error))
         return BAD_INPUT
     for path in drawn:
         print(printable(str(path)))

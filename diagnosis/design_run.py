@@ -141,7 +141,9 @@ def _of_fmu(
 
 
 def _diagnosis(path: Path) -> dict[str, Any]:
-    content = json_content(path, "a diagnosis (give the result folder of cybership learn)")
+    if not path.is_file():
+        raise InputError(f"no diagnosis in '{path.parent}': give the result folder of cybership learn")
+    content = json_content(path, "a diagnosis")
     if not isinstance(content, dict) or not {"effects", "possibilities", "verdict"} <= content.keys():
         raise InputError(f"'{path}' is not the result of cybership learn")
     return content
@@ -193,7 +195,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument(
         "--basin",
-        metavar="WxH|FILE",
+        metavar="NORTHxEAST|FILE",
         help="length to the north and to the east [m] about the middle of the measured tracks, or a "
         "JSON file with the walls (default: what the runs have used, and a ship's length more)",
     )

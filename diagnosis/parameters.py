@@ -64,10 +64,12 @@ def parameters(options: argparse.Namespace, advance: Advance) -> Done:
         task.close()
     shown += map(printable, task.notes)
     if not chosen:
-        return Done(0, [*shown, "The runs identify none of them; no file is written."])
+        return Done(0, [*shown, "The runs identify no parameter; no file is written."])
     options.write.parent.mkdir(parents=True, exist_ok=True)
     write_parameters(options.write, chosen)
-    return Done(0, [*shown, printable(f"'{options.write}' has {len(chosen)} of them: check the priors")])
+    return Done(
+        0, [*shown, printable(f"'{options.write}' has {len(chosen)} parameters: check their priors")]
+    )
 
 
 def _of_all(every: Sequence["CalibratedParameter"]) -> Table:

@@ -42,6 +42,8 @@ def columns(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .predictors import ship_with  # only now: it takes a second to import
 
+    if len(options.file) == 1 and (folder := options.file[0]).is_dir():
+        raise InputError(f"'{folder}' is a folder; give files of it, as '{folder / '*.csv'}'")
     craft = ship_with((), options.ship)
     if len(options.file) == 1:
         return _of_file(options, craft, advance)
@@ -62,7 +64,7 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
         shown = _seen(path, found.run, craft, options.anyway, advance)
     if found.unused:
         shown.append(f"not used: {', '.join(found.unused)}")
-    shown = list(map(printable, [*shown, *_blanks([found])]))
+    shown = list(map(printable, [*shown, *_blanks([found], options)]))
     if not found.needed:
         return Done(0, [*shown, printable(f"no side-car is needed for '{path}'")])
     if found.layout == stated_layout(path):
@@ -109,7 +111,7 @@ def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> 
     shown += _tabulated(proposals, runs, craft, options.anyway, advance)
     if unused := dict.fromkeys(name for found in proposals.values() for name in found.unused):
         shown.append(printable(f"not used: {', '.join(unused)}"))
-    shown += map(printable, _blanks(proposals.values()))
+    shown += map(printable, _blanks(proposals.values(), options))
     if common != Layout():
         shown += _stated(target, as_json(common), options.write)
     shown += _own_entries(others)
@@ -166,8 +168,10 @@ def _seconds(s: "Smoothed") -> float:
     return float(s.track.run.time[-1] - s.track.run.time[0])
 
 
-def _blanks(proposals: Iterable["Proposal"]) -> Iterator[str]:
-    """For each blank name its likely columns, by the measurement that shows the most."""
+def _blanks(proposals: Iterable["Proposal"], options: argparse.Namespace) -> Iterator[str]:
+    """For each blank name its likely columns, by the measurement that shows most; what to do then."""
+    from .runs.columns.columns import TAU
+
     found: dict[str, Sequence[LikelyColumn]] = {}
     for each in proposals:
         for signal, likely in each.likely.items():
@@ -177,6 +181,13 @@ def _blanks(proposals: Iterable["Proposal"]) -> Iterator[str]:
     for signal, likely in found.items():
         each = "; ".join(f"'{c.name}' ({', '.join(c.reasons)})" for c in likely)
         yield f"blank: {signal}; likely columns: {each or 'none'}"
+    if options.ship is None and found.keys() >= set(TAU):
+        yield (
+            "if the log has commands of actuators, such as shaft speed and rudder angle, state the "
+            "ship by --ship NAME|FILE.toml; its commands are then looked for"
+        )
+    if found:
+        yield "put the columns' names into the blanks of the side-car, and run this command again"
 
 
 def _stated(target: Path, content: Mapping[str, Any], write: bool) -> list[RenderableType]:

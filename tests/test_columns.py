@@ -82,6 +82,91 @@ def test_words_of_a_name_and_its_unit_tell_a_signal(name: str, unit: str, signal
     assert meaning_of_words(name, unit, quantities(TANKER)) == signal
 
 
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("Mz (Nm)", {"name": "Mz (Nm)"}),
+        ("yaw_moment_Nm", "yaw_moment_Nm"),
+        ("Mz [N·m]", {"name": "Mz [N·m]"}),
+        ("Mz [kNm]", {"name": "Mz [kNm]", "unit": "kN.m"}),
+    ],
+)
+def test_units_of_a_moment_are_read_as_they_are_usually_written(
+    name: str, column: object, tmp_path: Path
+) -> None:
+    table = pd.DataFrame(
+        {"time": np.arange(0.0, 60.0, 0.1)} | dict.fromkeys(("x", "y", "psi", "tau_X", "tau_Y"), 0.0)
+    )
+    table = table.assign(x=0.1 * table.time, tau_X=np.sin(table.time), **{name: np.cos(table.time)})
+    found = propose(written(tmp_path / "a.csv", table))
+    told = found.needed["columns"]["tau_N"]
+    assert told == (column["name"] if isinstance(column, dict) and len(column) == 1 else column)
+    assert found.unused == []
+    assert found.run is not None
+    largest = 1e3 if "k" in name else 1.0
+    assert np.abs(found.run.tau_cmd[:, 2]).max() == pytest.approx(largest)
+    side_car = {"columns": {"tau_N": {"name": name, "unit": "Nm"}}}
+    (tmp_path / "a.csv.json").write_text(json.dumps(side_car))
+    assert np.abs(read(tmp_path / "a.csv").tau_cmd[:, 2]).max() == pytest.approx(1.0)
+
+
+def test_a_unit_that_is_not_known_has_a_line_with_its_factor(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", zigzag(x="x [fathom]"))
+    with pytest.raises(InputError, match="with its factor to m ") as told:
+        propose(path, TANKER)
+    line = str(told.value).partition("put ")[2].partition(" with its factor to m ")[0]
+    columns = json.loads(line)["columns"]
+    columns["x"]["factor"] = 1.8288
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": columns}))
+    found = propose(path, TANKER)
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.pose[:, 0], 1.8288 * zigzag()[NAMES["x"]])
+
+
+@pytest.mark.parametrize(("name", "blank"), [("North (mm)", False), ("Nord (mm)", True)])
+@pytest.mark.parametrize(
+    ("decimal", "sep", "cell"), [(".", ",", "{:,.1f}"), (",", ";", "{:,.1f}"), (".", ",", "{:,.0f}")]
+)
+def test_separators_of_thousands_are_named(
+    name: str, blank: bool, decimal: str, sep: str, cell: str, tmp_path: Path
+) -> None:
+    marks = str.maketrans(",.", ".,") if decimal == "," else {}
+    table = zigzag(x=name)
+    table[name] = [cell.format(1000.0 * x + 5000.0).translate(marks) for x in table[name]]
+    table.to_csv(tmp_path / "a.csv", index=False, sep=sep, decimal=decimal)
+    with pytest.raises(InputError, match="separators of thousands"):
+        propose(tmp_path / "a.csv", TANKER)
+
+
+def test_a_cell_that_is_a_mark_must_be_empty(tmp_path: Path) -> None:
+    table = zigzag().astype("object")
+    table.loc[5, NAMES["x"]] = "-"
+    with pytest.raises(
+        InputError, match="'-' is not a number; a cell without a measurement must be empty"
+    ):
+        propose(written(tmp_path / "a.csv", table), TANKER)
+
+
+def test_a_log_with_commands_of_actuators_needs_its_ship(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", zigzag())
+    done = command(propose_columns.main, path)
+    assert "state the ship by --ship NAME|FILE.toml" in " ".join(done.stdout.split())
+    assert "put the columns' names into the blanks" in " ".join(done.stdout.split())
+    done = command(propose_columns.main, path, "--ship", "kvlcc2")
+    assert "--ship" not in done.stdout
+    assert "blanks" not in done.stdout
+
+
+def test_a_folder_is_not_a_measurement(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", zigzag())
+    for folder in (tmp_path, Path()):
+        done = command(propose_columns.main, folder)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert f"'{folder}' is a folder; give files of it" in done.stderr
+    with pytest.raises(InputError, match=f"a measurement is a file, as '{path}'"):
+        read(tmp_path)
+
+
 def test_what_is_known_is_proposed_and_read(tmp_path: Path) -> None:
     found = propose(written(tmp_path / "a.csv", zigzag()), TANKER)
     assert found.needed == {"columns": NAMES}

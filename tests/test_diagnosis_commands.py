@@ -269,7 +269,11 @@ UGLY = {
     "held out what was learned": (["a.csv", "--test", "copy.csv"], "the same measurement as"),
     "a model that is none": (["a.csv", "--model", "a.csv"], "cannot be read as a parameter set"),
     "an unknown parameter": (["a.csv", "--model", "wrong.ssv"], "delta_X_v"),
-    "a folder that is a file": (["a.csv", "--out", "a.csv"], "cannot write to"),
+    "a folder that is a file": (["a.csv", "--out", "a.csv"], "it is a file, not a folder"),
+    "a horizon beyond the run": (
+        ["a.csv", "--horizon", "1000"],
+        "longer than every run; the longest has",
+    ),
     "effects that are none": (["a.csv", "--effects", "none.py"], "registers no effect"),
 }
 

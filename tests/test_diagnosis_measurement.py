@@ -239,7 +239,7 @@ def test_wrong_layout_is_refused_with_one_line(tmp_path, layout, message):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("mine.csv", b"", "cannot be read as a table"),
+        ("mine.csv", b"", "mine.csv' is empty"),
         ("mine.csv", b"\xff\xfe\x00time", "cannot be read as a table"),
         ("mine.csv", b"time,x\n1,2\n1,2,3,4\n", "mine.csv' has no commands"),
         ("mine.parquet", b"no parquet", "cannot be read as a table"),

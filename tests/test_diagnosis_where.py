@@ -210,6 +210,8 @@ def test_a_region_in_words(covariate, low, high, phrase):
         == f"Yaw: the error is largest {phrase}: 0.31 N m, compared with 0.12 N m elsewhere, for 25 % of the time."
     )
     assert replace(region, run="b").phrase == f"in run b {phrase}"
+    large = replace(region, rms=52345.6, elsewhere=126.3)
+    assert "52346 N m, compared with 126 N m" in large.sentence
 
 
 def test_bins_are_eighths_of_the_windows_of_the_circle_or_fifteen_seconds():

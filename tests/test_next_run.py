@@ -521,6 +521,16 @@ def test_bad_input_is_one_message(folder, task, options, words):
     assert not (folder / "plan").exists()
 
 
+def test_a_folder_without_a_diagnosis_is_named(tmp_path):
+    (tmp_path / "log.json").write_text("{}")
+    for given in (tmp_path, tmp_path / "log.json"):
+        done = command(design_run.main, given, "--out", tmp_path / "plan")
+        assert done.returncode == 2
+        assert done.stderr.endswith(
+            f"no diagnosis in '{given}': give the result folder of cybership learn\n"
+        )
+
+
 def test_parameters_of_an_fmu_without_its_runs_are_refused(tmp_path):
     told = {"verdict": "ambiguous", "parameters": [], "effects": [], "possibilities": []}
     (tmp_path / "diagnosis.json").write_text(json.dumps(told))
@@ -580,12 +590,6 @@ def test_rivals_of_two_effects_are_pairs_of_candidates(question):
     expected = {(x, n) for x in ("X_|u|u", "X_uu") for n in ("N_r", "N_|r|r")}
     assert {h.ids for h in k.hypotheses} == expected
     assert k.weights.sum() == pytest.approx(1.0)
-
-
-def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
-    done = command(design_run.main, tmp_path, "--out", tmp_path / "plan")
-    assert done.returncode == 2
-    assert "diagnosis.json" in done.stderr
 
 
 def test_basins_by_size_and_by_file(tmp_path):

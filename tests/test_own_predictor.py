@@ -12,7 +12,8 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Model, PythonFunction, learn
-from diagnosis.predictors import ModelSource, open_model
+from diagnosis.predictors import ModelSource, black_box, open_model
+from diagnosis.predictors.black_box import commanded, commands_at
 from fmus.signals import Force
 from fmus.vessel import vessel
 
@@ -133,6 +134,20 @@ def test_a_function_that_is_none_is_refused_in_one_line(runs, tmp_path, content,
 def test_a_map_is_of_fmus_only(file):
     with pytest.raises(InputError, match="--map belongs to an FMU"):
         open_model(file, file)
+
+
+def test_commands_at_some_times_cost_what_these_times_cost(runs, monkeypatch):
+    run = runs[0].run
+    every, rows = commanded(run), np.array([0, 7, 40])
+    sizes = []
+    monkeypatch.setattr(
+        black_box.np, "hypot", lambda x, y: sizes.append(x.size) or np.sqrt(x * x + y * y)
+    )
+    found = commands_at(run, run.time[rows])
+    assert sizes == [rows.size]
+    assert found.keys() == every.keys()
+    for name, values in found.items():
+        np.testing.assert_allclose(values, every[name][rows], rtol=1e-12)
 
 
 def test_a_function_that_runs_away_has_infinite_errors(runs):

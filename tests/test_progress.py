@@ -196,3 +196,12 @@ def test_the_line_is_away_while_an_answer_is_printed():
         line("effect 1: the best candidates refined")
     assert text.getvalue()[shown:].startswith("the answer")
     assert "more" in text.getvalue()
+
+
+def test_the_elapsed_time_is_seen_next_to_a_long_name():
+    screen = StringIO()
+    console = Console(file=screen, force_terminal=True, width=60, color_system=None)
+    with progress(console) as advance:
+        advance(f"smoothing {'zigzag_31-Jul-2020_13_04_24, ' * 4}")
+        advance._bar.refresh()
+    assert "0:00:00 smoothing" in screen.getvalue()

@@ -42,6 +42,7 @@ cross_flow_length = { value = 2.0, rel_std = 0.0 }
 
 [wind]
 frontal_area = { value = 0.5, rel_std = 0.3 }
+lateral_area = 1.0
 
 [[actuators]]
 name = "port"
@@ -60,6 +61,8 @@ name = "stern"
 law = "force_table_sway"
 x = -0.8
 """
+FORCES = "\n".join(f"F_{k} = {k - 6}.0" for k in range(1, 12))
+TUG = re.sub('"(force_table_.*)"', rf'"\1"\n{FORCES}', TUG)
 MAP = {"outputs": {"x": "north"}, "disturbance_inputs": {"tau_X": "pull"}}
 SYSTEM_MAP = {"outputs": {"x": "north"}, "disturbance_inputs": ["pull"]}
 CRITERIA = {

@@ -35,6 +35,7 @@ from diagnosis.report.error_change import error_changes
 from diagnosis.report.pictures import tracks
 from diagnosis.report.pictures.chart import Text
 from diagnosis.report.reported_effect import ReportedCoefficient
+from diagnosis.runs.sensors.sensor_finding import Examined, SensorFinding
 from fmus.ship import ship
 from fmus.ships.naming import described_ship
 
@@ -223,6 +224,25 @@ def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
     assert "no missing effect" in text
     assert "None" not in text
     assert not re.search(r"\bnan\b", text, re.IGNORECASE)
+
+
+@pytest.mark.parametrize(
+    ("fate", "told"),
+    [
+        ({}, "u reads 5 % too little"),
+        ({"repaired": False}, "u reads 5 % too little (not repaired)"),
+        ({"repaired": False, "aside": ("u", "v")}, "(not repaired; u and v not used)"),
+    ],
+)
+def test_a_fault_of_a_channel_has_its_row(evaluations, tmp_path, fate, told):
+    fault = SensorFinding("u", "scale", 0.95, "1", (0.9, 1.0), 0.0, 9.0, "u reads 5 % too little")
+    first = evaluations[0]
+    examined = replace(
+        first.smoothed, sensors=Examined(first.weak_windows.run, (replace(fault, **fate),))
+    )
+    faulty = replace(first, weak_windows=replace(first.weak_windows, smoothed=examined))
+    page = write_report(tmp_path / "report.html", ReportData(compared([faulty]))).read_text("utf-8")
+    assert f"{told}</td>" in page
 
 
 def test_nothing_half_written_stays(evaluations, tmp_path, monkeypatch):

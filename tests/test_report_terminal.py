@@ -159,7 +159,7 @@ Finding 2: doubtful
 Possibly doubtful or other (60 % for doubtful): There is doubtful.
 X = doubtful
 confidence 60 %, explains 90 % of the squared error, unique contribution 25 %
-(no other effect explains it)
+(lost without this effect)
 Possibility: unlikely
 Possibly unlikely (20 % for unlikely): There is unlikely. However, something
 acts. It is not in the learned model.

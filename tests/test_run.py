@@ -84,6 +84,9 @@ def test_runs_are_laid_over_each_other(scenario, tmp_path):
     done = in_this_process(plots.main, tmp_path / "nowhere")
     assert done.returncode == 2
     assert "no log in" in done.stderr
+    (tmp_path / "file").write_text("")
+    done = in_this_process(metrics.main, tmp_path / "file")
+    assert f"'{tmp_path / 'file'}' is a file; a log is a folder" in done.stderr
 
 
 @pytest.mark.slow
@@ -165,7 +168,7 @@ def test_out_that_cannot_be_a_folder_is_refused(scenario, tmp_path):
     (tmp_path / "file").write_text("")
     done = command(scenario(), "--out", tmp_path / "file")
     assert done.returncode == 2
-    assert "cannot write to" in done.stderr
+    assert "file': it is a file, not a folder" in done.stderr
 
 
 def test_warning_goes_to_stderr(scenario, ellipse):

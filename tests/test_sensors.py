@@ -113,6 +113,23 @@ def test_sway_with_the_other_sign_is_no_place_of_the_antenna():
     assert closure(found.run, 30.0, 10.0).position < 0.02
 
 
+@pytest.mark.parametrize(("delay", "way"), [(0.5, "later"), (-0.5, "earlier")])
+def test_a_delay_that_is_found_in_steps_is_stated_as_it_is_repaired(delay, way):
+    run = made()
+    u, v, r = (np.interp(run.time - delay, run.time, run.measured[name]) for name in "uvr")
+    found = told(beside(run, u=u, v=v, r=r))
+    for channel, name in (("u", "u and v are"), ("r", "r is")):
+        value = abs(found[channel, "delay"].value)
+        assert value == pytest.approx(0.5, abs=0.05)
+        assert found[channel, "delay"].sentence == f"{name} {value:.3g} s {way} than the pose"
+
+
+def test_a_scale_is_stated_in_percent():
+    run = made()
+    found = told(beside(run, u=0.95 * run.measured["u"], v=0.95 * run.measured["v"]))
+    assert found["u", "scale"].sentence.startswith("u and v are 5.0 % too small")
+
+
 def swung(deviation=0.0):
     """A run all round the compass, which is off by heading as iron makes it."""
     run = made()
@@ -391,7 +408,7 @@ def test_the_command_writes_a_measurement_without_the_fault(tmp_path, capsys):
     told_beside = {"columns": {"r": {"name": "r", "noise": 0.002}}}
     (tmp_path / "a.csv.json").write_text(json.dumps(told_beside))
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 0
-    assert "r are 5.0% too large" in capsys.readouterr().out
+    assert "r is 5.0 % too large" in capsys.readouterr().out
     again = diagnosis.read(tmp_path / "b.csv")
     assert not told(again)
     assert again.noise == {"r": 0.002}

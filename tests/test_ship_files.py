@@ -47,12 +47,18 @@ name = "port"
 law = "fixed_propeller"
 y = -0.4
 n_max = 10.0
+n_min = -10.0
+k_ahead = 2.0
+k_astern = 2.0
 
 [[actuators]]
 name = "starboard"
 law = "fixed_propeller"
 y = 0.4
 n_max = 10.0
+n_min = -10.0
+k_ahead = 2.0
+k_astern = 2.0
 """
 
 
@@ -95,7 +101,8 @@ CHANGES = [
     ('product = "u"', 'product = "u^2"', "'u^2' is not a product of u, v, r, |u|, |v| and |r|"),
     ('product = "u"', 'product = "|u"', "'|u' is not a product"),
     ('product = "u"', 'product = ""', "'' is not a product"),
-    ('axis = "X"', 'axis = "Z"', "hull.terms[0].axis: "),
+    ('axis = "X"', 'axis = "Z"', "hull.terms[0].axis: Input should be 'X', 'Y' or 'N'; got 'Z'"),
+    ('name = "port"', 'name = "Port"', "actuators[0].name: needs small letters, digits and underscores, a letter first; got 'Port'"),
     ('axis = "X"', 'axes = "X"', "hull.terms[0].axes: unknown key; did you mean 'axis'?"),
     ("rel_std = 0.2 }", 'rel_std = 0.2 }, { axis = "X", product = "u", value = 1.0 }', "X_u occurs twice"),
     ("terms =", "termes =", "hull.termes: unknown key; did you mean 'terms'?"),
@@ -107,7 +114,7 @@ CHANGES = [
     ('name = "port"', 'name = "for"', "actuator 'for': a keyword of Python cannot be a name"),
     ("n_max = 10.0", "n_mx = 10.0", "actuator 'port': unknown key 'n_mx'; did you mean 'n_max'?"),
     ("n_max = 10.0", "n_max = -10.0", "n_max = -10 1/s is out of its range"),
-    ("n_max = 10.0", "n_min = 10.0", "n_min = 10 1/s is out of its range"),
+    ("n_min = -10.0", "n_min = 10.0", "n_min = 10 1/s is out of its range"),
     ("n_max = 10.0", "n_max = nan", "actuator 'port': n_max: Input should be a finite number"),
     ("n_max = 10.0", "n_max = [1]", "actuator 'port': n_max: Input should be a valid number"),
     ("n_max = 10.0", "n_max = {vlue = 1.0}", "n_max: vlue: unknown key; did you mean 'value'?"),
@@ -149,7 +156,15 @@ DOUBTS = [
     ("X_udot = -5.0", "Y_vdot = 5.0", 10, "Y_vdot = 5 kg is positive"),
     ("X_udot = -5.0", "N_rdot = 0.5", 10, "N_rdot = 0.5 kg.m2 is positive"),
     ("y = -0.4", "y = -40.0", 21, "actuator 'port' is at y = -40 m, outside of the outline, -0.5 to 0.5 m"),
-    ("y = 0.4", "y = 0.4\nx = -1.2", 28, "actuator 'starboard' is at x = -1.2 m, outside of the outline"),
+    ("y = 0.4", "y = 0.4\nx = -1.2", 31, "actuator 'starboard' is at x = -1.2 m, outside of the outline"),
+    (
+        "k_ahead = 2.0\n", "", 18,
+        "actuator 'port' does not state all of its numbers; assumed: k_ahead = 1 N.s2",
+    ),
+    (
+        "[hull]", "[wind]\nlateral_area = 2.0\n[hull]", 12,
+        "wind does not state all of its numbers; assumed: frontal_area = 1 m2",
+    ),
     ("value = 50.0", "value = 500.0", 8, "m = 500 kg is more than a box of length x beam x draft, 2 m x 1 m x 0.1 m"),
 ]  # fmt: skip
 # What a ship may have: damping that resists at all speeds with a coefficient of either sign, an outboard motor.
@@ -212,7 +227,9 @@ def test_one_line_says_what_is_wrong(old: str, new: str, says: str, tmp_path: Pa
     assert old in RIGHT
     text = RIGHT.replace(old, new, 1)
     if "given_force" in new:
-        text = text.replace("n_max = 10.0", "", 1)
+        text = text.replace(
+            "n_max = 10.0\nn_min = -10.0\nk_ahead = 2.0\nk_astern = 2.0\n", "F_X = 9.0\nF_Y = 9.0\n", 1
+        )
     done = command(main, "vessel", "--ship", written(tmp_path, text))
     assert done.returncode == 2
     assert says in done.stderr

@@ -25,7 +25,7 @@ from ..dispatch.job import Job, RunRow
 from ..dispatch.measured_run import Measured
 from ..dispatch.places import RunPlace, check_address, check_workers, place_for
 from ..dispatch.travelling_files import Files
-from ..errors import InputError, SimulationError
+from ..errors import InputError, SimulationError, not_written
 from ..files import update_json, write_roomy_json
 from ..interrupts import Held
 from ..process.run_state import CAMPAIGN, STATE
@@ -211,7 +211,7 @@ class _Work:
             write_roomy_json(self.folder / SUMMARY, self.told | self._state("running"))
             self._keep("running")
         except OSError as error:
-            raise InputError(self._not_written(error)) from None
+            raise InputError(not_written(self.folder, error)) from None
         STATE.write(CAMPAIGN, str(self.folder / SUMMARY))
         status, message = "failed", ""
         with ExitStack() as stack:
@@ -231,7 +231,7 @@ class _Work:
                 message = str(error)
                 raise
             except OSError as error:
-                message = self._not_written(error)
+                message = not_written(self.folder, error)
                 raise SimulationError(f"{message}; {self.ended} finished runs are kept") from None
             finally:
                 # Before the place closes, which may take seconds.
@@ -285,9 +285,6 @@ class _Work:
             "wall_s": time.time() - self.started,
         }
 
-    def _not_written(self, error: OSError) -> str:
-        return f"cannot write to '{self.folder}': {error.strerror or error}"
-
     def _missing(self) -> Iterator[Job]:
         """The runs that have not finished yet, each once."""
         for case in self.cases:
@@ -334,7 +331,7 @@ class _only_one:  # noqa: N801 - used as a function
         except Timeout:
             raise InputError(f"another campaign runs in '{folder}'") from None
         except OSError as error:
-            raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+            raise InputError(not_written(folder, error)) from None
 
     def __enter__(self) -> None:
         """Held since it was made."""

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from cybership.scratch_folder import atomic_write
 
 from ..dispatch.job import RunRow
-from ..errors import InputError
+from ..errors import InputError, not_written
 from ..files import write_all
 from ..results.performance import METRICS
 from ..trials.measures import EVERY
@@ -70,7 +70,7 @@ class Journal:
                 write_all(self._file, b"\n")
             self._agreed = self._file.tell()
         except OSError as error:
-            raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+            raise InputError(not_written(folder, error)) from None
 
     def _remember(self, line: bytes) -> None:
         try:

@@ -85,7 +85,8 @@ class FmuModel:
         self.path = path
         if not os.path.isfile(path):  # Path.is_file raises for names that are too long
             near = (p.name for p in path.parent.glob("*.fmu"))
-            raise InputError(f"no such FMU: '{path}'{nearest(path.name, near)}")
+            hint = nearest(path.name, near) or "; 'cybership build NAME --out DIR' writes one"
+            raise InputError(f"no such FMU: '{path}'{hint}")
         entries = {entry.filename for entry in archive_check.check_archive(path)}
         if DESCRIPTION not in entries:
             raise InputError(f"'{path}' is not an FMU: it has no {DESCRIPTION}")

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, nearest
+from ..errors import InputError, nearest, not_written
 from ..files import update_json, write_json
 from ..results import log as logs
 from ..results import performance
@@ -105,10 +105,6 @@ def writing(result: Result) -> Iterator[None]:
     except OSError as error:
         result.status = "failed"
         result.message = result.message or not_written(result.folder, error)
-
-
-def not_written(folder: Path, error: OSError) -> str:
-    return f"cannot write to '{folder}': {error.strerror}"
 
 
 def interrupted_late(result: Result) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from cybership.scratch_folder import sweep
 
 from ..compiled.library import prepare_library
-from ..errors import InputError, SimulationError
+from ..errors import InputError, SimulationError, not_written
 from ..files import update_json, write_json, write_roomy_json
 from ..process.run_state import LOGGING, STATE, Owner
 from ..results import log as logs
@@ -23,7 +23,7 @@ from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
 from ..system.system import System
 from .algorithm import Master
-from .ending import Result, finish, interrupted_late, not_written, writing
+from .ending import Result, finish, interrupted_late, writing
 from .loop_surroundings import interruptible, quiet_collector
 from .loops.chosen_loop import choose_loop, run_loop
 from .real_time import RealTimePace
@@ -178,7 +178,7 @@ def _clear(folder: Path, moved: str, show: Callable[[str], None]) -> None:
             show(f"note: replaces the earlier run in '{folder}'")
         clear_results(folder)
     except OSError as error:
-        raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+        raise InputError(not_written(folder, error)) from None
     if moved:
         show(moved)
 
@@ -199,7 +199,7 @@ def _record(
         write_roomy_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
         recorder = Recorder(system, master, folder, pictures=pictures)
     except OSError as error:
-        raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+        raise InputError(not_written(folder, error)) from None
     STATE.numbers[LOGGING] = 1
     steps = choose_loop(master, recorder.pending, realtime is not None)
     result.loop, result.loop_reason = steps.loop, steps.reason

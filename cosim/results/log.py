@@ -256,6 +256,8 @@ def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[s
                 table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2)
     except FileNotFoundError:
         raise InputError(f"no log in '{folder}': {CSV} is missing") from None
+    except NotADirectoryError:
+        raise InputError(f"'{folder}' is a file; a log is a folder, as results/ellipse") from None
     except (OSError, ValueError, UnicodeDecodeError, StopIteration) as error:
         raise InputError(f"'{path}' cannot be read as a log: {error}") from error
     table = table.reshape(-1, len(wanted))

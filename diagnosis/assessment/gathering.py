@@ -48,8 +48,8 @@ def gather(
         For each run its windows of the weak form; names are unique.
 
     Raises:
-        InputError: no positive horizon, or a run that cannot be used, is given twice by whatever name,
-            or seems to be misread.
+        InputError: a horizon that is not positive or longer than every run; or a run that cannot be
+            used, is given twice by whatever name, or seems to be misread.
     """
     if not paths:
         raise InputError("there is no run to read")
@@ -61,6 +61,11 @@ def gather(
     runs = read_each(paths, craft)
     advance(f"smoothing {', '.join(run.name for run in runs)}")
     smoothed = for_each(lambda run: motion(prepare(run, craft, anyway)), runs, (), meanwhile)
+    longest = max(float(np.ptp(s.track.run.time)) for s in smoothed)
+    if horizon is not None and horizon > longest:
+        raise InputError(
+            f"the horizon, {horizon:g} s, is longer than every run; the longest has {longest:.4g} s"
+        )
     return usable(smoothed, model, anyway, horizon)
 
 

@@ -19,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import stdtr
 
+from fmus.effects.text import number
+
 from ..execution.short_text import ShortRepr
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import NOISE_TOLERANCE
@@ -142,9 +144,9 @@ class Region:
     def sentence(self) -> str:
         unit = UNITS[self.axis]
         return (
-            f"{NAMES[self.axis]}: the error is largest {self.phrase}: {self.rms:.2g} {unit}, "
-            f"compared with {self.elsewhere:.2g} {unit} elsewhere, for {100.0 * self.share:.0f} % "
-            "of the time."
+            f"{NAMES[self.axis]}: the error is largest {self.phrase}: {number(self.rms, 2)} {unit}, "
+            f"compared with {number(self.elsewhere, 2)} {unit} elsewhere, "
+            f"for {100.0 * self.share:.0f} % of the time."
         )
 
 
@@ -182,7 +184,7 @@ def find_regions(
         designs = [_Design.of(axis, c, s, n, cluster, len(data) > 1) for c in covariates]
         profiles += [d.profile for d in designs]
         rms, uncertainty = np.sqrt(s.mean()), np.sqrt(n.mean())
-        measured = f"{rms:.2g} {UNITS[axis]} (uncertainty {uncertainty:.1g})"
+        measured = f"{number(rms, 2)} {UNITS[axis]} (uncertainty {number(uncertainty, 1)})"
         found: list[Region] = []
         if _exceeds_noise(s, n, cluster):
             clearest = filter(None, (d.clearest_region() for d in designs))

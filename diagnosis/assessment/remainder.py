@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from fmus.effects.text import number
 from fmus.scale import REFERENCE, Scale
 
 from ..predictors import Model, WeakWindows, omega
@@ -271,7 +272,8 @@ def remainder_sentence(
 def _amount(axis: str, r: AxisRemainder) -> str:
     share = 100.0 * np.sqrt(r.share)
     of_first = f", {share:.2g} % of the initial model error" if share < 99.5 else ""
-    return f"{NAMES[axis]}: {r.rms:.2g} {UNITS[axis]} (uncertainty {r.uncertainty:.1g}{of_first})"
+    size = f"{NAMES[axis]}: {number(r.rms, 2)} {UNITS[axis]}"
+    return f"{size} (uncertainty {number(r.uncertainty, 1)}{of_first})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
 from rich.progress_bar import ProgressBar
+from rich.table import Column
 from rich.text import Text
 
 from cosim.interrupts import raise_if_interrupted
@@ -16,6 +17,7 @@ from .remaining_time import RemainingTime
 Advance = Callable[[str], None]
 # s between two lines where there is no terminal; chosen: nobody thinks that it hangs.
 EVERY = 30.0
+MARGIN = 16  # 1, characters of a line for spinner, elapsed time and a short bar
 
 
 def silent(what: str) -> None:
@@ -83,11 +85,13 @@ def remaining(time_left: RemainingTime) -> str:
 def progress(console: Console) -> Iterator[ProgressLine]:
     """A progress callback that is shown until the end."""
     time_left = RemainingTime()
+    # Long names of runs leave room for the time and the bar.
+    described = Column(no_wrap=True, overflow="ellipsis", max_width=max(console.width - MARGIN, 1))
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        _Bar(time_left),
         TimeElapsedColumn(),
+        TextColumn("{task.description}", markup=False, table_column=described),
+        _Bar(time_left),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         yield ProgressLine(console, bar, time_left)

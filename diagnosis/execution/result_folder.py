@@ -11,6 +11,7 @@ from pathlib import Path
 
 from cosim import InputError
 from cosim.command import complain
+from cosim.errors import not_written
 from cosim.interrupts import Held
 from cosim.process import STATE
 from cybership.scratch_folder import Scratch, sweep
@@ -44,7 +45,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
                 scratch = _scratch(out)
                 STATE.unfinished(*(folder.absolute() for folder in (scratch.outer, *made)))
             except OSError as error:
-                raise InputError(f"cannot write to '{out}': {error.strerror or error}") from None
+                raise InputError(not_written(out, error)) from None
             interrupts.allow()
             yield scratch.path
             interrupts.hold()

@@ -213,28 +213,22 @@ def proposed(model: FmuModel, mapped: Collection[str]) -> tuple[list[CalibratedP
     """The parameters of an FMU with a prior by their kind.
 
     Returns:
-        The parameters, and a sentence for each that has no scale, which is left out.
+        The parameters, and a sentence of those that have no scale and are left out, if there are any.
     """
     every = [
         v
         for v in model.variables.values()
         if v.causality == "parameter" and can_be_calibrated(v) and v.name not in mapped
     ]
-    found, left_out = [], []
-    for v in every:
-        try:
-            found.append(_with_prior(v))
-        except ValueError as error:
-            left_out.append(f"{v.name} is left out: {error}")
-    return found, left_out
+    priors = {v.name: _with_prior(v) for v in every}
+    found = [prior for prior in priors.values() if prior is not None]
+    names = [name for name, prior in priors.items() if prior is None]
+    reason = "a value of 0 without a range has no scale; give 'std' to calibrate one"
+    return found, [f"left out: {', '.join(names)}; {reason}"] if names else []
 
 
-def _with_prior(v: FmuVariable) -> CalibratedParameter:
-    """A parameter with the prior of its kind.
-
-    Raises:
-        ValueError: its value is no scale and it has no range.
-    """
+def _with_prior(v: FmuVariable) -> CalibratedParameter | None:
+    """A parameter with the prior of its kind; None: its value is no scale and it has no range."""
     value, unit = float(v.start or 0.0), unit_of(v)
     kind = kind_of(v.unit)
     positive = value > 0.0 and (kind.positive or (v.min is not None and v.min >= 0.0))
@@ -244,7 +238,7 @@ def _with_prior(v: FmuVariable) -> CalibratedParameter:
         # Chosen: the range holds two standard deviations on either side of its middle.
         prior = Prior(std=0.25 * (v.max - v.min), origin="a quarter of its range")
     else:
-        raise ValueError("its value is 0 and it has no range; give 'std' to calibrate it")
+        return None
     return CalibratedParameter(
         name=v.name, unit=unit, value=value, min=v.min, max=v.max, log=positive, prior=prior
     )

@@ -285,9 +285,10 @@ class BlackBox(ABC):
         return {"X_udot": X, "Y_vdot": Y, "Y_rdot": Y_r, "N_vdot": N_v, "N_rdot": N}
 
 
-def commanded(run: Run) -> dict[str, np.ndarray]:
-    """Force or command -> its values (n,) in a run [SI], forces in the plane also as size and angle."""
-    found = dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+def commanded(run: Run, rows: np.ndarray | slice = slice(None)) -> dict[str, np.ndarray]:
+    """Force or command -> values (n,) in rows of a run [SI]; forces in a plane as size and angle too."""
+    every = dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    found = {name: values[rows] for name, values in every.items()}
     for name, (ahead, aside) in planes(found).items():
         found[f"{name}.force"] = np.hypot(found[ahead], found[aside])
         found[f"{name}.angle"] = np.arctan2(found[aside], found[ahead])
@@ -305,7 +306,7 @@ def planes(signals: Iterable[str]) -> dict[str, tuple[str, str]]:
 def commands_at(run: Run, time: np.ndarray) -> dict[str, np.ndarray]:
     """Force or command -> its values at some times [s]; a command acts from its time to the next."""
     row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
-    return {name: values[row] for name, values in commanded(run).items()}
+    return commanded(run, row)
 
 
 def at_samples(smoothed: Smoothed) -> dict[str, np.ndarray]:

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from fmus.effects.text import WRITTEN_OUT
+
 NO_VALUE = "–"
 _UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
-WRITTEN_OUT = 1e6  # 1, magnitude below which no digit is left out in favour of an exponent; chosen
 
 
 def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:

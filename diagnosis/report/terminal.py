@@ -186,7 +186,7 @@ def _effect(e: ReportedEffect) -> Iterator[str]:
     yield finding_sentence(e)
     yield e.equation
     share = _percent(e.share_of_error)
-    unique = f", unique contribution {_percent(e.share_unique)} (no other effect explains it)"
+    unique = f", unique contribution {_percent(e.share_unique)} (lost without this effect)"
     alone = "" if e.share_unique is None else unique
     yield f"confidence {_percent(e.confidence)}, explains {share} of the squared error{alone}"
     yield from filter(None, (e.separation, e.advice))

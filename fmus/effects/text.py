@@ -6,6 +6,7 @@ from math import atan2, degrees
 
 from .effect import Effect
 
+WRITTEN_OUT = 1e6  # 1, magnitude below which no digit is left out in favour of an exponent; chosen
 SIDES = {"X": ("ahead", "astern"), "Y": ("to starboard", "to port"), "N": ("to starboard", "to port")}
 
 
@@ -29,9 +30,10 @@ class Found:
         return self.values.get(name, declared[name])
 
 
-def number(x: float) -> str:
-    """The size of a number."""
-    return f"{abs(x):.3g}"
+def number(x: float, digits: int = 3) -> str:
+    """The size of a number; of 1 and more without an exponent, up to a million."""
+    text = f"{abs(x):.{digits}g}"
+    return f"{abs(x):.0f}" if "e" in text and 1.0 <= abs(x) < WRITTEN_OUT else text
 
 
 def percent(x: float) -> str:

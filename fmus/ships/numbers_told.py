@@ -1,7 +1,7 @@
 """Numbers of a ship's file: in SI or in prime units, where each comes from, and how well it is known."""
 
 import re
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat, Tag, model_validator
 
@@ -96,7 +96,7 @@ def _speed(factor: str) -> int:
 class Term(Number):
     """A damping force: a coefficient times a product of u, v, r, |u|, |v| and |r|."""
 
-    axis: Annotated[str, Field(pattern="^[XYN]$", description="X, Y or N")]
+    axis: Literal["X", "Y", "N"]
     product: Annotated[str, Field(max_length=40, description="such as u, |u|u, uv or |v|r")]
 
     @property

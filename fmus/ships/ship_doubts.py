@@ -1,14 +1,19 @@
-"""What no ship has: damping that drives it on, negative added mass, actuators outside, too much mass."""
+"""What no ship has: damping that drives it on, negative added mass, actuators outside, too much mass.
+
+And numbers that a file does not state although every ship has its own.
+"""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import sqrt
 from typing import NamedTuple
 
-from ..declare import parameters_of
+from ..actuators.law import Law
+from ..declare import Variable, parameters_of, variables
 from ..hull import term, term_force, term_variable
 from ..hull_functions import FUNCTIONS
-from ..ship_description import Description, Part
+from ..ship_description import Description, Part, Value
+from .wind import described_numbers
 
 G = 9.81  # m/s2
 SEA_WATER = 1025.0  # kg/m3, where the file has no density
@@ -18,6 +23,7 @@ FROUDE_NUMBERS = [10.0 ** (k / 6.0) for k in range(-18, 19)]
 AHEAD, ASIDE = 0.2, 0.02  # those of other functions: a usual speed, and a little drift on it (chosen)
 OVERHANG = 0.05  # of length and beam: outboard motors and rudders hang behind the outline (chosen)
 MOTIONS = ("surge", "sway", "yaw")
+COMMON = ("1", "rad", "1/rad", "kg/m3")  # units of numbers of which a usual one serves for any ship
 
 
 class ShipDoubt(NamedTuple):
@@ -48,6 +54,19 @@ def doubts(ship: Description, draft: float | None = None) -> Iterator[ShipDoubt]
     yield from _functions(ship)
     for k, part in enumerate(ship.actuators):
         yield from _place(ship, k, part)
+        if assumed := _assumed(part.values, variables(Law.known[part.law].Parameters)):
+            text = f"actuator '{part.name}' does not state all of its numbers; assumed: {assumed}"
+            yield ShipDoubt("actuators", k, "", text)
+    stated = {v.name: v.value for v in ship.wind}
+    if stated and (assumed := _assumed(ship.wind, described_numbers(stated))):
+        yield ShipDoubt("wind", 0, "", f"wind does not state all of its numbers; assumed: {assumed}")
+
+
+def _assumed(stated: Sequence[Value], needed: Sequence[Variable]) -> str:
+    """Numbers with their units that are not stated, and of which every ship has its own; empty: none."""
+    names = {v.name for v in stated}
+    left = [v for v in needed if v.name not in names and v.start and v.unit not in COMMON]
+    return ", ".join(f"{v.name} = {v.start:.4g} {v.unit}" for v in left)
 
 
 def _inertia(ship: Description, draft: float | None) -> Iterator[ShipDoubt]:

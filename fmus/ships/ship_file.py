@@ -15,7 +15,7 @@ from pydantic import (
     ValidationError,
 )
 
-from cybership.message_text import brief
+from cybership.message_text import Location, brief, quoted
 from cybership.model_fault import first_fault
 from cybership.renamed import with_new_names
 
@@ -170,7 +170,7 @@ def _read(path: Path, _changed: int) -> Description:
     try:
         table = ShipTable.model_validate(with_new_names(_toml(path), "ship", path))
     except ValidationError as error:
-        raise DeclarationError(f"'{path}': {first_fault(error, ShipTable)}") from None
+        raise DeclarationError(f"'{path}': {first_fault(error, ShipTable, _name_fault)}") from None
     except ValueError as error:
         raise DeclarationError(f"'{path}': {brief(str(error))}") from None
     try:
@@ -179,6 +179,13 @@ def _read(path: Path, _changed: int) -> Description:
         raise DeclarationError(f"'{path}': {brief(str(error))}") from None
     _warn(path, found, table.draft or (table.prime and table.prime.draft))
     return found
+
+
+def _name_fault(kind: str, at: Location, value: object) -> str:
+    """What a name needs that does not have it; empty: it is another fault."""
+    letters = "letters" if at and at[0] == "aliases" else "small letters"
+    needs = f"needs {letters}, digits and underscores, a letter first"
+    return f"{needs}; got {quoted(value)}" if kind == "string_pattern_mismatch" else ""
 
 
 def _warn(path: Path, ship: Description, draft: float | None) -> None:

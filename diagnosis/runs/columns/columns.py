@@ -46,7 +46,7 @@ from cosim.trials import KINDS
 from cybership.message_text import name_of, quoted
 from fmus.ship import Ship
 
-from .unit_check import UNITS
+from .unit_check import UNITS, spelt
 
 FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
 PREAMBLE = 1000  # 1, lines; chosen: far more than any file has before its names
@@ -128,6 +128,11 @@ class Column(Named):
     sign: str | None = None  # another column, which holds the sign
     negative: str = "-1"  # the cell of that in rows with a negative value
     late: NonNegativeFloat = Field(default=0.0, allow_inf_nan=False)  # s, of a command, behind the pose
+
+    @field_validator("unit")
+    @classmethod
+    def _spelt(cls, value: str | None) -> str | None:
+        return value and spelt(value)
 
 
 class Layout(BaseModel):

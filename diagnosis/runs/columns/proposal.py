@@ -1,5 +1,6 @@
 """The content of the file beside a measurement, proposed by a look at the measurement itself."""
 
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
@@ -45,8 +46,8 @@ from .likely_columns import (
     signal_of_sign,
     unit_in,
 )
-from .side_car import as_json, refuse_sentences
-from .unit_check import OFTENEST, RAREST, doubts, likely_unit
+from .side_car import as_json, refuse_sentences, refuse_thousands
+from .unit_check import OFTENEST, RAREST, SI_UNIT, doubts, likely_unit, spelt
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 NO_UNIT = ("", "-")
@@ -278,6 +279,7 @@ def _columns(
         signal, flip = meaning(bare, quantity)
         if not signal:
             bare, _, unit = bare.rpartition("_")  # as x_mm
+            unit = spelt(unit)
             signal, flip = meaning(bare, quantity)
             if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
@@ -285,7 +287,12 @@ def _columns(
             continue
         known = UNITS[quantity[signal]]
         if unit not in NO_UNIT and unit not in known:
-            raise InputError(f"'{path}', column '{name}': {no_unit(unit, signal, known)}")
+            line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
+            raise InputError(
+                f"'{path}', column '{name}': {no_unit(unit, signal, known)}; "
+                f"if it is another one, put {line} with its factor to {SI_UNIT[quantity[signal]]} "
+                f"into '{path}.json'"
+            )
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
     columns |= _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
@@ -363,7 +370,7 @@ def _names_of(columns: Mapping[str, Column]) -> set[str]:
 def _bare(name: str, below: str) -> tuple[str, str]:
     """A column's name without its unit, and the unit, which may stand below it."""
     told = WITH_UNIT.fullmatch(name)
-    return (told[1], told[2]) if told else (name, bare_unit(below))
+    return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
 
 
 def _likely(
@@ -376,6 +383,7 @@ def _likely(
     """Columns that may be those of signals without one, of unused ones with the units below them."""
     known = {s: layout.column(s) for s in ("time", *POSE) if s not in blank}
     table = table_of_file(path, layout, {*unused, *_names_of(known)})
+    refuse_thousands(path, layout, table)
     pose = {s: to_si(_numbers(table[c.name], s), s, c, quantity[s]) for s, c in known.items()}
     kind = "time" if "time" in blank else ""
     named = {n: (*_bare(n, below), _numbers(table[n], kind)) for n, below in unused.items()}

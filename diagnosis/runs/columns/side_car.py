@@ -16,6 +16,10 @@ from ..files.text_layout import text_layout
 from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, Named, stated_layout
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+THOUSANDS = {  # decimal mark -> numbers with separators of thousands, as 19,800.5
+    ".": re.compile(r"[+-]?\d{1,3}(?:[, '’\u00a0\u202f]\d{3})+(?:\.\d*)?"),
+    ",": re.compile(r"[+-]?\d{1,3}(?:[. '’\u00a0\u202f]\d{3})+(?:,\d*)?"),
+}
 SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,")  # how one of NMEA 0183 begins
 
 
@@ -76,7 +80,7 @@ def as_json(layout: Layout) -> dict[str, Any]:
 def _changed(path: Path, layout: Layout, **changes: Any) -> str:
     """What to put into the file beside a measurement, with what it says now."""
     content = layout.model_dump(exclude_defaults=True) | changes
-    return f"put {json.dumps(content)} into '{path}.json'"
+    return f"put {json.dumps(content, ensure_ascii=False)} into '{path}.json'"
 
 
 def refuse_encoding(path: Path, layout: Layout) -> None:
@@ -125,8 +129,27 @@ def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
         )
 
 
-def decimal_comma(path: Path, layout: Layout, cell: str) -> str:
-    """The end of a message about a cell that is no number: what to do if it is one such as 0,5."""
-    if not DECIMAL_COMMA.fullmatch(cell.strip()):
-        return ""
-    return f"; if the decimal mark is a comma, {_changed(path, layout, decimal=',')}"
+def refuse_thousands(path: Path, layout: Layout, table: pd.DataFrame) -> None:
+    """Refuse a CSV file in which most numbers of a column that are not read have such separators."""
+    for name, cells in table.items():
+        texts = cells[pd.to_numeric(cells, errors="coerce").isna()].dropna().astype("string").str.strip()
+        grouped = texts[texts.str.fullmatch(_thousands(layout))]
+        if grouped.size > 0.5 * texts.size:
+            raise InputError(
+                f"'{path}', column '{name}': {quoted(grouped.iloc[0])} has separators of thousands; "
+                "write the file without them"
+            )
+
+
+def _thousands(layout: Layout) -> re.Pattern[str]:
+    return THOUSANDS.get(layout.decimal, THOUSANDS["."])
+
+
+def what_to_do(path: Path, layout: Layout, cell: str) -> str:
+    """The end of a message about a cell that is not a number, such as 0,5 or 19,800.5; or nothing."""
+    hints = []
+    if _thousands(layout).fullmatch(cell.strip()):
+        hints.append("if it has separators of thousands, write the file without them")
+    if layout.decimal != "," and DECIMAL_COMMA.fullmatch(cell.strip()):
+        hints.append(f"if the decimal mark is a comma, {_changed(path, layout, decimal=',')}")
+    return "".join(f"; {hint}" for hint in hints)

@@ -25,6 +25,14 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s2": 1.0, "mm/s2": c.milli, "g": c.g},
     "angular acceleration": {"rad/s2": 1.0, "deg/s2": c.degree},
 }
+# Other spellings of units in files -> the one above.
+SPELT = {
+    **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
+    **dict.fromkeys(("kt", "kts", "knot", "knots"), "kn"),
+    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **dict.fromkeys(("sec", "seconds"), "s"),
+    **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
+}
 SI_UNIT = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"
@@ -44,6 +52,11 @@ class Doubt(NamedTuple):
     signals: tuple[str, ...]
     unit: str
     reason: str
+
+
+def spelt(unit: str) -> str:
+    """A unit as this project spells it: ``Nm`` is ``N.m``; one that is not known stays."""
+    return SPELT.get(unit, unit)
 
 
 def refuse_time(
@@ -107,7 +120,8 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
 def remedy(signals: Sequence[str], unit: str, called: Mapping[str, str] = NAMED_SO) -> str:
     """The line that states a unit."""
     columns = {s: {"name": called.get(s, s), "unit": unit} for s in signals}
-    return f"Then put {json.dumps({'columns': columns})} into its side-car, the .json file next to it"
+    line = json.dumps({"columns": columns}, ensure_ascii=False)
+    return f"Then put {line} into its side-car, the .json file next to it"
 
 
 def likely_unit(row: float) -> str | None:

@@ -144,7 +144,9 @@ def read(
     if path.is_dir():
         found = [path / name for name in LOGS if (path / name).is_file()]
         if not found:
-            raise InputError(f"no log in '{path}': log.csv is missing")
+            tables = sorted(file for file in path.iterdir() if _is_run(file) and file.is_file())
+            hint = f"; a measurement is a file, as '{tables[0]}'" if tables else ""
+            raise InputError(f"no log in '{path}': log.csv is missing{hint}")
         path = found[0]
     elif not path.is_file():
         near = [p.name for p in path.parent.iterdir() if _is_run(p)] if path.parent.is_dir() else []

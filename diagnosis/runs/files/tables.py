@@ -15,11 +15,11 @@ from cybership.message_text import quoted
 
 from ..columns.columns import Layout
 from ..columns.side_car import (
-    decimal_comma,
     refuse_encoding,
     refuse_layout,
     refuse_sentences,
     refuse_units,
+    what_to_do,
 )
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
@@ -43,6 +43,8 @@ def as_table(path: Path) -> Iterator[None]:
         raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
     except InputError:
         raise
+    except pd.errors.EmptyDataError:
+        raise InputError(f"'{path}' is empty") from None
     except Exception as error:  # a broken file makes the readers stumble in many ways
         text = " ".join(str(error).split())
         raise InputError(f"'{path}' cannot be read as a table: {text}") from None
@@ -165,9 +167,11 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
         raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
     wrong = _first(cells, np.isnan(found))
     if wrong is not None:
-        hint = decimal_comma(path, layout, wrong)
+        hint = what_to_do(path, layout, wrong)
         if cells.name == layout.column("time").name:
             hint = hint or " or a time stamp of ISO 8601, such as 2026-12-31T23:59:59.5Z"
+        elif not any(c.isdigit() for c in wrong):
+            hint = "; a cell without a measurement must be empty"
         raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
     return found
 

@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 
 from ..columns.columns import PREAMBLE, UNITS, Layout
+from ..columns.unit_check import spelt
 
 SEPARATORS = (",", ";", "\t", "|")  # that a table may have between its cells
 KNOWN = {unit for units in UNITS.values() for unit in units}
@@ -31,8 +32,8 @@ def table_cells(line: str, separator: str) -> list[str]:
 
 
 def bare_unit(text: str) -> str:
-    """A unit without the brackets around it."""
-    return text.strip().strip("[]()").strip()
+    """A unit without the brackets around it, as this project spells it."""
+    return spelt(text.strip().strip("[]()").strip())
 
 
 def _is_number(cell: str, decimal: str) -> bool:

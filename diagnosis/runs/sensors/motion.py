@@ -75,7 +75,7 @@ def motion(
         late = [_moved(f, steps[f.channel][0]) for f in late]
         first = corrected(e, Correction({(f.channel, f.kind): f.value for f in late}))
         rest = motion(first, scale, {**before, **steps})
-        return replace(rest, findings=(*_added(late, rest.findings),))
+        return replace(rest, findings=(*_added(late, rest.findings, e),))
     fixes = [f for f in findings if f.repaired]
     repaired = corrected(e, _correction(found, jumps, fixes)) if fixes else run
     notes = (*_leeway(e), *((TWO_CLOCKS,) if found.torn else ()))
@@ -94,7 +94,9 @@ def _moved(f: SensorFinding, value: float) -> SensorFinding:
     return replace(f, value=value, ci95=(low, high))
 
 
-def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iterator[SensorFinding]:
+def _added(
+    late: Sequence[SensorFinding], rest: Sequence[SensorFinding], e: Evidence
+) -> Iterator[SensorFinding]:
     """Delays that were taken off with what is left of them, and all else.
 
     What was taken off and found again with the other sign was none.
@@ -105,7 +107,8 @@ def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iter
         more = left.get((f.channel, f.kind), 0.0)
         low, high = f.ci95[0] + more, f.ci95[1] + more
         if not low < 0.0 < high:
-            yield replace(f, value=f.value + more, ci95=(low, high))
+            value = f.value + more
+            yield replace(f, value=value, ci95=(low, high), sentence=_late(f.channel, value, e))
 
 
 def _correction(
@@ -227,13 +230,26 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     return made
 
 
+def _being(channel: str, e: Evidence) -> str:
+    """The channels that a fault of one is in, and a verb."""
+    several = e.by and channel == e.by[0] and channel != "speed"
+    return f"{' and '.join(e.by)} are" if e.by and several else f"{channel} is"
+
+
+def _late(channel: str, value: float, e: Evidence) -> str:
+    """A delay [s] in words."""
+    way = "earlier" if value < 0.0 else "later"
+    return f"{_being(channel, e)} {abs(value):.3g} s {way} than the pose"
+
+
 def _told(c: FaultColumn, value: float, e: Evidence) -> str:
     """A constant fault in words."""
     name = " and ".join(e.by) if e.by and c.channel == e.by[0] and e.by[0] != "speed" else c.channel
     if c.kind == "scale":
-        return f"{name} are {abs(value - 1.0):.1%} too {'large' if value > 1.0 else 'small'}"
+        way = "large" if value > 1.0 else "small"
+        return f"{_being(c.channel, e)} {100.0 * abs(value - 1.0):.1f} % too {way}"
     if c.kind == "delay":
-        return f"{name} are {value:.3g} s later than the pose"
+        return _late(c.channel, value, e)
     if c.kind == "place":
         way = {"x": ("ahead", "aft"), "y": ("to starboard", "to port")}[c.channel][value < 0.0]
         return f"the position is measured {abs(value):.3g} m {way} of the place of the velocity"

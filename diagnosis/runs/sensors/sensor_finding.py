@@ -41,6 +41,12 @@ class SensorFinding:
     repaired: bool = True
     aside: tuple[str, ...] = ()
 
+    @property
+    def remark(self) -> str:
+        """What becomes of a fault that is not repaired, to follow the sentence; else nothing."""
+        unused = f"; {' and '.join(self.aside)} not used" if self.aside else ""
+        return "" if self.repaired else f" (not repaired{unused})"
+
     @classmethod
     def estimated(
         cls,
@@ -104,5 +110,4 @@ def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
         found = [f for f in found if f.kind != "clock_rate"]
     for f in found:
         when = f", {f.start:.1f} to {f.end:.1f} s" if f.kind == "clock_rate" else ""
-        unused = f"; {' and '.join(f.aside)} not used" if f.aside else ""
-        yield f"{f.sentence}{when}{'' if f.repaired else f' (not repaired{unused})'}"
+        yield f"{f.sentence}{when}{f.remark}"

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fmus.effects.text import number
+
 from ...predictors import Model, WeakWindows, omega
 from ...predictors.uncertainty import NOISE_TOLERANCE, omega_std
 from ...predictors.weak_form import BLOCK, kernel_integral
@@ -51,7 +53,9 @@ class Unrecorded:
     def sentence(self) -> str:
         """What is to be said of it."""
         size = zip(NAMES, self.push.size, UNITS, self.push.time, strict=True)
-        told = [f"{x:.2g} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0]
+        told = [
+            f"{number(x, 2)} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0
+        ]
         text = "No disturbance is detected. "
         if told:
             text = f"A disturbance remains, with size and correlation time: {', '.join(told)}. "
