@@ -391,7 +391,7 @@ def test_the_command_writes_a_measurement_without_the_fault(tmp_path, capsys):
     told_beside = {"columns": {"r": {"name": "r", "noise": 0.002}}}
     (tmp_path / "a.csv.json").write_text(json.dumps(told_beside))
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 0
-    assert "r are 5.0% too large" in capsys.readouterr().out
+    assert "r is 5.0% too large" in capsys.readouterr().out
     again = diagnosis.read(tmp_path / "b.csv")
     assert not told(again)
     assert again.noise == {"r": 0.002}

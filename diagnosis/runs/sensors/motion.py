@@ -229,11 +229,12 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
 
 def _told(c: FaultColumn, value: float, e: Evidence) -> str:
     """A constant fault in words."""
-    name = " and ".join(e.by) if e.by and c.channel == e.by[0] and e.by[0] != "speed" else c.channel
+    both = e.by and c.channel == e.by[0] and e.by[0] != "speed"
+    name, verb = (" and ".join(e.by), "are") if both else (c.channel, "is")
     if c.kind == "scale":
-        return f"{name} are {abs(value - 1.0):.1%} too {'large' if value > 1.0 else 'small'}"
+        return f"{name} {verb} {abs(value - 1.0):.1%} too {'large' if value > 1.0 else 'small'}"
     if c.kind == "delay":
-        return f"{name} are {value:.3g} s later than the pose"
+        return f"{name} {verb} {abs(value):.3g} s {'later' if value > 0.0 else 'earlier'} than the pose"
     if c.kind == "place":
         way = {"x": ("ahead", "aft"), "y": ("to starboard", "to port")}[c.channel][value < 0.0]
         return f"the position is measured {abs(value):.3g} m {way} of the place of the velocity"
