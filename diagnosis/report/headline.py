@@ -33,7 +33,7 @@ CALIBRATED = (
 VERDICTS = {
     "found": "An effect is missing and was identified",
     "ambiguous": "An effect is missing, and several candidates explain it",
-    "coefficients": "Coefficients differ from their nominal values; no effect is missing",
+    "coefficients": "Coefficients differ from their nominal values; no effect is needed",
     "unexplained": "A model error remains that no known effect explains",
     "none": "These data show no missing effect",
 }
@@ -138,7 +138,7 @@ def headline(r: ReportData) -> str:
         names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
         above = f", mainly {listed(names, 'and')}" if names else ""
         return (
-            f"Other values of the nominal coefficients explain these data{above}; no effect is missing."
+            f"Other values of the nominal coefficients explain these data{above}; no effect is needed."
         )
     if d.verdict == "unexplained":
         return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated
