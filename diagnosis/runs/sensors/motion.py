@@ -128,7 +128,7 @@ def _estimated(
     e: Evidence, every: Sequence[FaultColumn], jumps: Sequence[SensorFinding]
 ) -> MotionFaults:
     """The likeliest clock and the constants that are sure."""
-    cut = [(jump.start, jump.end) for jump in jumps]
+    cut = [*((jump.start, jump.end) for jump in jumps), *e.silences]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
     sizes = max(float(np.hypot(*sigma[:2])), NEGLIGIBLE), max(float(sigma[2]), NEGLIGIBLE)
     # Where the mean rate of the clock is free, there is one scale less.
@@ -229,8 +229,9 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
 
 def _told(c: FaultColumn, value: float, e: Evidence) -> str:
     """A constant fault in words."""
-    both = e.by and c.channel == e.by[0] and e.by[0] != "speed"
-    name, verb = (" and ".join(e.by), "are") if both else (c.channel, "is")
+    name, verb = c.channel, "is"
+    if e.by and c.channel == e.by[0] and e.by[0] != "speed":
+        name, verb = " and ".join(e.by), "are"
     if c.kind == "scale":
         return f"{name} {verb} {abs(value - 1.0):.1%} too {'large' if value > 1.0 else 'small'}"
     if c.kind == "delay":
