@@ -24,6 +24,7 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.thrust import FORGOTTEN
 from .closed_loop import REFERENCES, bound_of, largest_distance
+from .covariates import AXES
 from .settings import SETTINGS
 
 MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
@@ -237,12 +238,17 @@ def _scaled(nu: np.ndarray, region: OperatingRegion) -> np.ndarray:
 
 def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
     """Whether in surge, sway or yaw alone a hull drives the ship on, and another less or not at all."""
-    metric = mass(other)
-    for nu in (alone(k, region) for k in range(3)):
-        lowest, of_other = (dissipation(m, nu, metric).min() for m in (model, other))
+    return bool(driven_axes(model, other, region))
+
+
+def driven_axes(model: Model, other: Model, region: OperatingRegion) -> set[str]:
+    """Axes of the motions in which alone a hull drives the ship on, and another less or not at all."""
+    metric, found = mass(other), set()
+    for k, axis in enumerate(AXES):
+        lowest, of_other = (dissipation(m, alone(k, region), metric).min() for m in (model, other))
         if lowest < 0.0 and _less(lowest, of_other):
-            return True
-    return False
+            found.add(axis)
+    return found
 
 
 def _less(after: Any, before: Any) -> Any:
