@@ -25,7 +25,7 @@ CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of th
 NOTHING_FOUND = "These data show no missing effect."
 TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
 UNEXPLAINED = "A model error remains that no known effect explains."
-NOT_BELIEVED = "A model error remains, and no known effect explains it with sufficient confidence."
+NOT_BELIEVED = "The model has an error that no known effect explains with sufficient confidence."
 CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
     "and predictions of validation data improve. This does not identify a cause."
