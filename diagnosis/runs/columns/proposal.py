@@ -55,8 +55,8 @@ NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
-    "x": ("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionn", "posnorth"),
-    "y": ("east", "easting", "e", "posy", "positiony", "ye", "pose", "positione", "poseast"),
+    "x": ("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
+    "y": ("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
         *("hdm", "compass", "gyro", "gyrocompass"),
