@@ -374,6 +374,22 @@ def test_a_compass_and_one_shaft_are_known(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.sin(found.run.pose[:, 2]), np.sin(zigzag()[NAMES["psi"]]), atol=1e-9)
 
 
+def test_names_that_end_in_a_unit_are_known_by_their_words(tmp_path: Path) -> None:
+    """Brackets are seldom in the names of loggers; u_1 and rudder_kn have no unit that fits."""
+    names = {"x": "pos_n", "y": "pos_e", "psi": "gyro_heading_deg", "rudder.delta": "rudder_deg"}
+    table = zigzag(**names, **{"propeller.n": "shaft_rpm"})
+    for name in ("gyro_heading_deg", "rudder_deg"):
+        table[name] = np.degrees(table[name])
+    table["yaw_rate_deg_s"], table["rudder_1"], table["rudder_kn"] = 0.1, table["rudder_deg"], 0.2
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    columns = found.layout.columns
+    assert {s: columns[s].name for s in names} == names
+    assert (columns["r"].name, columns["r"].unit) == ("yaw_rate_deg_s", "deg/s")
+    assert found.unused == ["rudder_1", "rudder_kn"]
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.commands[:, 1], zigzag()[NAMES["rudder.delta"]], atol=1e-9)
+
+
 def test_a_shaft_that_turns_evenly_is_likely_by_its_unit(tmp_path: Path) -> None:
     table = zigzag(**{"propeller.n": "A [rpm]"})
     table["B [rpm]"] = table["A [rpm]"] = 480.0

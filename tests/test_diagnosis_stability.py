@@ -177,6 +177,16 @@ def test_an_indefinite_mass_matrix_is_told():
     assert not is_definite(mass(Model({"m": 0.0, "X_udot": 1.0})))
 
 
+@pytest.mark.parametrize(("astern", "safe"), [(0.06, True), (2.0, False)])
+def test_a_ship_is_judged_astern_as_far_as_it_goes_there(astern, safe):
+    """Y_uv damps the drift of a ship that goes ahead, and drives on that of one that goes astern."""
+    start = Model(ship=ship_with((), "otter"))
+    u = np.linspace(-astern, 2.0, 2001)
+    nu = np.column_stack([u, 0.5 * np.sin(u), 0.5 * np.cos(u)])
+    region = OperatingRegion.of(nu, start.ship.scale)
+    assert check_stability(start.plus({"delta_Y_uv": -400.0}), start, region=region).safe == safe
+
+
 def test_what_cannot_be_checked_is_one_message():
     with pytest.raises(InputError, match="nominal model is not positive definite"):
         check_stability(NOMINAL, Model({"X_udot": 20.0}))
@@ -242,7 +252,7 @@ def test_a_region_of_data_holds_nearly_all_of_them():
     nu = np.random.default_rng(1).normal(0.0, [0.1, 0.05, 0.0], (10_000, 3))
     nu[::7] = np.nan
     region = OperatingRegion.of(nu)
-    inside = (np.abs(nu[~np.isnan(nu[:, 0])]) <= region).mean(axis=0)
+    inside = (np.abs(nu[~np.isnan(nu[:, 0])]) <= region.edges[1]).mean(axis=0)
     assert inside[:2] == pytest.approx(0.99, abs=1e-3)
     assert region.r == pytest.approx(0.06)
     assert OperatingRegion.of(np.full((3, 3), np.nan)) == pytest.approx(0.1 * np.array(OPERATING))

@@ -13,6 +13,7 @@ from diagnosis import Model, Run, omega, weak_windows
 from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
+from diagnosis.assessment.stability import OPERATING
 from diagnosis.predictors.evaluation import evaluate_run
 from diagnosis.predictors.parameter_set import ship_with
 from diagnosis.predictors.ship_model import of_one_run
@@ -27,7 +28,7 @@ from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.verdict.confidence import confidence_of
-from diagnosis.verdict.judging import verdict_name, with_confidence
+from diagnosis.verdict.judging import driven_by_effects, verdict_name, with_confidence
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
@@ -422,6 +423,26 @@ def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does
     assert "same axis" in there.doubt
     assert beside.confidence == beside.together == 0.99
     assert not beside.doubt
+
+
+def test_a_pair_that_makes_up_another_shape_of_damping_is_even_odds_and_one_alone_is_not():
+    """Of a cubic drag too much by |u|u and too little by u: at low speed the hull drives the ship on."""
+    start = Model()
+    parts = [
+        ("X_|u|u", {"delta_X_absu_u": -40.0}),
+        ("X_u", {"delta_X_u": 2.0 * abs(start.value("X_u"))}),
+    ]
+    other = ("N_r", {"delta_N_r": -1.0})
+
+    def seen(*effects):
+        made = [Finding(i, v, {}, 0.99, [], 0.9, 0.9, together=0.99) for i, v in effects]
+        model = start.plus({n: x for _, v in effects for n, x in v.items()})
+        found = Findings(made, model=model)
+        driven = driven_by_effects(found, start, OPERATING)
+        return [f.confidence for f in with_confidence(found, left_on(), start, "", driven).effects]
+
+    assert seen(*parts, other) == [0.5, 0.5, 0.99]
+    assert seen(parts[0], other) == [0.99, 0.99]
 
 
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])

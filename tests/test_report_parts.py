@@ -132,6 +132,7 @@ def test_names_in_a_row():
     assert finding_text.listed(["a"]) == "a"
     assert finding_text.listed([*"abc"]) == "a, b or c"
     assert finding_text.listed([*"abcd"]) == "a, b, c or d"
+    assert finding_text.listed([*"abcde"]) == "a, b, c, d or 1 other"
     assert finding_text.listed([*"abcdef"]) == "a, b, c, d or 2 others"
     assert finding_text.separation_note("x", []) == ""
 

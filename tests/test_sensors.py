@@ -284,6 +284,53 @@ def test_an_angle_interpolated_through_its_wrap_is_put_on_the_short_way():
     assert unwrapped(np.mod(true, 2.0 * np.pi))[1].size == 0
 
 
+def test_a_course_at_rest_is_not_interpolated():
+    """A receiver that does not move states any course; under way it is as smooth as the motion."""
+    rng = np.random.default_rng(0)
+    course = np.concatenate([rng.uniform(0.0, 2.0 * np.pi, 300), 0.01 * np.arange(300)])
+    assert unwrapped(course)[1].size == 0
+
+
+def idle(run, speed, seconds=60.0):
+    """The run after some time at rest, whose receiver states a speed along a course that is held."""
+    rng = np.random.default_rng(1)
+    n = round(seconds / H)
+    s = np.abs(run.measured["u"] + 1j * run.measured["v"])
+    drift = np.arctan2(run.measured["v"], run.measured["u"])
+    at_rest = np.abs(speed * (rng.standard_normal(n) + 1j * rng.standard_normal(n)))
+    channels = {
+        "speed": np.concatenate([at_rest, s]),
+        "course": np.concatenate([np.full(n, 1.0), run.pose[:, 2] + drift]),
+    }
+    pose = np.concatenate([run.pose[0] + NOISE * rng.standard_normal((n, 3)), run.pose])
+    time = H * np.arange(len(pose))
+    tau = np.concatenate([np.zeros((n, 3)), run.tau_cmd])
+    return replace(run, time=time, pose=pose, tau_cmd=tau, measured=channels)
+
+
+def test_a_ship_at_rest_says_nothing_of_the_clock():
+    """A receiver at rest states a speed above zero; a clock that stands still would explain it."""
+    assert not {f.kind for f in examine(idle(made(), 2e-3), REFERENCE).findings} & {"clock_rate"}
+    slow = idle(made(), 2e-3)
+    late = np.where(slow.time < 140.0, slow.time, 140.0 + 1.1 * (slow.time - 140.0))
+    found = [f for f in examine(replace(slow, time=late), REFERENCE).findings if f.kind == "clock_rate"]
+    assert min(f.value for f in found) == pytest.approx(1.0 / 1.1, abs=0.02)
+
+
+@pytest.mark.parametrize(("first", "last"), [(40.0, 70.0), (75.0, 95.0), (100.0, 150.0)])
+def test_a_time_that_was_not_logged_says_nothing_of_the_clock(first, last):
+    run = made(turning=2.0)
+    cut = run.rows((run.time <= first) | (run.time >= last))
+    assert examine(cut, REFERENCE).findings == ()
+
+
+def test_seconds_that_a_log_has_too_many_are_told():
+    """The ship is where it was: its clock was set ahead."""
+    run = made()
+    found = told(replace(run, time=np.where(run.time < 80.0, run.time, run.time + 20.0)))
+    assert found["time", "clock_gap"].value == pytest.approx(-20.0, abs=0.3)
+
+
 def test_rows_between_telegrams_do_not_count():
     rng = np.random.default_rng(0)
     at = np.arange(0.0, 200.0, 2.0)

@@ -24,32 +24,51 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.thrust import FORGOTTEN
 from .closed_loop import REFERENCES, bound_of, largest_distance
+from .covariates import AXES
 from .settings import SETTINGS
 
 MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
 
 
 class OperatingRegion(NamedTuple):
-    """Largest |u|, |v| [m/s] and |r| [rad/s] at which a ship operates.
+    """Largest speeds at which a ship operates.
 
     The default holds 99 % of each of the four runs that NTNU published of CyberShip Enterprise 1; the
     thesis' paths stay below half of it.
+
+    Attributes:
+        u, v, r: largest speed ahead and |v| [m/s], largest |r| [rad/s].
+        astern: largest speed astern [m/s]. Terms such as Y_uv u v are those of a ship that goes ahead;
+            astern they drive it on, so that a ship is judged there only as far as it goes there.
     """
 
     u: float = SETTINGS.limits[0]
     v: float = SETTINGS.limits[1]
     r: float = SETTINGS.limits[2]
+    astern: float = SETTINGS.limits[0]
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(2, 3), lowest and highest u, v, r [m/s, m/s, rad/s]."""
+        return np.array([(-self.astern, -self.v, -self.r), (self.u, self.v, self.r)])
+
+    @property
+    def largest(self) -> tuple[float, float, float]:
+        """Largest |u|, |v| [m/s] and |r| [rad/s]."""
+        return max(self.u, self.astern), self.v, self.r
 
     @classmethod
     def at(cls, scale: Scale) -> "OperatingRegion":
         """The default region of a ship of some size."""
-        return cls(*(x * f for x, f in zip(cls(), scale.speeds, strict=True)))
+        u, v, r = scale.speeds
+        return cls(*(x * f for x, f in zip(cls(), (u, v, r, u), strict=True)))
 
     @classmethod
     def of(cls, nu: np.ndarray, scale: Scale = REFERENCE) -> "OperatingRegion":
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
-        known = np.abs(nu[np.isfinite(nu).all(axis=1)])
-        most = np.quantile(known, 1.0 - SETTINGS.chance, axis=0) if len(known) else np.zeros(3)
+        u, v, r = nu[np.isfinite(nu).all(axis=1)].T
+        sizes = (u[u > 0.0], np.abs(v), np.abs(r), -u[u < 0.0])
+        most = [np.quantile(size, 1.0 - SETTINGS.chance) if size.size else 0.0 for size in sizes]
         return cls(*map(float, np.maximum(most, SETTINGS.least_region * np.array(cls.at(scale)))))
 
 
@@ -202,24 +221,34 @@ def sampled_motions(region: OperatingRegion) -> np.ndarray:
     side, a, b = (grid.ravel() for grid in np.meshgrid([-1.0, 1.0], edge, edge))
     faces = [np.roll(np.column_stack([side, a, b]), k, axis=1) for k in range(3)]
     speeds = np.linspace(0.0, 1.0, SETTINGS.directions + 1)[1:, None, None]
-    return (speeds * np.concatenate(faces) * np.array(region)).reshape(-1, 3)
+    return _scaled((speeds * np.concatenate(faces)).reshape(-1, 3), region)
 
 
 def alone(k: int, region: OperatingRegion) -> np.ndarray:
     """Velocities (n, 3) in surge, sway or yaw alone, from one border of a region to the other."""
     nu = np.zeros((2 * SETTINGS.directions, 3))  # an even number, without rest
-    nu[:, k] = np.linspace(-region[k], region[k], len(nu))
-    return nu
+    nu[:, k] = np.linspace(-1.0, 1.0, len(nu))
+    return _scaled(nu, region)
+
+
+def _scaled(nu: np.ndarray, region: OperatingRegion) -> np.ndarray:
+    """Velocities (n, 3) of a region from those of a region of size one."""
+    return np.abs(nu) * np.where(nu < 0.0, *region.edges)
 
 
 def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
     """Whether in surge, sway or yaw alone a hull drives the ship on, and another less or not at all."""
-    metric = mass(other)
-    for nu in (alone(k, region) for k in range(3)):
-        lowest, of_other = (dissipation(m, nu, metric).min() for m in (model, other))
+    return bool(driven_axes(model, other, region))
+
+
+def driven_axes(model: Model, other: Model, region: OperatingRegion) -> set[str]:
+    """Axes of the motions in which alone a hull drives the ship on, and another less or not at all."""
+    metric, found = mass(other), set()
+    for k, axis in enumerate(AXES):
+        lowest, of_other = (dissipation(m, alone(k, region), metric).min() for m in (model, other))
         if lowest < 0.0 and _less(lowest, of_other):
-            return True
-    return False
+            found.add(axis)
+    return found
 
 
 def _less(after: Any, before: Any) -> Any:
@@ -254,7 +283,7 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     with np.errstate(all="ignore"):
         for _ in range(round(FORGOTTEN / h)):
             s = vessel.integrate(s, Force(0.0, 0.0, 0.0), model.hull.hull, h * scale.time)
-            speeds = np.abs(np.stack([s.u, s.v, s.r])) / np.array(region)[:, None]
+            speeds = np.abs(np.stack([s.u, s.v, s.r])) / np.array(region.largest)[:, None]
             most = max(most, float(np.nan_to_num(speeds, nan=np.inf).max()))
             if most > SETTINGS.runaway:
                 break

@@ -97,7 +97,8 @@ def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
 
 def listed(names: Sequence[str], joined: str = "or") -> str:
     """Names in a row: a, b or c; of many the first few, and how many more."""
-    more = [f"{len(names) - SHOWN} others"] if len(names) > SHOWN else []
+    hidden = len(names) - SHOWN
+    more = [f"{hidden} other{'s' * (hidden > 1)}"] if hidden > 0 else []
     *most, last = [*names[:SHOWN], *more]
     return f"{', '.join(most)} {joined} {last}" if most else last
 

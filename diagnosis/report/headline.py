@@ -25,7 +25,7 @@ CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of th
 NOTHING_FOUND = "These data show no missing effect."
 TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
 UNEXPLAINED = "A model error remains that no known effect explains."
-NOT_BELIEVED = "A model error remains, and no known effect explains it with sufficient confidence."
+NOT_BELIEVED = "The model has an error that no known effect explains with sufficient confidence."
 CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
     "and predictions of validation data improve. This does not identify a cause."
@@ -33,7 +33,7 @@ CALIBRATED = (
 VERDICTS = {
     "found": "An effect is missing and was identified",
     "ambiguous": "An effect is missing, and several candidates explain it",
-    "coefficients": "Coefficients differ from their nominal values; no effect is missing",
+    "coefficients": "Coefficients differ from their nominal values; no effect is needed",
     "unexplained": "A model error remains that no known effect explains",
     "none": "These data show no missing effect",
 }
@@ -138,7 +138,7 @@ def headline(r: ReportData) -> str:
         names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
         above = f", mainly {listed(names, 'and')}" if names else ""
         return (
-            f"Other values of the nominal coefficients explain these data{above}; no effect is missing."
+            f"Other values of the nominal coefficients explain these data{above}; no effect is needed."
         )
     if d.verdict == "unexplained":
         return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated

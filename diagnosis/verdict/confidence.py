@@ -3,7 +3,7 @@
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
 the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
-the same axes.
+the same axes, a damping that no hull has.
 """
 
 from collections.abc import Collection, Sequence
@@ -31,6 +31,7 @@ MAY_BE_NONE = "the intervals of all its values include zero"
 MAY_BE_LAGS = "faster actuators than described, or measured states as commands, have the same effect"
 MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
+STAND_IN = "the damping by these effects drives the ship on, which no hull does; it has another shape"
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 
 
@@ -60,7 +61,11 @@ def probability(e: EffectEvidence) -> float:
 
 
 def confidence_of(
-    f: Finding, start: Model, residual: Collection[str] = (), of_data: str = ""
+    f: Finding,
+    start: Model,
+    residual: Collection[str] = (),
+    of_data: str = "",
+    driven: Collection[str] = (),
 ) -> Confidence:
     """The confidence of a finding.
 
@@ -69,6 +74,7 @@ def confidence_of(
         start: the initial model.
         residual: axes on which the learned model leaves a significant residual.
         of_data: see :func:`doubt_of_data`.
+        driven: axes on which the effects of the learned model make the hull drive the ship on.
     """
     own, of_set = f.confidence, f.together
     if f.evidence is not None and f.set_evidence is not None:
@@ -86,6 +92,8 @@ def confidence_of(
     # Waves are a residual themselves.
     if own > EVEN_ODDS and effect.search.by != "spectrum" and set(residual) & set(effect.axis):
         return Confidence(EVEN_ODDS, EVEN_ODDS, RESIDUAL)
+    if own > EVEN_ODDS and set(driven) & set(effect.axis):
+        return Confidence(EVEN_ODDS, EVEN_ODDS, STAND_IN)
     return Confidence(own, of_set, doubt)
 
 

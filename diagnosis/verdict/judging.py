@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError
 from ..assessment.recurrence import recurrence
 from ..assessment.regions import find_regions
 from ..assessment.remainder import Remainder, noise_of, remainder_sentence, remaining
-from ..assessment.stability import OperatingRegion, drives_on
+from ..assessment.stability import OperatingRegion, driven_axes, drives_on
 from ..execution.progress import Advance
 from ..execution.short_text import ShortRepr
 from ..predictors import Model, WeakWindows, omega
@@ -141,7 +141,8 @@ def judge(
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
-    learned = with_confidence(fit.findings, remainder, start, doubt_of_data(train))
+    driven = driven_by_effects(fit.findings, start, region)
+    learned = with_confidence(fit.findings, remainder, start, doubt_of_data(train), driven)
     explained = shares(learned, start, data.validate)
     alone = unique_shares(learned, start, train, data.validate)
     known, force = fit.posterior, fit.unrecorded
@@ -150,11 +151,29 @@ def judge(
     )
 
 
-def with_confidence(found: Findings, remainder: Remainder, start: Model, of_data: str = "") -> Findings:
+def driven_by_effects(found: Findings, start: Model, region: OperatingRegion) -> set[str]:
+    """Axes on which the learned hull drives the ship on, where the first one does not, by an effect.
+
+    Of a damping in a shape that no candidate has, two make up: one that is too large, and one that
+    takes too much off it where the ship is slow.
+    """
+    driven = driven_axes(found.model, start, region)
+    without = [found.model.plus({n: -v for n, v in f.values.items()}) for f in found.effects if driven]
+    return driven & {axis for m in without for axis in driven_axes(found.model, m, region)}
+
+
+def with_confidence(
+    found: Findings,
+    remainder: Remainder,
+    start: Model,
+    of_data: str = "",
+    driven: Collection[str] = (),
+) -> Findings:
     """The findings with their confidence: the one place where it is set.
 
     A significant residual on the axes of an effect makes it even odds at the most; waves that are found
-    account for the one that is left in addition to them. So does what speaks against the data, to all.
+    account for the one that is left in addition to them. So does what speaks against the data, to all,
+    and a damping that drives the ship on to those of its axis (``driven``: :func:`driven_by_effects`).
     """
     axes: Collection[str] = {axis for axis, r in remainder.axes.items() if r.significant}
     waves = [f for f in found.effects if start.ship.effects[f.id].search.by == "spectrum"]
@@ -162,7 +181,7 @@ def with_confidence(found: Findings, remainder: Remainder, start: Model, of_data
         axes = ()
     effects = []
     for f in found.effects:
-        c = confidence_of(f, start, axes, of_data)
+        c = confidence_of(f, start, axes, of_data, driven)
         effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
     return replace(found, effects=effects)
 

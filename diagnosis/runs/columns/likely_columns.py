@@ -19,6 +19,7 @@ FILLERS = frozenset(
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
         *("sign", "gear"),
+        *("gyro", "compass"),
     )
 )
 # Quantity -> word that is left of a name -> signal.

@@ -51,11 +51,13 @@ from .unit_check import OFTENEST, RAREST, SI_UNIT, doubts, likely_unit, spelt
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 NO_UNIT = ("", "-")
+# Units that a name may end in; u_1 is the first of several, and not a fraction.
+NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
-    "x": ("north", "northing", "n", "posx", "positionx", "xn"),
-    "y": ("east", "easting", "e", "posy", "positiony", "ye"),
+    "x": ("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
+    "y": ("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
         *("hdm", "compass", "gyro", "gyrocompass"),
@@ -278,8 +280,7 @@ def _columns(
         bare, unit = _bare(name, below)
         signal, flip = meaning(bare, quantity)
         if not signal:
-            bare, _, unit = bare.rpartition("_")  # as x_mm
-            unit = spelt(unit)
+            bare, unit = _unit_at_the_end(bare)
             signal, flip = meaning(bare, quantity)
             if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
@@ -307,6 +308,8 @@ def _by_words(
     shafts: list[Column] = []
     for name, below in free:
         bare, unit = _bare(name, below)
+        if not unit:
+            bare, unit = _unit_at_the_end(bare)
         unit = unit or unit_in(bare)
         if signal := meaning_of_words(bare, unit, quantity):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
@@ -373,6 +376,16 @@ def _bare(name: str, below: str) -> tuple[str, str]:
     return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
 
 
+def _unit_at_the_end(name: str) -> tuple[str, str]:
+    """A name without the unit that its last words are, as x_mm and yaw_rate_deg_s, and the unit."""
+    words = name.split("_")
+    for count in (2, 1):
+        unit = spelt("/".join(words[-count:]))
+        if len(words) > count and unit in NAMED_UNITS:
+            return "_".join(words[:-count]), unit
+    return name, ""
+
+
 def _likely(
     path: Path,
     layout: Layout,
@@ -386,7 +399,11 @@ def _likely(
     refuse_thousands(path, layout, table)
     pose = {s: to_si(_numbers(table[c.name], s), s, c, quantity[s]) for s, c in known.items()}
     kind = "time" if "time" in blank else ""
-    named = {n: (*_bare(n, below), _numbers(table[n], kind)) for n, below in unused.items()}
+    named = {}
+    for name, below in unused.items():
+        bare, unit = _bare(name, below)
+        bare, unit = (bare, unit) if unit else _unit_at_the_end(bare)
+        named[name] = bare, unit, _numbers(table[name], kind)
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}
 

@@ -9,6 +9,9 @@ fault of a single channel does. Unknown are pose and c at nodes and the constant
     P_(j+1) - P_j = c_j (D_j + constants) + a random walk of the velocity's and of the rate's error,
     c_(j+1) - c_j   a random walk.
 
+Where a ship hardly moves, velocity and rate are noise, or what a receiver states at rest. The clock does
+not act on these, or it would be found slow enough to make them vanish.
+
 All is linear but for c times a constant, which is iterated: banded least squares with a variance for
 each group of equations, as those of the smoother (:mod:`..smoothing.penalised`). The variances are
 those of restricted maximum likelihood, by the fixed point of Harville (1977), J. Am. Stat. Assoc. 72,
@@ -109,18 +112,24 @@ class PathProblem:
             return (a * (moved[end] - moved[start])).sum(axis=1)
 
         one, clock = np.ones(1), STATES - 1
+        speed, turn = (np.linalg.norm(np.diff(x[nodes], axis=0), axis=1) for x in (e.gone, moved[:, 2:]))
+        moves = np.array([x > still * steps for x, still in zip((speed, turn), e.still, strict=True)])
+        moves = moves[[0, 0, 1]]  # along, across, heading
         for k in measured:  # samples of the pose
             a, start = axes[k][rows], nodes[at]
             of = [(STATES * at + i, a[:, i]) for i in range(clock) if a[:, i].any()]
-            of.append((STATES * at + clock, ahead(a, start, rows)))
-            self.parts.append((add(k, of, (a * pose[rows]).sum(axis=1), one), a, start, rows))
+            way, by_clock = ahead(a, start, rows), moves[k][at]
+            of.append((STATES * at + clock, way * by_clock))
+            y = (a * pose[rows]).sum(axis=1) - way * ~by_clock
+            self.parts.append((add(k, of, y, one), a, start, rows))
         j = np.flatnonzero(~self.cut)
         for k in measured:  # from node to node
             a, start, end = axes[k][nodes[j]], nodes[j], nodes[j + 1]
             of = [(STATES * j + i, -a[:, i]) for i in range(clock)]
             of += [(STATES * (j + 1) + i, a[:, i]) for i in range(clock)]
-            of.append((STATES * j + clock, -ahead(a, start, end)))
-            begin = add(TURN if k == HEADING else DRIFT, of, np.zeros(j.size), steps[j])
+            way, by_clock = ahead(a, start, end), moves[k][j]
+            of.append((STATES * j + clock, -way * by_clock))
+            begin = add(TURN if k == HEADING else DRIFT, of, way * ~by_clock, steps[j])
             self.parts.append((begin, -a, start, end))
         j = np.flatnonzero(~self.cut[:-1] & ~self.cut[1:])
         of = [(STATES * (j + 1) + clock, one), (STATES * j + clock, -one)]

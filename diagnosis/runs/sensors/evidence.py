@@ -10,7 +10,7 @@ from fmus.frames import rotate_to_earth
 from ..cleaning import NORMAL_MAD, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
-from ..run_constants import FEWEST
+from ..run_constants import EVERY, FAR_OFF, FEWEST, LONG
 
 SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 FAR = 8.0  # 1, times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
@@ -51,6 +51,18 @@ class Evidence:
         return self.run.time
 
     @cached_property
+    def still(self) -> tuple[float, float]:
+        """Speed [m/s] and yaw rate [rad/s] up to which those that are measured may be noise alone."""
+        return _of_noise(self.velocity), _of_noise(self.rate)
+
+    @cached_property
+    def silences(self) -> list[tuple[float, float]]:
+        """Begin and end [s] of each stretch without rows, of whose motion nothing is known."""
+        step = np.diff(self.time)
+        at = np.flatnonzero(step > max(EVERY, LONG * float(np.median(step))))
+        return [(float(self.time[k]), float(self.time[k + 1])) for k in at]
+
+    @cached_property
     def turned(self) -> np.ndarray:
         """(n,): the yaw rate integrated over the log's time [rad]; zero where there is none."""
         return integral(self.time, np.zeros_like(self.time) if self.rate is None else self.rate)
@@ -79,6 +91,15 @@ def evidence(run: Run) -> Evidence | None:
     rate = _whole(run, "r") if _given(run, "r") else None
     velocity = None if by is None else velocity_over_ground(run, by, psi)
     return None if by is None and rate is None else Evidence(run, rows, psi, velocity, rate, by, between)
+
+
+def _of_noise(values: np.ndarray | None) -> float:
+    """Size up to which a velocity (n,) or (n, k) may be noise alone; 0: it is not measured."""
+    if values is None:
+        return 0.0
+    columns = values.reshape(len(values), -1)
+    new = np.any(np.diff(columns, axis=0, prepend=np.nan) != 0.0, axis=1)  # a slow channel is held
+    return FAR_OFF * float(np.hypot.reduce(noise(columns[new]))) if new.sum() >= FEWEST else 0.0
 
 
 def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -31,9 +31,11 @@ def gaps(e: Evidence) -> list[SensorFinding]:
     aligned = (moved * said).sum(axis=1) > AGREED * way * np.hypot(*said.T)
     turned = np.diff(psi) - np.diff(e.turned[rows])
     least = FAR * spread_of(turned)
-    # Position and heading jump together in time alone, however the ship went meanwhile.
-    missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN)))
-    ahead = (FAST * (late + step) < step) & (step > LONG * period)
+    # Position and heading jump together in time alone, however the ship went meanwhile. Of a time that
+    # was not logged the speed is not known: there a clock is ahead only if the ship is where it was.
+    silent = step > LONG * period
+    missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN))) & ~silent
+    ahead = silent & (FAST * (late + step) < step) & (late + step < LONG * period)
     shortest = max(EVERY, 2.0 * period)
     jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > shortest)
     jumps &= going & (missing | ahead)

@@ -131,7 +131,7 @@ def _estimated(
     e: Evidence, every: Sequence[FaultColumn], jumps: Sequence[SensorFinding]
 ) -> MotionFaults:
     """The likeliest clock and the constants that are sure."""
-    cut = [(jump.start, jump.end) for jump in jumps]
+    cut = [*((jump.start, jump.end) for jump in jumps), *e.silences]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
     sizes = max(float(np.hypot(*sigma[:2])), NEGLIGIBLE), max(float(sigma[2]), NEGLIGIBLE)
     # Where the mean rate of the clock is free, there is one scale less.
@@ -230,24 +230,24 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     return made
 
 
-def _being(channel: str, e: Evidence) -> str:
-    """The channels that a fault of one is in, and a verb."""
+def _channels(channel: str, e: Evidence) -> tuple[str, str]:
+    """The channels that a fault of one is in, and their verb."""
     several = e.by and channel == e.by[0] and channel != "speed"
-    return f"{' and '.join(e.by)} are" if e.by and several else f"{channel} is"
+    return (" and ".join(e.by), "are") if e.by and several else (channel, "is")
 
 
 def _late(channel: str, value: float, e: Evidence) -> str:
     """A delay [s] in words."""
     way = "earlier" if value < 0.0 else "later"
-    return f"{_being(channel, e)} {abs(value):.3g} s {way} than the pose"
+    return f"{' '.join(_channels(channel, e))} {abs(value):.3g} s {way} than the pose"
 
 
 def _told(c: FaultColumn, value: float, e: Evidence) -> str:
     """A constant fault in words."""
-    name = " and ".join(e.by) if e.by and c.channel == e.by[0] and e.by[0] != "speed" else c.channel
+    name, verb = _channels(c.channel, e)
     if c.kind == "scale":
         way = "large" if value > 1.0 else "small"
-        return f"{_being(c.channel, e)} {100.0 * abs(value - 1.0):.1f} % too {way}"
+        return f"{name} {verb} {100.0 * abs(value - 1.0):.1f} % too {way}"
     if c.kind == "delay":
         return _late(c.channel, value, e)
     if c.kind == "place":

@@ -48,6 +48,8 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         turn = float(np.angle(np.exp(1j * total)))
         if (b - a) * LEAST_TURN > 2.0 * np.pi or abs(total) < max(np.pi, 2.0 * abs(turn)):
             continue
+        if large[a - 1 : a].any() or large[b : b + 1].any():  # a course at rest, which jumps to and fro
+            continue
         inside = np.arange(a + 1, b)
         angle[inside] = angle[a] + turn * (inside - a) / (b - a)
         changed += there[inside].tolist()
