@@ -1,11 +1,13 @@
 """What the commands of all packages share: parser, types of options, and lines on standard error."""
 
 import argparse
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
-from .message_text import printable
+from .message_text import most_alike, printable
 
 
 def complain(message: object, kind: str = "error: ") -> None:
@@ -18,6 +20,16 @@ def program(module: str) -> str:
     return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that names the nearest option where there is no such option."""
+
+    def error(self, message: str) -> NoReturn:
+        options = [option[2:] for action in self._actions for option in action.option_strings]
+        given = re.match(r"unrecognized arguments: .*?--(\w[\w-]*)", message)
+        near = most_alike(given[1], filter(None, options)) if given else None
+        super().error(f"{message}; did you mean '--{near}'?" if near else message)
+
+
 def command_parser(module: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser of the command that a module is.
 
@@ -26,7 +38,7 @@ def command_parser(module: str, description: str, epilog: str) -> argparse.Argum
         description: what the command does.
         epilog: examples and exit codes, line by line.
     """
-    return argparse.ArgumentParser(
+    return _Parser(
         prog=program(module),
         description=description,
         epilog=epilog,

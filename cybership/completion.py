@@ -1,8 +1,10 @@
 """Shell completion: ``eval "$(cybership completion bash)"``; so for zsh, for fish with ``source``."""
 
 import sys
+from collections.abc import Sequence
 
 from cosim import shipped_names
+from cybership.command_arguments import command_parser
 from cybership.subcommands import all_modules
 
 # One match a line, as names of files may have blanks. Options are those of the usage line, which ends at
@@ -41,16 +43,21 @@ ZSH = "autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashc
 SHELLS = {"bash": BASH, "zsh": f"{ZSH}{BASH}", "fish": FISH}
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print the completion of a shell; returns the exit code."""
-    if len(arguments) != 1 or arguments[0] not in SHELLS:
-        print("usage: cybership completion bash|zsh|fish\n", __doc__, file=sys.stderr)
-        return 2
-    between = " " if arguments[0] == "fish" else r"\n"
+    parser = command_parser(
+        "cybership.completion",
+        "Print the completion of commands, options and files for a shell.",
+        'in ~/.bashrc or ~/.zshrc:  eval "$(cybership completion bash)", or zsh\n'
+        "in config.fish:            cybership completion fish | source",
+    )
+    parser.add_argument("shell", choices=[*SHELLS], help="the shell")
+    shell: str = parser.parse_args(arguments).shell
+    between = " " if shell == "fish" else r"\n"
     names = {"commands": between.join(all_modules()), "scenarios": between.join(shipped_names())}
-    print(SHELLS[arguments[0]].format(**names), end="")
+    print(SHELLS[shell].format(**names), end="")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

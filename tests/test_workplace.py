@@ -294,6 +294,23 @@ def test_bash_completes_commands_options_values_scenarios_and_files(tmp_path, ca
     assert (done.stdout.splitlines(), done.stderr) == (expected, "")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["--help"], 0, "cybership completion fish | source"),
+        (["bsh"], 2, "invalid choice: 'bsh'"),
+        ([], 2, "required: shell"),
+    ],
+)
+def test_completion_has_help_and_names_its_shells(arguments, code, told, capsys):
+    with pytest.raises(SystemExit) as ended:
+        completion.main(arguments)
+    assert ended.value.code == code
+    shown = capsys.readouterr()
+    assert told in (shown.err if code else shown.out)
+    assert "``" not in shown.err + shown.out
+
+
 def test_a_missing_library_is_told_with_its_extra():
     message = missing_extra(ModuleNotFoundError("No module named 'sklearn'", name="sklearn.cross"))
     assert message == "this needs sklearn: pip install 'cybership[analysis]'"
