@@ -112,7 +112,7 @@ class Diagnosis(DecidedFindings):
         comparison: errors before and after, on training, validation and test runs, in this order.
         start: the initial model.
         stability: of the learned model.
-        speeds: u, v, r that hold 99 % of the training runs [m/s, m/s, rad/s].
+        speeds: |u|, |v|, |r| that hold 99 % of the training runs [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
         gain: what the search for effects gains over calibration alone in the data that decide; None
@@ -320,7 +320,7 @@ class Session(ShortRepr):
             comparison=replace(found, evaluations=evaluations, predictor=self.predictor),
             start=self.start,
             stability=check_stability(learned, self.start, self.advance, region),
-            speeds=region,
+            speeds=region.largest,
             prior=self.prior,
             seed=self.seed,
             gain=gain,

@@ -101,7 +101,7 @@ def _sentence(d: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
     """A finding in words; what holds in single runs, one after the other."""
 
     def told(own: Mapping[str, float]) -> str:
-        return sentence(Found(d.start.ship.effects[f.id], own, d.speeds.largest))
+        return sentence(Found(d.start.ship.effects[f.id], own, d.speeds))
 
     shown = _shown(d, values)
     runs = [run for run in f.of_runs if shown is values]
