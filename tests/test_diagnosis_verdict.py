@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import reported
-from support.measured import NOISE, commands, smoothed
+from support.measured import NOISE, commands, sail, smoothed
 from support.planted import bank, dead_bow, gusts, voyages
 
 import diagnosis
@@ -14,6 +14,7 @@ from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from diagnosis.assessment.stability import OPERATING
+from diagnosis.execution.progress import silent
 from diagnosis.predictors.evaluation import evaluate_run
 from diagnosis.predictors.parameter_set import ship_with
 from diagnosis.predictors.ship_model import of_one_run
@@ -27,8 +28,17 @@ from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
-from diagnosis.verdict.confidence import confidence_of
-from diagnosis.verdict.judging import driven_by_effects, verdict_name, with_confidence
+from diagnosis.session import begin
+from diagnosis.verdict import judging
+from diagnosis.verdict.confidence import Doubts, confidence_of
+from diagnosis.verdict.judging import (
+    driven_by_effects,
+    judge,
+    replaceable,
+    unexplained_axes,
+    verdict_name,
+    with_confidence,
+)
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
@@ -417,8 +427,10 @@ def test_set_holds_95_percent_of_the_weights_that_confidence_comes_from(weights,
 
 def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does_not():
     found = told(0.99, 0.99)
-    (there,) = with_confidence(found, left_on(X=True), Model()).effects
-    (beside,) = with_confidence(found, left_on(N=True), Model()).effects
+    (there,), (beside,) = (
+        with_confidence(found, Model(), Doubts(unexplained_axes(found, left, Model()))).effects
+        for left in (left_on(X=True), left_on(N=True))
+    )
     assert there.confidence == there.together == 0.5
     assert "same axis" in there.doubt
     assert beside.confidence == beside.together == 0.99
@@ -439,10 +451,44 @@ def test_a_pair_that_makes_up_another_shape_of_damping_is_even_odds_and_one_alon
         model = start.plus({n: x for _, v in effects for n, x in v.items()})
         found = Findings(made, model=model)
         driven = driven_by_effects(found, start, OPERATING)
-        return [f.confidence for f in with_confidence(found, left_on(), start, "", driven).effects]
+        return [f.confidence for f in with_confidence(found, start, Doubts(driven=driven)).effects]
 
     assert seen(*parts, other) == [0.5, 0.5, 0.99]
     assert seen(parts[0], other) == [0.99, 0.99]
+
+
+@pytest.mark.parametrize(("own", "sure"), [(0.9, True), (0.01, False), (0.0, False), (None, True)])
+def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sure):
+    """By shares of the first error; a method that cannot fit without it says nothing."""
+    found, start = told(0.99, 0.99), Model()
+    doubts = Doubts(replaceable=replaceable(found, start, [0.9], [own]))
+    (f,) = with_confidence(found, start, doubts).effects
+    assert f.confidence == (0.99 if sure else 0.5)
+    assert ("as much without it" in f.doubt) != sure
+
+
+def test_waves_are_in_no_model_and_not_replaceable():
+    waves = Finding("waves", {"wave_peak": 0.6}, {}, 0.95, [], 0.8, 0.8, together=0.95)
+    assert not replaceable(Findings([waves], model=Model()), Model(), [0.8], [0.0])
+
+
+@pytest.mark.slow
+def test_the_judgement_is_sure_only_of_what_nothing_else_explains(monkeypatch):
+    """The same evidence of the same run, once as if coefficients made up for the effect."""
+    runs = diagnosis.gather([sail(64.0, 0.1, {"delta_X_u": -2.0})[0]])
+    session = begin(runs)
+    found = session.method.fit(runs, session.start, session.prior, silent, 0)
+    data, region = session.data(found.sigma), OPERATING
+
+    def seen():
+        return judge(found, data, session.known, session.harms, region, True, silent).learned.effects
+
+    (sure,) = seen()
+    monkeypatch.setattr(judging, "unique_shares", lambda learned, *_: [0.0] * len(learned.effects))
+    (unsure,) = seen()
+    assert (sure.id, unsure.id) == ("X_u", "X_u")
+    assert sure.confidence > 0.8
+    assert unsure.confidence == 0.5
 
 
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])

@@ -13,7 +13,7 @@ from diagnosis.report.report_data import ReportData
 from diagnosis.runs import channels_of, prepare, table_of
 from diagnosis.runs.smoothing.likelihood import equal_variances, excess_kurtosis
 from diagnosis.search.findings import Finding
-from diagnosis.verdict.confidence import confidence_of, doubt_of_data
+from diagnosis.verdict.confidence import Doubts, confidence_of, doubt_of_data
 
 H, SECONDS, NOISE = 0.1, 120.0, np.array([4e-3, 4e-3, 2e-3])
 
@@ -88,7 +88,7 @@ def test_of_rare_samples_nothing_is_sure(every, sure):
     (windows,) = gather([rare], anyway=True)
     assert np.diff(windows.smoothed.time).max() <= 0.5 + 1e-9
     f = Finding("mass", {"mass": 30.0}, {"mass": (20.0, 40.0)}, 0.99, [], 0.9, 0.9, together=0.99)
-    seen = confidence_of(f, Model(), (), doubt_of_data([windows]))
+    seen = confidence_of(f, Model(), Doubts(of_data=doubt_of_data([windows])))
     assert seen.own == (0.99 if sure else 0.5)
     assert ("too rare" in seen.doubt) != sure
 

@@ -21,7 +21,7 @@ from diagnosis.runs.sensors.further_channels import accelerations, receivers
 from diagnosis.runs.sensors.wraps import unwrapped
 from diagnosis.runs.smoothing import smoother
 from diagnosis.search.findings import Finding
-from diagnosis.verdict.confidence import confidence_of, doubt_of_data
+from diagnosis.verdict.confidence import Doubts, confidence_of, doubt_of_data
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE, Scale
 
@@ -270,7 +270,7 @@ def test_without_turns_clock_and_scale_are_one_and_the_speed_is_set_aside(factor
     np.testing.assert_array_equal(prepared.run.time, run.time)
     assert bool(doubt_of_data([prepared])) == (factor == 0.9)
     f = Finding("mass", {"mass": 30.0}, {"mass": (20.0, 40.0)}, 0.99, [], 0.9, 0.9, together=0.99)
-    seen = confidence_of(f, Model(), (), doubt_of_data([prepared]))
+    seen = confidence_of(f, Model(), Doubts(of_data=doubt_of_data([prepared])))
     assert (seen.own == 0.99) == (not seen.doubt) == (factor != 0.9)
 
 

@@ -24,7 +24,7 @@ from ..search.findings import Finding
 from ..search.gram import GramTable, Nuisance, block_numbers, gram_table
 from ..search.map_regression import first_share, regression, score
 from ..search.shortlist import LENGTH
-from ..verdict.confidence import confidence_of, doubt_of_data, probability
+from ..verdict.confidence import Doubts, confidence_of, doubt_of_data, probability
 from .hypotheses import Space, block_of
 from .information import SURE, Hypothesis, Knowledge
 
@@ -131,7 +131,7 @@ class Rehearsal:
             for z in rng.multivariate_normal(mean, e.covariance, count, method="eigh"):
                 y = np.concatenate([old.y, X @ z + self._noise(len(X), rng)])
                 findings = [t.finding(y, rng) for t in trials]
-                own = [confidence_of(f, start, self.residual[n], doubt).own for f in findings]
+                own = [confidence_of(f, start, Doubts(self.residual[n], doubt)).own for f in findings]
                 found.append(min(own, default=0.0))
         return np.array(found)
 

@@ -3,7 +3,7 @@
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
 the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
-the same axes, a damping that no hull has.
+the same axes, a damping that no hull has, effects and coefficients that explain as much without it.
 """
 
 from collections.abc import Collection, Sequence
@@ -33,6 +33,26 @@ MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which 
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
 STAND_IN = "the damping by these effects drives the ship on, which no hull does; it has another shape"
 RESIDUAL = "a residual that it does not explain acts on the same axis"
+REPLACEABLE = "the other effects and coefficients explain as much without it"
+
+
+class Doubts(NamedTuple):
+    """What speaks against the findings of a model in addition to their evidence.
+
+    Attributes:
+        residual: axes on which the learned model leaves a significant residual.
+        of_data: see :func:`doubt_of_data`.
+        driven: axes on which the effects of the learned model make the hull drive the ship on.
+        replaceable: ids of the effects without which all else, fitted anew, explains as much.
+    """
+
+    residual: Collection[str] = ()
+    of_data: str = ""
+    driven: Collection[str] = ()
+    replaceable: Collection[str] = ()
+
+
+NO_DOUBTS = Doubts()
 
 
 class Confidence(NamedTuple):
@@ -60,21 +80,13 @@ def probability(e: EffectEvidence) -> float:
     return float(e.bagged * a_candidate_is_right)
 
 
-def confidence_of(
-    f: Finding,
-    start: Model,
-    residual: Collection[str] = (),
-    of_data: str = "",
-    driven: Collection[str] = (),
-) -> Confidence:
+def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confidence:
     """The confidence of a finding.
 
     Args:
         f: the finding; without evidence, what its method says of it stands.
         start: the initial model.
-        residual: axes on which the learned model leaves a significant residual.
-        of_data: see :func:`doubt_of_data`.
-        driven: axes on which the effects of the learned model make the hull drive the ship on.
+        doubts: of the model with it.
     """
     own, of_set = f.confidence, f.together
     if f.evidence is not None and f.set_evidence is not None:
@@ -86,14 +98,17 @@ def confidence_of(
         own, doubt = EVEN_ODDS, MAY_BE_NONE
     elif _may_be_lags(f, start):
         own, doubt = min(own, EVEN_ODDS), MAY_BE_LAGS
-    elif own > EVEN_ODDS and of_data:
-        own, doubt = EVEN_ODDS, of_data
+    elif own > EVEN_ODDS and doubts.of_data:
+        own, doubt = EVEN_ODDS, doubts.of_data
     effect = start.ship.effects[f.id]
-    # Waves are a residual themselves.
-    if own > EVEN_ODDS and effect.search.by != "spectrum" and set(residual) & set(effect.axis):
-        return Confidence(EVEN_ODDS, EVEN_ODDS, RESIDUAL)
-    if own > EVEN_ODDS and set(driven) & set(effect.axis):
-        return Confidence(EVEN_ODDS, EVEN_ODDS, STAND_IN)
+    capped = {
+        # Waves are a residual themselves.
+        RESIDUAL: effect.search.by != "spectrum" and set(doubts.residual) & set(effect.axis),
+        STAND_IN: set(doubts.driven) & set(effect.axis),
+        REPLACEABLE: f.id in doubts.replaceable,
+    }
+    if own > EVEN_ODDS and any(capped.values()):
+        return Confidence(EVEN_ODDS, EVEN_ODDS, next(text for text, holds in capped.items() if holds))
     return Confidence(own, of_set, doubt)
 
 

@@ -1,6 +1,6 @@
 """The judgement: evidence of a search and data that decide in, one verdict out."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,13 +17,14 @@ from ..predictors import Model, WeakWindows, omega
 from ..predictors.evaluation import Bands
 from ..predictors.windows import Windows
 from ..runs import Smoothed
+from ..runs.run_constants import NEGLIGIBLE
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import prediction_bands, to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
-from .confidence import FOUND, Confidence, confidence_of, doubt_of_data
+from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
@@ -141,10 +142,15 @@ def judge(
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
-    driven = driven_by_effects(fit.findings, start, region)
-    learned = with_confidence(fit.findings, remainder, start, doubt_of_data(train), driven)
-    explained = shares(learned, start, data.validate)
-    alone = unique_shares(learned, start, train, data.validate)
+    explained = shares(fit.findings, start, data.validate)
+    alone = unique_shares(fit.findings, start, train, data.validate)
+    doubts = Doubts(
+        residual=unexplained_axes(fit.findings, remainder, start),
+        of_data=doubt_of_data(train),
+        driven=driven_by_effects(fit.findings, start, region),
+        replaceable=replaceable(fit.findings, start, explained, alone),
+    )
+    learned = with_confidence(fit.findings, start, doubts)
     known, force = fit.posterior, fit.unrecorded
     return DecidedFindings(
         learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
@@ -162,26 +168,38 @@ def driven_by_effects(found: Findings, start: Model, region: OperatingRegion) ->
     return driven & {axis for m in without for axis in driven_axes(found.model, m, region)}
 
 
-def with_confidence(
-    found: Findings,
-    remainder: Remainder,
-    start: Model,
-    of_data: str = "",
-    driven: Collection[str] = (),
-) -> Findings:
-    """The findings with their confidence: the one place where it is set.
-
-    A significant residual on the axes of an effect makes it even odds at the most; waves that are found
-    account for the one that is left in addition to them. So does what speaks against the data, to all,
-    and a damping that drives the ship on to those of its axis (``driven``: :func:`driven_by_effects`).
-    """
-    axes: Collection[str] = {axis for axis, r in remainder.axes.items() if r.significant}
+def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
+    """Axes with a significant residual; none where waves are sure, which account for it."""
     waves = [f for f in found.effects if start.ship.effects[f.id].search.by == "spectrum"]
     if any(confidence_of(f, start).own >= FOUND for f in waves):
-        axes = ()
+        return set()
+    return {axis for axis, r in remainder.axes.items() if r.significant}
+
+
+def replaceable(
+    found: Findings, start: Model, explained: Sequence[float], alone: Sequence[float | None]
+) -> set[str]:
+    """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`.
+
+    Waves are in no model, so that none explains less without them.
+    """
+    return {
+        f.id
+        for f, share, own in zip(found.effects, explained, alone, strict=True)
+        if own is not None
+        and own <= NEGLIGIBLE * share
+        and start.ship.effects[f.id].search.by != "spectrum"
+    }
+
+
+def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
+    """The findings with their confidence: the one place where it is set.
+
+    Each of the doubts that holds for an effect makes it even odds at the most.
+    """
     effects = []
     for f in found.effects:
-        c = confidence_of(f, start, axes, of_data, driven)
+        c = confidence_of(f, start, doubts)
         effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
     return replace(found, effects=effects)
 
