@@ -133,7 +133,8 @@ def refuse_thousands(path: Path, layout: Layout, table: pd.DataFrame) -> None:
     """Refuse a CSV file in which most numbers of a column that are not read have such separators."""
     for name, cells in table.items():
         numbers: Any = pd.to_numeric(cells, errors="coerce")
-        texts = cells[numbers.isna()].dropna().astype("string").str.strip()
+        left: Any = cells[numbers.isna()]
+        texts = left.dropna().astype("string").str.strip()
         grouped = texts[texts.str.fullmatch(_thousands(layout))]
         if grouped.size > 0.5 * texts.size:
             raise InputError(
