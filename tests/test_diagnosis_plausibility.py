@@ -21,6 +21,7 @@ from diagnosis.assessment import plausibility
 from diagnosis.assessment.command_check import without_force
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import (
+    Mistake,
     likeliest_mistake,
     pushed_aside,
     refuse_implausible,
@@ -345,6 +346,21 @@ def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
     (line,) = found.smoothed.doubted
     assert line.startswith("perhaps tau_Y has the wrong sign (odds 10^2 : 1); if so, put {")
     assert line in found.smoothed.notes
+
+
+@pytest.mark.parametrize(("factor", "refused"), [(1.0, True), (0.1, False)])
+def test_a_noise_that_the_samples_contradict_gives_readings_no_odds(factor, refused, monkeypatch):
+    """With a motion that follows its noise accelerations are smaller in feet, whatever the ship does."""
+    run = sail(64.0, 0.1)[0]
+    run = replace(run, noise={n: factor * s for n, s in zip(POSE, NOISE, strict=True)})
+    feet = Mistake([Reading("y is in ft", {"y": Named(name="y", factor=0.3048)})], 20.0)
+    monkeypatch.setattr(plausibility, "likeliest_mistake", lambda *_: feet)
+    if refused:
+        with pytest.raises(InputError, match="y is in ft"):
+            diagnosis.gather([run])
+        return
+    (w,) = diagnosis.gather([run])
+    assert any("the noise of x is given as" in line for line in w.smoothed.doubted)
 
 
 def test_the_side_car_of_a_run_that_seems_mirrored_is_written_all_the_same(tmp_path):

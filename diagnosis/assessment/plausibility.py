@@ -81,7 +81,9 @@ def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
     seen = beyond or (
         f"its accelerations follow {', '.join(wrong)}" if wrong else pushed_aside(w, model)
     )
-    found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean)
+    # Where the samples contradict the stated noise, no motion follows from which readings have odds.
+    readable = not w.smoothed.doubted
+    found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean) if readable else None
     if found and (found.sure or not seen):
         clause = f"{beyond}; {found.clause}" if beyond else found.clause
         return Misreading(clause, found.readings[0].changes, sure=found.sure)
