@@ -58,6 +58,7 @@ TOLD = [
     ("tau_percent", "times the 1.165 N that the thrusters give"),
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
     ("psi_180", column(psi={"offset": 3.142})),
+    ("psi_90", column(psi={"offset": 4.712})),
     ("const_tau", "all its commands are constant"),
     ("outliers_tau", "leave false cells empty"),
     ("commands_zero_half", "all commands are zero for 2"),

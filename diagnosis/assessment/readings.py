@@ -89,8 +89,9 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
     )
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
-    half = Named(name="psi", offset=np.pi)
-    yield Reading("its heading is off by 180 deg", {"psi": half})
+    for degrees in (180, 90, -90):
+        back = Named(name="psi", offset=float(-np.radians(degrees) % (2.0 * np.pi)))
+        yield Reading(f"its heading is off by {degrees} deg", {"psi": back})
     for unit, m in UNITS["length"].items():
         if m == 1.0:
             continue
