@@ -11,6 +11,7 @@ from typing import Any
 from cybership.scratch_folder import is_scratch, sweep
 
 from ..command import FAILED, INTERRUPTED, complain
+from ..errors import not_written
 from ..files import update_json, write_json
 from ..interrupts import ignore_interrupts
 from ..process.run_state import CAMPAIGN, DESCRIPTION, FOLDER, LATE, LOGGING, STATE, UNFINISHED
@@ -58,7 +59,7 @@ def report(code: int, interrupted: bool) -> int:
             folder, runs = str(Path(summary).parent), _end_campaign(Path(summary), status, message)
             kept = f"{runs} runs are kept in '{_shown(folder)}'; the same command goes on"
     except OSError as error:
-        message += f"; cannot write to '{folder}': {error.strerror}"
+        message += f"; {not_written(Path(folder), error)}"
     _remove_unfinished()
     sweep()
     if interrupted:

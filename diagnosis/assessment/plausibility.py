@@ -29,8 +29,8 @@ from .readings import AS_READ, Reading, other_factors, readings, reread
 from .settings import SETTINGS
 
 # rad; a heading that is off by any of them is an effect of the library, and no mistake where it explains
-# a run as well. Chosen: 30 degrees apart, so that one is within 15 degrees; the search for
-# effects, which begins at zero, finds no way to a right angle and more.
+# a run as well. Chosen: 30 degrees apart, so that one is within 15 degrees, and less than a right angle,
+# to which the search for effects, which begins at zero, finds no way.
 TURNS = tuple(k * np.pi / 6.0 for k in range(-2, 3) if k)
 MOST = 6  # 1, power of ten of the odds that are stated; no model is true enough for more
 

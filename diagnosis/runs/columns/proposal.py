@@ -307,9 +307,7 @@ def _by_words(
     found: dict[str, list[Column]] = {}
     shafts: list[Column] = []
     for name, below in free:
-        bare, unit = _bare(name, below)
-        if not unit:
-            bare, unit = _unit_at_the_end(bare)
+        bare, unit = _without_unit(name, below)
         unit = unit or unit_in(bare)
         if signal := meaning_of_words(bare, unit, quantity):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
@@ -376,6 +374,12 @@ def _bare(name: str, below: str) -> tuple[str, str]:
     return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
 
 
+def _without_unit(name: str, below: str) -> tuple[str, str]:
+    """The same, where the unit may be the end of the name, too."""
+    bare, unit = _bare(name, below)
+    return (bare, unit) if unit else _unit_at_the_end(bare)
+
+
 def _unit_at_the_end(name: str) -> tuple[str, str]:
     """A name without the unit that its last words are, as x_mm and yaw_rate_deg_s, and the unit."""
     words = name.split("_")
@@ -399,11 +403,7 @@ def _likely(
     refuse_thousands(path, layout, table)
     pose = {s: to_si(_numbers(table[c.name], s), s, c, quantity[s]) for s, c in known.items()}
     kind = "time" if "time" in blank else ""
-    named = {}
-    for name, below in unused.items():
-        bare, unit = _bare(name, below)
-        bare, unit = (bare, unit) if unit else _unit_at_the_end(bare)
-        named[name] = bare, unit, _numbers(table[name], kind)
+    named = {n: (*_without_unit(n, below), _numbers(table[n], kind)) for n, below in unused.items()}
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}
 

@@ -6,11 +6,12 @@ from functools import cached_property
 import numpy as np
 
 from fmus.frames import rotate_to_earth
+from fmus.scale import REFERENCE
 
-from ..cleaning import NORMAL_MAD, lost, noise, repeated
+from ..cleaning import NORMAL_MAD, long_gap, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
-from ..run_constants import EVERY, FAR_OFF, FEWEST, LONG
+from ..run_constants import FAR_OFF, FEWEST
 
 SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 FAR = 8.0  # 1, times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
@@ -56,10 +57,10 @@ class Evidence:
         return _of_noise(self.velocity), _of_noise(self.rate)
 
     @cached_property
-    def silences(self) -> list[tuple[float, float]]:
+    def unlogged(self) -> list[tuple[float, float]]:
         """Begin and end [s] of each stretch without rows, of whose motion nothing is known."""
         step = np.diff(self.time)
-        at = np.flatnonzero(step > max(EVERY, LONG * float(np.median(step))))
+        at = np.flatnonzero(step > long_gap(float(np.median(step)), REFERENCE))
         return [(float(self.time[k]), float(self.time[k + 1])) for k in at]
 
     @cached_property

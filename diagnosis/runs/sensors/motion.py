@@ -131,7 +131,7 @@ def _estimated(
     e: Evidence, every: Sequence[FaultColumn], jumps: Sequence[SensorFinding]
 ) -> MotionFaults:
     """The likeliest clock and the constants that are sure."""
-    cut = [*((jump.start, jump.end) for jump in jumps), *e.silences]
+    cut = [*((jump.start, jump.end) for jump in jumps), *e.unlogged]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
     sizes = max(float(np.hypot(*sigma[:2])), NEGLIGIBLE), max(float(sigma[2]), NEGLIGIBLE)
     # Where the mean rate of the clock is free, there is one scale less.
