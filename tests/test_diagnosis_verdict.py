@@ -33,6 +33,7 @@ from diagnosis.verdict import judging
 from diagnosis.verdict.confidence import Doubts, confidence_of
 from diagnosis.verdict.judging import (
     driven_by_effects,
+    faster_than_smoothing,
     judge,
     replaceable,
     unexplained_axes,
@@ -465,6 +466,28 @@ def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sur
     (f,) = with_confidence(found, start, doubts).effects
     assert f.confidence == (0.99 if sure else 0.5)
     assert ("as much without it" in f.doubt) != sure
+
+
+def filters_of(*values):
+    made = [Finding(i, {i: T}, {}, 0.99, [], 0.5, 0.5, together=0.99) for i, T in values]
+    return Findings(made, model=Model(measurement=dict(values)))
+
+
+@pytest.mark.parametrize(("noise", "faster"), [(0.0, set()), (0.05, {"heading_tracker"})])
+def test_a_tracking_filter_faster_than_the_smoothing_is_even_odds(noise, faster):
+    """Of a noise of 3 degrees the smoothing of the heading ends at 1 rad/s; the filter's corner is 2."""
+    run = sail(60.0, 0.1, {})[0]
+    pose = np.array(run.pose)
+    pose[:, 2] += noise * np.random.default_rng(3).standard_normal(len(pose))
+    windows = [weak_windows(smoothed(replace(run, pose=pose)))]
+    found = filters_of(("heading_tracker", 0.5), ("position_tracker", 1.5), ("heading_lag", 0.5))
+    assert faster_than_smoothing(found, Model(), windows) == faster
+    slow = filters_of(("heading_tracker", 3.0))
+    assert not faster_than_smoothing(slow, Model(), windows)
+    assert not faster_than_smoothing(slow, slow.model, windows)
+    doubts = Doubts(smoothed=faster)
+    sure = [f.id for f in with_confidence(found, Model(), doubts).effects if f.confidence > 0.5]
+    assert {f.id for f in found.effects} - {*sure} == faster
 
 
 def test_waves_are_in_no_model_and_not_replaceable():

@@ -100,6 +100,12 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     return np.asarray(np.sqrt(_force_variance(w, model, variances) + floor))
 
 
+def corner_frequency(w: WeakWindows) -> np.ndarray:
+    """(K, 3), w0 of the smoothing of each window [rad/s], by the variance of its pose."""
+    smooth = w.smooth @ np.where(w.known[:, None], w.smoothed.eta_std, 0.0) ** 2
+    return np.asarray(3.0 * smooth / (_sampled(w) * w.smoothed.noise**2))
+
+
 def undone_variance(w: WeakWindows, model: Model) -> np.ndarray:
     """Variance (K, 3) of the model error by the noise of the poses, as a model undoes its filters.
 
@@ -133,8 +139,7 @@ def _force_variance(
         variances: of a derivative's order and w0 (K, 3) that of north, east and heading (K, 3).
     """
     s, mass = w.smoothed, model.reference_mass
-    smooth = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
-    corner = 3.0 * smooth / (_sampled(w) * s.noise**2) * w.scale.time
+    corner = corner_frequency(w) * w.scale.time
     c2 = np.clip(w.smooth @ np.where(w.known, np.cos(s.eta[:, 2]) ** 2, 0.0), 0.0, 1.0)
 
     def in_axes(order: int) -> np.ndarray:

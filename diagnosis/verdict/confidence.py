@@ -3,7 +3,8 @@
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
 the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
-the same axes, a damping that no hull has, effects and coefficients that explain as much without it.
+the same axes, a damping that no hull has, effects and coefficients that explain as much without it, a
+smoothing that is slower than a filter.
 """
 
 from collections.abc import Collection, Sequence
@@ -33,6 +34,7 @@ MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which 
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
 STAND_IN = "the damping by these effects drives the ship on, which no hull does; it has another shape"
 RESIDUAL = "a residual that it does not explain acts on the same axis"
+SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -44,12 +46,14 @@ class Doubts(NamedTuple):
         of_data: see :func:`doubt_of_data`.
         driven: axes on which the effects of the learned model make the hull drive the ship on.
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
+        smoothed: ids of the filters that are faster than the smoothing.
     """
 
     residual: Collection[str] = ()
     of_data: str = ""
     driven: Collection[str] = ()
     replaceable: Collection[str] = ()
+    smoothed: Collection[str] = ()
 
 
 NO_DOUBTS = Doubts()
@@ -106,6 +110,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         RESIDUAL: effect.search.by != "spectrum" and set(doubts.residual) & set(effect.axis),
         STAND_IN: set(doubts.driven) & set(effect.axis),
         REPLACEABLE: f.id in doubts.replaceable,
+        SMOOTHED: f.id in doubts.smoothed,
     }
     if own > EVEN_ODDS and any(capped.values()):
         return Confidence(EVEN_ODDS, EVEN_ODDS, next(text for text, holds in capped.items() if holds))

@@ -15,6 +15,7 @@ from ..execution.progress import Advance
 from ..execution.short_text import ShortRepr
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.evaluation import Bands
+from ..predictors.uncertainty import corner_frequency
 from ..predictors.windows import Windows
 from ..runs import Smoothed
 from ..runs.run_constants import NEGLIGIBLE
@@ -149,6 +150,7 @@ def judge(
         of_data=doubt_of_data(train),
         driven=driven_by_effects(fit.findings, start, region),
         replaceable=replaceable(fit.findings, start, explained, alone),
+        smoothed=faster_than_smoothing(fit.findings, start, train),
     )
     learned = with_confidence(fit.findings, start, doubts)
     known, force = fit.posterior, fit.unrecorded
@@ -190,6 +192,23 @@ def replaceable(
         and own <= NEGLIGIBLE * share
         and start.ship.effects[f.id].search.by != "spectrum"
     }
+
+
+def faster_than_smoothing(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
+    """The tracking filters with corner frequencies above those of the smoothing, in all runs.
+
+    At low frequencies w both take w^2 off a motion, without a lag: where the smoothing ends below the
+    filter's corner 1 / T, the data hold nothing that discriminates them.
+    """
+    corner = np.max([np.median(corner_frequency(w), axis=0) for w in runs], axis=0)
+    before = np.array(start.filters.tracker)
+    faster = set()
+    for f in found.effects:
+        tracker = np.array(start.plus(f.values).filters.tracker)
+        changed = tracker != before
+        if changed.any() and (tracker * corner < 1.0)[changed].all():
+            faster.add(f.id)
+    return faster
 
 
 def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
