@@ -1,47 +1,41 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
-The number of effects is known only in the end. The time that is left if no further one is found is the
-least that is possible; :data:`MORE` times that is stated. The true time is at least 0.6 of it then, and
-more than twice it only where it is 3.2 times the least. Where no effect was found, none is validated
-and fitted. A kind of step that has ended takes what it took; any other one its usual time, scaled by
-what the steps so far took.
+The number of effects is known only in the end. It is between those that were found and those that the
+search announces as likely (:mod:`diagnosis.search.further_effects`). The geometric mean of the times
+for both is stated: it is right within a factor of two where they differ by less than four. A kind of
+step that has ended takes what it took; any other one its usual time, scaled by what the steps of the
+search took so far.
 """
 
+import math
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 ROUND = ("every effect as a candidate", "candidates refined")
 AGAIN = "its place searched again"  # of one effect, each time that another one is found
 OF_EACH = "validation data are predicted better"  # for each effect
 OF_EFFECTS = (OF_EACH, "fit to predictions")  # only where there is one
-# s of processor time for ten minutes of the Otter at 10 Hz; only their ratios count. In their order.
+# s of processor time, medians over six logs (benchmarks/code.md); only their ratios count. In their order.
 USUAL = {
-    "reading": 0.1,
-    "smoothing": 1.4,
-    "calibration of the coefficients": 2.4,
-    **dict(zip(ROUND, (0.8, 1.1), strict=True)),
-    AGAIN: 4.8,
-    "waves": 0.6,
-    **dict(zip(OF_EFFECTS, (1.2, 5.0), strict=True)),
-    "residual": 0.1,
-    "gain of the search over calibration": 1.5,
-    "predicting": 0.8,
-    "stability": 0.9,
-    "report: figures": 1.1,
-    "report: page": 0.3,
+    **dict(zip(ROUND, (0.9, 0.8), strict=True)),
+    AGAIN: 0.8,
+    "waves": 0.7,
+    **dict(zip(OF_EFFECTS, (0.3, 2.2), strict=True)),
+    "residual": 0.2,
+    "gain of the search over calibration": 0.2,
+    "predicting": 0.2,
+    "stability": 1.2,
+    "report: figures": 0.2,
+    "report: page": 0.2,
 }
 LAST = [*USUAL][[*USUAL].index(AGAIN) + 1 :]  # steps behind the search
-# 1, of the remaining time of a search that finds no further effect. Chosen: the largest for which a
-# search that finds none at all, one, two or three effects is within a factor of two from its first round
-# on.
-MORE = 1.6
 # 1, share of its time that a step is taken to go on for where it takes longer than usual; chosen.
 LATE = 0.3
 
 
 class RemainingTime:
-    """The remaining time of ``learn``, once its search has begun.
+    """The remaining time of ``learn``, once its search has regressed all candidates.
 
     Args:
         now: the time [s].
@@ -52,7 +46,9 @@ class RemainingTime:
         self._step, self._begun, self._round, self._again = "", self._started, 0, 0
         self._took: dict[str, list[float]] = {}  # kind of step -> how long each took, over its number
         self._number = 1.0  # of the present step: of effects where it takes as long as they are many
-        self._left: dict[str, float] = {}
+        self._likely = 0
+        # Of each kind of step, for the fewest effects and for those that are likely.
+        self._left: list[dict[str, float]] = []
 
     @property
     def elapsed(self) -> float:
@@ -61,11 +57,14 @@ class RemainingTime:
 
     @property
     def seconds(self) -> float | None:
-        """The remaining time [s]; None: the search has not begun."""
+        """The remaining time [s]; None: how many effects are likely is not known yet."""
         if not self._round:
             return None
         spent = self._now() - self._begun
-        rest = sum(number * self._usual(name) for name, number in self._left.items())
+        rest = math.prod(
+            sum(number * self._usual(name) for name, number in left.items()) ** (1.0 / len(self._left))
+            for left in self._left
+        )
         return max(self._number * self._usual(self._step) - spent, LATE * spent) + rest
 
     @property
@@ -91,29 +90,29 @@ class RemainingTime:
         if self._step:
             self._took.setdefault(self._step, []).append((now - self._begun) / self._number)
         self._step, self._begun, self._number = step, now, 1.0
-        if step in ROUND or step == AGAIN:
+        number = re.match(r"effect (\d+) of about (\d+)", what)
+        if number:
+            self._round, self._likely = int(number[1]), int(number[2])
+        if number or step == AGAIN:
             self._again = self._again + 1 if step == AGAIN else 0
-            number = re.match(r"effect (\d+)", what)
-            self._round = max(self._round, int(number[1]) if number and step in ROUND else 1)
-            self._left = self._following()
+            fewest = self._round - (step != AGAIN)
+            self._left = [self._following(n) for n in (fewest, max(fewest, self._likely))]
         elif step in LAST and self._round:
-            effects = self._round - 1.0
-            self._number = max(effects, 1.0) if step == OF_EACH else 1.0
-            numbers = dict.fromkeys(LAST, 1.0) | self._of_effects(effects)
-            self._left = {name: numbers[name] for name in LAST[LAST.index(step) + 1 :]}
+            effects = self._round - 1
+            self._number = max(effects, 1) if step == OF_EACH else 1
+            self._left = [_last(effects, LAST[LAST.index(step) + 1 :])]
 
-    def _of_effects(self, effects: float) -> dict[str, float]:
-        """The number of steps that depend on how many effects there are."""
-        return dict.fromkeys(OF_EFFECTS, min(effects, 1.0)) | {OF_EACH: effects}
-
-    def _following(self) -> dict[str, float]:
-        """The number of each kind of step that usually follows the present one of a round."""
-        effects = max(self._round if self._again else self._round - 1.0, 1.0)
-        left = dict.fromkeys(ROUND, effects + 1.0 - self._round)
-        if self._step == ROUND[0]:
-            left[ROUND[1]] += 1.0
+    def _following(self, effects: int) -> dict[str, float]:
+        """The number of each kind of step that follows the present one, if so many effects are found."""
+        present = self._round
+        left = dict.fromkeys(ROUND, float(effects + 1 - present))
+        left[ROUND[1]] += self._step == ROUND[0]
         # With each further effect the place of each before it is searched again.
-        again = max(effects - 1.0 - self._again, 0.0) if self._again else 0.0
-        last = dict.fromkeys(LAST, 1.0) | self._of_effects(effects)
-        steps = left | {AGAIN: again} | last
-        return {name: MORE * number for name, number in steps.items()}
+        again = sum(range(present, effects)) + max(present - 1 - self._again, 0) * (effects >= present)
+        return left | {AGAIN: float(again)} | _last(effects, LAST)
+
+
+def _last(effects: int, steps: Sequence[str]) -> dict[str, float]:
+    """The number of each of some steps behind a search that found so many effects."""
+    numbers = dict.fromkeys(OF_EFFECTS, float(effects > 0)) | {OF_EACH: float(effects)}
+    return {name: numbers.get(name, 1.0) for name in steps}

@@ -20,6 +20,7 @@ from ..predictors.weak_form import commanded
 from ..runs.run_constants import STEPS
 from .conclusion import AcceptedEffect, Selection
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
+from .further_effects import further_effects
 from .map_regression import Scored, first_share
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
@@ -73,12 +74,13 @@ def search(
     advance("every effect as a candidate")
     made: MadeCandidates = {}
     ranking = rank(t, at, set(), made)
+    likely = further_effects(ranking, start)
     lacking, command = ranking.base, commanded(data, start)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
     while len(accepted) < MOST_REPORTED:
-        advance(f"effect {len(accepted) + 1}: the best candidates refined")
+        advance(f"{_in_turn(len(accepted) + 1, likely)}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:
             t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
@@ -101,10 +103,11 @@ def search(
         before = (t, alone) if harms else None
         accepted.append(accepted_effect(best, rng))
         at = best.winner
+        likely = min(len(accepted) - 1 + further_effects(ranking, start), MOST_REPORTED)
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
             at, accepted = searched_again(t, at, accepted, made, advance, rng)
-        advance(f"effect {len(accepted) + 1}: every effect as a candidate")
+        advance(f"{_in_turn(len(accepted) + 1, likely)}: every effect as a candidate")
         ranking = rank(t, at, {p.id for p in accepted}, made)
     if before is not None:
         t, at = before
@@ -114,6 +117,11 @@ def search(
         at, intervals = profiled(t, at, p)
         accepted[k] = replace(p, intervals={**p.intervals, **intervals})
     return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
+
+
+def _in_turn(number: int, likely: int) -> str:
+    """The effect that is searched, and how many there may be."""
+    return f"effect {number} of about {max(number, likely)}"
 
 
 def searched_again(
