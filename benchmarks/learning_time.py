@@ -23,6 +23,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 HERE = Path(__file__)
+LEAST_REST = 0.05  # 1, of the whole time: who waits for so little does not mind a factor of it
 SECONDS, SAMPLES, THINNED = 180.0, 1800, 5  # s; of each run; samples at 50 Hz in one at 10 Hz
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 # First words of the steps that `learn` tells -> part.
@@ -102,8 +103,11 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
 
 
 def ratios(stated: Sequence[tuple[float, float]], end: float) -> dict[str, float]:
-    """Remaining times over the true ones, of times at which they were stated [s] until an end [s]."""
-    each = [(at, left / (end - at)) for at, left in stated if end - at > 1.0]
+    """Remaining times over the true ones, of times at which they were stated [s] until an end [s].
+
+    The last LEAST_REST of the whole time is left out.
+    """
+    each = [(at, left / (end - at)) for at, left in stated if end - at > LEAST_REST * end]
     found = {"first remaining time": each[0][1]} if each else {}
     for half, begin in (("", 0.0), (", second half", 0.5 * end)):
         if of_part := [ratio for at, ratio in each if at >= begin]:

@@ -9,9 +9,10 @@ from support.measured import learn, sail, smoothed
 from diagnosis.predictors import Model, omega, weak_windows
 from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
 from diagnosis.search import forward_selection
-from diagnosis.search.prior import NominalPrior
+from diagnosis.search.further_effects import further_effects
+from diagnosis.search.prior import MEASURED, NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
-from diagnosis.search.shortlist import NEW, novelty, rank
+from diagnosis.search.shortlist import NEW, novelty, rank, reweighted
 from diagnosis.verdict.confidence import probability
 
 
@@ -179,3 +180,14 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     assert new["curve_vsp_y(c)"]
     assert {step.candidates[j.candidate].effect.id for j in step.order} == {e for e in new if new[e]}
     assert all(novelty(step.table, k, 0) == 1.0 for k in range(len(new))), "beside nothing all is new"
+
+
+@pytest.mark.parametrize("hidden", [{}, {"delta_X_u": -2.0}, {"delta_X_u": -2.0, "delta_N_r": -1.5}])
+def test_as_many_effects_are_likely_as_there_are(hidden):
+    """Of the first ranking, with the noise that no candidate explains."""
+    start = Model()
+    belief = NominalPrior.of(start, None, MEASURED)
+    t, at = TrainingSet([data(64.0, ship=hidden)[0]], None, belief), RefinedModel.at(start, belief)
+    weighed = reweighted(t, at, rank(t, at, set()))
+    likely = 0 if weighed is None else further_effects(weighed[1], start)
+    assert likely == len(hidden)

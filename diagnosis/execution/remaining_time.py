@@ -16,7 +16,7 @@ ROUND = ("every effect as a candidate", "candidates refined")
 AGAIN = "its place searched again"  # of one effect, each time that another one is found
 OF_EACH = "validation data are predicted better"  # for each effect
 OF_EFFECTS = (OF_EACH, "fit to predictions")  # only where there is one
-# s of processor time, medians over six logs (benchmarks/code.md); only their ratios count. In their order.
+# s of processor time, medians of six logs (benchmarks/code.md); only ratios count. In their order.
 USUAL = {
     **dict(zip(ROUND, (0.9, 0.8), strict=True)),
     AGAIN: 0.8,
