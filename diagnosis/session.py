@@ -350,9 +350,10 @@ def begin(
     harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
     blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
     if blocks < PARTS:
+        notes = "".join(f"; {w.run.name}: {note}" for w in train for note in w.smoothed.track.notes)
         raise InputError(
             f"too little data to learn from: thrusters are at work in {blocks} stretches of "
-            f"{block:.3g} s; at least {PARTS} are needed"
+            f"{block:.3g} s; at least {PARTS} are needed{notes}"
         )
     first, last = len(train), len(runs) - len(held_out)
     parts = runs[:first], runs[first:last], runs[last:]

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.measured import sail
 
+from cosim import InputError
 from diagnosis import Model, Run
 from diagnosis.assessment.gathering import gather
 from diagnosis.interactive import compare, load
@@ -13,6 +15,7 @@ from diagnosis.report.report_data import ReportData
 from diagnosis.runs import channels_of, prepare, table_of
 from diagnosis.runs.smoothing.likelihood import equal_variances, excess_kurtosis
 from diagnosis.search.findings import Finding
+from diagnosis.session import begin
 from diagnosis.verdict.confidence import Doubts, confidence_of, doubt_of_data
 
 H, SECONDS, NOISE = 0.1, 120.0, np.array([4e-3, 4e-3, 2e-3])
@@ -197,3 +200,42 @@ def test_files_hold_each_channel_by_its_name():
     for channels in (data["channels"], *(of["channels"] for of in data["runs"])):
         assert all(keys <= set(c) for c in channels.values())
     assert data["channels"]["r"]["used"] is True
+
+
+@pytest.mark.parametrize("coordinate", [0, 1])
+@pytest.mark.parametrize(("until", "rounded"), [(400, None), (400, 3), (None, None)])
+def test_a_coordinate_that_is_frozen_alone_is_no_measurement_of_the_place(coordinate, until, rounded):
+    run = replace(sailed(), measured={})
+    if rounded:
+        run = replace(run, pose=np.round(run.pose, rounded), resolution=np.full_like(run.pose, 1e-3))
+    pose = np.array(run.pose)
+    pose[200:until, coordinate] = pose[200, coordinate]
+    whole, part = prepare(run).smoothed, prepare(replace(run, pose=pose)).smoothed
+    last = run.time.size if until is None else until
+    assert not part.track.fresh[201:last, :2].any()
+    assert part.track.fresh[201:last, 2].any()
+    name, seconds = "xy"[coordinate], (last - 1 - 200) * H
+    assert any(f"{name} is frozen for {seconds:.3g} s" in note for note in part.track.notes)
+    assert not any("frozen" in note for note in whole.track.notes)
+    used = np.arange(run.time.size) < 200
+    assert part.eta[used] == pytest.approx(whole.eta[used], abs=5.0 * NOISE.max())
+
+
+def test_a_coordinate_that_is_constant_by_the_motion_or_by_rounding_is_measured():
+    """A straight leg to the north without noise, then a turn; and steps as large as the ship's motion."""
+    run = replace(sailed(), measured={})
+    t = run.time
+    turned = np.cumsum(np.where(t < 20.0, 0.0, 0.02 * (t - 20.0))) * H
+    leg = np.column_stack([0.2 * t, 0.1 * turned, np.arctan2(turned, 20.0)])
+    coarse = np.round(leg * 10.0) / 10.0
+    for pose, step in ((leg, 0.0), (coarse, 0.1)):
+        smoothed = prepare(replace(run, pose=pose, resolution=np.full_like(pose, step))).smoothed
+        assert not any("frozen" in note for note in smoothed.track.notes)
+
+
+def test_a_run_that_is_too_short_by_a_frozen_coordinate_says_so():
+    run = sail(120.0, 0.1)[0]
+    pose = np.array(run.pose)
+    pose[300:, 1] = pose[300, 1]
+    with pytest.raises(InputError, match=r"too little data .* y is frozen for 89\.9 s, 30 s from"):
+        begin(gather([replace(run, pose=pose)]))
