@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 from support.cases import slow
@@ -48,6 +48,7 @@ coefficient = st.floats(-10.0, 10.0)
 
 @settings(max_examples=30)
 @given(st.fixed_dictionaries({f"delta_{name}": coefficient for name in sorted(LINEAR)}))
+@example({"delta_N_r": -NOMINAL.value("N_r"), "delta_N_v": -NOMINAL.value("N_v")})
 def test_for_linear_damping_it_is_the_smallest_eigenvalue(changes):
     model = Model({**NONLINEAR_OFF, **changes})
     D = -force(model, np.eye(3)).T

@@ -32,7 +32,6 @@ from diagnosis.session import begin
 from diagnosis.verdict import judging
 from diagnosis.verdict.confidence import Doubts, confidence_of
 from diagnosis.verdict.judging import (
-    driven_by_effects,
     faster_than_smoothing,
     judge,
     replaceable,
@@ -438,24 +437,30 @@ def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does
     assert not beside.doubt
 
 
-def test_a_pair_that_makes_up_another_shape_of_damping_is_even_odds_and_one_alone_is_not():
-    """Of a cubic drag too much by |u|u and too little by u: at low speed the hull drives the ship on."""
+@pytest.mark.parametrize(
+    ("ids", "sure"),
+    [
+        (("N_|r|r", "N_r"), ()),  # of a cubic damping too much by its square and too little by its line
+        (("N_v", "N_|v|v", "N_ur"), ()),  # of a lift by u|v|; another one on the axis is no surer
+        (("N_r", "N_uv"), ("N_r", "N_uv")),
+        (("N_r", "Y_r"), ("N_r", "Y_r")),
+        (("N_r", "N_|r|r", "Y_ur", "loss_yaw"), ("Y_ur", "loss_yaw")),
+        (("N_|r|r",), ("N_|r|r",)),
+    ],
+)
+def test_laws_of_one_family_on_an_axis_make_up_another_shape(ids, sure):
     start = Model()
-    parts = [
-        ("X_|u|u", {"delta_X_absu_u": -40.0}),
-        ("X_u", {"delta_X_u": 2.0 * abs(start.value("X_u"))}),
-    ]
-    other = ("N_r", {"delta_N_r": -1.0})
+    made = [Finding(i, {}, {}, 0.99, [], 0.9, 0.9, together=0.99) for i in ids]
+    found = with_confidence(Findings(made, model=start), start, Doubts()).effects
+    assert [f.confidence for f in found] == [0.99 if i in sure else 0.5 for i in ids]
+    assert all(("another shape" in f.doubt) != (f.id in sure) for f in found)
 
-    def seen(*effects):
-        made = [Finding(i, v, {}, 0.99, [], 0.9, 0.9, together=0.99) for i, v in effects]
-        model = start.plus({n: x for _, v in effects for n, x in v.items()})
-        found = Findings(made, model=model)
-        driven = driven_by_effects(found, start, OPERATING)
-        return [f.confidence for f in with_confidence(found, start, Doubts(driven=driven)).effects]
 
-    assert seen(*parts, other) == [0.5, 0.5, 0.99]
-    assert seen(parts[0], other) == [0.99, 0.99]
+def test_a_law_beside_a_mere_possibility_of_its_family_stays_sure():
+    start = Model()
+    made = [Finding(i, {}, {}, c, [], 0.9, 0.9, together=c) for i, c in (("N_|r|r", 0.99), ("N_r", 0.3))]
+    found = with_confidence(Findings(made, model=start), start, Doubts()).effects
+    assert [f.confidence for f in found] == [0.99, 0.3]
 
 
 @pytest.mark.parametrize(("own", "sure"), [(0.9, True), (0.01, False), (0.0, False), (None, True)])

@@ -191,10 +191,11 @@ def force(model: Model, nu: np.ndarray) -> np.ndarray:
 
     def total(u: np.ndarray, v: np.ndarray, r: np.ndarray) -> np.ndarray:
         at = Loaded(u=u, v=v, r=r, damping=b.hull.damping)
-        result = np.stack(damping_force(u, v, r, b.hull.damping))
+        # An axis without any damping is the number zero.
+        parts = [damping_force(u, v, r, b.hull.damping)]
         for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
-            added = member.apply(acts, b.params.outside, NONE, at)
-            result = result + np.stack([np.broadcast_to(axis, u.shape) for axis in added])
+            parts.append(member.apply(acts, b.params.outside, NONE, at))
+        result = sum(np.stack([np.broadcast_to(axis, u.shape) for axis in part]) for part in parts)
         return result.T
 
     return total(*nu.T) - total(*np.zeros((3, 1)))
@@ -238,17 +239,12 @@ def _scaled(nu: np.ndarray, region: OperatingRegion) -> np.ndarray:
 
 def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
     """Whether in surge, sway or yaw alone a hull drives the ship on, and another less or not at all."""
-    return bool(driven_axes(model, other, region))
-
-
-def driven_axes(model: Model, other: Model, region: OperatingRegion) -> set[str]:
-    """Axes of the motions in which alone a hull drives the ship on, and another less or not at all."""
-    metric, found = mass(other), set()
-    for k, axis in enumerate(AXES):
+    metric = mass(other)
+    for k in range(len(AXES)):
         lowest, of_other = (dissipation(m, alone(k, region), metric).min() for m in (model, other))
         if lowest < 0.0 and _less(lowest, of_other):
-            found.add(axis)
-    return found
+            return True
+    return False
 
 
 def _less(after: Any, before: Any) -> Any:

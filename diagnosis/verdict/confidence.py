@@ -3,7 +3,7 @@
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
 the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
-the same axes, a damping that no hull has, effects and coefficients that explain as much without it, a
+the same axes, laws that make up another one, effects and coefficients that explain as much without it, a
 smoothing that is slower than a filter.
 """
 
@@ -32,7 +32,7 @@ MAY_BE_NONE = "the intervals of all its values include zero"
 MAY_BE_LAGS = "faster actuators than described, or measured states as commands, have the same effect"
 MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
-STAND_IN = "the damping by these effects drives the ship on, which no hull does; it has another shape"
+IN_PARTS = "findings of one kind on the same axis make up a law of another shape as well"
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
@@ -44,14 +44,14 @@ class Doubts(NamedTuple):
     Attributes:
         residual: axes on which the learned model leaves a significant residual.
         of_data: see :func:`doubt_of_data`.
-        driven: axes on which the effects of the learned model make the hull drive the ship on.
+        of_parts: axes on which findings make up one law in parts.
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
         smoothed: ids of the filters that are faster than the smoothing.
     """
 
     residual: Collection[str] = ()
     of_data: str = ""
-    driven: Collection[str] = ()
+    of_parts: Collection[str] = ()
     replaceable: Collection[str] = ()
     smoothed: Collection[str] = ()
 
@@ -108,7 +108,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     capped = {
         # Waves are a residual themselves.
         RESIDUAL: effect.search.by != "spectrum" and set(doubts.residual) & set(effect.axis),
-        STAND_IN: set(doubts.driven) & set(effect.axis),
+        IN_PARTS: effect.kind == "force" and set(doubts.of_parts) & set(effect.axis),
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
     }

@@ -1,5 +1,6 @@
 """The judgement: evidence of a search and data that decide in, one verdict out."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -10,7 +11,7 @@ from scipy.linalg import LinAlgError
 from ..assessment.recurrence import recurrence
 from ..assessment.regions import find_regions
 from ..assessment.remainder import Remainder, noise_of, remainder_sentence, remaining
-from ..assessment.stability import OperatingRegion, driven_axes, drives_on
+from ..assessment.stability import OperatingRegion, drives_on
 from ..execution.progress import Advance
 from ..execution.short_text import ShortRepr
 from ..predictors import Model, WeakWindows, omega
@@ -148,7 +149,6 @@ def judge(
     doubts = Doubts(
         residual=unexplained_axes(fit.findings, remainder, start),
         of_data=doubt_of_data(train),
-        driven=driven_by_effects(fit.findings, start, region),
         replaceable=replaceable(fit.findings, start, explained, alone),
         smoothed=faster_than_smoothing(fit.findings, start, train),
     )
@@ -157,17 +157,6 @@ def judge(
     return DecidedFindings(
         learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
     )
-
-
-def driven_by_effects(found: Findings, start: Model, region: OperatingRegion) -> set[str]:
-    """Axes on which the learned hull drives the ship on, where the first one does not, by an effect.
-
-    Of a damping in a shape that no candidate has, two make up: one that is too large, and one that
-    takes too much off it where the ship is slow.
-    """
-    driven = driven_axes(found.model, start, region)
-    without = [found.model.plus({n: -v for n, v in f.values.items()}) for f in found.effects if driven]
-    return driven & {axis for m in without for axis in driven_axes(found.model, m, region)}
 
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
@@ -216,11 +205,28 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
 
     Each of the doubts that holds for an effect makes it even odds at the most.
     """
+    doubts = doubts._replace(of_parts=in_parts(found, start, doubts))
     effects = []
     for f in found.effects:
         c = confidence_of(f, start, doubts)
         effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
     return replace(found, effects=effects)
+
+
+def in_parts(found: Findings, start: Model, doubts: Doubts) -> set[str]:
+    """Axes on which two or more findings are laws of the hull of one family.
+
+    Of a law in a shape that no candidate has, they make up the parts: of a cubic one, too much by its
+    square and too little by its line.
+    """
+    laws = [
+        effect
+        for f in found.effects
+        if (effect := start.ship.effects[f.id]).kind == "force"
+        and confidence_of(f, start, doubts).is_finding
+    ]
+    count = Counter((law.axis, law.wording.family.name) for law in laws)
+    return {axis for (axes, _), n in count.items() if n > 1 for axis in axes}
 
 
 def remainder_of(
