@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, diagnose
+from diagnosis.predictors.filters import FilterStart
 from diagnosis.predictors.prediction import before_filters, filtered, true_motion
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, omega_std
@@ -20,6 +21,8 @@ BEHIND = Model(measurement=LAGS)
 TRACKERS = {"position_tracker": 0.6, "heading_tracker": 0.9}
 TRACKED = Model(measurement=TRACKERS)
 BOTH = Model(measurement=LAGS | TRACKERS)
+LATE = {"position_latency": 0.43, "heading_latency": 0.27}
+ALL = Model(measurement=LAGS | TRACKERS | LATE)
 
 
 def behind_filters(run, position_lag=0.0, heading_lag=0.0):
@@ -85,30 +88,49 @@ class Sine:
         low = 1.0 / (1.0 + s * np.array(model.filters.lag))
         T = np.array(model.filters.tracker)
         tracking = (np.sqrt(2.0) * s * T + 1.0) / (s**2 * T**2 + np.sqrt(2.0) * s * T + 1.0)
-        z = low * tracking * np.exp(s * t)[:, None]
+        z = low * tracking * np.exp(s * (t[:, None] - np.array(model.filters.latency)))
         return cls(t, z.imag, (s * z).imag, (s**2 * z).imag)
 
 
-@pytest.mark.parametrize("model", [Model(measurement=LAGS), TRACKED, BOTH])
+@pytest.mark.parametrize("model", [Model(measurement=LAGS), TRACKED, BOTH, Model(measurement=LATE), ALL])
 def test_the_motion_behind_filters_is_that_before_them(model):
     """Whatever the filters do to a sine is undone, once a tracker's unknown start is forgotten."""
     t, w = np.linspace(0.0, 60.0, 6001), 0.5
     pose, rate = before_filters(Sine.behind(model, t, w), model)
-    later = (t > 20.0) & (t < 59.9)  # at the end the slope of the rate is one-sided
+    later = (t > 20.0) & (t < 59.4)  # at the end nothing is known of later rows
     np.testing.assert_allclose(pose[later], np.sin(w * t)[later, None] * np.ones(3), atol=2e-5)
     np.testing.assert_allclose(rate[later], w * np.cos(w * t)[later, None] * np.ones(3), atol=2e-5)
 
 
-def test_forward_and_back_are_inverse():
+@pytest.mark.parametrize("model", [BOTH, Model(measurement=LATE), ALL])
+def test_forward_and_back_are_inverse(model):
     """A motion behind the filters, sample by sample, is undone to the motion."""
     t, w = np.linspace(0.0, 60.0, 6001), 0.5
-    sine = Sine.behind(BOTH, t, w)
-    _, _, between = BOTH.filters.undone(sine)
+    sine = Sine.behind(model, t, w)
+    before = model.filters.undone(sine)
     at = 3000
     poses = np.repeat(np.sin(w * t[at:])[:, None, None, None], 3, axis=1)
-    starts = (x[at][:, None] for x in (between, sine.eta, sine.eta_dot))
-    found = BOTH.filters.behind(poses, *starts, t[1])
-    np.testing.assert_allclose(found[:, :, 0, 0], sine.eta[at:], atol=1e-4)
+    motions = (before.between, before.timely, before.timely_rate, sine.eta)
+    found = model.filters.behind(poses, FilterStart(*(x[at][:, None] for x in motions)), t[1])
+    later = np.full(3, 0 if model is BOTH else 50)  # before, a latency has a line for the motion
+    for k, first in enumerate(later):
+        np.testing.assert_allclose(found[first:, k, 0, 0], sine.eta[at + first :, k], atol=1e-4)
+        np.testing.assert_allclose(found[:first, k, 0, 0], sine.eta[at : at + first, k], atol=8e-3)
+
+
+def test_a_motion_that_is_late_is_undone_up_to_a_gap():
+    """Where the later motion is not known, the acceleration stays as it is."""
+    t, w = np.linspace(0.0, 20.0, 201), 0.5
+    sine = Sine.behind(Model(measurement=LATE), t, w)
+    gap = slice(100, 130)
+    for x in (sine.eta, sine.eta_dot, sine.eta_ddot):
+        x[gap] = np.nan
+    before = Model(measurement=LATE).filters.undone(sine)
+    known = np.isfinite(sine.eta[:, 0])
+    off = np.abs(before.pose - np.sin(w * t)[:, None])
+    assert np.isfinite(off[known]).all()
+    assert off[known].max() < 0.43**3 / 6.0 * w**3 * 1.05
+    assert off[:90].max() < 1e-5
 
 
 @pytest.mark.parametrize("gain", [0.02, 0.05, 0.1])
@@ -205,3 +227,19 @@ def test_no_filter_is_found_where_none_is():
     """Thrusters that lag are its opposite: the force is late, and not the measurement."""
     w = weak_windows(smoothed(sail(120.0, h=0.1, thrusters={"lag": 0.5})[0]))
     assert {e.id for e in diagnose([w]).content.effects} == {"lag"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [0.6, 1.2])
+def test_a_position_that_is_late_is_no_low_pass(late):
+    """Positions of a receiver that are older than their stamps, as by a slow link; the heading is not."""
+    run = sail(240.0, h=0.1, noise=0.2)[0]
+    rows = round(late / 0.1)
+    pose = np.array(run.pose)
+    pose[rows:, :2] = run.pose[:-rows, :2]
+    w = weak_windows(smoothed(replace(run.rows(np.arange(rows, run.time.size)), pose=pose[rows:])))
+    found = {e.id: e for e in diagnose([w]).content.effects}
+    assert {*found} == {"position_latency"}
+    assert found["position_latency"].coefficients["position_latency"].value == pytest.approx(
+        late, rel=0.05
+    )

@@ -1,4 +1,4 @@
-"""Filters between the true and the measured pose: a low-pass, then a tracker of constant velocity."""
+"""Filters of the pose that is measured: a low-pass, a tracker of constant velocity, a latency."""
 
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -21,28 +21,30 @@ class Filters(NamedTuple):
         lag: (3,), time constants T [s] of low-pass filters of first order, T dz/dt = p - z.
         tracker: (3,), time constants T = 1/w [s] of trackers of constant velocity: with d = sqrt(1/2),
             dy/dt = v + 2 d w (z - y), and dv/dt = w^2 (z - y).
+        latency: (3,), ages T [s] at the time stamp, m(t) = y(t - T).
     """
 
     lag: tuple[float, float, float]
     tracker: tuple[float, float, float]
+    latency: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __bool__(self) -> bool:
-        return any(self.lag) or any(self.tracker)
+        return any(map(any, self))
 
-    def undone(self, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pose before the filters, its rate, and the pose between the two, (n, 3) each."""
+    def undone(self, s: Smoothed) -> "BeforeFilters":
+        """The motion before each of the filters."""
         return _undone(self, s)
 
     def undoing(self, w: np.ndarray) -> np.ndarray:
         """(3, n), factor by which undoing the filters multiplies what has a frequency w (n,) [rad/s]."""
         s = 1j * w
-        lag, T = (np.array(each)[:, None] for each in self)
+        lag, T = (np.array(each)[:, None] for each in (self.lag, self.tracker))
         return np.abs((1.0 + s * lag) * (1.0 + (s * T) ** 2 / (1.0 + 2.0 * DAMPING * T * s)))
 
     def first_response(self, h: np.ndarray) -> np.ndarray:
         """(3,), share of a new sample in the output of a filter computed at intervals h (3,) [s]."""
         with np.errstate(divide="ignore"):
-            lag, tracker = (h / np.array(each) for each in self)
+            lag, tracker = (h / np.array(each) for each in (self.lag, self.tracker))
         return np.expm1(-lag) * np.expm1(-2.0 * DAMPING * tracker)
 
     @property
@@ -50,34 +52,63 @@ class Filters(NamedTuple):
         """(3,), the factor of w^2 [s2] by which undoing the filters adds to a density, at the most."""
         return np.array(self.lag) ** 2 + 0.5 * np.array(self.tracker) ** 2
 
-    def behind(
-        self, poses: np.ndarray, between: np.ndarray, eta: np.ndarray, eta_dot: np.ndarray, h: float
-    ) -> np.ndarray:
+    def behind(self, poses: np.ndarray, start: "FilterStart", h: float) -> np.ndarray:
         """Poses (n, 3, p, w) behind the filters, exact for straight lines between.
 
         Args:
             poses: of windows, at their start and at equal intervals from there.
-            between: (3, w), the pose between the filters at the start, of :meth:`undone`.
-            eta, eta_dot: (3, w), the measured pose and its rate at the start.
+            start: of each filter.
             h: interval [s].
         """
         found = np.stack([*poses.transpose(1, 0, 2, 3)[:2], np.unwrap(poses[:, 2], axis=0)], axis=1)
-        for k, (lag, T) in enumerate(zip(self.lag, self.tracker, strict=True)):
+        for k, (lag, T, late) in enumerate(zip(*self, strict=True)):
             if lag:
-                found[:, k] = _lagging(found[:, k], _off(found[0, k], between[k], k), lag, h)
+                found[:, k] = _lagging(found[:, k], _off(found[0, k], start.between[k], k), lag, h)
             if T:
-                off = _off(found[0, k], eta[k], k)
-                found[:, k] = _tracking(found[:, k], off, eta_dot[k], T, h)
+                off = _off(found[0, k], start.timely[k], k)
+                found[:, k] = _tracking(found[:, k], off, start.timely_rate[k], T, h)
+            if late:
+                found[:, k] = _late(found[:, k], _off(found[0, k], start.measured[k], k), late / h)
         return found
 
 
+class BeforeFilters(NamedTuple):
+    """The motion (n, 3) before each of the filters.
+
+    Attributes:
+        pose, rate: before all of them.
+        between: pose behind the low-pass and before the tracker.
+        timely, timely_rate: pose and its rate behind the tracker and before the latency.
+    """
+
+    pose: np.ndarray
+    rate: np.ndarray
+    between: np.ndarray
+    timely: np.ndarray
+    timely_rate: np.ndarray
+
+
+class FilterStart(NamedTuple):
+    """Where windows begin, (3, w) each; see :class:`BeforeFilters`. The last is the measured pose."""
+
+    between: np.ndarray
+    timely: np.ndarray
+    timely_rate: np.ndarray
+    measured: np.ndarray
+
+
 @lru_cache  # a fit asks for the same runs several times
-def _undone(f: Filters, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """See :meth:`Filters.undone`: y + T dy/dt of a low-pass, and y + b of a tracker.
+def _undone(f: Filters, s: Smoothed) -> BeforeFilters:
+    """See :meth:`Filters.undone`: m(t + T) of a latency, y + T dy/dt of a low-pass, y + b of a tracker.
 
     The error b of the tracker follows 2 d w db/dt + w^2 b = d2y/dt2.
     """
     eta, eta_dot, eta_ddot = (np.array(part) for part in (s.eta, s.eta_dot, s.eta_ddot))
+    for k, late in enumerate(f.latency):
+        if late:
+            motion = eta[:, k], eta_dot[:, k], eta_ddot[:, k]
+            eta[:, k], eta_dot[:, k], eta_ddot[:, k] = _ahead(s.time, *motion, late)
+    timely, timely_rate = eta.copy(), eta_dot.copy()
     for k, T in enumerate(f.tracker):
         if T:
             tau = 2.0 * DAMPING * T
@@ -86,7 +117,32 @@ def _undone(f: Filters, s: Smoothed) -> tuple[np.ndarray, np.ndarray, np.ndarray
             eta[:, k] += error
             eta_dot[:, k] += rate
             eta_ddot[:, k] += np.gradient(rate, s.time)
-    return eta + f.lag * eta_dot, eta_dot + f.lag * eta_ddot, eta
+    return BeforeFilters(eta + f.lag * eta_dot, eta_dot + f.lag * eta_ddot, eta, timely, timely_rate)
+
+
+def _ahead(
+    time: np.ndarray, x: np.ndarray, rate: np.ndarray, bend: np.ndarray, T: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A coordinate (n,), its rate and second derivative a time T [s] later.
+
+    They are interpolated; behind the last row that is known, the second derivative stays as it is.
+    """
+    later = np.minimum(time + T, time[-1])
+    after = np.clip(np.searchsorted(time, later, "right"), 1, time.size - 1)
+    before, step = after - 1, time[after] - time[after - 1]
+    share = (later - time[before]) / step
+    slope = (bend[after] - bend[before]) / step
+    s = share * step
+    bent = bend[before] + slope * s
+    moved = (
+        x[before] + s * (rate[before] + s * (0.5 * bend[before] + s * slope / 6.0)),
+        rate[before] + s * (bend[before] + 0.5 * s * slope),
+        bent,
+    )
+    known = np.isfinite(x[after]) & np.isfinite(x[before]) & (time + T <= time[-1])
+    steady = (x + T * (rate + 0.5 * T * bend), rate + T * bend, bend)
+    found = (np.where(known, m, t) for m, t in zip(moved, steady, strict=True))
+    return tuple(found)  # type: ignore[return-value]
 
 
 def _off(a: Any, b: Any, k: int) -> Any:
@@ -120,6 +176,15 @@ def _tracking(p: np.ndarray, off: np.ndarray, rate: np.ndarray, T: float, h: flo
         velocity = slope - slow
         found[n] -= off
     return found
+
+
+def _late(y: np.ndarray, off: Any, steps: float) -> np.ndarray:
+    """A coordinate (n, p, w) some steps later; before, on a line from where it was off at the start."""
+    at = np.arange(len(y)) - steps
+    before = np.clip(np.floor(at).astype(int), 0, max(len(y) - 2, 0))
+    share = (at - before)[:, None, None]
+    within = (1.0 - share) * y[before] + share * y[np.minimum(before + 1, len(y) - 1)]
+    return np.where(at[:, None, None] < 0.0, y[0] + off * at[:, None, None] / steps, within)
 
 
 def _low_passed(time: np.ndarray, x: np.ndarray, T: float) -> np.ndarray:

@@ -21,6 +21,7 @@ from fmus.vessel import vessel
 from ..runs import Smoothed, idle
 from ..runs.cleaning import WIDTH
 from ..runs.run_constants import DIGITS, FAR_OFF
+from .filters import FilterStart
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
 from .traced.compiled_law import compiler
@@ -296,17 +297,19 @@ def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) ->
     filters = model.filters
     if not filters:
         return poses
-    between = starts.first(lambda s: filters.undone(s)[2])
-    eta, eta_dot = (starts.first(attrgetter(name)) for name in ("eta", "eta_dot"))
-    return filters.behind(poses, between, eta, eta_dot, h)
+    before = (
+        starts.first(lambda s, name=name: getattr(filters.undone(s), name))
+        for name in ("between", "timely", "timely_rate")
+    )
+    return filters.behind(poses, FilterStart(*before, starts.first(attrgetter("eta"))), h)
 
 
 def before_filters(s: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Smoothed pose and its rate (n, 3) of a run, before a model's filters."""
     if not model.filters:
         return s.eta, s.eta_dot
-    pose, rate, _ = model.filters.undone(s)
-    return pose, rate
+    before = model.filters.undone(s)
+    return before.pose, before.rate
 
 
 def true_motion(

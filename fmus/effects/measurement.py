@@ -156,9 +156,37 @@ def tracker(channel: str, symbol: str, coordinates: str) -> Effect:
     )
 
 
+def latency(channel: str, symbol: str, coordinates: str) -> Effect:
+    """The effect that a channel is older than its time stamp, and the others are not."""
+    name = f"{channel}_latency"
+    return Effect(
+        id=name,
+        kind="measurement",
+        axis="XYN",
+        description=f"the measured {channel} alone is older than its stamp",
+        formula=f"({coordinates})_m(t) = ({coordinates})(t - δ)",
+        symbol=symbol,
+        sign="0: none",
+        source="4.3.1; latency of a receiver",
+        linear=False,
+        parameters=(Variable(name, "s", f"age of the {channel} at its time stamp", 0.0, LAGS, False),),
+        function=None,
+        search=Search(differentiable=True),
+        wording=Wording(
+            lambda f: f"The {channel} is {number(f[name])} s older than its time stamp.", FILTER
+        ),
+    )
+
+
 # No FMU has the receiver's filter, as none has its clock.
 POSITION_LAG = low_pass("position", "T_p", "x, y")
 HEADING_LAG = low_pass("heading", "T_ψ", "psi")
 POSITION_TRACKER = tracker("position", "T_p", "x, y")
 HEADING_TRACKER = tracker("heading", "T_ψ", "psi")
-MEASURED_BEHIND = ((POSITION_LAG, HEADING_LAG), (POSITION_TRACKER, HEADING_TRACKER))
+POSITION_LATENCY = latency("position", "δ_p", "x, y")
+HEADING_LATENCY = latency("heading", "δ_ψ", "psi")
+MEASURED_BEHIND = (
+    (POSITION_LAG, HEADING_LAG),
+    (POSITION_TRACKER, HEADING_TRACKER),
+    (POSITION_LATENCY, HEADING_LATENCY),
+)
