@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.predictors import of_one_run, of_run
+from fmus.effects.measurement import MEASURED_BEHIND
 from fmus.ship import ship
 
 from .effect_forms import form
@@ -30,7 +31,7 @@ FOREIGN: dict[str, tuple[str, ...]] = {
 }
 # The runs have one set of commands: what acts on one of the two propellers is no candidate there.
 # Their measurement has no filters, which benchmarks.logs has.
-FILTERS = ("position_lag", "heading_lag", "position_tracker", "heading_tracker")
+FILTERS = [effect.id for pair in MEASURED_BEHIND for effect in pair]
 LOOKED_FOR = [
     e for e in EFFECTS.values() if not e.apart and e.search.by != "given" and e.id not in FILTERS
 ]
