@@ -9,10 +9,9 @@ from support.measured import learn, sail, smoothed
 from diagnosis.predictors import Model, omega, weak_windows
 from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
 from diagnosis.search import forward_selection
-from diagnosis.search.further_effects import further_effects
 from diagnosis.search.prior import MEASURED, NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
-from diagnosis.search.shortlist import NEW, novelty, rank, reweighted
+from diagnosis.search.shortlist import NEW, further_effects, novelty, rank, reweighted
 from diagnosis.verdict.confidence import probability
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.predictors import of_one_run, of_run
-from fmus.effects.measurement import MEASURED_BEHIND
 from fmus.ship import ship
 
 from .effect_forms import form
@@ -31,7 +30,7 @@ FOREIGN: dict[str, tuple[str, ...]] = {
 }
 # The runs have one set of commands: what acts on one of the two propellers is no candidate there.
 # Their measurement has no filters, which benchmarks.logs has.
-FILTERS = [effect.id for pair in MEASURED_BEHIND for effect in pair]
+FILTERS = [e.id for e in EFFECTS.values() if e.wording.family.name == "filter"]
 LOOKED_FOR = [
     e for e in EFFECTS.values() if not e.apart and e.search.by != "given" and e.id not in FILTERS
 ]

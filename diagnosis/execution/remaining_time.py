@@ -1,10 +1,9 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
 The number of effects is known only in the end. It is between those that were found and those that the
-search announces as likely (:mod:`diagnosis.search.further_effects`). The geometric mean of the times
-for both is stated: it is right within a factor of two where they differ by less than four. A kind of
-step that has ended takes what it took; any other one its usual time, scaled by what the steps of the
-search took so far.
+search announces as likely (:mod:`diagnosis.search.shortlist`). The geometric mean of the times for both
+is stated: it is right within a factor of two where they differ by less than four. A kind of step that
+has ended takes what it took; any other one its usual time, scaled by what the steps of the search took.
 """
 
 import math

@@ -20,13 +20,21 @@ from ..predictors.weak_form import commanded
 from ..runs.run_constants import STEPS
 from .conclusion import AcceptedEffect, Selection
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
-from .further_effects import further_effects
 from .map_regression import Scored, first_share
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
 from .refinement import RefinedModel, TrainingSet, nuisance_of, refit
-from .shortlist import MadeCandidates, Ranking, Shortlist, leads, rank, reweighted, scored_alone
+from .shortlist import (
+    MadeCandidates,
+    Ranking,
+    Shortlist,
+    further_effects,
+    leads,
+    rank,
+    reweighted,
+    scored_alone,
+)
 from .significance import better, beyond_chance, harmful, matters
 
 
