@@ -283,3 +283,18 @@ def test_measured_runs_are_predicted():
     for k in range(4):
         assert 0.02 < nominal.over_all(k)[0] < 1.0, "the nominal model is far from the real ship"
     assert delayed.over_all()[0] < nominal.over_all()[0]
+
+
+def test_a_heading_in_degrees_is_known_by_the_way_of_a_ship_that_turns_slowly():
+    """Neither its rate nor its steps are too large for radians; one that circles in radians is read."""
+    run, _ = sail(64.0, 0.1)
+    t = run.time
+    psi = 2.0 + 0.05 * t
+    course = np.column_stack([np.cos(psi), np.sin(psi)])
+    place = np.cumsum(0.2 * course, axis=0) * 0.1
+    degrees = np.column_stack([place, np.degrees(psi)])
+    with pytest.raises(InputError, match=r'only in degrees .*"unit": "deg"'):
+        windows_of(replace(run, pose=degrees))
+    windows_of(replace(run, pose=np.column_stack([place, psi + 2.0 * np.pi])))
+    astern = np.column_stack([-place, psi + 2.0 * np.pi])
+    windows_of(replace(run, pose=astern))

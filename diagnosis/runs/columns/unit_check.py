@@ -44,6 +44,7 @@ OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 LARGEST = 1e9
 # Beyond these no ship moves, so that the unit must be another one (chosen).
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
+AHEAD = 0.5  # 1, share of the way by which one unit of the heading explains more than another (chosen)
 
 
 class Doubt(NamedTuple):
@@ -98,8 +99,8 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s]."""
     second = np.searchsorted(time, time + 1.0)
     second = second[second < time.size]
-    dt = time[second] - time[: second.size]
-    moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
+    dt, step = time[second] - time[: second.size], pose[second] - pose[: second.size]
+    moved = np.abs(step) / dt[:, None]
     speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
     if speed > FASTEST:
         slow = (u for u, size in UNITS["length"].items() if speed * size < FASTEST)
@@ -115,6 +116,23 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     if turn > QUICKEST or (jumps.any() and reach < 365.0):
         reason = f"turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg?"
         yield Doubt(("psi",), "deg", reason)
+        return
+    way, start = step[:, 0] + 1j * step[:, 1], psi[: second.size]
+    in_rad, in_deg = (follows(way, start * unit) for unit in (1.0, c.degree))
+    if in_deg - in_rad > AHEAD:
+        reason = f"goes where its heading is only in degrees ({in_deg:.0%} of the way): is it in deg?"
+        yield Doubt(("psi",), "deg", reason)
+
+
+def follows(way: np.ndarray, psi: np.ndarray) -> float:
+    """Share of a way that is in one direction as seen from the ship, 0...1 (mean resultant length).
+
+    Args:
+        way: (n,), steps to the north plus i times those to the east [m].
+        psi: (n,), headings [rad].
+    """
+    length = float(np.abs(way).sum())
+    return float(np.abs(np.sum(way * np.exp(-1j * psi)))) / length if length else 0.0
 
 
 def remedy(signals: Sequence[str], unit: str, called: Mapping[str, str] = NAMED_SO) -> str:
