@@ -239,3 +239,12 @@ def test_a_run_that_is_too_short_by_a_frozen_coordinate_says_so():
     pose[300:, 1] = pose[300, 1]
     with pytest.raises(InputError, match=r"too little data .* y is frozen for 89\.9 s, 30 s from"):
         begin(gather([replace(run, pose=pose)]))
+
+
+def test_a_speed_that_rises_by_its_rounding_has_the_noise_of_that():
+    """The values that are new are on a line, so that their differences show no noise."""
+    run, step = sailed(), 0.1 * 1852.0 / 3600.0
+    rising = np.round(run.time * 0.05 / step) * step
+    found = table(replace(run, measured={**run.measured, "speed": rising}))
+    assert found["speed"].noise == pytest.approx(step / 12.0**0.5)
+    assert found["r"].noise == pytest.approx(1e-3, rel=0.2)

@@ -13,7 +13,7 @@ from ..execution.short_text import SHOWN
 from .cleaning import noise, repeated
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
-from .run_constants import ORDER
+from .run_constants import DIGITS, ORDER
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
@@ -127,7 +127,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
                 name,
                 _rate(time[new]),
                 1.0 - float(new.sum() / there.sum()),
-                given.get(name, float(noise(values[new, None])[0])),
+                given.get(name, max(float(noise(values[new, None])[0]), _of_rounding(values[new]))),
                 0.0 if name in given else _of_differences(int(new.sum())),
                 _unit(name),
                 GIVEN if name in given else ESTIMATED,
@@ -141,6 +141,13 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
 def _unit(name: str) -> str:
     """The SI unit of a signal."""
     return SI_UNIT[(QUANTITY | outputs([name])).get(name, "command")]
+
+
+def _of_rounding(values: np.ndarray) -> float:
+    """Standard deviation by the rounding of values (n,): the least step between them, over sqrt(12)."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > DIGITS * np.abs(values).max()]
+    return float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
 
 
 def _of_differences(samples: int) -> float:
