@@ -285,3 +285,25 @@ def test_run_that_cannot_be_used_is_refused_with_one_line(edit, message):
 
 def test_shortest_run_is_taken():
     assert clean(base().rows(np.arange(400))).counts().used == 400
+
+
+@pytest.mark.parametrize("period", [86400.0, 43200.0, 3600.0, 60.0])
+def test_a_time_of_day_that_begins_anew_goes_on(period):
+    run, start = base(), period - 14.0
+    anew = ordered(replace(run, time=(run.time + start) % period))
+    np.testing.assert_allclose(np.diff(anew.time), np.diff(run.time), atol=1e-9)
+    assert anew.time[0] == pytest.approx(start)
+    assert any(f"begins anew after {period:.5g} s, 1 times" in note for note in anew.notes)
+
+
+def test_a_clock_that_jumps_back_by_another_time_is_no_period():
+    run = base()
+    back = np.where(run.time > 14.0, run.time - 5000.0, run.time)
+    with pytest.raises(InputError, match="time does not increase"):
+        ordered(replace(run, time=back))
+
+
+def test_minutes_that_begin_anew_each_hour_go_on_all_day():
+    rare = base().rows(np.arange(0, N, 60))
+    hours = replace(rare, time=(rare.time / 0.02 * 10.0 + 3000.0) % 3600.0)
+    assert np.diff(ordered(hours).time) == pytest.approx(600.0)

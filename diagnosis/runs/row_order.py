@@ -15,6 +15,8 @@ from fmus.scale import REFERENCE, Scale
 from .files.reading import Run
 from .run_constants import CHANCE, HORIZON, LONG
 
+# s after which the time of a clock begins anew: of a day, of half a day, of minutes, of seconds.
+PERIODS = (86400.0, 43200.0, 3600.0, 60.0)
 MOST_WRONG = 0.1  # 1, of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
 
 
@@ -31,7 +33,7 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
         return run
     run = _without_empty(run)
     many = run.time.size
-    found = _spread(_merged(continued(_sorted(run), scale)))
+    found = _spread(_merged(_begun_anew(continued(_sorted(run), scale))))
     kept = in_order(found.time)
     lost = found.time.size - kept.size  # a sample that is there again is none
     if lost > MOST_WRONG * many:
@@ -113,6 +115,25 @@ def continued(run: Run, scale: Scale = REFERENCE) -> Run:
                 )
             time[row:] += back
     return replace(run, time=time, notes=(*run.notes, *notes)) if notes else run
+
+
+def _begun_anew(run: Run) -> Run:
+    """A run whose time of day began anew, as at midnight, with the time going on.
+
+    It did where one period makes each step back one as long as steps between rows are.
+    """
+    step = np.diff(run.time)
+    back = step < 0.0
+    if not (back.any() and (step > 0.0).any()):
+        return run
+    longest = LONG * float(np.median(step[step > 0.0]))
+    for period in PERIODS:
+        on = step[back] + period
+        if ((on > 0.0) & (on <= longest)).all():
+            count = np.append(0, np.cumsum(back))
+            note = f"the time begins anew after {period:.5g} s, {count[-1]} times: it goes on"
+            return replace(run, time=run.time + period * count, notes=(*run.notes, note))
+    return run
 
 
 def _merged(run: Run) -> Run:
