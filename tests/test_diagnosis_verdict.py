@@ -456,6 +456,19 @@ def test_laws_of_one_family_on_an_axis_make_up_another_shape(ids, sure):
     assert all(("another shape" in f.doubt) != (f.id in sure) for f in found)
 
 
+@pytest.mark.parametrize(("own", "sure"), [(0.5, False), (0.99, True)])
+def test_what_an_unsure_finding_cannot_be_discriminated_from_is_not_sure(own, sure):
+    """Of a thrust curve that may as well be a drag, and the drag beside it, neither is known."""
+    start = Model()
+    made = [
+        Finding("thrust_curve", {}, {}, own, ["X_uuu"], 0.9, 0.9, together=0.99),
+        Finding("X_uuu", {}, {}, 0.93, [], 0.9, 0.9, together=0.93),
+    ]
+    found = with_confidence(Findings(made, model=start), start, Doubts()).effects
+    assert [f.confidence for f in found] == [own, 0.93 if sure else 0.5]
+    assert bool(found[1].doubt) != sure
+
+
 def test_a_law_beside_a_mere_possibility_of_its_family_stays_sure():
     start = Model()
     made = [Finding(i, {}, {}, c, [], 0.9, 0.9, together=c) for i, c in (("N_|r|r", 0.99), ("N_r", 0.3))]

@@ -34,6 +34,7 @@ MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which 
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
 IN_PARTS = "findings of one kind on the same axis make up a law of another shape as well"
 RESIDUAL = "a residual that it does not explain acts on the same axis"
+RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
@@ -44,6 +45,7 @@ class Doubts(NamedTuple):
     Attributes:
         residual: axes on which the learned model leaves a significant residual.
         of_data: see :func:`doubt_of_data`.
+        rivals: ids of the effects from which an unsure finding cannot be discriminated.
         of_parts: axes on which findings make up one law in parts.
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
         smoothed: ids of the filters that are faster than the smoothing.
@@ -51,6 +53,7 @@ class Doubts(NamedTuple):
 
     residual: Collection[str] = ()
     of_data: str = ""
+    rivals: Collection[str] = ()
     of_parts: Collection[str] = ()
     replaceable: Collection[str] = ()
     smoothed: Collection[str] = ()
@@ -108,6 +111,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     capped = {
         # Waves are a residual themselves.
         RESIDUAL: effect.search.by != "spectrum" and set(doubts.residual) & set(effect.axis),
+        RIVAL: f.id in doubts.rivals,
         IN_PARTS: effect.kind == "force" and set(doubts.of_parts) & set(effect.axis),
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,

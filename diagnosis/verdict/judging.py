@@ -205,7 +205,11 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
 
     Each of the doubts that holds for an effect makes it even odds at the most.
     """
-    doubts = doubts._replace(of_parts=in_parts(found, start, doubts))
+    alone = [confidence_of(f, start, doubts) for f in found.effects]
+    doubts = doubts._replace(
+        of_parts=in_parts(found, start, alone),
+        rivals={i for f, c in zip(found.effects, alone, strict=True) if c.own < FOUND for i in f.alike},
+    )
     effects = []
     for f in found.effects:
         c = confidence_of(f, start, doubts)
@@ -213,17 +217,21 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
     return replace(found, effects=effects)
 
 
-def in_parts(found: Findings, start: Model, doubts: Doubts) -> set[str]:
+def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[str]:
     """Axes on which two or more findings are laws of the hull of one family.
 
     Of a law in a shape that no candidate has, they make up the parts: of a cubic one, too much by its
     square and too little by its line.
+
+    Args:
+        found: the findings.
+        start: the initial model.
+        alone: the confidence of each, all others left out of account.
     """
     laws = [
         effect
-        for f in found.effects
-        if (effect := start.ship.effects[f.id]).kind == "force"
-        and confidence_of(f, start, doubts).is_finding
+        for f, c in zip(found.effects, alone, strict=True)
+        if c.is_finding and (effect := start.ship.effects[f.id]).kind == "force"
     ]
     count = Counter((law.axis, law.wording.family.name) for law in laws)
     return {axis for (axes, _), n in count.items() if n > 1 for axis in axes}
