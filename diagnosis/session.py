@@ -40,7 +40,7 @@ from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import DecidedFindings, judge
-from .verdict.prediction_gain import PredictionGain, gain_of_search, prediction_gain
+from .verdict.prediction_gain import PredictionGain, prediction_gain
 from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
 
@@ -115,8 +115,6 @@ class Diagnosis(DecidedFindings):
         speeds: |u|, |v|, |r| that hold 99 % of the training runs [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
-        gain: what the search for effects gains over calibration alone in the data that decide; None
-            where that is not known.
     """
 
     comparison: Comparison
@@ -125,7 +123,6 @@ class Diagnosis(DecidedFindings):
     speeds: tuple[float, float, float]
     prior: Prior
     seed: int
-    gain: PredictionGain | None = None
 
     @property
     def sound(self) -> bool:
@@ -283,24 +280,18 @@ class Session(ShortRepr):
         nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
         region = OperatingRegion.of(nu, self.start.ship.scale)
         calibrates = self.predictor.parametric
-        verdict = judge(found, data, self.known, self.harms, region, calibrates, self.advance)
-        gain = self._gained(verdict, data) if self.predictor.parametric else None
-        return self._concluded(verdict, region, gain)
-
-    def _gained(self, verdict: DecidedFindings, data: ValidationData) -> PredictionGain | None:
-        """What the search for effects gained over calibration alone."""
-        self.advance("gain of the search over calibration")
-        calibrated = None if self.calibration is None else self.calibration.findings
-        learned = verdict.learned.model if verdict.changed else self.start
-        return gain_of_search(data, self.start, calibrated, verdict.learned, learned)
+        fit = self.calibration if calibrates else None
+        calibration = None if fit is None else fit.findings
+        verdict = judge(
+            found, data, self.known, self.harms, region, calibrates, calibration, self.advance
+        )
+        return self._concluded(verdict, region)
 
     def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:
         decide, runs = len(self.train) + len(self.validate), self.runs
         return _compared(predictor or self.predictor, runs[:decide], after, runs[decide:], self.advance)
 
-    def _concluded(
-        self, verdict: DecidedFindings, region: OperatingRegion, gain: PredictionGain | None
-    ) -> Diagnosis:
+    def _concluded(self, verdict: DecidedFindings, region: OperatingRegion) -> Diagnosis:
         """The diagnosis by a verdict: errors and bands of predictions, and whether it is stable."""
         learned = verdict.learned.model
         found = self._compared(learned if verdict.changed else None, self.predictor.in_windows())
@@ -323,7 +314,6 @@ class Session(ShortRepr):
             speeds=region.largest,
             prior=self.prior,
             seed=self.seed,
-            gain=gain,
         )
 
 

@@ -522,7 +522,8 @@ def test_the_judgement_is_sure_only_of_what_nothing_else_explains(monkeypatch):
     data, region = session.data(found.sigma), OPERATING
 
     def seen():
-        return judge(found, data, session.known, session.harms, region, True, silent).learned.effects
+        decided = judge(found, data, session.known, session.harms, region, True, None, silent)
+        return decided.learned.effects
 
     (sure,) = seen()
     monkeypatch.setattr(judging, "unique_shares", lambda learned, *_: [0.0] * len(learned.effects))

@@ -1,11 +1,21 @@
 """What the search for effects gained over calibration alone: paired errors, both ways."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+from support.measured import sail, smoothed
 
-from diagnosis import Finding, Findings, Model
+from diagnosis import Finding, Findings, Model, weak_windows
+from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
-from diagnosis.verdict.prediction_gain import gain_of_search, prediction_gain
+from diagnosis.verdict.prediction_gain import (
+    PairedChange,
+    PredictionGain,
+    gain_of_search,
+    prediction_gain,
+    without_gain,
+)
 
 START, BETTER = Model(), Model().plus({"delta_X_u": -1.0})
 WINDOWS = 40
@@ -89,3 +99,44 @@ def test_a_model_that_runs_away_gains_nothing():
     gain = prediction_gain(data, START, BETTER)
     assert not gain.gained
     assert gain.position.difference == 0.0
+
+
+@cache
+def run():
+    return [weak_windows(smoothed(sail(64.0, 0.1)[0]))]
+
+
+UNSHOWN = {"marker_offset", "X_vv", "clock_offset", "lag"}  # no coefficient of this ship
+
+
+@pytest.mark.parametrize(
+    ("over", "gained", "unshown"),
+    [
+        ("calibrated", False, UNSHOWN),
+        ("calibrated", True, set()),
+        ("initial", False, UNSHOWN | {"X_u", "added_mass_Y", "mass", "loss_bow"}),
+        ("initial", True, set()),
+    ],
+)
+def test_what_calibration_predicts_as_well_is_not_shown_but_for_changes_of_coefficients(
+    over, gained, unshown
+):
+    values = {
+        "marker_offset": {"marker_offset_dx": 0.05, "marker_offset_dy": 0.0},
+        "X_vv": {"delta_X_vv": -3.0},
+        "clock_offset": {"clock_offset": 0.2},
+        "X_u": {"delta_X_u": -2.0},
+        "added_mass_Y": {"added_mass_Y": 3.0},
+        "mass": {"mass": 1.0},
+        "loss_bow": {"loss_bow": 0.2},
+        "lag": {"lag": 0.5},
+        "waves": {"wave_peak": 3.0},
+    }
+    start = Model()
+    each = [Finding(i, v, {}, 0.9, [], 1.0, 1.0, start) for i, v in values.items()]
+    findings = Findings(each, model=start, sigma=np.array([1e-3, 1e-3, 1e-3]))
+    change = PairedChange(1.0, 1.0, 0.0, 1.0)
+    gain = PredictionGain("validation runs", 9, change, change, gained, over)
+    coefficients = [*NominalPrior.of(start).std]
+    assert without_gain(gain, findings, start, run(), coefficients) == unshown
+    assert not without_gain(None, findings, start, run(), coefficients)

@@ -36,6 +36,7 @@ IN_PARTS = "findings of one kind on the same axis make up a law of another shape
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
+NO_GAIN = "other coefficients predict data left out of the fit as well"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -49,6 +50,7 @@ class Doubts(NamedTuple):
         of_parts: axes on which findings make up one law in parts.
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
         smoothed: ids of the filters that are faster than the smoothing.
+        without_gain: ids of the effects that predictions do not show, as calibration predicts as well.
     """
 
     residual: Collection[str] = ()
@@ -57,6 +59,7 @@ class Doubts(NamedTuple):
     of_parts: Collection[str] = ()
     replaceable: Collection[str] = ()
     smoothed: Collection[str] = ()
+    without_gain: Collection[str] = ()
 
 
 NO_DOUBTS = Doubts()
@@ -115,6 +118,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         IN_PARTS: effect.kind == "force" and set(doubts.of_parts) & set(effect.axis),
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
+        NO_GAIN: f.id in doubts.without_gain,
     }
     if own > EVEN_ODDS and any(capped.values()):
         return Confidence(EVEN_ODDS, EVEN_ODDS, next(text for text, holds in capped.items() if holds))

@@ -27,6 +27,7 @@ from ..search.prediction_fit.refit import prediction_bands, to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
+from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
 from .validation_data import ValidationData
@@ -49,6 +50,7 @@ class DecidedFindings(ShortRepr):
         unique: for each the share that nothing else explains; None where that cannot be told.
         posterior: of all fitted values; of none where nothing was learned.
         unrecorded: what acts on the ship and is in no command and no effect.
+        gain: of the search over calibration, in predictions of the data that decide; None: not known.
     """
 
     learned: Findings
@@ -60,6 +62,7 @@ class DecidedFindings(ShortRepr):
     unique: Sequence[float | None]
     posterior: JointPosterior
     unrecorded: Unrecorded
+    gain: PredictionGain | None
 
     @property
     def verdict(self) -> VerdictName:
@@ -108,6 +111,7 @@ def judge(
     criterion: Harm,
     region: OperatingRegion,
     calibrates: bool,
+    calibration: Findings | None,
     advance: Advance,
 ) -> DecidedFindings:
     """Judge what a search found: prune, conclude, fit to predictions, calibrate, say how sure it is.
@@ -119,6 +123,7 @@ def judge(
         criterion: of pruning.
         region: motions that the training runs hold.
         calibrates: whether coefficients may take the place of effects that are no findings.
+        calibration: the coefficients fitted without an effect; None: there are none.
         advance: receives the name of each step when it begins.
     """
     start, train = data.start, data.train
@@ -137,25 +142,31 @@ def judge(
     refitted = refitted or (changed and not left)
     if calibrates and not any_finding(fit.findings, start):
         advance("calibration")
-        calibration = calibrated(fit.findings, data, prior)
-        if calibration is not None:
-            dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, calibration
+        other = calibrated(fit.findings, data, prior)
+        if other is not None:
+            dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
     advance("residual")
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
     explained = shares(fit.findings, start, data.validate)
     alone = unique_shares(fit.findings, start, train, data.validate)
+    gain = None
+    if calibrates:
+        advance("gain of the search over calibration")
+        model = fit.findings.model if changed else start
+        gain = gain_of_search(data, start, calibration, fit.findings, model)
     doubts = Doubts(
         residual=unexplained_axes(fit.findings, remainder, start),
         of_data=doubt_of_data(train),
         replaceable=replaceable(fit.findings, start, explained, alone),
         smoothed=faster_than_smoothing(fit.findings, start, train),
+        without_gain=without_gain(gain, fit.findings, start, train, [*prior.std]),
     )
     learned = with_confidence(fit.findings, start, doubts)
     known, force = fit.posterior, fit.unrecorded
     return DecidedFindings(
-        learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
+        learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force, gain
     )
 
 

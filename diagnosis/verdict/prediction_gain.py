@@ -1,12 +1,15 @@
 """What one model predicts better than another: paired errors in the same windows of data that decide."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from ..predictors import Model
-from ..search.findings import Findings
+from ..predictors import Model, WeakWindows
+from ..predictors.weak_form import SMALL
+from ..search.candidates import LEAST_SHARE, model_error, shape
+from ..search.findings import Finding, Findings
 from ..search.shortlist import TIE
 from ..search.significance import predicts_worse
 from .validation_data import ValidationData
@@ -106,3 +109,59 @@ def gain_of_search(
         gain = prediction_gain(data, calibrated, after)
         gain = gain and replace(gain, over="calibrated")
     return gain and replace(gain, gained=gain.gained and bool(found.effects))
+
+
+def without_gain(
+    gain: PredictionGain | None,
+    found: Findings,
+    start: Model,
+    runs: Sequence[WeakWindows],
+    coefficients: Sequence[str],
+) -> set[str]:
+    """Ids of the findings that predictions do not show: calibration alone predicts as well.
+
+    An effect that is a change of coefficients, as an added mass or a lag, is a calibration, and stays.
+    Waves and failures in times of one run are in no prediction of other data.
+
+    Args:
+        gain: of the search over calibration; None: not known, so that nothing follows.
+        found: the findings.
+        start: the initial model.
+        runs: training runs.
+        coefficients: names of those that calibration may change.
+    """
+    if gain is None or gain.gained:
+        return set()
+    effects = start.ship.effects
+    shown = [f for f in found.effects if not f.of_runs and effects[f.id].search.by != "spectrum"]
+    if gain.over == "initial" or not shown:
+        return {f.id for f in shown}
+    base = model_error(runs, start)
+    by_coefficients = _columns(runs, start, base, coefficients, found.sigma)
+    lags = any(start.declared(n).unit == "s" for n in coefficients)
+
+    def is_coefficient(f: Finding) -> bool:
+        """A further lag is a time constant of the actuators, though not the same function of it."""
+        of_time = effects[f.id].kind == "actuator" and all(
+            start.declared(n).unit == "s" for n in f.values
+        )
+        return (lags and of_time) or _spanned(
+            _columns(runs, start, base, [*f.values], found.sigma), by_coefficients
+        )
+
+    return {f.id for f in shown if not is_coefficient(f)}
+
+
+def _columns(
+    runs: Sequence[WeakWindows], start: Model, base: np.ndarray, names: Sequence[str], sigma: np.ndarray
+) -> np.ndarray:
+    """(3 K, names), the model error by small steps of some parameters, in units of the noise."""
+    columns = shape(runs, start, base, {}, names, SMALL).columns / sigma[:, None]
+    return columns.reshape(-1, len(names))
+
+
+def _spanned(columns: np.ndarray, others: np.ndarray) -> bool:
+    """Whether some columns (n, p) are, all but LEAST_SHARE of each, made up of others (n, q)."""
+    left = columns - others @ np.linalg.lstsq(others, columns)[0]
+    own = np.sum(columns**2, axis=0)
+    return bool((own > 0.0).all() and (np.sum(left**2, axis=0) <= LEAST_SHARE * own).all())
