@@ -106,7 +106,7 @@ def run():
     return [weak_windows(smoothed(sail(64.0, 0.1)[0]))]
 
 
-UNSHOWN = {"marker_offset", "X_vv", "clock_offset", "lag"}  # no coefficient of this ship
+UNSHOWN = {"marker_offset", "N_uv", "clock_offset", "lag"}  # no coefficient of this ship
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_what_calibration_predicts_as_well_is_not_shown_but_for_changes_of_coeff
 ):
     values = {
         "marker_offset": {"marker_offset_dx": 0.05, "marker_offset_dy": 0.0},
-        "X_vv": {"delta_X_vv": -3.0},
+        "N_uv": {"delta_N_uv": -3.0},
         "clock_offset": {"clock_offset": 0.2},
         "X_u": {"delta_X_u": -2.0},
         "added_mass_Y": {"added_mass_Y": 3.0},

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import SMALL
-from ..search.candidates import LEAST_SHARE, model_error, shape
+from ..search.candidates import model_error, shape
 from ..search.findings import Finding, Findings
 from ..search.shortlist import TIE
 from ..search.significance import predicts_worse
@@ -161,7 +161,7 @@ def _columns(
 
 
 def _spanned(columns: np.ndarray, others: np.ndarray) -> bool:
-    """Whether some columns (n, p) are, all but LEAST_SHARE of each, made up of others (n, q)."""
+    """Whether some columns (n, p) are made up of others (n, q), to the error of a small step."""
     left = columns - others @ np.linalg.lstsq(others, columns)[0]
     own = np.sum(columns**2, axis=0)
-    return bool((own > 0.0).all() and (np.sum(left**2, axis=0) <= LEAST_SHARE * own).all())
+    return bool((own > 0.0).all() and (np.sum(left**2, axis=0) <= SMALL**2 * own).all())
