@@ -38,8 +38,7 @@ FREQUENCIES = np.geomspace(0.02, 60.0, 400)
 # 1, factor within which the standard deviation is right (tests/test_diagnosis_where.py).
 NOISE_TOLERANCE = 1.3
 # 1, of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come
-# from how a simulator integrates. Contract, for the residual; the same for findings, there also of the
-# squares of the first model error.
+# from how a simulator integrates. Contract, for the residual; the same for findings.
 SHARE_OF_COMMAND = 0.02
 
 # 1, relative standard deviation of a measured coefficient. The search has no more for any coefficient;

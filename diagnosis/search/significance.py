@@ -38,7 +38,7 @@ def harmful(nothing: Scored, best: Scored) -> bool:
 
 
 def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: np.ndarray) -> bool:
-    """Whether an effect takes away a force that shows, on some axis.
+    """Whether an effect takes away a force that shows, on some axis: one that a residual may not have.
 
     Args:
         first: (K, 3), the first model error.
@@ -46,7 +46,7 @@ def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: n
         command: (K, 3), the commanded force.
     """
     fall = np.sum(without**2 - left**2, axis=0)
-    of_error = SHARE_OF_COMMAND * np.sum(first**2, axis=0)
+    of_error = NEGLIGIBLE**2 * np.sum(first**2, axis=0)
     of_command = SHARE_OF_COMMAND**2 * np.sum(command**2, axis=0)
     return bool(np.any(fall >= np.maximum(of_error, of_command)))
 
