@@ -12,7 +12,6 @@ from diagnosis.search import forward_selection
 from diagnosis.search.prior import MEASURED, NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
 from diagnosis.search.shortlist import NEW, further_effects, novelty, rank, reweighted
-from diagnosis.search.significance import matters
 from diagnosis.verdict.confidence import probability
 
 
@@ -191,22 +190,3 @@ def test_as_many_effects_are_likely_as_there_are(hidden):
     weighed = reweighted(t, at, rank(t, at, set()))
     likely = 0 if weighed is None else further_effects(weighed[1], start)
     assert likely == len(hidden)
-
-
-@pytest.mark.parametrize(
-    ("without", "left", "command", "shows"),
-    [
-        (0.06, 0.0, 0.0, True),  # 6 % of the first error, beside one that explains the rest
-        (0.04, 0.0, 0.0, False),
-        (0.06, 0.05, 0.0, False),
-        (0.06, 0.0, 2.9, True),
-        (0.06, 0.0, 3.1, False),  # less than 2 % of the command
-    ],
-)
-def test_an_effect_shows_if_a_residual_of_its_size_would_count(without, left, command, shows):
-    """5 % of the first error and 2 % of the command, as root mean squares of one axis."""
-
-    def of(size):
-        return np.array([[0.0, size, 0.0]] * 7)
-
-    assert matters(of(1.0), of(without), of(left), of(command)) == shows
