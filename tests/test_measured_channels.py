@@ -248,3 +248,38 @@ def test_a_speed_that_rises_by_its_rounding_has_the_noise_of_that():
     found = table(replace(run, measured={**run.measured, "speed": rising}))
     assert found["speed"].noise == pytest.approx(step / 12.0**0.5)
     assert found["r"].noise == pytest.approx(1e-3, rel=0.2)
+
+
+def over_ground(run):
+    """The run with its speed and course as a receiver states them, rounded."""
+    vx, vy = (np.gradient(run.pose[:, k], run.time) for k in range(2))
+    knot = 1852.0 / 3600.0
+    course = np.round(np.degrees(np.arctan2(vy, vx)) % 360.0, 1)
+    speed = np.round(np.hypot(vx, vy) / knot, 2) * knot
+    return replace(run, measured={"speed": speed, "course": np.radians(course)})
+
+
+@pytest.mark.parametrize(("channel", "until"), [("course", None), ("speed", None), ("speed", 800)])
+def test_a_channel_that_is_frozen_is_not_used_there_and_shows_no_fault_of_the_others(channel, until):
+    """A course that stays for half of a run was taken as a clock that ran at a tenth of its rate."""
+    run = over_ground(sailed())
+    values = np.array(run.measured[channel])
+    values[600:until] = values[600]
+    frozen = replace(run, measured={**run.measured, channel: values})
+    before, after = (prepare(r).smoothed for r in (run, frozen))
+    length = (len(values) if until is None else until) - 601
+    line = f"{channel} is constant for {length * H:.3g} s, 60 s from the start"
+    assert any(note.startswith(line) for note in after.track.notes)
+    assert not any("constant" in note for note in before.track.notes)
+    assert [f.channel for f in after.sensors.findings] == [f.channel for f in before.sensors.findings]
+    assert after.eta == pytest.approx(before.eta, abs=3.0 * NOISE.max(), nan_ok=True)
+
+
+def test_a_speed_at_the_quay_is_constant_and_no_fault():
+    run = over_ground(sailed())
+    pose, speed = np.array(run.pose), np.array(run.measured["speed"])
+    noise = NOISE * np.random.default_rng(5).standard_normal((600, 3))
+    pose[600:] = pose[600] + noise
+    speed[600:] = 0.0
+    at_rest = replace(run, pose=pose, measured={"speed": speed})
+    assert not any("constant" in note for note in prepare(at_rest).smoothed.track.notes)

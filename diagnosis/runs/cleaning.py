@@ -15,8 +15,9 @@ from ..execution.short_text import ShortRepr
 from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
+from .frozen import repeated, stuck
 from .row_order import ordered
-from .run_constants import EVERY, HORIZON, IN_A_ROW, LONG, NEGLIGIBLE, ORDER
+from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE, ORDER
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
@@ -274,53 +275,11 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
     return there & ~repeats & ~between, repeats, between
 
 
-def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Rows with one coordinate of the place frozen while the other one is measured.
-
-    It repeats to the bit more often than noise does, and then jumps by more than 99 % of its own steps;
-    a number without rounding that moved before may stay so until the end.
-
-    Args:
-        run: its rows in order.
-        seen: (n,), rows in which the place was measured.
-
-    Returns:
-        (n,), and a line on each stretch.
-    """
-    found, lines, rows = np.zeros_like(seen), list[str](), np.flatnonzero(seen)
-    for k in range(2):
-        step, coarse = np.abs(np.diff(run.pose[rows, k])), run.coarse[rows, k]
-        moves = step[step > 0.0]
-        if not moves.size:
-            continue
-        usual = float(np.quantile(moves, 0.99))
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], step == 0.0, [False]])))
-        for first, last in edges.reshape(-1, 2).tolist():
-            at_end = last == step.size
-            jump = float(step[last]) if not at_end else np.inf if first and not coarse[last] else 0.0
-            if last - first >= IN_A_ROW and jump > max(usual, 1.5 * coarse[last]):
-                found[rows[first + 1 : last + 1]] = True
-                begin, end = run.time[rows[[first, last]]]
-                lines.append(
-                    f"{'xy'[k]} is frozen for {end - begin:.3g} s, {begin - run.time[0]:.3g} s from the "
-                    "start: the position is not used there"
-                )
-    return found, lines
-
-
 def near(time: np.ndarray, there: np.ndarray, apart: float) -> np.ndarray:
     """(n,): which times (n,) [s] are at most ``apart`` [s] from one of those that are there (n,)."""
     known = np.concatenate([[-np.inf], time[there], [np.inf]])
     after = np.searchsorted(known, time)
     return np.minimum(time - known[after - 1], known[after] - time) <= apart
-
-
-def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """(n,): where a pose, or channels of it, (n, k), is to the bit the last one that was there."""
-    rows = np.flatnonzero(there)
-    repeats = np.zeros(there.size, bool)
-    repeats[rows[1:]] = (np.diff(pose[rows], axis=0) == 0.0).all(axis=1)
-    return repeats
 
 
 def unwrap(time: np.ndarray, psi: np.ndarray, gap: float) -> np.ndarray:

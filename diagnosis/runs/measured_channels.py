@@ -10,9 +10,10 @@ import numpy as np
 from fmus.ops import wrap
 
 from ..execution.short_text import SHOWN
-from .cleaning import noise, repeated
+from .cleaning import noise
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
+from .frozen import repeated
 from .run_constants import DIGITS, ORDER
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed

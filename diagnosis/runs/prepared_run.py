@@ -18,6 +18,7 @@ from fmus.ship import Ship, ship
 from .cleaning import Track, clean, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
+from .frozen import without_frozen
 from .row_order import ordered
 from .sensors.further_channels import accelerations, receivers, through_water
 from .sensors.motion import motion
@@ -123,7 +124,7 @@ def examine(run: Run, scale: Scale) -> Examined:
     Returns:
         The run as far as its own channels repair it, and what they say of each other.
     """
-    found = Examined(ordered(run, scale))
+    found = Examined(without_frozen(ordered(run, scale)))
     # In the order in which one needs what others repair.
     for check in (wraps, units, sway, receivers, motion, accelerations, through_water):
         found = found.plus(check(found.run, scale))

@@ -13,10 +13,11 @@ import pandas as pd
 from cosim import InputError
 from fmus.ship import Ship, ship
 
-from ..cleaning import lost, repeated
+from ..cleaning import lost
 from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
+from ..frozen import repeated
 from ..row_order import in_order
 from ..run_constants import NEGLIGIBLE
 from .columns import (

@@ -8,9 +8,10 @@ import numpy as np
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE
 
-from ..cleaning import NORMAL_MAD, long_gap, lost, noise, repeated
+from ..cleaning import NORMAL_MAD, long_gap, lost, noise
 from ..files.reading import Run
 from ..files.telegrams import filled
+from ..frozen import repeated
 from ..run_constants import FAR_OFF, FEWEST
 
 SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
@@ -58,10 +59,13 @@ class Evidence:
 
     @cached_property
     def unlogged(self) -> list[tuple[float, float]]:
-        """Begin and end [s] of each stretch without rows, of whose motion nothing is known."""
-        step = np.diff(self.time)
+        """Begin and end [s] of each stretch without rows, or without the velocity."""
+        there = np.isfinite([self.run.measured[name] for name in self.by or ()]).all(axis=0)
+        known = self.time[np.broadcast_to(there, self.time.shape)]
+        time = np.concatenate([self.time[:1], known, self.time[-1:]])
+        step = np.diff(time)
         at = np.flatnonzero(step > long_gap(float(np.median(step)), REFERENCE))
-        return [(float(self.time[k]), float(self.time[k + 1])) for k in at]
+        return [(float(time[k]), float(time[k + 1])) for k in at]
 
     @cached_property
     def turned(self) -> np.ndarray:

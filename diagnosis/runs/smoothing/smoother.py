@@ -20,8 +20,9 @@ from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
 from ...execution.short_text import ShortRepr
-from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise, repeated
+from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise
 from ..columns.columns import POSE
+from ..frozen import repeated
 from ..measured_wind import air_along
 from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
