@@ -283,3 +283,12 @@ def test_a_speed_at_the_quay_is_constant_and_no_fault():
     speed[600:] = 0.0
     at_rest = replace(run, pose=pose, measured={"speed": speed})
     assert not any("constant" in note for note in prepare(at_rest).smoothed.track.notes)
+
+
+def test_positions_without_a_heading_are_reported():
+    run = replace(sailed(), measured={})
+    pose = np.array(run.pose)
+    pose[600:, 2] = pose[600, 2]
+    notes = prepare(replace(run, pose=pose)).smoothed.track.notes
+    assert any(n.startswith("569 positions have no heading near them, the first 63.1 s") for n in notes)
+    assert not any("heading near" in n for n in prepare(run).smoothed.track.notes)

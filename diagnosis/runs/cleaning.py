@@ -159,7 +159,14 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         turned = turned | constant
     # Where no heading is near, a place tells nothing of surge and sway.
     apart = max(WIDTH * scale.time, LONG * row)
-    dropped = ~(seen | repeats | between) | (seen & ~near(run.time, turned, apart))
+    headless = seen & ~near(run.time, turned, apart)
+    dropped = ~(seen | repeats | between) | headless
+    if many := int(headless.sum()):
+        begin = run.time[np.argmax(headless)] - run.time[0]
+        notes.append(
+            f"{many} positions have no heading near them, the first {begin:.3g} s from the start: they "
+            "are not used"
+        )
     fresh = np.flatnonzero(seen & ~dropped)
     if min(fresh.size, turned.sum()) <= ORDER:  # there is no third difference
         raise InputError(f"{where} does not move: its pose is frozen or missing in all rows")
