@@ -1,11 +1,12 @@
 """Progress: the remaining time of a search is told once it has begun, and falls while a step goes on."""
 
+import re
 from io import StringIO
 
 import pytest
 from rich.console import Console
 
-from diagnosis.execution.progress import progress
+from diagnosis.execution.progress import progress, remaining
 from diagnosis.execution.remaining_time import USUAL, RemainingTime
 
 ROUND = ("every effect as a candidate", "the best candidates refined")
@@ -64,14 +65,22 @@ def test_remaining_time_is_right_within_a_factor_of_two_on_any_machine(effects, 
         clock.time += speed * took
 
 
-def test_it_is_between_those_for_the_fewest_and_for_the_likely_effects():
-    def stated(likely):
+def test_its_range_is_from_the_fewest_to_the_likely_effects():
+    def begun(likely):
         left = RemainingTime(Clock())
         left.begin(f"effect 1 of about {likely}: {ROUND[1]}")
-        return left.seconds
+        return left
 
-    few, some, many = map(stated, (1, 3, 6))
-    assert few < some < many
+    ranges = [begun(likely).ends for likely in (1, 3, 6)]
+    assert len({least for least, _ in ranges}) == 1
+    assert ranges[0][1] < ranges[1][1] < ranges[2][1]
+    assert all(least < begun(3).seconds < most for least, most in ranges[1:])
+    assert re.fullmatch(r", \d+ to \d+ s more", remaining(begun(6)))
+    last = RemainingTime(Clock())
+    last.begin(f"effect 1 of about 1: {ROUND[1]}")
+    last.begin("waves")
+    assert re.fullmatch(r", about \d+ s more", remaining(last))
+    assert remaining(RemainingTime(Clock())) == ""
 
 
 # Steps of `learn` from a log of R/V Gunnerus and processor times [s]; six effects were accepted in turn

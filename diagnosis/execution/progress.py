@@ -72,13 +72,18 @@ class ProgressLine:
 
 
 def remaining(time_left: RemainingTime) -> str:
-    """The remaining time in words, with what is before them; empty where it is not known."""
-    seconds = time_left.seconds
-    if seconds is None:
+    """The remaining time in words, with what is before them; empty where it is not known.
+
+    It is a range where its ends differ by more than half.
+    """
+    if time_left.ends is None or time_left.seconds is None:
         return ""
-    return (
-        f", about {seconds:.0f} s more" if seconds < 90.0 else f", about {seconds / 60.0:.0f} min more"
-    )
+    least, most = time_left.ends
+    size, unit = (60.0, "min") if most >= 90.0 else (1.0, "s")
+    first, last = (f"{seconds / size:.0f}" for seconds in (least, most))
+    if most > 1.5 * least and first != last:
+        return f", {first} to {last} {unit} more"
+    return f", about {time_left.seconds / size:.0f} {unit} more"
 
 
 @contextmanager

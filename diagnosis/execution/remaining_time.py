@@ -1,9 +1,9 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
 The number of effects is known only in the end. It is between those that were found and those that the
-search announces as likely (:mod:`diagnosis.search.shortlist`). The geometric mean of the times for both
-is stated: it is right within a factor of two where they differ by less than four. A kind of step that
-has ended takes what it took; any other one its usual time, scaled by what the steps of the search took.
+search announces as likely (:mod:`diagnosis.search.shortlist`): the times for both are stated. A kind of
+step that has ended takes what it took; any other one its usual time, scaled by what the steps of the
+search took.
 """
 
 import math
@@ -55,16 +55,19 @@ class RemainingTime:
         return self._now() - self._started
 
     @property
-    def seconds(self) -> float | None:
-        """The remaining time [s]; None: how many effects are likely is not known yet."""
+    def ends(self) -> tuple[float, float] | None:
+        """Remaining times [s] for the fewest and for the likely effects; None: not known yet."""
         if not self._round:
             return None
         spent = self._now() - self._begun
-        rest = math.prod(
-            sum(number * self._usual(name) for name, number in left.items()) ** (1.0 / len(self._left))
-            for left in self._left
-        )
-        return max(self._number * self._usual(self._step) - spent, LATE * spent) + rest
+        present = max(self._number * self._usual(self._step) - spent, LATE * spent)
+        rest = [sum(number * self._usual(name) for name, number in left.items()) for left in self._left]
+        return present + rest[0], present + rest[-1]
+
+    @property
+    def seconds(self) -> float | None:
+        """The remaining time [s], the geometric mean of its ends; None: not known yet."""
+        return None if self.ends is None else math.sqrt(math.prod(self.ends))
 
     @property
     def share(self) -> float | None:
