@@ -115,6 +115,8 @@ class Diagnosis(DecidedFindings):
         speeds: |u|, |v|, |r| that hold 99 % of the training runs [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
+        gain: what the search for effects gains over calibration alone in the data that decide; None
+            where that is not known.
     """
 
     comparison: Comparison
@@ -123,6 +125,7 @@ class Diagnosis(DecidedFindings):
     speeds: tuple[float, float, float]
     prior: Prior
     seed: int
+    gain: PredictionGain | None = None
 
     @property
     def sound(self) -> bool:
@@ -282,16 +285,18 @@ class Session(ShortRepr):
         calibrates = self.predictor.parametric
         fit = self.calibration if calibrates else None
         calibration = None if fit is None else fit.findings
-        verdict = judge(
+        verdict, gain = judge(
             found, data, self.known, self.harms, region, calibrates, calibration, self.advance
         )
-        return self._concluded(verdict, region)
+        return self._concluded(verdict, region, gain)
 
     def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:
         decide, runs = len(self.train) + len(self.validate), self.runs
         return _compared(predictor or self.predictor, runs[:decide], after, runs[decide:], self.advance)
 
-    def _concluded(self, verdict: DecidedFindings, region: OperatingRegion) -> Diagnosis:
+    def _concluded(
+        self, verdict: DecidedFindings, region: OperatingRegion, gain: PredictionGain | None
+    ) -> Diagnosis:
         """The diagnosis by a verdict: errors and bands of predictions, and whether it is stable."""
         learned = verdict.learned.model
         found = self._compared(learned if verdict.changed else None, self.predictor.in_windows())
@@ -314,6 +319,7 @@ class Session(ShortRepr):
             speeds=region.largest,
             prior=self.prior,
             seed=self.seed,
+            gain=gain,
         )
 
 

@@ -293,7 +293,7 @@ def test_what_only_one_has_stands_beside_it(tmp_path: Path) -> None:
 def test_a_unit_that_one_shows_is_that_of_all(tmp_path: Path) -> None:
     one, other = zigzag(psi="heading"), zigzag(psi="heading")
     one["heading"] = np.degrees(one["heading"] * 4.0) % 360.0
-    other["heading"] = np.degrees(other["heading"])
+    other["heading"] = np.degrees(other["heading"] * 0.2)
     files = written(tmp_path / "a.csv", one), written(tmp_path / "b.csv", other)
     assert "unit" not in propose(files[1], TANKER).needed["columns"]["psi"]
     command(propose_columns.main, *files, "--ship", "kvlcc2", "--write", "--anyway")

@@ -522,7 +522,7 @@ def test_the_judgement_is_sure_only_of_what_nothing_else_explains(monkeypatch):
     data, region = session.data(found.sigma), OPERATING
 
     def seen():
-        decided = judge(found, data, session.known, session.harms, region, True, None, silent)
+        decided, _ = judge(found, data, session.known, session.harms, region, True, None, silent)
         return decided.learned.effects
 
     (sure,) = seen()

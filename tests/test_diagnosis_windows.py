@@ -298,3 +298,5 @@ def test_a_heading_in_degrees_is_known_by_the_way_of_a_ship_that_turns_slowly():
     windows_of(replace(run, pose=np.column_stack([place, psi + 2.0 * np.pi])))
     astern = np.column_stack([-place, psi + 2.0 * np.pi])
     windows_of(replace(run, pose=astern))
+    spinning = np.column_stack([0.2 * t, 0.1 * t, 0.2 * t])  # while it drifts on a line
+    windows_of(replace(run, pose=spinning))

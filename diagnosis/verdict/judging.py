@@ -50,7 +50,6 @@ class DecidedFindings(ShortRepr):
         unique: for each the share that nothing else explains; None where that cannot be told.
         posterior: of all fitted values; of none where nothing was learned.
         unrecorded: what acts on the ship and is in no command and no effect.
-        gain: of the search over calibration, in predictions of the data that decide; None: not known.
     """
 
     learned: Findings
@@ -62,7 +61,6 @@ class DecidedFindings(ShortRepr):
     unique: Sequence[float | None]
     posterior: JointPosterior
     unrecorded: Unrecorded
-    gain: PredictionGain | None
 
     @property
     def verdict(self) -> VerdictName:
@@ -113,7 +111,7 @@ def judge(
     calibrates: bool,
     calibration: Findings | None,
     advance: Advance,
-) -> DecidedFindings:
+) -> tuple[DecidedFindings, PredictionGain | None]:
     """Judge what a search found: prune, conclude, fit to predictions, calibrate, say how sure it is.
 
     Args:
@@ -125,6 +123,9 @@ def judge(
         calibrates: whether coefficients may take the place of effects that are no findings.
         calibration: the coefficients fitted without an effect; None: there are none.
         advance: receives the name of each step when it begins.
+
+    Returns:
+        What the runs that decide say, and the gain of the search over calibration; None: not known.
     """
     start, train = data.start, data.train
     advance("effects without which validation data are predicted better")
@@ -165,9 +166,10 @@ def judge(
     )
     learned = with_confidence(fit.findings, start, doubts)
     known, force = fit.posterior, fit.unrecorded
-    return DecidedFindings(
-        learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force, gain
+    decided = DecidedFindings(
+        learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
     )
+    return decided, gain
 
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:

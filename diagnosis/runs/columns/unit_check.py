@@ -44,7 +44,7 @@ OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 LARGEST = 1e9
 # Beyond these no ship moves, so that the unit must be another one (chosen).
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
-AHEAD = 0.5  # 1, share of the way by which one unit of the heading explains more than another (chosen)
+AHEAD = 0.5  # 1, of the way that a constant heading does not explain, what one in degrees does (chosen)
 
 
 class Doubt(NamedTuple):
@@ -118,8 +118,8 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
         yield Doubt(("psi",), "deg", reason)
         return
     way, start = step[:, 0] + 1j * step[:, 1], psi[: second.size]
-    in_rad, in_deg = (follows(way, start * unit) for unit in (1.0, c.degree))
-    if in_deg - in_rad > AHEAD:
+    still, in_rad, in_deg = (follows(way, start * unit) for unit in (0.0, 1.0, c.degree))
+    if in_rad < still and in_deg - still > AHEAD * (1.0 - still):
         reason = f"goes where its heading is only in degrees ({in_deg:.0%} of the way): is it in deg?"
         yield Doubt(("psi",), "deg", reason)
 
