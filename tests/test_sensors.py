@@ -155,7 +155,8 @@ def test_a_compass_off_by_heading_is_no_clock_that_wanders():
 @pytest.mark.parametrize("either", [True, False])
 def test_a_clock_that_a_compass_would_look_like_is_told_with_it(monkeypatch, either):
     monkeypatch.setattr(motion, "_stretches", lambda path: [(0.0, 60.0, 1.1, 0.01)])
-    (found,) = motion._clock(SimpleNamespace(wanders=True, either=either, path=None))
+    faults = SimpleNamespace(wanders=True, either=either, by_way=False, path=None)
+    (found,) = motion._clock(faults, SimpleNamespace(by=None))
     assert ("compass" in found.sentence) == ("deviation_sin" in found.alike) == either
     assert found.repaired != either
 
@@ -210,6 +211,19 @@ def test_without_a_way_a_clock_that_wanders_may_be_a_heading_that_is_none():
     assert rates
     assert not any(f.repaired for f in rates)
     assert np.array_equal(found.run.time, run.time)
+
+
+def test_without_a_turn_a_clock_that_wanders_may_be_a_speed_that_is_filtered():
+    """A receiver that averages its speed looks like a clock that follows the throttle."""
+    run = made()
+    log = run.time + 0.1 * 60.0 / (2.0 * np.pi) * np.sin(2.0 * np.pi * run.time / 60.0)
+    speeds = {n: run.measured[n] for n in ("u", "v")}
+    found = examine(replace(run, time=log, measured=speeds), REFERENCE)
+    rates = [f for f in found.findings if f.kind == "clock_rate"]
+    assert rates
+    assert not any(f.repaired for f in rates)
+    assert all(f.aside == ("u", "v") and "no yaw rate is measured" in f.sentence for f in rates)
+    assert np.array_equal(found.run.time, log)
 
 
 def held(run):

@@ -24,6 +24,9 @@ from .sensor_finding import Examined, SensorFinding
 STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to locate its error; chosen
 CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
 CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
+CLOCK_OR_SPEED = (
+    "no yaw rate is measured: a speed that is filtered, late or wrong by direction has the same effect"
+)
 CLOCK_OR_RATE = "no speed is measured: a clock at this rate has the same effect"
 # 1, of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
 # differ by beyond noise. Chosen: with more, most of it is not common to both.
@@ -42,12 +45,14 @@ class MotionFaults(NamedTuple):
         wanders: whether it does.
         either: whether a compass that is off by heading would look like that clock.
         torn: whether way and turn would each need a clock of its own.
+        by_way: whether the way alone tells of that clock.
     """
 
     path: Path
     wanders: bool
     either: bool = False
     torn: bool = False
+    by_way: bool = False
 
 
 def motion(
@@ -68,7 +73,7 @@ def motion(
         found = _estimated(e, columns(e, scale), jumps)
     except LinAlgError:
         return Examined(run, notes=("the channels in addition to the pose do not determine a motion",))
-    findings = [*jumps, *_clock(found), *_constants(found, e)]
+    findings = [*jumps, *_clock(found, e), *_constants(found, e)]
     late = [f for f in findings if f.kind == "delay"]
     if late:  # its column is a tangent: all else is estimated once it is gone
         steps = {f.channel: _step(f.value, *before.get(f.channel, (0.0, 1.0))) for f in late}
@@ -117,7 +122,7 @@ def _correction(
     """What findings say of the run."""
     values = {(f.channel, f.kind): f.value for f in fixes if f.channel != "time"}
     rates = [f.value for f in fixes if f.kind == "clock_rate"]
-    wanders = found.wanders and not found.either
+    wanders = found.wanders and not (found.either or found.by_way)
     if not (wanders or rates or jumps):
         return Correction(values)
     problem, clock = found.path.problem, found.path.clock
@@ -163,7 +168,7 @@ def _estimated(
         path = problem.solve([c for c in every if c.kind == "delay"], fixed_clock=True)
     while len(kept := _sure(path)) < len(path.columns):
         path = problem.solve(kept, fixed_clock=not wanders)
-    return MotionFaults(path, wanders, either, torn)
+    return MotionFaults(path, wanders, either, torn, wanders and e.rate is None)
 
 
 def _sure(path: Path) -> list[FaultColumn]:
@@ -172,7 +177,7 @@ def _sure(path: Path) -> list[FaultColumn]:
     return [c for c, value, s in found if abs(value) > max(SURE * s, c.least) and s > 0.0]
 
 
-def _clock(found: MotionFaults) -> list[SensorFinding]:
+def _clock(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
     clock = ("time", "clock_rate", "1")
     if not found.wanders:
@@ -185,13 +190,17 @@ def _clock(found: MotionFaults) -> list[SensorFinding]:
         text = text.format(scales[0]) + ", by speed and turn"
         alike = ("scale of all speeds and rates",)
         return [SensorFinding.estimated(clock, *scales, found.path.problem.edges, text, alike)]
-    alike, or_else = (tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}") if found.either else ((), "")
+    alike, or_else, aside = (), "", ()
+    if found.either:
+        alike, or_else = tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}"
+    elif found.by_way:
+        alike, or_else, aside = e.by or (), f"; {CLOCK_OR_SPEED}", e.by or ()
     made = []
     for begin, end, value, s in _stretches(found.path):
         way = "slow" if value > 1.0 else "fast"
         text = f"the clock of the log is {way}: {value:.3g} s pass in one second of it{or_else}"
         ends = np.array([begin, end])
-        made.append(SensorFinding.estimated(clock, value, s, ends, text, alike, not found.either))
+        made.append(SensorFinding.estimated(clock, value, s, ends, text, alike, not alike, aside))
     return made
 
 
