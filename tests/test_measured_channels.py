@@ -290,5 +290,5 @@ def test_positions_without_a_heading_are_reported():
     pose = np.array(run.pose)
     pose[600:, 2] = pose[600, 2]
     notes = prepare(replace(run, pose=pose)).smoothed.track.notes
-    assert any(n.startswith("569 positions have no heading near them, the first 63.1 s") for n in notes)
+    assert any(n.startswith("594 positions have no heading near them, the first 60.6 s") for n in notes)
     assert not any("heading near" in n for n in prepare(run).smoothed.track.notes)

@@ -158,7 +158,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
             raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
         turned = turned | constant
     # Where no heading is near, a place tells nothing of surge and sway.
-    apart = max(WIDTH * scale.time, LONG * row)
+    own = float(np.median(np.diff(run.time[turned]))) if turned.sum() > 1 else row
+    apart = min(max(WIDTH * scale.time, LONG * row), long_gap(own, scale))
     headless = seen & ~near(run.time, turned, apart)
     dropped = ~(seen | repeats | between) | headless
     if many := int(headless.sum()):
