@@ -195,8 +195,8 @@ def force(model: Model, nu: np.ndarray) -> np.ndarray:
         parts = [damping_force(u, v, r, b.hull.damping)]
         for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
             parts.append(member.apply(acts, b.params.outside, NONE, at))
-        result = sum(np.stack([np.broadcast_to(axis, u.shape) for axis in part]) for part in parts)
-        return result.T
+        each = [np.stack([np.broadcast_to(axis, u.shape) for axis in part]) for part in parts]
+        return np.sum(each, axis=0).T
 
     return total(*nu.T) - total(*np.zeros((3, 1)))
 

@@ -297,11 +297,13 @@ def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) ->
     filters = model.filters
     if not filters:
         return poses
-    before = (
-        starts.first(lambda s, name=name: getattr(filters.undone(s), name))
-        for name in ("between", "timely", "timely_rate")
+    start = FilterStart(
+        between=starts.first(lambda s: filters.undone(s).between),
+        timely=starts.first(lambda s: filters.undone(s).timely),
+        timely_rate=starts.first(lambda s: filters.undone(s).timely_rate),
+        measured=starts.first(attrgetter("eta")),
     )
-    return filters.behind(poses, FilterStart(*before, starts.first(attrgetter("eta"))), h)
+    return filters.behind(poses, start, h)
 
 
 def before_filters(s: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
