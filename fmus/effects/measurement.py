@@ -97,8 +97,8 @@ CLOCK_OFFSET = Effect(
 
 def measured_behind(
     name: str,
-    channel: str,
-    kind: str,
+    meaning: str,
+    sentence: str,
     search: Search,
     *,
     description: str,
@@ -106,8 +106,14 @@ def measured_behind(
     symbol: str,
     source: str,
 ) -> Effect:
-    """The effect that a channel of the pose is measured behind a filter with one time constant."""
-    said = f"The {channel} is measured through a {kind} with a time constant of"
+    """The effect that a channel of the pose is measured behind a filter with one time.
+
+    Args:
+        name: of the effect, and of the time.
+        meaning: of the time.
+        sentence: what is said of it, with {} in place of the time.
+        search, description, formula, symbol, source: see :class:`.Effect`.
+    """
     return Effect(
         id=name,
         kind="measurement",
@@ -118,12 +124,10 @@ def measured_behind(
         sign="0: none",
         source=source,
         linear=False,
-        parameters=(
-            Variable(name, "s", f"time constant of the {kind} of the {channel}", 0.0, LAGS, False),
-        ),
+        parameters=(Variable(name, "s", meaning, 0.0, LAGS, False),),
         function=None,
         search=search,
-        wording=Wording(lambda f: f"{said} {number(f[name])} s.", FILTER),
+        wording=Wording(lambda f: sentence.format(f"{number(f[name])} s"), FILTER),
     )
 
 
@@ -131,8 +135,8 @@ def low_pass(channel: str, symbol: str, coordinates: str) -> Effect:
     """The effect that a channel is measured behind a low-pass filter of first order."""
     return measured_behind(
         f"{channel}_lag",
-        channel,
-        "low-pass filter",
+        f"time constant of the low-pass filter of the {channel}",
+        f"The {channel} is measured through a low-pass filter with a time constant of {{}}.",
         Search(differentiable=True),
         description=f"the measured {channel} is low-pass filtered (first order)",
         formula=f"T d({coordinates})_m/dt = ({coordinates}) - ({coordinates})_m",
@@ -146,8 +150,8 @@ def tracker(channel: str, symbol: str, coordinates: str) -> Effect:
     name = f"{channel}_tracker"
     return measured_behind(
         name,
-        channel,
-        "tracking filter",
+        f"time constant of the tracking filter of the {channel}",
+        f"The {channel} is measured through a tracking filter with a time constant of {{}}.",
         Search(tries=[{name: T} for T in TRACKERS]),
         description=f"the measured {channel} is the estimate of a Kalman filter of constant velocity",
         formula=f"T^2 d2y/dt2 + sqrt(2) T d(y - p)/dt + y - p = 0, p = ({coordinates})",
@@ -158,23 +162,15 @@ def tracker(channel: str, symbol: str, coordinates: str) -> Effect:
 
 def latency(channel: str, symbol: str, coordinates: str) -> Effect:
     """The effect that a channel is older than its time stamp, and the others are not."""
-    name = f"{channel}_latency"
-    return Effect(
-        id=name,
-        kind="measurement",
-        axis="XYN",
+    return measured_behind(
+        f"{channel}_latency",
+        f"age of the {channel} at its time stamp",
+        f"The {channel} is {{}} older than its time stamp.",
+        Search(differentiable=True),
         description=f"the measured {channel} alone is older than its stamp",
         formula=f"({coordinates})_m(t) = ({coordinates})(t - δ)",
         symbol=symbol,
-        sign="0: none",
         source="4.3.1; latency of a receiver",
-        linear=False,
-        parameters=(Variable(name, "s", f"age of the {channel} at its time stamp", 0.0, LAGS, False),),
-        function=None,
-        search=Search(differentiable=True),
-        wording=Wording(
-            lambda f: f"The {channel} is {number(f[name])} s older than its time stamp.", FILTER
-        ),
     )
 
 
