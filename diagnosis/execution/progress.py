@@ -76,14 +76,15 @@ def remaining(time_left: RemainingTime) -> str:
 
     It is a range where its ends differ by more than half.
     """
-    if time_left.ends is None or time_left.seconds is None:
+    ends, seconds = time_left.ends, time_left.seconds
+    if ends is None or seconds is None:
         return ""
-    least, most = time_left.ends
+    least, most = ends
     size, unit = (60.0, "min") if most >= 90.0 else (1.0, "s")
-    first, last = (f"{seconds / size:.0f}" for seconds in (least, most))
+    first, last = (f"{end / size:.0f}" for end in ends)
     if most > 1.5 * least and first != last:
         return f", {first} to {last} {unit} more"
-    return f", about {time_left.seconds / size:.0f} {unit} more"
+    return f", about {seconds / size:.0f} {unit} more"
 
 
 @contextmanager

@@ -67,7 +67,8 @@ class RemainingTime:
     @property
     def seconds(self) -> float | None:
         """The remaining time [s], the geometric mean of its ends; None: not known yet."""
-        return None if self.ends is None else math.sqrt(math.prod(self.ends))
+        ends = self.ends
+        return None if ends is None else math.sqrt(math.prod(ends))
 
     @property
     def share(self) -> float | None:

@@ -106,8 +106,8 @@ def _undone(f: Filters, s: Smoothed) -> BeforeFilters:
     eta, eta_dot, eta_ddot = (np.array(part) for part in (s.eta, s.eta_dot, s.eta_ddot))
     for k, late in enumerate(f.latency):
         if late:
-            motion = eta[:, k], eta_dot[:, k], eta_ddot[:, k]
-            eta[:, k], eta_dot[:, k], eta_ddot[:, k] = _ahead(s.time, *motion, late)
+            motion = np.stack([eta[:, k], eta_dot[:, k], eta_ddot[:, k]])
+            eta[:, k], eta_dot[:, k], eta_ddot[:, k] = _ahead(s.time, motion, late)
     timely, timely_rate = eta.copy(), eta_dot.copy()
     for k, T in enumerate(f.tracker):
         if T:
@@ -120,29 +120,24 @@ def _undone(f: Filters, s: Smoothed) -> BeforeFilters:
     return BeforeFilters(eta + f.lag * eta_dot, eta_dot + f.lag * eta_ddot, eta, timely, timely_rate)
 
 
-def _ahead(
-    time: np.ndarray, x: np.ndarray, rate: np.ndarray, bend: np.ndarray, T: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A coordinate (n,), its rate and second derivative a time T [s] later.
+def _ahead(time: np.ndarray, motion: np.ndarray, T: float) -> np.ndarray:
+    """A coordinate, its rate and second derivative (3, n) a time T [s] later.
 
     They are interpolated; behind the last row that is known, the second derivative stays as it is.
     """
+
+    def after(x: np.ndarray, rate: np.ndarray, bend: np.ndarray, slope: Any, s: Any) -> np.ndarray:
+        """The same a time s later, with a third derivative."""
+        moved = x + s * (rate + s * (0.5 * bend + s * slope / 6.0))
+        return np.stack([moved, rate + s * (bend + 0.5 * s * slope), bend + slope * s])
+
     later = np.minimum(time + T, time[-1])
-    after = np.clip(np.searchsorted(time, later, "right"), 1, time.size - 1)
-    before, step = after - 1, time[after] - time[after - 1]
-    share = (later - time[before]) / step
-    slope = (bend[after] - bend[before]) / step
-    s = share * step
-    bent = bend[before] + slope * s
-    moved = (
-        x[before] + s * (rate[before] + s * (0.5 * bend[before] + s * slope / 6.0)),
-        rate[before] + s * (bend[before] + 0.5 * s * slope),
-        bent,
-    )
-    known = np.isfinite(x[after]) & np.isfinite(x[before]) & (time + T <= time[-1])
-    steady = (x + T * (rate + 0.5 * T * bend), rate + T * bend, bend)
-    found = (np.where(known, m, t) for m, t in zip(moved, steady, strict=True))
-    return tuple(found)  # type: ignore[return-value]
+    end = np.clip(np.searchsorted(time, later, "right"), 1, time.size - 1)
+    begin = end - 1
+    slope = (motion[2, end] - motion[2, begin]) / (time[end] - time[begin])
+    known = np.isfinite(motion[0, end]) & np.isfinite(motion[0, begin]) & (time + T <= time[-1])
+    between = after(*motion[:, begin], slope, later - time[begin])
+    return np.where(known, between, after(*motion, 0.0, T))
 
 
 def _off(a: Any, b: Any, k: int) -> Any:

@@ -149,8 +149,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
-    alone, told = stuck(run, seen)
-    notes += told
+    alone, lines = stuck(run, seen)
+    notes += lines
     seen, repeats = seen & ~alone, repeats | alone
     turned, constant, lined = updates(run, HEADING, gone)
     if turned.sum() <= ORDER < min(seen.sum(), constant.sum()):

@@ -8,6 +8,8 @@ import numpy as np
 from .files.reading import Run
 from .run_constants import IN_A_ROW, LONG
 
+USUAL = 0.99  # 1, of the steps or lengths of a channel, which are usual; chosen: the rest may be spikes
+
 
 def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
     """(n,): where a pose, or channels of it, (n, k), is to the bit the last one that was there."""
@@ -36,7 +38,7 @@ def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
         moves = step[step > 0.0]
         if not moves.size:
             continue
-        usual = float(np.quantile(moves, 0.99))
+        usual = float(np.quantile(moves, USUAL))
         edges = np.flatnonzero(np.diff(np.concatenate([[False], step == 0.0, [False]])))
         for first, last in edges.reshape(-1, 2).tolist():
             at_end = last == step.size
@@ -85,7 +87,7 @@ def _constant(values: np.ndarray) -> Iterator[np.ndarray]:
     lengths = np.diff(np.append(new, rows.size))
     if not lengths.size:
         return
-    usual = np.sort(lengths)[: max(int(0.99 * lengths.size), 1)].max()
+    usual = np.sort(lengths)[: max(int(USUAL * lengths.size), 1)].max()
     for first, length in zip(new.tolist(), lengths.tolist(), strict=True):
         if length > LONG * max(usual, IN_A_ROW):
             yield rows[first : first + length]

@@ -148,7 +148,7 @@ def _of_rounding(values: np.ndarray) -> float:
     """Standard deviation by the rounding of values (n,): the least step between them, over sqrt(12)."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > DIGITS * np.abs(values).max()]
-    return float(steps.min(initial=np.inf)) / 12.0**0.5 if steps.size else 0.0
+    return float(steps.min()) / 12.0**0.5 if steps.size else 0.0
 
 
 def _of_differences(samples: int) -> float:

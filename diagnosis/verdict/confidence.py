@@ -36,7 +36,7 @@ IN_PARTS = "findings of one kind on the same axis make up a law of another shape
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
-NO_GAIN = "other coefficients predict data left out of the fit as well"
+NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 

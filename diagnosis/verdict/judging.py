@@ -202,15 +202,12 @@ def faster_than_smoothing(found: Findings, start: Model, runs: Sequence[WeakWind
     At low frequencies w both take w^2 off a motion, without a lag: where the smoothing ends below the
     filter's corner 1 / T, the data hold nothing that discriminates them.
     """
+    trackers = {f.id: np.array(start.plus(f.values).filters.tracker) for f in found.effects}
+    changed = {i: np.array(start.filters.tracker) != T for i, T in trackers.items()}
+    if not any(map(np.any, changed.values())):
+        return set()
     corner = np.max([np.median(corner_frequency(w), axis=0) for w in runs], axis=0)
-    before = np.array(start.filters.tracker)
-    faster = set()
-    for f in found.effects:
-        tracker = np.array(start.plus(f.values).filters.tracker)
-        changed = tracker != before
-        if changed.any() and (tracker * corner < 1.0)[changed].all():
-            faster.add(f.id)
-    return faster
+    return {i for i, own in changed.items() if own.any() and (trackers[i] * corner < 1.0)[own].all()}
 
 
 def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:

@@ -60,8 +60,8 @@ class Evidence:
     @cached_property
     def unlogged(self) -> list[tuple[float, float]]:
         """Begin and end [s] of each stretch without rows, or without the velocity."""
-        there = np.isfinite([self.run.measured[name] for name in self.by or ()]).all(axis=0)
-        known = self.time[np.broadcast_to(there, self.time.shape)]
+        columns = np.column_stack([self.time, *(self.run.measured[name] for name in self.by or ())])
+        known = self.time[np.isfinite(columns).all(axis=1)]
         time = np.concatenate([self.time[:1], known, self.time[-1:]])
         step = np.diff(time)
         at = np.flatnonzero(step > long_gap(float(np.median(step)), REFERENCE))
