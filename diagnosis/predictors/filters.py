@@ -126,8 +126,9 @@ def _ahead(time: np.ndarray, motion: np.ndarray, T: float) -> np.ndarray:
     They are interpolated; behind the last row that is known, the second derivative stays as it is.
     """
 
-    def after(x: np.ndarray, rate: np.ndarray, bend: np.ndarray, slope: Any, s: Any) -> np.ndarray:
+    def after(first: np.ndarray, slope: Any, s: Any) -> np.ndarray:
         """The same a time s later, with a third derivative."""
+        x, rate, bend = first
         moved = x + s * (rate + s * (0.5 * bend + s * slope / 6.0))
         return np.stack([moved, rate + s * (bend + 0.5 * s * slope), bend + slope * s])
 
@@ -136,8 +137,8 @@ def _ahead(time: np.ndarray, motion: np.ndarray, T: float) -> np.ndarray:
     begin = end - 1
     slope = (motion[2, end] - motion[2, begin]) / (time[end] - time[begin])
     known = np.isfinite(motion[0, end]) & np.isfinite(motion[0, begin]) & (time + T <= time[-1])
-    between = after(*motion[:, begin], slope, later - time[begin])
-    return np.where(known, between, after(*motion, 0.0, T))
+    between = after(motion[:, begin], slope, later - time[begin])
+    return np.where(known, between, after(motion, 0.0, T))
 
 
 def _off(a: Any, b: Any, k: int) -> Any:
