@@ -46,20 +46,13 @@ def main() -> int:
 
         complain(f"no command '{name}'{nearest(name, modules)}")
         return 2
-    sys.argv = [f"cybership {name}", *sys.argv[2:]]
-    try:
-        # As python -m does it: what a command does before its imports happens here, too. But sys.argv[0]
-        # stays the name of the command, by which usage lines call it.
-        runpy.run_module(modules[name], run_name="__main__")
-    except ModuleNotFoundError as error:
-        from cosim.command import BAD_INPUT, complain, missing_extra
-        from cosim.process.run_state import STATE
+    from cosim.supervision import end_without_extra
 
-        if (line := missing_extra(error)) is None:
-            raise
-        complain(line)
-        STATE.end(BAD_INPUT)  # the process did not die: it has nothing to do
-        return BAD_INPUT
+    sys.excepthook = end_without_extra
+    sys.argv = [f"cybership {name}", *sys.argv[2:]]
+    # As python -m does it: what a command does before its imports happens here, too. But sys.argv[0]
+    # stays the name of the command, by which usage lines call it.
+    runpy.run_module(modules[name], run_name="__main__")
     return 0
 
 

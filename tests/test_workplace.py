@@ -3,6 +3,7 @@
 import argparse
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -315,6 +316,19 @@ def test_a_missing_library_is_told_with_its_extra():
     message = missing_extra(ModuleNotFoundError("No module named 'sklearn'", name="sklearn.cross"))
     assert message == "this needs sklearn: pip install 'cybership[analysis]'"
     assert missing_extra(ModuleNotFoundError("No module named 'mine'", name="mine")) is None
+
+
+@pytest.mark.parametrize("command", [["diagnosis.learn"], ["thesis.pca"], ["cybership", "learn"]])
+def test_a_command_that_cannot_be_imported_ends_in_one_line(command, tmp_path):
+    absent = "raise ModuleNotFoundError(\"No module named 'scipy'\", name='scipy')"
+    (tmp_path / "scipy.py").write_text(absent)
+    places = os.pathsep.join([str(tmp_path), str(ROOT)])
+    done = subprocess.run(
+        [sys.executable, "-m", *command, "nowhere.csv"], capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": places},
+    )  # fmt: skip
+    assert done.stderr == "error: this needs scipy: pip install 'cybership[diagnosis]'\n"
+    assert done.returncode == 2
 
 
 def test_shipped_scenarios_come_by_name(tmp_path, monkeypatch):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from contextlib import suppress
 
@@ -23,7 +24,7 @@ from ..process.spawned import end_with_parent
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import FrameType
+    from types import FrameType, TracebackType
 
 # Two interrupts within this wall time [s] are one: ``timeout`` sends its signal to a process and to its
 # group. Chosen: longer than that takes, shorter than between two presses of a key.
@@ -39,6 +40,7 @@ INDIFFERENT = ("SIGUSR1", "SIGUSR2", "SIGPIPE", "SIGQUIT", "SIGVTALRM", "SIGPROF
 
 def supervised() -> None:
     """Go on in a process that this one watches; this one never returns."""
+    sys.excepthook = end_without_extra
     if not hasattr(os, "fork"):
         leave_on_interrupt()
         return
@@ -59,6 +61,24 @@ def supervised() -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
     STATE.keep()
     end_with_parent(watching)
+
+
+def end_without_extra(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Hook for an exception that ends a command; a library of an extra is named in one line.
+
+    Commands catch their own exceptions, but not those of their imports.
+    """
+    from ..command import BAD_INPUT, complain, missing_extra  # only now: it takes a while to import
+
+    line = missing_extra(error) if isinstance(error, ModuleNotFoundError) else None
+    if line is None:
+        sys.__excepthook__(kind, error, trace)
+        return
+    complain(line)
+    STATE.end(BAD_INPUT)
+    raise SystemExit(BAD_INPUT)
 
 
 def _no_action(number: int, frame: FrameType | None) -> None:
