@@ -5,8 +5,8 @@ of 240 s at 50 Hz with a hidden drag, or those that are named. With ``--ship`` t
 from three runs of CyberShip Enterprise 1 and from three of that ship, each of 180 s at 10 Hz (times the
 scale of the ship) with a hidden drag. Times are of the processor, the last one is that of the wall.
 With ``--answers`` each state learns from one run of the Otter, or of that ship, of ten minutes at 10 Hz:
-the table has the time of the processor until each answer is there, imports included, and the nearer end
-of the remaining time that was stated over the true one.
+the table has the time of the processor until each answer is there, imports included, and the remaining
+times that were stated over the true ones.
 """
 
 import argparse
@@ -47,7 +47,7 @@ PARTS = {
 }
 
 ANSWERS = ["compare", "compare, wall", "compare, report", *(f"until answer {k}" for k in (1, 2, 3))]
-Stated = tuple[float, tuple[float, float]]
+Stated = tuple[float, float]
 # Remaining time over the true one.
 REMAINING = [
     "first remaining time",
@@ -75,13 +75,17 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
         nonlocal part
         close()
         part = next(
-            (p for words, p in PARTS.items() if re.sub(r"^effect \d+: ", "", step).startswith(words)),
+            (
+                p
+                for words, p in PARTS.items()
+                if re.sub(r"^effect \d+[^:]*: ", "", step).startswith(words)
+            ),
             part,
         )
         if remaining is not None:
             remaining.begin(step)
-            if remaining.ends is not None:
-                stated.append((since, remaining.ends))
+            if remaining.seconds is not None:
+                stated.append((since, remaining.seconds))
 
     from diagnosis import learn as command
 
@@ -104,19 +108,15 @@ def learn(runs: Sequence[str], ship: str | None) -> dict[str, float]:
 
 
 def ratios(stated: Sequence[Stated], end: float) -> dict[str, float]:
-    """The nearer end of stated ranges over the true remaining time; 1: that is within the range.
+    """Remaining times that were stated over the true ones.
 
     The last LEAST_REST of the whole time is left out.
 
     Args:
-        stated: times at which remaining times were stated, and their ranges [s].
+        stated: times at which remaining times were stated, and these [s].
         end: of the work [s].
     """
-    each = [
-        (at, max(least / (end - at), min(1.0, most / (end - at))))
-        for at, (least, most) in stated
-        if end - at > LEAST_REST * end
-    ]
+    each = [(at, left / (end - at)) for at, left in stated if end - at > LEAST_REST * end]
     found = {"first remaining time": each[0][1]} if each else {}
     for half, begin in (("", 0.0), (", second half", 0.5 * end)):
         if of_part := [ratio for at, ratio in each if at >= begin]:

@@ -72,18 +72,11 @@ class ProgressLine:
 
 
 def remaining(time_left: RemainingTime) -> str:
-    """The remaining time in words, with what is before them; empty where it is not known.
-
-    It is a range where its ends differ by more than half.
-    """
-    ends, seconds = time_left.ends, time_left.seconds
-    if ends is None or seconds is None:
+    """The remaining time in words, with what is before them; empty where it is not known."""
+    seconds = time_left.seconds
+    if seconds is None:
         return ""
-    least, most = ends
-    size, unit = (60.0, "min") if most >= 90.0 else (1.0, "s")
-    first, last = (f"{end / size:.0f}" for end in ends)
-    if most > 1.5 * least and first != last:
-        return f", {first} to {last} {unit} more"
+    size, unit = (60.0, "min") if seconds >= 90.0 else (1.0, "s")
     return f", about {seconds / size:.0f} {unit} more"
 
 

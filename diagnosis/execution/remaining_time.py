@@ -1,9 +1,8 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
-The number of effects is known only in the end. It is between those that were found and those that the
-search announces as likely (:mod:`diagnosis.search.shortlist`): the times for both are stated. A kind of
-step that has ended takes what it took; any other one its usual time, scaled by what the steps of the
-search took.
+The number of effects is known only in the end: the search forecasts it once, by regressions of all
+candidates (:mod:`diagnosis.search.forward_selection`). A kind of step that has ended takes what it took
+last; any other one its usual time, scaled by what the steps of the search took.
 """
 
 import math
@@ -15,20 +14,27 @@ ROUND = ("every effect as a candidate", "candidates refined")
 AGAIN = "its place searched again"  # of one effect, each time that another one is found
 OF_EACH = "validation data are predicted better"  # for each effect
 OF_EFFECTS = (OF_EACH, "fit to predictions")  # only where there is one
-# s of processor time, medians of six logs (benchmarks/code.md); only ratios count. In their order.
+# s of processor time, medians of six logs (benchmarks/code.md). In their order.
 USUAL = {
-    **dict(zip(ROUND, (0.9, 0.8), strict=True)),
-    AGAIN: 0.8,
-    "waves": 0.7,
-    **dict(zip(OF_EFFECTS, (0.3, 2.2), strict=True)),
+    "calibration of the coefficients": 0.6,
+    **dict(zip(ROUND, (0.65, 1.35), strict=True)),
+    AGAIN: 0.85,
+    "waves": 0.85,
+    **dict(zip(OF_EFFECTS, (0.5, 1.9), strict=True)),
     "residual": 0.2,
     "gain of the search over calibration": 0.2,
     "predicting": 0.2,
-    "stability": 1.2,
+    "stability": 1.1,
     "report: figures": 0.2,
     "report: page": 0.2,
 }
 LAST = [*USUAL][[*USUAL].index(AGAIN) + 1 :]  # steps behind the search
+# Steps that take as long for few data as for many. Whether other steps took long because the data are
+# many or because the machine is slow is not known: these are scaled by the root.
+FIXED = {"gain of the search over calibration", "stability", "report: figures", "report: page"}
+FIRST = 1.9  # 1, the first regression of all candidates over each later one; median of the same logs
+# 1, refining candidates of which none is accepted over refining others; a third in the median.
+REJECTED = 0.3
 # 1, share of its time that a step is taken to go on for where it takes longer than usual; chosen.
 LATE = 0.3
 
@@ -43,11 +49,10 @@ class RemainingTime:
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._started = now, now()
         self._step, self._begun, self._round, self._again = "", self._started, 0, 0
+        self._likely = 0  # number of effects
         self._took: dict[str, list[float]] = {}  # kind of step -> how long each took, over its number
-        self._number = 1.0  # of the present step: of effects where it takes as long as they are many
-        self._likely = 0
-        # Of each kind of step, for the fewest effects and for those that are likely.
-        self._left: list[dict[str, float]] = []
+        self._number = 1.0  # of the present step: where it takes as long as several of its kind
+        self._left: dict[str, float] = {}  # of each kind of step
 
     @property
     def elapsed(self) -> float:
@@ -55,20 +60,13 @@ class RemainingTime:
         return self._now() - self._started
 
     @property
-    def ends(self) -> tuple[float, float] | None:
-        """Remaining times [s] for the fewest and for the likely effects; None: not known yet."""
+    def seconds(self) -> float | None:
+        """The remaining time [s]; None: not known yet."""
         if not self._round:
             return None
         spent = self._now() - self._begun
         present = max(self._number * self._usual(self._step) - spent, LATE * spent)
-        rest = [sum(number * self._usual(name) for name, number in left.items()) for left in self._left]
-        return present + rest[0], present + rest[-1]
-
-    @property
-    def seconds(self) -> float | None:
-        """The remaining time [s], the geometric mean of its ends; None: not known yet."""
-        ends = self.ends
-        return None if ends is None else math.sqrt(math.prod(ends))
+        return present + sum(n * self._usual(name) for name, n in self._left.items())
 
     @property
     def share(self) -> float | None:
@@ -82,7 +80,8 @@ class RemainingTime:
             return sum(own) / len(own)
         took = sum(map(sum, self._took.values()))
         usual = sum(len(each) * USUAL[kind] for kind, each in self._took.items())
-        return USUAL.get(name, 0.0) * (took / usual if usual else 1.0)
+        scale = took / usual if usual else 1.0
+        return USUAL.get(name, 0.0) * (math.sqrt(scale) if name in FIXED else scale)
 
     def begin(self, what: str) -> None:
         """A step begins, and the one before it has ended; one that is not known is a part of that."""
@@ -90,26 +89,30 @@ class RemainingTime:
         if not step:
             return
         now = self._now()
+        if self._step == ROUND[1] and step in LAST:
+            self._number = REJECTED
         if self._step:
             self._took.setdefault(self._step, []).append((now - self._begun) / self._number)
-        self._step, self._begun, self._number = step, now, 1.0
-        number = re.match(r"effect (\d+) of about (\d+)", what)
-        if number:
-            self._round, self._likely = int(number[1]), int(number[2])
-        if number or step == AGAIN:
+        self._step, self._begun = step, now
+        self._number = FIRST if what == ROUND[0] else 1.0
+        turn = re.match(r"effect (\d+), about (\d+) likely", what)
+        if turn:
+            self._round, self._likely = int(turn[1]), int(turn[2])
+        if turn or step == AGAIN:
             self._again = self._again + 1 if step == AGAIN else 0
-            fewest = self._round - (step != AGAIN)
-            self._left = [self._following(n) for n in (fewest, max(fewest, self._likely))]
+            found = self._round - (step != AGAIN)
+            self._left = self._following(max(found, self._likely))
         elif step in LAST and self._round:
             effects = self._round - 1
             self._number = max(effects, 1) if step == OF_EACH else 1
-            self._left = [_last(effects, LAST[LAST.index(step) + 1 :])]
+            self._left = _last(effects, LAST[LAST.index(step) + 1 :])
 
     def _following(self, effects: int) -> dict[str, float]:
         """The number of each kind of step that follows the present one, if so many effects are found."""
         present = self._round
         left = dict.fromkeys(ROUND, float(effects + 1 - present))
-        left[ROUND[1]] += self._step == ROUND[0]
+        if self._step == ROUND[0] or effects >= present:
+            left[ROUND[1]] += (self._step == ROUND[0]) + REJECTED - 1.0  # the last one is rejected
         # With each further effect the place of each before it is searched again.
         again = sum(range(present, effects)) + max(present - 1 - self._again, 0) * (effects >= present)
         return left | {AGAIN: float(again)} | _last(effects, LAST)

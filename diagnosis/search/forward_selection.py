@@ -9,8 +9,10 @@ One of two causes, alone, may well do harm where the other acts most: an effect 
 harms is kept on trial for one step, and stays if it and the next do no harm together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,18 +20,23 @@ from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import commanded
 from ..runs.run_constants import STEPS
+from .candidates import CandidateShape
 from .conclusion import AcceptedEffect, Selection
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
-from .map_regression import Scored, first_share
+from .gram import Entry, GramTable
+from .map_regression import Scored, first_share, regression, score
+from .most_likely import ridge
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
-from .refinement import RefinedModel, TrainingSet, nuisance_of, refit
+from .refinement import RefinedModel, TrainingSet, bounded, nuisance_of, refit
 from .shortlist import (
+    LENGTH,
+    NEW,
     MadeCandidates,
     Ranking,
     Shortlist,
-    further_effects,
+    in_order,
     leads,
     rank,
     reweighted,
@@ -82,8 +89,9 @@ def search(
     advance("every effect as a candidate")
     made: MadeCandidates = {}
     ranking = rank(t, at, set(), made)
-    likely = further_effects(ranking, start)
     lacking, command = ranking.base, commanded(data, start)
+    shows = partial(matters, lacking, command=command)
+    likely = likely_effects(ranking, start, shows)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
@@ -102,8 +110,7 @@ def search(
         alone = refit(t, at, ranking.nuisance).estimate
         nothing = scored_alone(t, alone)
         ranked = ranked or in_one_order(ranking, best, nothing)
-        shows = matters(lacking, t.error(without), left, command)
-        if not (shows and beyond_chance(nothing, first, total)):
+        if not (shows(t.error(without), left) and beyond_chance(nothing, first, total)):
             break
         harms = harmful(nothing if before is None else scored_alone(t, before[1]), first)
         if harms and before is not None:
@@ -111,7 +118,6 @@ def search(
         before = (t, alone) if harms else None
         accepted.append(accepted_effect(best, rng))
         at = best.winner
-        likely = min(len(accepted) - 1 + further_effects(ranking, start), MOST_REPORTED)
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
             at, accepted = searched_again(t, at, accepted, made, advance, rng)
@@ -129,7 +135,7 @@ def search(
 
 def _in_turn(number: int, likely: int) -> str:
     """The effect that is searched, and how many there may be."""
-    return f"effect {number} of about {max(number, likely)}"
+    return f"effect {number}, about {likely} likely"
 
 
 def searched_again(
@@ -197,3 +203,90 @@ def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ran
         return Ranked(name, s.score, q2, beyond, s.score - first.score, float(std))
 
     return [ranked(name, s) for name, s in in_order]
+
+
+class LikelyEffect(NamedTuple):
+    """A shape of a candidate, and what it takes off the sum of squares, less its charge."""
+
+    fall: float
+    candidate: int
+    shape: int
+
+
+def likely_effects(
+    ranking: Ranking, start: Model, shows: Callable[[np.ndarray, np.ndarray], bool]
+) -> int:
+    """The number of effects (0 to MOST_REPORTED) that regressions accept one after the other.
+
+    Only the remaining time of a search is stated by it: the effects are linear in their parameters, and
+    none is accepted or rejected here.
+
+    Args:
+        ranking: all candidates.
+        start: the initial model, which has the ranges of the values.
+        shows: :func:`.significance.matters` of this search, by the model errors without an effect and
+            with it (K, 3).
+    """
+    table, used, on_trial = ranking.table, list[int](), False
+    while len(used) < MOST_REPORTED:
+        gram = _without(table, table.total, table.nuisance, table.precision)
+        falls = [
+            LikelyEffect(_fall(table, gram, shape, entry, start), k, number)
+            for k, candidate in enumerate(ranking.candidates)
+            if k not in used
+            for number, (shape, entry) in enumerate(zip(candidate.shapes, table.entries[k], strict=True))
+        ]
+        best = dict.fromkeys(f.candidate for f in sorted(falls, reverse=True) if f.fall > NEW)
+        shapes = {k: len(ranking.candidates[k].shapes) for k in [*best][:LENGTH]}
+        if not shapes:
+            break
+        first = in_order([score(table, *each) for each in shapes.items()])[0]
+        nothing = score(table, -1, 1)
+        # What a fit leaves is orthogonal to the force of the effect.
+        force = _force(table, first, ranking.candidates[first.candidate].shapes[first.shape])
+        harms = harmful(nothing, first)
+        if not (shows(force, np.zeros_like(force)) and beyond_chance(nothing, first, ranking.size)):
+            break
+        if harms and on_trial:
+            break
+        used.append(first.candidate)
+        on_trial = harms
+        table = table.with_effect(first.candidate, first.shape)
+    return len(used) - on_trial
+
+
+def _force(t: GramTable, scored: Scored, shape: CandidateShape) -> np.ndarray:
+    """(K, 3), the force of an effect that is fitted together with all nuisance parameters."""
+    fitted = regression(t, scored.candidate, scored.shape)
+    entry = t.entries[scored.candidate][scored.shape]
+    beta = dict(zip(fitted.use.tolist(), fitted.fitted(t.total).beta.tolist(), strict=False))
+    force = shape.columns @ np.array([beta.get(k, 0.0) for k in entry.columns])
+    return force if shape.offset is None else force + shape.offset
+
+
+def _fall(t: GramTable, gram: np.ndarray, shape: CandidateShape, entry: Entry, start: Model) -> float:
+    """See :class:`LikelyEffect`; minus infinity where the best values are out of their ranges."""
+    given, columns = entry.given, entry.columns
+    right, fall = gram[columns, 0], -(len(columns) + entry.nonlinear) * t.per_parameter - entry.quieted
+    if given >= 0:
+        right = right - gram[columns, given]
+        fall += 2.0 * gram[given, 0] - gram[given, given]
+    if columns:
+        values = np.linalg.solve(_regular(t, gram, columns, entry.precision), right)
+        fall += right @ values
+        for name, value in zip(shape.fitted, values.tolist(), strict=True):
+            whole = shape.given.get(name, 0.0) + value
+            if bounded(start, name, whole) != whole:
+                return -np.inf
+    return float(fall) if np.isfinite(fall) else -np.inf
+
+
+def _regular(t: GramTable, gram: np.ndarray, columns: list[int], precision: np.ndarray) -> np.ndarray:
+    own = gram[np.ix_(columns, columns)] + precision
+    return own + ridge(own, t.unit[columns])
+
+
+def _without(t: GramTable, gram: np.ndarray, columns: list[int], precision: np.ndarray) -> np.ndarray:
+    """A Gram matrix (p, p) of what some columns, fitted, do not explain of all."""
+    own = _regular(t, gram, columns, precision)
+    return np.asarray(gram - gram[:, columns] @ np.linalg.solve(own, gram[columns]))
