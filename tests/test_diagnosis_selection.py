@@ -1,5 +1,7 @@
 """From a measured run to the model error and to the effect that is missing."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from support.cases import slow
@@ -7,11 +9,13 @@ from support.cse1 import EFFECTS
 from support.measured import learn, sail, smoothed
 
 from diagnosis.predictors import Model, omega, weak_windows
-from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
+from diagnosis.predictors.weak_form import commanded, kernel, kernel_integral, kernel_moment
 from diagnosis.search import forward_selection
+from diagnosis.search.forward_selection import likely_effects
 from diagnosis.search.prior import MEASURED, NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
-from diagnosis.search.shortlist import NEW, further_effects, novelty, rank, reweighted
+from diagnosis.search.shortlist import NEW, novelty, rank
+from diagnosis.search.significance import matters
 from diagnosis.verdict.confidence import probability
 
 
@@ -183,10 +187,10 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
 
 @pytest.mark.parametrize("hidden", [{}, {"delta_X_u": -2.0}, {"delta_X_u": -2.0, "delta_N_r": -1.5}])
 def test_as_many_effects_are_likely_as_there_are(hidden):
-    """Of the first ranking, with the noise that no candidate explains."""
-    start = Model()
+    start, windows = Model(), data(64.0, ship=hidden)[0]
     belief = NominalPrior.of(start, None, MEASURED)
-    t, at = TrainingSet([data(64.0, ship=hidden)[0]], None, belief), RefinedModel.at(start, belief)
-    weighed = reweighted(t, at, rank(t, at, set()))
-    likely = 0 if weighed is None else further_effects(weighed[1], start)
-    assert likely == len(hidden)
+    t, at = TrainingSet([windows], None, belief), RefinedModel.at(start, belief)
+    ranking = rank(t, at, set())
+    shows = partial(matters, ranking.base, command=commanded([windows], start))
+    assert likely_effects(ranking, start, shows) == len(hidden)
+    assert likely_effects(ranking, start, lambda without, left: False) == 0
