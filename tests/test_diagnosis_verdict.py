@@ -39,6 +39,7 @@ from diagnosis.verdict.judging import (
     verdict_name,
     with_confidence,
 )
+from diagnosis.verdict.law_in_parts import on_one_line
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
@@ -454,6 +455,29 @@ def test_laws_of_one_family_on_an_axis_make_up_another_shape(ids, sure):
     found = with_confidence(Findings(made, model=start), start, Doubts()).effects
     assert [f.confidence for f in found] == [0.99 if i in sure else 0.5 for i in ids]
     assert all(("another shape" in f.doubt) != (f.id in sure) for f in found)
+
+
+@pytest.mark.parametrize(
+    ("values", "parts"),
+    [
+        ({"loss_bow": 0.2, "bow_speed_loss": 0.3}, 2),  # a thruster that loses force in a third way
+        ({"loss_surge": 0.1, "loss_bow": 0.2}, 0),
+        ({"loss_sway": 0.1, "loss_yaw": 0.2}, 0),
+        ({"loss_bow": 0.2, "lag": 0.4}, 0),  # what acts late has the same line, and is no part
+        ({"loss_bow": 0.2, "N_r": -0.3}, 0),
+        ({"loss_bow": 0.2}, 0),
+    ],
+)
+def test_changes_of_actuators_on_one_line_make_up_another_force(values, parts):
+    start = Model()
+    windows = weak_windows(smoothed(sail(96.0)[0]))
+    made = [Finding(i, {i: x}, {}, 0.99, [], 0.9, 0.9, together=0.99) for i, x in values.items()]
+    of = Findings(made, model=start.plus(values))
+    on_line = on_one_line(of, start, [windows])
+    assert len(on_line) == parts
+    found = with_confidence(of, start, Doubts(on_one_line=on_line)).effects
+    assert [f.confidence for f in found] == [0.5 if f.id in on_line else 0.99 for f in made]
+    assert all(("on the same line" in f.doubt) == (f.id in on_line) for f in found)
 
 
 @pytest.mark.parametrize(("own", "sure"), [(0.5, False), (0.99, True)])

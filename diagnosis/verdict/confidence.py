@@ -33,6 +33,7 @@ MAY_BE_LAGS = "faster actuators than described, or measured states as commands, 
 MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
 IN_PARTS = "findings of one kind on the same axis make up a law of another shape as well"
+ON_ONE_LINE = "with another finding it makes up a force of another shape on the same line as well"
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
@@ -48,6 +49,7 @@ class Doubts(NamedTuple):
         of_data: see :func:`doubt_of_data`.
         rivals: ids of the effects from which an unsure finding cannot be discriminated.
         of_parts: axes on which findings make up one law in parts.
+        on_one_line: ids of the changes of actuators whose forces act on one line.
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
         smoothed: ids of the filters that are faster than the smoothing.
         without_gain: ids of the effects that predictions do not show, as calibration predicts as well.
@@ -57,6 +59,7 @@ class Doubts(NamedTuple):
     of_data: str = ""
     rivals: Collection[str] = ()
     of_parts: Collection[str] = ()
+    on_one_line: Collection[str] = ()
     replaceable: Collection[str] = ()
     smoothed: Collection[str] = ()
     without_gain: Collection[str] = ()
@@ -116,6 +119,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         RESIDUAL: effect.search.by != "spectrum" and set(doubts.residual) & set(effect.axis),
         RIVAL: f.id in doubts.rivals,
         IN_PARTS: effect.kind == "force" and set(doubts.of_parts) & set(effect.axis),
+        ON_ONE_LINE: f.id in doubts.on_one_line,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
         NO_GAIN: f.id in doubts.without_gain,

@@ -1,6 +1,5 @@
 """The judgement: evidence of a search and data that decide in, one verdict out."""
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -27,6 +26,7 @@ from ..search.prediction_fit.refit import prediction_bands, to_predictions
 from ..search.prior import NominalPrior
 from .coefficients import any_finding, calibrated, concluded
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
+from .law_in_parts import in_parts, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
@@ -161,6 +161,7 @@ def judge(
         residual=unexplained_axes(fit.findings, remainder, start),
         of_data=doubt_of_data(train),
         replaceable=replaceable(fit.findings, start, explained, alone),
+        on_one_line=on_one_line(fit.findings, start, train),
         smoothed=faster_than_smoothing(fit.findings, start, train),
         without_gain=without_gain(gain, fit.findings, start, train, [*prior.std]),
     )
@@ -225,26 +226,6 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
         c = confidence_of(f, start, doubts)
         effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
     return replace(found, effects=effects)
-
-
-def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[str]:
-    """Axes on which two or more findings are laws of the hull of one family.
-
-    Of a law in a shape that no candidate has, they make up the parts: of a cubic one, too much by its
-    square and too little by its line.
-
-    Args:
-        found: the findings.
-        start: the initial model.
-        alone: the confidence of each, all others left out of account.
-    """
-    laws = [
-        effect
-        for f, c in zip(found.effects, alone, strict=True)
-        if c.is_finding and (effect := start.ship.effects[f.id]).kind == "force"
-    ]
-    count = Counter((law.axis, law.wording.family.name) for law in laws)
-    return {axis for (axes, _), n in count.items() if n > 1 for axis in axes}
 
 
 def remainder_of(

@@ -1,0 +1,68 @@
+"""Findings that together make up a law which no candidate has, so that none of them is known."""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ..predictors import Model, WeakWindows, omega
+from ..runs.run_constants import NEGLIGIBLE
+from ..search.findings import Finding, Findings
+from .confidence import Confidence
+
+
+def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[str]:
+    """Axes on which two or more findings are laws of the hull of one family.
+
+    Of a law in a shape that no candidate has, they make up the parts: of a cubic one, too much by its
+    square and too little by its line.
+
+    Args:
+        found: the findings.
+        start: the initial model.
+        alone: the confidence of each, all others left out of account.
+    """
+    laws = [
+        effect
+        for f, c in zip(found.effects, alone, strict=True)
+        if c.is_finding and (effect := start.ship.effects[f.id]).kind == "force"
+    ]
+    count = Counter((law.axis, law.wording.family.name) for law in laws)
+    return {axis for (axes, _), n in count.items() if n > 1 for axis in axes}
+
+
+def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
+    """Ids of the changes of actuators whose forces act on one line, two or more.
+
+    Of a force in a shape that no candidate has, they make up the parts: of a side force at the stern
+    with the square of the shaft speed, an inclined propeller and a rudder that is off. What acts later
+    than the command, or only at times of one run, is a part of no force that does not.
+
+    Args:
+        found: the findings, and the model with them.
+        start: the initial model.
+        runs: training runs.
+    """
+    effects = start.ship.effects
+    of_actuators = [
+        f
+        for f in found.effects
+        if (e := effects[f.id]).kind == "actuator" and e.memory is None and not f.of_runs
+    ]
+    if len(of_actuators) < 2:
+        return set()
+    lines = {f.id: _line(f, found.model, runs) for f in of_actuators}
+    return {
+        i
+        for pair in combinations(lines, 2)
+        if np.linalg.norm(np.cross(*(lines[i] for i in pair))) <= NEGLIGIBLE
+        for i in pair
+    }
+
+
+def _line(f: Finding, model: Model, runs: Sequence[WeakWindows]) -> np.ndarray:
+    """(3,), unit vector of the line of an effect's force (X, Y, N), in units of the size of the ship."""
+    without = model.plus({name: -value for name, value in f.values.items()})
+    force = np.concatenate([(omega(w, without) - omega(w, model)) / w.scale.forces for w in runs])
+    return np.asarray(np.linalg.svd(force, full_matrices=False)[2][0])
