@@ -53,12 +53,9 @@ def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> s
     if len(of_actuators) < 2:
         return set()
     lines = {f.id: _line(f, found.model, runs) for f in of_actuators}
-    return {
-        i
-        for pair in combinations(lines, 2)
-        if np.linalg.norm(np.cross(*(lines[i] for i in pair))) <= NEGLIGIBLE
-        for i in pair
-    }
+    pairs = combinations(lines, 2)
+    on_line = [(a, b) for a, b in pairs if np.linalg.norm(np.cross(lines[a], lines[b])) <= NEGLIGIBLE]
+    return {i for pair in on_line for i in pair}
 
 
 def _line(f: Finding, model: Model, runs: Sequence[WeakWindows]) -> np.ndarray:
