@@ -213,7 +213,19 @@ def test_a_model_that_was_unsound_before_it_learned_is_no_reason_to_withhold_it(
     assert not found.bounded
     assert found.safe
     assert not check_stability(Model({"X_u": 41.0}), Model({"X_u": 40.0})).safe  # is gains energy more
-    assert "nor is the nominal model held there" in found.notes
+    assert {stability.NOT_HELD, stability.NOR_NOMINAL} <= {*found.notes}
+
+
+@pytest.mark.parametrize("lost", [True, False])
+@pytest.mark.parametrize(("drag", "rests"), [(0.1, True), (40.0, False)])
+def test_paths_on_which_the_initial_model_is_lost_as_well_tell_nothing(lost, drag, rests, monkeypatch):
+    learned = Model({"X_u": NOMINAL.value("X_u") + drag})
+    far = {id(learned): True, id(NOMINAL): lost}
+    monkeypatch.setattr(stability, "largest_distance", lambda _, model: 1e9 * far.get(id(model), True))
+    found = check_stability(learned, NOMINAL)
+    assert found.closed_loop != lost
+    assert found.bounded == found.safe == (lost and rests)
+    assert (stability.NOT_HELD in found.notes) == lost
 
 
 def test_the_thrusters_count_in_the_loop():

@@ -73,7 +73,9 @@ class OperatingRegion(NamedTuple):
 
 
 OPERATING = OperatingRegion()
-NOR_NOMINAL = "nor is the nominal model held there"
+NOT_HELD = "the initial model is not held there either"
+NOR_NOMINAL = "nor does that of the initial model"
+NO_THRUST = "its thrusters give no force on some axis, so no reference controller can hold it"
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ class Stability:
         mass_definite: whether M is positive definite.
         nominal_min_dissipation, learned_min_dissipation: smallest dissipation over the region [1/s].
         bounded: whether the ship stays within some ship lengths of its target on every reference path;
-            of a ship that lacks thrust on an axis, whether its motion decays without thrust.
+            of a ship that lacks thrust on an axis, or of which the initial model is lost on these paths
+            as well, whether its motion decays without thrust.
         closed_loop: which of the two was judged.
         from_start: whether the initial model fails wherever the learned one does, and its hull
             dissipates no more: then nothing that was learned is the reason.
@@ -147,14 +150,19 @@ def check_stability(
             f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
             f"{after.min():.3g} 1/s (nominal at least {before.min():.3g})"
         ]
-    if not model.ship.fully_actuated:
+    bounded, both, held = False, False, model.ship.fully_actuated
+    if held and mass_definite:
+        bounded, both = _bounded(model, nominal, advance, notes)
+        held = (
+            not both
+        )  # paths on which the nominal ship is lost as well tell nothing of the learned one
+    if not held:
         advance("the decay of the motion without thrust")
         fastest = np.split(everywhere, SETTINGS.directions)[-1]
+        notes += [] if model.ship.fully_actuated else [NO_THRUST]
         bounded = mass_definite and comes_to_rest(model, fastest, region, notes)
         both = not (bounded or comes_to_rest(nominal, fastest, region, []))
         notes += [NOR_NOMINAL] if both else []
-    else:
-        bounded, both = _bounded(model, nominal, advance, notes) if mass_definite else (False, False)
     return Stability(
         mass_definite,
         float(before.min()),
@@ -162,7 +170,7 @@ def check_stability(
         bounded,
         "; ".join(worse) or None,
         tuple(dict.fromkeys(notes)),
-        model.ship.fully_actuated,
+        held,
         both and not _less(after.min(), before.min()),
     )
 
@@ -285,10 +293,7 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
                 break
     kept = most <= SETTINGS.runaway
     what = f"{'stays below' if kept else 'exceeds'} {SETTINGS.runaway:g} times"
-    notes.append(
-        "its thrusters give no force on some axis, so no reference controller can hold it: the "
-        f"motion without thrust is checked, and {what} the speeds of its region"
-    )
+    notes.append(f"the motion without thrust is checked, and {what} the speeds of its region")
     return kept
 
 
@@ -314,7 +319,7 @@ def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -
             )
             both = False
         elif largest_distance(reference, nominal) >= bound:
-            notes.append(NOR_NOMINAL)
+            notes.append(NOT_HELD)
         else:
             both = False
     return bounded, both and not bounded
