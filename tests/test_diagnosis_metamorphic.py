@@ -11,6 +11,7 @@ from support.shared import kept
 
 from diagnosis import Model, Windows, clean, weak_windows
 from diagnosis.predictors import omega
+from diagnosis.predictors.windows import usable_windows
 
 SECONDS, H, LATE = 64.0, 0.01, 0.3
 # Commands, delay of the thrusters [s], noise.
@@ -142,6 +143,31 @@ def test_hole_in_the_commands_spoils_no_window(change):
     assert whole.middle.size - 28 <= other.middle.size < whole.middle.size - 12
     rms = [np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0)) for w in (whole, other)]
     assert (rms[1] <= 1.5 * rms[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [(0.0, 0.6), (0.3, 1.0), (0.2, 0.8), (0.0, 0.35)],  # shares of the time; the last one: most are lost
+)
+def test_where_a_command_is_lost_no_model_is_judged(first, last):
+    run, _ = sail(SECONDS, H, given=jumps)
+    run = thinned(run, 2)
+    begin, end = run.time[0] + SECONDS * first, run.time[0] + SECONDS * last
+    lost = (run.time < begin) | (run.time > end)
+    commands = run.tau_cmd.copy()
+    commands[lost, 1] = commands[np.flatnonzero(~lost)[-1], 1]
+    track = clean(replace(run, tau_cmd=commands, held=lost))
+    assert ((track.silences % 2 == 1) == lost).mean() > 0.99
+    assert sum(note.startswith("commands are missing for") for note in track.notes) == 1
+    other, whole = smoothed(replace(run, tau_cmd=commands, held=lost)), smoothed(run)
+    windows = weak_windows(other)
+    assert ((windows.middle > begin) & (windows.middle < end)).all()
+    rms = [np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0)) for w in (weak_windows(whole), windows)]
+    assert (rms[1] <= 1.5 * rms[0]).all()
+    length = 10.0
+    starts = other.time[usable_windows(other, length).first_rows]
+    assert starts.size
+    assert ((starts >= begin) & (starts + length <= end + H)).all()
 
 
 def test_commands_that_are_written_when_they_change_are_known_all_the_time():

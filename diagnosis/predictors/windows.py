@@ -257,7 +257,8 @@ def usable_windows(
     prompt &= (started >= span[0]) & (started <= span[1])
     chosen, samples = np.unique(number[used], return_counts=True)
     full = chosen[2 * samples >= round(length / period)]
-    first = first[prompt & used[first] & np.isin(number[first], full)]
+    silent = number[track.silences % 2 == 1]  # the commands there are not known
+    first = first[prompt & used[first] & np.isin(number[first], full) & ~np.isin(number[first], silent)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
 

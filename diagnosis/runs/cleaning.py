@@ -115,13 +115,21 @@ class Track(ShortRepr):
     def silences(self) -> np.ndarray:
         """(n,), number of the part of the run that each row lies in; odd parts are without commands.
 
-        A log in which most commands are missing writes them when they change: there they are held.
+        A log in which most commands are missing, between most of the others, too, writes them when
+        they change: there they are held.
         """
         time, held = self.run.time, self.run.held
-        given = time if held is None or 2 * int(held.sum()) > time.size else time[~held]
-        silent = np.diff(given) > long_gap(float(np.median(np.diff(time))), self.scale)
-        last, next_one = given[:-1][silent], given[1:][silent]
-        return np.searchsorted(last, time, "left") + np.searchsorted(next_one, time, "right")
+        stated = np.arange(time.size) if held is None else np.flatnonzero(~held)
+        written = 2 * stated.size < time.size and 2 * int((np.diff(stated) == 1).sum()) < stated.size
+        given = time if written else time[stated]
+        longest = long_gap(float(np.median(np.diff(time))), self.scale)
+        # Before the first command and behind the last one nothing is known of them either.
+        first = [-np.inf] if given[0] - time[0] > longest else []
+        last = [np.inf] if time[-1] - given[-1] > longest else []
+        given = np.concatenate([first, given, last])
+        silent = np.diff(given) > longest
+        begun, ended = given[:-1][silent], given[1:][silent]
+        return np.searchsorted(begun, time, "left") + np.searchsorted(ended, time, "right")
 
     def counts(self, spikes: int = 0) -> Counts:
         """Counts of the samples by their use."""
@@ -209,9 +217,24 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         begin = run.time[fresh][steps.argmax()] - run.time[0]
         longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
-    return Track(
+    track = Track(
         run, pose, measured, frozen, dropped, between, period, run.left_out, tuple(notes), scale
     )
+    return replace(track, notes=(*notes, *_without_commands(track)))
+
+
+def _without_commands(track: Track) -> list[str]:
+    """A line on the time without commands."""
+    rows = np.flatnonzero(track.silences % 2 == 1)
+    if not rows.size:
+        return []
+    time = track.run.time
+    seconds = float(np.median(np.diff(time))) * rows.size
+    begin = time[rows[0]] - time[0]
+    return [
+        f"commands are missing for {seconds:.3g} s, first {begin:.3g} s from the start: no model is "
+        "judged there"
+    ]
 
 
 def long_gap(period: float, scale: Scale) -> float:
