@@ -338,6 +338,17 @@ def test_a_time_that_was_not_logged_says_nothing_of_the_clock(first, last):
     assert examine(cut, REFERENCE).findings == ()
 
 
+@pytest.mark.parametrize("factor", [1.0, 1.05])
+@pytest.mark.parametrize(("first", "last"), [(60.0, 80.0), (0.0, 30.0), (100.0, 161.0)])
+def test_where_a_yaw_rate_is_missing_it_contradicts_no_heading(first, last, factor):
+    run = made()
+    missing = (run.time >= first) & (run.time <= last)
+    found = told(beside(run, r=np.where(missing, np.nan, factor * run.measured["r"])))
+    assert [*found] == [("r", "scale")] * (factor != 1.0)
+    if found:
+        assert found["r", "scale"].value == pytest.approx(factor, rel=0.02)
+
+
 def test_seconds_that_a_log_has_too_many_are_told():
     """The ship is where it was: its clock was set ahead."""
     run = made()

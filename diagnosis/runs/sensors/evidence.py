@@ -93,7 +93,7 @@ def evidence(run: Run) -> Evidence | None:
     rows = fresh[~between[fresh]]
     psi = np.interp(run.time, run.time[fresh], np.unwrap(run.pose[fresh, 2]))
     by = next((pair for pair in VELOCITIES if all(_given(run, name) for name in pair)), None)
-    rate = _whole(run, "r") if _given(run, "r") else None
+    rate = _rate_of_turn(run, psi) if _given(run, "r") else None
     velocity = None if by is None else velocity_over_ground(run, by, psi)
     return None if by is None and rate is None else Evidence(run, rows, psi, velocity, rate, by, between)
 
@@ -123,6 +123,15 @@ def _whole(run: Run, name: str) -> np.ndarray:
     there = np.isfinite(run.measured[name])
     values = run.measured[name][there]
     return np.interp(run.time, run.time[there], np.unwrap(values) if name == "course" else values)
+
+
+def _rate_of_turn(run: Run, psi: np.ndarray) -> np.ndarray:
+    """(n,) [rad/s]; where it is missing for long that of the heading (n,), which contradicts nothing."""
+    missing = ~np.isfinite(run.measured["r"])
+    known = run.time[~missing]
+    step = np.diff([-np.inf, *known, np.inf])[np.searchsorted(known, run.time, side="right")]
+    far = missing & (step > long_gap(float(np.median(np.diff(known))), REFERENCE))
+    return np.where(far, np.gradient(psi, run.time), _whole(run, "r"))
 
 
 def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
