@@ -85,9 +85,8 @@ class Stability:
     Attributes:
         mass_definite: whether M is positive definite.
         nominal_min_dissipation, learned_min_dissipation: smallest dissipation over the region [1/s].
-        bounded: whether the ship stays within some ship lengths of its target on every reference path;
-            of a ship that lacks thrust on an axis, or of which the initial model is lost on these paths
-            as well, whether its motion decays without thrust.
+        bounded: whether the ship stays within some ship lengths of its target on every reference path.
+            Of a ship that no controller holds there: whether its motion decays without thrust.
         closed_loop: which of the two was judged.
         from_start: whether the initial model fails wherever the learned one does, and its hull
             dissipates no more: then nothing that was learned is the reason.
