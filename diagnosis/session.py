@@ -283,8 +283,7 @@ class Session(ShortRepr):
         nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
         region = OperatingRegion.of(nu, self.start.ship.scale)
         calibrates = self.predictor.parametric
-        fit = self.calibration if calibrates else None
-        calibration = None if fit is None else fit.findings
+        calibration = self.calibration if calibrates else None
         verdict, gain = judge(
             found, data, self.known, self.harms, region, calibrates, calibration, self.advance
         )

@@ -1,6 +1,7 @@
 """What the search for effects gained over calibration alone: paired errors, both ways."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from support.measured import sail, smoothed
 from diagnosis import Finding, Findings, Model, weak_windows
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
+from diagnosis.verdict.coefficients import better_calibration
 from diagnosis.verdict.prediction_gain import (
     PairedChange,
     PredictionGain,
@@ -26,7 +28,7 @@ class Data:
 
     def __init__(self, sizes, known=True, validate=(), windows=WINDOWS):
         self.sizes, self.known, self.validate, self.where = sizes, known, validate, "validation runs"
-        self.windows = windows
+        self.windows, self.start = windows, START
 
     def judges(self, found):
         return self.known
@@ -66,6 +68,25 @@ def test_the_search_gains_what_calibration_does_not(start, calibrated, learned, 
     for change in (gain.position, gain.heading):
         assert change.difference == pytest.approx(change.before**2 - change.after**2)
         assert change.standard_error > 0.0 or start == learned
+
+
+@pytest.mark.parametrize(
+    ("start", "calibrated", "learned", "taken"),
+    [
+        (9.0, 1.0, 9.0, True),
+        (9.0, 1.0, 4.0, True),
+        (9.0, 4.0, 4.0, False),
+        (9.0, 4.0, 1.0, False),
+        (1.0, 4.0, 9.0, False),  # the initial model is better
+    ],
+)
+def test_without_a_finding_the_coefficients_stay_calibrated_where_that_predicts_better(
+    start, calibrated, learned, taken
+):
+    fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(0)
+    data = Data({id(START): start, id(fit.findings): calibrated, id(end): learned})
+    assert better_calibration(fit, end, data) is (fit if taken else None)
+    assert better_calibration(None, end, data) is None
 
 
 def test_the_standard_error_is_paired_and_covers_the_difference():

@@ -15,7 +15,7 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import gain, harm
+from ..search.significance import gain, harm, predicts_worse
 from .confidence import confidence_of
 from .pruning import without
 from .validation_data import ValidationData
@@ -93,6 +93,25 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         return None
     its, others = data.losses(best.findings.model, start)
     return None if data.validate and harm(its, others) else best
+
+
+def better_calibration(
+    calibration: RefitOutcome | None, found: Findings | Model, data: ValidationData
+) -> RefitOutcome | None:
+    """The calibration of the nominal coefficients alone, where a model without a finding predicts worse.
+
+    Args:
+        calibration: the fit; None: there is none.
+        found: the end of a search without a finding; the initial model if nothing was learned.
+        data: the data that decide.
+
+    Returns:
+        None where it predicts no better, beyond chance, or is worse than the initial model.
+    """
+    if calibration is None:
+        return None
+    now, its, first = data.losses(found, calibration.findings, data.start)
+    return calibration if predicts_worse(now, its) and not harm(its, first) else None
 
 
 def _flows(fit: RefitOutcome) -> bool:

@@ -22,9 +22,9 @@ from ..runs.run_constants import NEGLIGIBLE
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
-from ..search.prediction_fit.refit import prediction_bands, to_predictions
+from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
 from ..search.prior import NominalPrior
-from .coefficients import any_finding, calibrated, concluded
+from .coefficients import any_finding, better_calibration, calibrated, concluded
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .law_in_parts import in_parts, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
@@ -109,7 +109,7 @@ def judge(
     criterion: Harm,
     region: OperatingRegion,
     calibrates: bool,
-    calibration: Findings | None,
+    calibration: RefitOutcome | None,
     advance: Advance,
 ) -> tuple[DecidedFindings, PredictionGain | None]:
     """Judge what a search found: prune, conclude, fit to predictions, calibrate, say how sure it is.
@@ -121,7 +121,7 @@ def judge(
         criterion: of pruning.
         region: motions that the training runs hold.
         calibrates: whether coefficients may take the place of effects that are no findings.
-        calibration: the coefficients fitted without an effect; None: there are none.
+        calibration: the nominal coefficients fitted without an effect; None: there are none.
         advance: receives the name of each step when it begins.
 
     Returns:
@@ -143,7 +143,8 @@ def judge(
     refitted = refitted or (changed and not left)
     if calibrates and not any_finding(fit.findings, start):
         advance("calibration")
-        other = calibrated(fit.findings, data, prior)
+        now = _predicting(fit.findings, data, changed)
+        other = calibrated(fit.findings, data, prior) or better_calibration(calibration, now, data)
         if other is not None:
             dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
     advance("residual")
@@ -155,8 +156,9 @@ def judge(
     gain = None
     if calibrates:
         advance("gain of the search over calibration")
-        model = fit.findings.model if changed else start
-        gain = gain_of_search(data, start, calibration, fit.findings, model)
+        coefficients = None if calibration is None else calibration.findings
+        now = _predicting(fit.findings, data, changed)
+        gain = gain_of_search(data, start, coefficients, fit.findings, now)
     doubts = Doubts(
         residual=unexplained_axes(fit.findings, remainder, start),
         of_data=doubt_of_data(train),
@@ -171,6 +173,13 @@ def judge(
         learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
     )
     return decided, gain
+
+
+def _predicting(found: Findings, data: ValidationData, changed: bool) -> Findings | Model:
+    """What the data that decide judge at the end of a search; each fold has a fit of the findings."""
+    if not changed:
+        return data.start
+    return found.model if data.validate else found
 
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:

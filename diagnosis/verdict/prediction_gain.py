@@ -86,7 +86,11 @@ def prediction_gain(
 
 
 def gain_of_search(
-    data: ValidationData, start: Model, calibrated: Findings | None, found: Findings, learned: Model
+    data: ValidationData,
+    start: Model,
+    calibrated: Findings | None,
+    found: Findings,
+    after: Findings | Model,
 ) -> PredictionGain | None:
     """What the search for effects gained over calibration alone.
 
@@ -97,12 +101,11 @@ def gain_of_search(
         data: the data that decide.
         start: the initial model.
         calibrated: the calibration; None: there is none.
-        found, learned: the end of the search; the model is the initial one where nothing was learned.
+        found, after: the end of the search, and what of it predicts the data that decide.
 
     Returns:
         None where that is not known, see :func:`prediction_gain`.
     """
-    after = learned if data.validate or learned is start else found
     if calibrated is None or predicts_worse(*data.losses(calibrated, start)):
         gain = prediction_gain(data, start, after)
     else:
