@@ -6,13 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from support.cases import slow
-from support.measured import NOISE, sail, smoothed
+from support.measured import NOISE, jumps, sail, smoothed
 
 from diagnosis import Model, omega_std
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME, YAW_RATE
 from diagnosis.assessment.regions import Region, _Design, cluster_mean, find_regions, welch_p_value
-from diagnosis.predictors import omega, weak_windows
+from diagnosis.assessment.remainder import remaining
+from diagnosis.predictors import omega, uncertainty, weak_windows
 from diagnosis.predictors.ship_model import SampledForce
+from diagnosis.predictors.uncertainty import bridged
 from diagnosis.predictors.weak_form import halfway
 
 
@@ -91,6 +93,57 @@ def test_uncertainty_grows_with_the_noise_and_where_samples_are_missing():
     around = np.abs(holed.middle - 24.5) < 0.6
     assert around.any()
     assert (omega_std(holed)[around] > omega_std(w)[np.isin(w.middle, holed.middle[around])]).all()
+
+
+def dropped_out(run, channels, seed):
+    """The run with gaps of 0.5 to 2.9 s, 3 to 9 s apart, in some channels of the pose."""
+    rng, pose, begin = np.random.default_rng(seed), run.pose.copy(), 4.0
+    while begin < run.time[-1] - 8.0:
+        end = begin + rng.uniform(0.5, 2.9)
+        pose[(run.time > begin) & (run.time < end), channels] = np.nan
+        begin = end + rng.uniform(3.0, 9.0)
+    return replace(run, pose=pose)
+
+
+@pytest.mark.parametrize("noise", [0.1, slow(1.0)])
+@pytest.mark.parametrize("channels", [np.s_[:], slow(np.s_[2:])])
+def test_uncertainty_is_the_error_where_a_gap_is_bridged(noise, channels):
+    """The true model's error in windows with a gap is one standard deviation, within a factor of 1.5.
+
+    Commands jump in the gaps, so that the splines do not know what happens there. By the mean rate and
+    the mean variance of a window, as in windows without a gap, its yaw error is 2 to 2.5 of them.
+    """
+    ratio, gaps = [], []
+    for seed in range(6):
+        run, _ = sail(120.0, h=0.05, noise=noise, seed=seed, given=jumps)
+        w = windows(dropped_out(run, channels, seed))
+        ratio.append(omega(w, Model()) / omega_std(w))
+        gaps.append(bridged(w).any(axis=1))
+    with_gap = np.concatenate(gaps)
+    assert 100 < with_gap.sum() < with_gap.size - 100
+    for rows in (with_gap, ~with_gap):
+        rms = np.sqrt(np.mean(np.concatenate(ratio)[rows] ** 2, axis=0))
+        assert (rms > 1.0 / 1.5).all(), rms
+        assert (rms < 1.5).all(), rms
+
+
+def test_the_true_model_leaves_nothing_with_or_without_dropouts():
+    run = sail(240.0, h=0.05, noise=0.1, seed=3, given=jumps)[0]
+    for each in (run, dropped_out(run, np.s_[:], 0)):
+        w = windows(each)
+        left = remaining([w], Model(), Model())
+        assert not any(axis.beyond_chance for axis in left.values()), left
+
+
+def test_the_posterior_is_the_same_where_no_sample_is_missing(monkeypatch):
+    """What a window with a gap gets goes over into what the density of the noise gives."""
+    w = windows(sail(120.0, h=0.05, given=jumps)[0])
+    assert not bridged(w).any()
+    by_density = omega_std(w)
+    monkeypatch.setattr(uncertainty, "bridged", lambda w: np.ones((w.middle.size, 3), bool))
+    by_posterior = omega_std(w)
+    assert (by_posterior != by_density).all()
+    np.testing.assert_allclose(by_posterior, by_density, rtol=0.1)
 
 
 @pytest.mark.parametrize("noise", [1.0, slow(4.0)])

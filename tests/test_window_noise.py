@@ -122,6 +122,7 @@ def test_noise_of_a_window_is_what_its_samples_leave_through_the_kernel(
         time=time,
         agrees=counts,
         noise=noise,
+        jerk=np.full(3, 1e-30),  # so slow a motion that no gap is long
         eta_std=std,
         eta=np.tile([0.0, 0.0, psi], (n, 1)),
     )

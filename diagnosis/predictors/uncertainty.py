@@ -13,6 +13,11 @@ nu = B eta' + A eta, where B turns the axes and A has what an error of the headi
 mass M and the slope F of the force by nu make of an error of the pose at the frequency w
 (-w^2 M B + i w (M A - F B) - F A) of it; the last term is counted as if it were independent.
 
+A density holds where samples are even. In a window in which samples of a channel are missing for longer
+than half a period of w0, they do not determine what the smoothing passes: there the variances of the
+derivatives are those of the posterior of the splines (:mod:`..runs.smoothing.posterior`), which are the
+same in windows without a gap.
+
 Behind a filter of the measurement the noise of a pose is what it changes by from sample to sample: that
 of the receiver is larger, by the filter's first response to an impulse, and white again once the filter
 is undone. Rounding comes after the filter, and undoing it adds (w T)^2 to its density.
@@ -24,7 +29,8 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.special import hyp0f1
 
-from ..runs.run_constants import DIGITS
+from ..runs import Smoothed
+from ..runs.run_constants import DIGITS, ORDER
 from .filters import Filters
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
@@ -102,7 +108,28 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
 def corner_frequency(w: WeakWindows) -> np.ndarray:
     """(K, 3), w0 of the smoothing of each window [rad/s], by the variance of its pose."""
     smooth = w.smooth @ np.where(w.known[:, None], w.smoothed.eta_std, 0.0) ** 2
-    return np.asarray(3.0 * smooth / (_sampled(w) * w.smoothed.noise**2))
+    even = 3.0 * smooth / (_sampled(w) * w.smoothed.noise**2)
+    return np.where(bridged(w), _corner_by_jerk(w.smoothed), even)
+
+
+def _corner_by_jerk(s: Smoothed) -> np.ndarray:
+    """(3,), w0 of the smoothing of a run [rad/s], as of even samples and a jerk of constant density."""
+    return np.asarray((s.jerk / (s.noise**2 * s.track.periods)) ** (0.5 / ORDER))
+
+
+def bridged(w: WeakWindows) -> np.ndarray:
+    """(K, 3), windows in which samples of a channel are missing for longer than half a period of w0."""
+    s, half = w.smoothed, 0.5 * w.width
+    found = np.zeros((w.middle.size, 3), bool)
+    for k, (there, corner) in enumerate(zip(s.agrees.T, _corner_by_jerk(s), strict=True)):
+        time, period = s.time[there], s.track.periods[k]
+        step = np.diff(time)
+        gap = (step > np.pi / corner) & (np.round(step / period) > 1.0)
+        # Those that end after a window's begin, less those that begin after its end.
+        begins, ends = time[:-1][gap], time[1:][gap]
+        after = np.searchsorted(ends, w.middle - half, side="right")
+        found[:, k] = np.searchsorted(begins, w.middle + half, side="left") > after
+    return found
 
 
 def undone_variance(w: WeakWindows, model: Model) -> np.ndarray:
@@ -143,7 +170,7 @@ def _force_variance(
 
     def in_axes(order: int) -> np.ndarray:
         """(K, 3), variance of a derivative of the pose in the ship's axes."""
-        x, y, psi = variances(order, corner).T
+        x, y, psi = (variances(order, corner) * _by_gaps(w, order)).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
     pose, velocity, acceleration = map(in_axes, (0, 1, 2))
@@ -154,6 +181,24 @@ def _force_variance(
         for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
             variance += np.einsum("kij,kj->ki", by**2, of)
     return variance
+
+
+def _by_gaps(w: WeakWindows, order: int) -> np.ndarray:
+    """Factor (K, 3) by which gaps make the variance of a derivative more than that of even samples."""
+    gaps = bridged(w)
+    if not gaps.any():
+        return np.ones((1, 3))
+
+    def factor() -> np.ndarray:
+        rows, known, s, time = gaps.any(axis=1), w.known, w.smoothed, w.scale.time
+        weights, derivative = ((w.smooth, 0), (w.smooth, 1), (w.slope, 1))[order]
+        posterior = s.posterior.variance(weights[rows][:, known], s.time[known], derivative)
+        even = _sampled(w) * s.noise**2 * _gain(noise_gain(), corner_frequency(w) * time, order)
+        found = np.ones(gaps.shape)
+        found[rows] = posterior * time ** (2 * order + 1) / even[rows]
+        return np.where(gaps, found, 1.0)
+
+    return w.recall("gaps", order, factor)
 
 
 def _gain(gains: Sequence[np.ndarray], corner: np.ndarray, order: int) -> np.ndarray:
