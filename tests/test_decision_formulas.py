@@ -77,17 +77,18 @@ def test_the_share_that_repeats_is_a_squared_correlation_beyond_chance(seed, rep
 def test_a_command_with_an_amplitude_for_each_stretch_is_compared_with_a_force_for_each(seed, always):
     rng = np.random.default_rng(seed)
     stretch = np.repeat(np.arange(6), 8)
-    command, error = rng.standard_normal((2, 48))
-    error = error + rng.choice([0.0, 3.0], 6)[stretch] * command
+    command, velocity, error = rng.standard_normal((3, 48))
+    error = error + rng.choice([0.0, 3.0], 6)[stretch] * (command if seed % 2 else velocity)
+    others = [np.ones(48), velocity]
 
     def explained(x):
         X = np.where(stretch[:, None] == np.arange(6), x[:, None], 0.0)
         left = error - X @ np.linalg.lstsq(X, error, rcond=None)[0]
         return 1.0 - left @ left / (error @ error)
 
-    expected = explained(command) > max(explained(np.ones(48)), always) + SETTINGS.negligible
-    assert recurrences._in_part(error, command, stretch, always) == expected
-    assert not recurrences._in_part(0.0 * error, command, stretch, 0.0)
+    expected = explained(command) > max(*map(explained, others), always) + SETTINGS.negligible
+    assert recurrences._in_part(error, command, others, stretch, always) == expected
+    assert not recurrences._in_part(0.0 * error, command, others, stretch, 0.0)
 
 
 def test_motions_count_by_their_spread_and_one_that_rests_does_not():

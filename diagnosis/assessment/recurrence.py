@@ -67,7 +67,8 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     for k in range(3):
         error = left[:, k]
         shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
-        in_part = _in_part(error, command[:, k], stretch, shares["command"])
+        others = (np.ones_like(error), motion[:, k])
+        in_part = _in_part(error, command[:, k], others, stretch, shares["command"])
         size = np.bincount(run, error**2) / np.bincount(run)
         one = int(size.argmax())
         alone = len(data) > 1 and size[one] > (1.0 - SETTINGS.negligible) * size.sum()
@@ -115,9 +116,17 @@ def _share(error: np.ndarray, near: tuple[np.ndarray, np.ndarray], offsets: np.n
     return share if all(foretold(np.roll(error, int(n))) < share for n in offsets) else 0.0
 
 
-def _in_part(error: np.ndarray, command: np.ndarray, stretch: np.ndarray, always: float) -> bool:
+def _in_part(
+    error: np.ndarray,
+    command: np.ndarray,
+    others: Sequence[np.ndarray],
+    stretch: np.ndarray,
+    always: float,
+) -> bool:
     """Whether the command with an amplitude of its own for each stretch gives far more of an error than
-    a constant force for each stretch, and than the command gives ``always``.
+    others with theirs, and than the command gives ``always``.
+
+    The others (K,) are a constant force, and a damping by the velocity of the axis.
     """
 
     def explained(x: np.ndarray) -> float:
@@ -125,4 +134,4 @@ def _in_part(error: np.ndarray, command: np.ndarray, stretch: np.ndarray, always
         squares = np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0])
         return float(squares / max(error @ error, np.finfo(float).tiny))
 
-    return explained(command) > max(explained(np.ones_like(error)), always) + SETTINGS.negligible
+    return explained(command) > max(*map(explained, others), always) + SETTINGS.negligible
