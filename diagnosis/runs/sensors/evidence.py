@@ -131,7 +131,9 @@ def _rate_of_turn(run: Run, psi: np.ndarray) -> np.ndarray:
     known = run.time[~missing]
     step = np.diff([-np.inf, *known, np.inf])[np.searchsorted(known, run.time, side="right")]
     far = missing & (step > long_gap(float(np.median(np.diff(known))), REFERENCE))
-    return np.where(far, np.gradient(psi, run.time), _whole(run, "r"))
+    with np.errstate(all="ignore"):  # two rows may have one time
+        turning = np.gradient(psi, run.time)
+    return np.where(far & np.isfinite(turning), turning, _whole(run, "r"))
 
 
 def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
