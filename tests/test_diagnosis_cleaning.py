@@ -221,6 +221,22 @@ def test_rows_between_two_measurements_are_no_freeze():
     assert 90 <= track.counts().frozen <= 100
 
 
+@pytest.mark.parametrize("rows", [2, 5])
+def test_a_held_value_after_a_missing_row_is_no_new_sample(rows):
+    """It may have been new in the missing row: taken as new, it is as late as that, and a spike."""
+    kept = np.random.default_rng(rows).random(N) > 0.2
+    kept[0] = True
+    pose = base().pose.copy()
+    pose[:, :2] = pose[np.arange(N) // rows * rows, :2]
+    track = clean(replace(base(), pose=pose).rows(kept))
+    sure = [k for k in range(0, N, rows) if kept[k] and (k == 0 or kept[k - 1])]
+    assert np.flatnonzero(kept)[track.valid].tolist() == sure
+    late = sum(kept[k : k + rows].any() for k in range(0, N, rows)) - len(sure)
+    assert track.notes[0].startswith(f"{late} positions are not used")
+    assert track.fresh[:, 2].all()
+    assert track.counts().samples == len(sure)
+
+
 def test_heading_about_south_is_taken_for_radians():
     psi = np.angle(np.exp(1j * (np.pi + 0.01 * np.random.default_rng(0).standard_normal(N))))
     track = clean(replace(base(), pose=np.column_stack([base().pose[:, :2], psi])))

@@ -127,9 +127,36 @@ def test_uncertainty_is_the_error_where_a_gap_is_bridged(noise, channels):
         assert (rms < 1.5).all(), rms
 
 
+def without_rows(run, seed):
+    """The run without a fifth of its rows."""
+    kept = np.random.default_rng(seed).random(run.time.size) > 0.2
+    kept[[0, -1]] = True
+    return run.rows(kept)
+
+
+def test_uncertainty_is_the_error_where_rows_are_missing():
+    """A command that jumps may have done so in a missing row: held, it is late, and so is its force.
+
+    Of the noise alone the model error is six to nine standard deviations.
+    """
+    ratio, jumped = [], []
+    for seed in range(6):
+        run, _ = sail(120.0, h=0.05, noise=0.1, seed=seed, given=jumps)
+        w = windows(without_rows(run, seed))
+        std = omega_std(w)
+        ratio.append(omega(w, Model()) / std)
+        jumped.append((std > 2.0 * uncertainty.measurement_std(w, Model())).any(axis=1))
+    late = np.concatenate(jumped)
+    assert 50 < late.sum() < 0.5 * late.size
+    for rows in (late, ~late):
+        rms = np.sqrt(np.mean(np.concatenate(ratio)[rows] ** 2, axis=0))
+        assert (rms > 1.0 / 1.5).all(), rms
+        assert (rms < 1.5).all(), rms
+
+
 def test_the_true_model_leaves_nothing_with_or_without_dropouts():
     run = sail(240.0, h=0.05, noise=0.1, seed=3, given=jumps)[0]
-    for each in (run, dropped_out(run, np.s_[:], 0)):
+    for each in (run, dropped_out(run, np.s_[:], 0), without_rows(run, 0)):
         w = windows(each)
         left = remaining([w], Model(), Model())
         assert not any(axis.beyond_chance for axis in left.values()), left

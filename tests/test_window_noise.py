@@ -16,7 +16,7 @@ from diagnosis.predictors.uncertainty import (
     NOISE_TOLERANCE,
     correlated_windows,
     independent,
-    omega_std,
+    measurement_std,
 )
 from diagnosis.predictors.weak_form import BLOCK, EVERY, OVERLAP, WIDTH
 from diagnosis.runs.run_constants import CHANCE
@@ -138,7 +138,7 @@ def test_noise_of_a_window_is_what_its_samples_leave_through_the_kernel(
     model, F = Model(), np.full((windows, 3, 3), slope)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(uncertainty, "_slope", lambda w, model: F)
-        found = omega_std(w, model)
+        found = measurement_std(w, model)
     mass = model.reference_mass
     for k in range(windows):
         rate = np.zeros(3)  # of samples [1/s]

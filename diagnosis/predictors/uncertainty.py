@@ -32,6 +32,7 @@ from scipy.special import hyp0f1
 from ..runs import Smoothed
 from ..runs.run_constants import DIGITS, ORDER
 from .filters import Filters
+from .missing_commands import command_variance
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
@@ -77,7 +78,7 @@ def _passed() -> np.ndarray:
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
-    """Standard deviation of the model error of each window.
+    """Standard deviation of the model error of each window, by the measurement and by missing rows.
 
     Args:
         w: windows of a run.
@@ -87,6 +88,16 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         (K, 3) [N, N, N m].
     """
     model = model or Model()
+    return np.asarray(np.sqrt(_measurement_variance(w, model) + command_variance(w, model)))
+
+
+def measurement_std(w: WeakWindows, model: Model) -> np.ndarray:
+    """The part (K, 3) of :func:`omega_std` by the measurement, that no force on the ship has."""
+    return np.asarray(np.sqrt(_measurement_variance(w, model)))
+
+
+def _measurement_variance(w: WeakWindows, model: Model) -> np.ndarray:
+    """(K, 3), square of :func:`measurement_std`."""
     filters = model.filters
     time, period, sampled = w.scale.time, w.smoothed.track.periods, _sampled(w)
     rounding = np.minimum(w.smoothed.noise, w.smoothed.track.usual_rounding)
@@ -102,7 +113,7 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         return sampled * (receiver * gain + rounding**2 * rounded)
 
     floor = (FLOOR * w.scale.forces) ** 2
-    return np.asarray(np.sqrt(_force_variance(w, model, variances) + floor))
+    return _force_variance(w, model, variances) + floor
 
 
 def corner_frequency(w: WeakWindows) -> np.ndarray:

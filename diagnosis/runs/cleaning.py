@@ -16,7 +16,7 @@ from .columns.unit_check import GO_ON, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .frozen import repeated, stuck
-from .row_order import ordered
+from .row_order import missing_rows, ordered
 from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE, ORDER
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
@@ -25,6 +25,9 @@ WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is kno
 
 FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
+
+# 1, rows from a new value to the next from which on a channel is slower than its log (half of one more).
+SLOWER = 1.5
 
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 
@@ -161,6 +164,11 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     notes += lines
     seen, repeats = seen & ~alone, repeats | alone
     turned, constant, lined = updates(run, HEADING, gone)
+    late, lines = perhaps_late(run.time, seen, row, "positions")
+    notes += lines
+    turned_late, lines = perhaps_late(run.time, turned, row, "headings")
+    notes += lines
+    seen, turned = seen & ~late, turned & ~turned_late
     if turned.sum() <= ORDER < min(seen.sum(), constant.sum()):
         if not anyway:
             raise InputError(f"{where}: psi is constant while the ship moves; {GO_ON}")
@@ -169,7 +177,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     own = float(np.median(np.diff(run.time[turned]))) if turned.sum() > 1 else row
     apart = min(max(WIDTH * scale.time, LONG * row), long_gap(own, scale))
     headless = seen & ~near(run.time, turned, apart)
-    dropped = ~(seen | repeats | between) | headless
+    dropped = ~(seen | repeats | between | late) | headless
     if many := int(headless.sum()):
         begin = run.time[np.argmax(headless)] - run.time[0]
         notes.append(
@@ -181,6 +189,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         raise InputError(f"{where} does not move: its pose is frozen or missing in all rows")
     if between.any() or lined.any():
         notes.append("rows between two measurements were linearly interpolated: they are not counted")
+    between |= late
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
     steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
@@ -189,7 +198,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
         )
-    if period > 1.5 * row:  # a log that is faster than the measurement
+    if period > SLOWER * row:  # a log that is faster than the measurement
         after = np.searchsorted(fresh, np.arange(repeats.size))
         last = run.time[fresh][np.maximum(after - 1, 0)]
         between |= repeats & (run.time - last < period - 0.5 * row)
@@ -304,6 +313,29 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
     between = np.zeros_like(there)
     between[rows] = filled(run.time[rows], values[rows], float(coarse.max(initial=0.0)))
     return there & ~repeats & ~between, repeats, between
+
+
+def perhaps_late(
+    time: np.ndarray, new: np.ndarray, row: float, what: str
+) -> tuple[np.ndarray, list[str]]:
+    """New values that are not known to be of their row.
+
+    A value that is held for several rows may have been new in one that is missing, whose time it has.
+
+    Args:
+        time: (n,) [s].
+        new: (n,), rows with a value that is not that of the row before.
+        row: median time between two rows [s].
+        what: is measured.
+
+    Returns:
+        A mask (n,), and a line if there are any.
+    """
+    if new.sum() <= 1 or not np.median(np.diff(time[new])) > SLOWER * row:
+        return np.zeros_like(new), []
+    late = new & (np.append(0.0, missing_rows(time)) > 0.0)
+    line = f"{late.sum()} {what} are not used: each is held for some rows, and the one before is missing"
+    return late, [line] if late.any() else []
 
 
 def near(time: np.ndarray, there: np.ndarray, apart: float) -> np.ndarray:

@@ -17,6 +17,7 @@ from .run_constants import CHANCE, HORIZON, LONG
 
 # s after which the time of a clock begins anew: of a day, of half a day, of minutes, of seconds.
 PERIODS = (86400.0, 43200.0, 3600.0, 60.0)
+ON_GRID = 0.2  # of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
 MOST_WRONG = 0.1  # 1, of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
 
 
@@ -41,6 +42,20 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     out = found.left_out + lost
     note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
+
+
+def whole_periods(step: np.ndarray, period: float) -> np.ndarray | None:
+    """(n,), whole periods [s], at least 1, in steps of time (n,) [s]; None where they are not even."""
+    counts = np.maximum(np.round(step / period), 1.0)
+    even = np.mean(np.abs(step - counts * period) <= ON_GRID * period) >= 1.0 - ON_GRID
+    return counts if even else None
+
+
+def missing_rows(time: np.ndarray) -> np.ndarray:
+    """(n - 1,), how many rows are missing between those at times (n,) [s]; 0 where they are not even."""
+    step = np.diff(time)
+    counts = whole_periods(step, float(np.median(step)))
+    return np.zeros_like(step) if counts is None else counts - 1.0
 
 
 def _without_empty(run: Run) -> Run:

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ..cleaning import NORMAL_MAD
+from ..row_order import whole_periods
 from ..run_constants import CHANCE, DIGITS, ORDER
 from .likelihood import adapt, likeliest
 from .outliers import REWEIGHTINGS, Inliers
@@ -27,8 +28,6 @@ from .penalised import Problem
 from .spline import DEGREE
 
 GROWTH = 1.5  # from lag to lag, in samples
-
-ON_GRID = 0.2  # of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
 
 
 class Correlated(NamedTuple):
@@ -67,8 +66,8 @@ def hadamard(
     """
     step = np.diff(time)
     period = float(np.median(step))
-    counts = np.maximum(np.round(step / period), 1.0)
-    if np.mean(np.abs(step - counts * period) <= ON_GRID * period) < 1.0 - ON_GRID:
+    counts = whole_periods(step, period)
+    if counts is None:
         return np.zeros(0), np.zeros(0), np.zeros(0), period
     counts = np.minimum(counts, int(3.0 * longest / period) + 1)  # none reaches over a longer gap
     place = np.concatenate([[0], np.cumsum(counts)]).astype(int)

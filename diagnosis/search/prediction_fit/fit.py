@@ -30,7 +30,7 @@ from scipy.linalg import block_diag
 from ...execution.parallel import for_each
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
-from ...predictors.uncertainty import omega_std
+from ...predictors.uncertainty import measurement_std
 from ...runs.run_constants import DIGITS, STEPS
 from ..candidates import SMALL, model_error
 from ..gram import WHOLE_RUNS, run_folds
@@ -135,7 +135,7 @@ class PredictionFit:
     ) -> None:
         self.runs, self.prior, self.windows = runs, prior, windows
         self._place = {id(w.smoothed): k for k, w in enumerate(runs)}
-        self.std = np.concatenate([omega_std(w, at.start) for w in runs])
+        self.std = np.concatenate([measurement_std(w, at.start) for w in runs])
         names, believed = at.fitted, [*prior.std.values()]
         self._kept = np.array([True] * len(names) + [s > 0.0 for s in believed])
         units = [at.start.unit(n) for n in names]

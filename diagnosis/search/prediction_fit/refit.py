@@ -8,7 +8,7 @@ import numpy as np
 from ...predictors import Model, WeakWindows
 from ...predictors.evaluation import Bands
 from ...predictors.shooting import Shooting
-from ...predictors.uncertainty import omega_std
+from ...predictors.uncertainty import measurement_std
 from ...predictors.windows import Windows
 from ...runs import Smoothed
 from ..candidates import SMALL, model_error
@@ -60,7 +60,7 @@ def to_predictions(
     begin, searched, windows = found.estimate, found.searched, shootings(runs) if fits else []
     known = begin is None or not (begin.fitted or any(prior.std.values()))
     if known or begin is None or searched is None or not windows:
-        std = np.concatenate([omega_std(w, found.model) for w in runs])
+        std = np.concatenate([measurement_std(w, found.model) for w in runs])
         push = estimate(runs, model_error(runs, found.model), std)
         return RefitOutcome(found, JointPosterior.nothing(), unrecorded(runs, found.model, push, {}))
     begin = replace(begin, offset=prior.rescaled(begin.offset, searched))
