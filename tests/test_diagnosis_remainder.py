@@ -144,6 +144,18 @@ def test_runs_that_are_too_short_for_a_span_have_no_slow_part():
     assert left(noise(SPAN // 2) + 0.1)["X"].slow == pytest.approx(0.1, rel=0.3)
 
 
+@pytest.mark.parametrize(("size", "matters"), [(2.0, False), (4.0, True)])
+def test_noise_of_windows_with_gaps_is_no_residual_that_matters(size, matters):
+    """Beyond chance in windows without a gap, by a small force; the RMS is that of noise in others."""
+    gap = np.arange(K) % 10 == 0
+    std = np.where(gap, 5.0 * NOISE, 0.1 * NOISE)[:, None] * np.ones(3)
+    after = std * np.where(gap, 1.0, size)[:, None] * np.where(np.arange(K) % 4 < 2, 1.0, -1.0)[:, None]
+    found = axis_remainders([windows()], [np.full_like(after, 0.1)], [after], [std], Model())["X"]
+    assert found.rms > found.least == pytest.approx(0.005)
+    assert found.beyond_chance
+    assert found.significant == matters
+
+
 def test_without_a_first_error_there_is_no_share():
     assert left(noise(), before=0.0)["X"].share == 0.0
 

@@ -138,7 +138,8 @@ def axis_remainders(
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups, freedom[k])
         rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
         least = max(SETTINGS.negligible * start, SHARE_OF_COMMAND * _rms(command[:, k]))
-        matters = (by_size < level() and rms > least) or (by_slowness < level() and slow > least)
+        beyond = rms**2 - uncertainty**2 > least**2  # without the noise, as the slow part is
+        matters = (by_size < level() and beyond) or (by_slowness < level() and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
         p_value = min(by_size, by_slowness)
         found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters)
