@@ -221,20 +221,24 @@ def test_rows_between_two_measurements_are_no_freeze():
     assert 90 <= track.counts().frozen <= 100
 
 
+@pytest.mark.parametrize("empty", [False, True])
 @pytest.mark.parametrize("rows", [2, 5])
-def test_a_held_value_after_a_missing_row_is_no_new_sample(rows):
+def test_a_held_value_after_a_missing_row_is_no_new_sample(rows, empty):
     """It may have been new in the missing row: taken as new, it is as late as that, and a spike."""
     kept = np.random.default_rng(rows).random(N) > 0.2
     kept[0] = True
     pose = base().pose.copy()
     pose[:, :2] = pose[np.arange(N) // rows * rows, :2]
-    track = clean(replace(base(), pose=pose).rows(kept))
+    pose[~kept, :2] = np.nan if empty else pose[~kept, :2]
+    run = replace(base(), pose=pose)
+    track = clean(run if empty else run.rows(kept))
+    there = np.arange(N) if empty else np.flatnonzero(kept)
     sure = [k for k in range(0, N, rows) if kept[k] and (k == 0 or kept[k - 1])]
-    assert np.flatnonzero(kept)[track.valid].tolist() == sure
+    assert there[track.valid].tolist() == sure
     late = sum(kept[k : k + rows].any() for k in range(0, N, rows)) - len(sure)
     assert track.notes[0].startswith(f"{late} positions are not used")
     assert track.fresh[:, 2].all()
-    assert track.counts().samples == len(sure)
+    assert track.counts().used == len(sure)
 
 
 def test_heading_about_south_is_taken_for_radians():

@@ -164,9 +164,9 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     notes += lines
     seen, repeats = seen & ~alone, repeats | alone
     turned, constant, lined = updates(run, HEADING, gone)
-    late, lines = perhaps_late(run.time, seen, row, "positions")
+    late, lines = perhaps_late(run.time, seen, repeats | between, row, "positions")
     notes += lines
-    turned_late, lines = perhaps_late(run.time, turned, row, "headings")
+    turned_late, lines = perhaps_late(run.time, turned, constant | lined, row, "headings")
     notes += lines
     seen, turned = seen & ~late, turned & ~turned_late
     if turned.sum() <= ORDER < min(seen.sum(), constant.sum()):
@@ -316,24 +316,28 @@ def updates(run: Run, channels: slice, gone: np.ndarray) -> tuple[np.ndarray, np
 
 
 def perhaps_late(
-    time: np.ndarray, new: np.ndarray, row: float, what: str
+    time: np.ndarray, new: np.ndarray, repeats: np.ndarray, row: float, what: str
 ) -> tuple[np.ndarray, list[str]]:
     """New values that are not known to be of their row.
 
-    A value that is held for several rows may have been new in one that is missing, whose time it has.
+    A value that is held for several rows may have been new in one that is missing, or that is empty: it
+    has the time of that.
 
     Args:
         time: (n,) [s].
         new: (n,), rows with a value that is not that of the row before.
+        repeats: (n,), rows in which that is held.
         row: median time between two rows [s].
         what: is measured.
 
     Returns:
         A mask (n,), and a line if there are any.
     """
-    if new.sum() <= 1 or not np.median(np.diff(time[new])) > SLOWER * row:
+    held = 2 * repeats.sum() > new.sum() > 1
+    if not held or not np.median(np.diff(time[new])) > SLOWER * row:
         return np.zeros_like(new), []
-    late = new & (np.append(0.0, missing_rows(time)) > 0.0)
+    empty = np.append(False, ~(new | repeats)[:-1])
+    late = new & (empty | (np.append(0.0, missing_rows(time)) > 0.0))
     line = f"{late.sum()} {what} are not used: each is held for some rows, and the one before is missing"
     return late, [line] if late.any() else []
 
