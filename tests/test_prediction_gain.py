@@ -85,8 +85,9 @@ def test_without_a_finding_the_coefficients_stay_calibrated_where_that_predicts_
 ):
     fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(0)
     data = Data({id(START): start, id(fit.findings): calibrated, id(end): learned})
-    assert better_calibration(fit, end, data) is (fit if taken else None)
-    assert better_calibration(None, end, data) is None
+    assert better_calibration(fit, end, data, lambda *_: False) is (fit if taken else None)
+    assert better_calibration(fit, end, data, lambda a, b: (a, b) == (BETTER, START)) is None
+    assert better_calibration(None, end, data, lambda *_: False) is None
 
 
 def test_the_standard_error_is_paired_and_covers_the_difference():

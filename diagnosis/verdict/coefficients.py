@@ -1,6 +1,6 @@
 """Nominal coefficients in place of effects: where they alone explain the data, or predict better."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -96,7 +96,10 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
 
 
 def better_calibration(
-    calibration: RefitOutcome | None, found: Findings | Model, data: ValidationData
+    calibration: RefitOutcome | None,
+    found: Findings | Model,
+    data: ValidationData,
+    drives: Callable[[Model, Model], bool],
 ) -> RefitOutcome | None:
     """The calibration of the nominal coefficients alone, where a model without a finding predicts worse.
 
@@ -104,11 +107,13 @@ def better_calibration(
         calibration: the fit; None: there is none.
         found: the end of a search without a finding; the initial model if nothing was learned.
         data: the data that decide.
+        drives: whether the hull of a model drives the ship on more than that of another.
 
     Returns:
-        None where it predicts no better, beyond chance, or is worse than the initial model.
+        None where it predicts no better, beyond chance, is worse than the initial model, or has a hull
+        that drives the ship on.
     """
-    if calibration is None:
+    if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
     return calibration if predicts_worse(now, its) and not harm(its, first) else None

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -129,7 +130,8 @@ def judge(
     """
     start, train = data.start, data.train
     advance("effects without which validation data are predicted better")
-    kept, withdrawn = prune(found, data, lambda a, b: drives_on(a, b, region), criterion)
+    drives = partial(drives_on, region=region)
+    kept, withdrawn = prune(found, data, drives, criterion)
     kept, unproven = proven(kept, data, criterion)
     learned, refitted, replaced = concluded(kept, data, prior)
     dropped = [*unproven, *replaced]
@@ -144,7 +146,9 @@ def judge(
     if calibrates and not any_finding(fit.findings, start):
         advance("calibration")
         now = _predicting(fit.findings, data, changed)
-        other = calibrated(fit.findings, data, prior) or better_calibration(calibration, now, data)
+        other = calibrated(fit.findings, data, prior) or better_calibration(
+            calibration, now, data, drives
+        )
         if other is not None:
             dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
     advance("residual")
