@@ -61,7 +61,6 @@ TOLD = [
     ("psi_90", column(psi={"offset": 4.712})),
     ("const_tau", "all its commands are constant"),
     ("outliers_tau", "leave false cells empty"),
-    ("commands_zero_half", "all commands are zero for 2"),
 ]
 
 
@@ -129,6 +128,19 @@ def test_rare_samples_and_many_outliers_still_give_a_motion(table, rate, tmp_pat
 @pytest.mark.parametrize("way", ["outliers_1", "rounded_1_cm", "tau_double", "half"])
 def test_file_that_can_be_used_is_not_refused(way, tmp_path):
     assert len(diagnosis.load(spoilt(tmp_path, way))) == 1
+
+
+def test_zero_commands_of_a_ship_that_goes_on_count_as_not_logged(tmp_path):
+    """Half of the run; no model is judged there, and the true one has no error elsewhere."""
+    (w,) = diagnosis.load(spoilt(tmp_path, "commands_zero_half"))
+    (whole,) = diagnosis.load(written(tmp_path, good()))
+    assert any("all commands are zero for 2" in note for note in w.smoothed.track.notes)
+    middle = 0.5 * (w.run.time[0] + w.run.time[-1])
+    assert (w.middle < middle).all()
+    assert w.middle.size > 0.45 * whole.middle.size
+    rms = [np.sqrt(np.mean(diagnosis.omega(x, Model()) ** 2, axis=0)) for x in (whole, w)]
+    assert (rms[1] <= 1.5 * rms[0]).all()
+    assert not diagnosis.load(spoilt(tmp_path, "commands_zero_half"), anyway=True)[0].run.held
 
 
 # What a ship may have: single effects of unusual size.

@@ -9,7 +9,7 @@ from support.command import command
 from support.measured import DATA
 
 from diagnosis import Model, propose_columns
-from diagnosis.assessment.command_check import contradicted_commands
+from diagnosis.assessment.command_check import moves_on
 from diagnosis.predictors import ship_with, weak_windows
 from diagnosis.runs import prepare, read_frame
 from diagnosis.runs.measured_channels import channels_of
@@ -54,8 +54,7 @@ def test_one_side_car_for_all(tmp_path):
         for name in POSE:  # as often as all of the pose is new at least, at most each row
             assert new * 0.99 <= rates[name] <= rows * 1.001, (path.stem, name)
         assert (min(rates[name] for name in POSE) < 9.9) == (path.stem == HELD)
-    (unusable,) = " ".join(done.stdout.split()).split("not usable yet: ")[1:]
-    assert unusable.startswith(f"run '{UNLOGGED}': all commands are zero for ")
+    assert "not usable yet" not in done.stdout
 
 
 @pytest.mark.parametrize(("name", "asked"), [(DRIFT, False), (UNLOGGED, True)])
@@ -63,4 +62,4 @@ def test_a_drift_in_the_measured_wind_is_no_missing_command(name, asked):
     craft, table = ship_with((), "esso_osaka"), pd.read_csv(ESSO / f"{name}.csv")
     frame = pd.DataFrame({signal: table[column] for signal, column in NAMES.items()})
     w = weak_windows(prepare(read_frame(frame, of=craft), craft).smoothed)
-    assert bool(contradicted_commands(w, Model(ship=craft))) is asked
+    assert bool(moves_on(w, Model(ship=craft))) is asked

@@ -105,7 +105,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
                 f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
                 "if nothing was commanded there, give it a column of zeros"
             )
-    return _moves_on(w, model, lasting(z, w.block))
+    return None
 
 
 def lasting(force: np.ndarray, block: np.ndarray) -> np.ndarray:
@@ -118,11 +118,11 @@ def lasting(force: np.ndarray, block: np.ndarray) -> np.ndarray:
     return np.sqrt((mean[at] ** 2).mean(axis=0))
 
 
-def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
-    """A clause about a ship that goes on as before while all of its commands are zero.
+def moves_on(w: WeakWindows, model: Model) -> str | None:
+    """A line about a ship that goes on as before while all of its commands are zero; None: it does not.
 
-    What it needs is compared with the usual size (3,) of it, both as :func:`lasting` and in excess of
-    the measured wind.
+    What it needs is compared with what it needs usually, both as of :func:`lasting` and in excess of the
+    measured wind.
     """
     s, tau = w.smoothed, w.run.tau_cmd
     # Beyond a limit it is a command, though it gives no force; a rudder has one under way.
@@ -131,14 +131,25 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
         return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
-    idle = (every.held @ given).max(axis=1) == 0.0
-    if w.every * idle.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
+    resting = (every.held @ given).max(axis=1) == 0.0
+    if w.every * resting.sum() < BLOCK * w.scale.time:  # the ship may not have forgotten its thrust
         return None
-    still = lasting(needed_force(every, model)[idle], every.block[idle])
+    still = lasting(needed_force(every, model)[resting], every.block[resting])
+    size = lasting(needed_force(w, model), w.block)
     if 2.0 * np.median(still / size) < 1.0:  # on two axes of three: one may be so by chance
         return None
     return (
-        f"all commands are zero for {w.every * idle.sum():.0f} s, and the motion needs "
-        f"{still[0]:.3g} N, {still[1]:.3g} N, {still[2]:.3g} N.m there, as before: leave the cells "
-        "of commands empty that were not logged"
+        f"all commands are zero for {w.every * resting.sum():.0f} s, and the motion needs "
+        f"{still[0]:.3g} N, {still[1]:.3g} N, {still[2]:.3g} N.m there, as before: they count as not "
+        "logged"
     )
+
+
+def idle(run: Run, least: float) -> np.ndarray:
+    """(n,), rows in which all commands are zero for so long [s] at least."""
+    zero = np.abs(run.tau_cmd if run.commands is None else run.commands).max(axis=1) == 0.0
+    part = np.cumsum(np.diff(zero, prepend=zero[0]))
+    begin, end = (np.full(part[-1] + 1, sign * np.inf) for sign in (1.0, -1.0))
+    np.minimum.at(begin, part, run.time)
+    np.maximum.at(end, part, run.time)
+    return zero & (end - begin >= least)[part]

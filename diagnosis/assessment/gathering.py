@@ -13,10 +13,10 @@ from cosim import InputError
 from ..execution.parallel import for_each, one_thread
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows, weak_windows
-from ..predictors.weak_form import WIDTH
+from ..predictors.weak_form import BLOCK, WIDTH
 from ..runs import PreparedRun, Run, Smoothed, prepare, read_each
 from ..runs.columns.unit_check import GO_ON
-from .command_check import without_force
+from .command_check import idle, moves_on, without_force
 from .plausibility import refuse_implausible
 from .trial_errors import measured_passage
 
@@ -61,12 +61,27 @@ def gather(
     runs = read_each(paths, craft)
     advance(f"smoothing {', '.join(run.name for run in runs)}")
     smoothed = for_each(lambda run: motion(prepare(run, craft, anyway)), runs, (), meanwhile)
+    if not anyway:
+        smoothed = [_with_known_commands(s, run, model) for s, run in zip(smoothed, runs, strict=True)]
     longest = max(float(np.ptp(s.track.run.time)) for s in smoothed)
     if horizon is not None and horizon > longest:
         raise InputError(
             f"the horizon, {horizon:g} s, is longer than every run; the longest has {longest:.4g} s"
         )
     return usable(smoothed, model, anyway, horizon)
+
+
+def _with_known_commands(s: Smoothed, run: Run, model: Model) -> Smoothed:
+    """The motion of a run; zero commands are none where the ship goes on as before."""
+    rows = idle(run, BLOCK * s.scale.time)  # in less the ship may not have forgotten its thrust
+    if not rows.any() or rows.all():
+        return s
+    windows = weak_windows(s)
+    line = moves_on(windows, model) if windows.middle.size else None
+    if line is None:
+        return s
+    held = rows if run.held is None else rows | run.held
+    return motion(prepare(replace(run, held=held, notes=(*run.notes, line)), model.ship))
 
 
 def motion(prepared: PreparedRun) -> Smoothed:
