@@ -15,8 +15,8 @@ mass M and the slope F of the force by nu make of an error of the pose at the fr
 
 A density holds where samples are even. In a window in which samples of a channel are missing for longer
 than half a period of w0, they do not determine what the smoothing passes: there the variances of the
-derivatives are those of the posterior of the splines (:mod:`..runs.smoothing.posterior`), which are the
-same in windows without a gap.
+derivatives are those of the splines' covariance (:mod:`..runs.smoothing.spline_covariance`), which are
+the same in windows without a gap.
 
 Behind a filter of the measurement the noise of a pose is what it changes by from sample to sample: that
 of the receiver is larger, by the filter's first response to an impulse, and white again once the filter
@@ -30,9 +30,9 @@ import numpy as np
 from scipy.special import hyp0f1
 
 from ..runs import Smoothed
+from ..runs.row_order import missing_rows
 from ..runs.run_constants import DIGITS, ORDER
 from .filters import Filters
-from .missing_commands import command_variance
 from .ship_model import Model
 from .weak_form import BLOCK, EVERY, OVERLAP, WIDTH, WeakWindows, modelled_force
 
@@ -94,6 +94,21 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
 def measurement_std(w: WeakWindows, model: Model) -> np.ndarray:
     """The part (K, 3) of :func:`omega_std` by the measurement, that no force on the ship has."""
     return np.asarray(np.sqrt(_measurement_variance(w, model)))
+
+
+def command_variance(w: WeakWindows, model: Model) -> np.ndarray:
+    """Variance (K, 3) of the model error by commands of missing rows [N2, N2, N2 m2]; 0 without any.
+
+    Commands are held from each row to the next. Where m rows of period h are missing between two, a
+    command that changed may have done so in any of them: the later one acted for 0, h ... or m h [s]
+    before its own row, each as likely as the others, h^2 m (2 m + 1) / 6 in the mean square.
+    """
+    step = np.diff(w.run.time)
+    missing = missing_rows(w.run.time)
+    early = float(np.median(step)) ** 2 * missing * (2.0 * missing + 1.0) / 6.0
+    change = np.diff(w.run.tau_cmd @ model.effective_thrust.T, axis=0)
+    square = early[:, None] * (change / step[:, None]) ** 2
+    return np.asarray(w.held[:, :-1].power(2) @ square)
 
 
 def _measurement_variance(w: WeakWindows, model: Model) -> np.ndarray:
@@ -197,13 +212,14 @@ def _force_variance(
 def _by_gaps(w: WeakWindows, order: int) -> np.ndarray:
     """Factor (K, 3) by which gaps make the variance of a derivative more than that of even samples."""
     gaps = bridged(w)
-    if not gaps.any():
+    covariance = w.smoothed.covariance if gaps.any() else None
+    if covariance is None:
         return np.ones((1, 3))
 
     def factor() -> np.ndarray:
         rows, known, s, time = gaps.any(axis=1), w.known, w.smoothed, w.scale.time
         weights, derivative = ((w.smooth, 0), (w.smooth, 1), (w.slope, 1))[order]
-        posterior = s.posterior.variance(weights[rows][:, known], s.time[known], derivative)
+        posterior = covariance.variance(weights[rows][:, known], s.time[known], derivative)
         even = _sampled(w) * s.noise**2 * _gain(noise_gain(), corner_frequency(w) * time, order)
         found = np.ones(gaps.shape)
         found[rows] = posterior * time ** (2 * order + 1) / even[rows]

@@ -33,8 +33,8 @@ from .correlated_noise import with_correlated
 from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
-from .posterior import Posterior
 from .spline import DEGREE, Knots, basis, knots
+from .spline_covariance import SplineCovariance
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 
@@ -93,11 +93,11 @@ class Smoothed(ShortRepr):
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
         late: whether the whole run agrees on that delay.
         pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
-        posterior: what the samples leave uncertain of the motion.
         doubted: lines on noise that was given and contradicts the samples.
         sensors: what the run's channels say of each other; None where nobody asked.
         noise_rel_std: (3,), relative standard deviation of the noise; zero where it was given.
         noise_at_most: (3,), whether the noise is an upper bound, see :mod:`.likelihood`.
+        covariance: what the samples leave uncertain of the splines; None: not known.
     """
 
     track: Track
@@ -116,11 +116,11 @@ class Smoothed(ShortRepr):
     delay: float
     late: bool
     pose_only: PoseOnly
-    posterior: Posterior
     doubted: tuple[str, ...] = ()
     sensors: Examined | None = None
     noise_rel_std: np.ndarray = field(default_factory=lambda: np.zeros(3))
     noise_at_most: np.ndarray = field(default_factory=lambda: np.zeros(3, bool))
+    covariance: SplineCovariance | None = None
 
     @property
     def time(self) -> np.ndarray:
@@ -320,10 +320,12 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         response.delay,
         response.sure,
         pose_only,
-        Posterior(grid, np.array([system.factor for system in fit.systems]), float(track.run.time[0])),
         tuple(_doubted(track, alone, even)),
         noise_rel_std=np.where(estimated, uncertain.rel_std, 0.0),
         noise_at_most=estimated & uncertain.at_most,
+        covariance=SplineCovariance(
+            grid, np.array([system.factor for system in fit.systems]), float(track.run.time[0])
+        ),
     )
 
 

@@ -16,7 +16,7 @@ from .spline import MEMORY, Knots, basis
 TBTRS: Any = get_lapack_funcs("tbtrs", dtype=float)  # solves by a triangular band
 
 
-class Posterior(NamedTuple):
+class SplineCovariance(NamedTuple):
     """What the samples leave uncertain of the splines of the three channels.
 
     Attributes:
