@@ -119,7 +119,7 @@ def lasting(force: np.ndarray, block: np.ndarray) -> np.ndarray:
 
 
 def moves_on(w: WeakWindows, model: Model) -> str | None:
-    """A line about a ship that goes on as before while all of its commands are zero; None: it does not.
+    """A line about a ship that goes on as before where all of its commands are zero; None: it does not.
 
     What it needs is compared with what it needs usually, both as of :func:`lasting` and in excess of the
     measured wind.
@@ -127,8 +127,6 @@ def moves_on(w: WeakWindows, model: Model) -> str | None:
     s, tau = w.smoothed, w.run.tau_cmd
     # Beyond a limit it is a command, though it gives no force; a rudder has one under way.
     given = np.abs(tau if w.run.commands is None else w.run.commands)
-    if not (given.max(axis=1) == 0.0).any():
-        return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
     resting = (every.held @ given).max(axis=1) == 0.0

@@ -152,9 +152,7 @@ def check_stability(
     bounded, both, held = False, False, model.ship.fully_actuated
     if held and mass_definite:
         bounded, both = _bounded(model, nominal, advance, notes)
-        held = (
-            not both
-        )  # paths on which the nominal ship is lost as well tell nothing of the learned one
+        held = not both  # paths on which the nominal ship is lost as well tell nothing of the other
     if not held:
         advance("the decay of the motion without thrust")
         fastest = np.split(everywhere, SETTINGS.directions)[-1]

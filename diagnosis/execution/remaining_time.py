@@ -2,7 +2,7 @@
 
 The number of effects is known only in the end: the search forecasts it once, by regressions of all
 candidates (:mod:`diagnosis.search.forward_selection`). A kind of step that has ended takes what it took
-last; any other one its usual time, scaled by what the steps of the search took.
+on average; any other one its usual time, scaled by what all steps took.
 """
 
 import math

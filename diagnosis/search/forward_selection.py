@@ -24,7 +24,7 @@ from .candidates import CandidateShape
 from .conclusion import AcceptedEffect, Selection
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
 from .gram import Entry, GramTable
-from .map_regression import Scored, first_share, regression, score
+from .map_regression import Scored, first_share, fitted_columns, score
 from .most_likely import ridge
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
@@ -257,10 +257,9 @@ def likely_effects(
 
 def _force(t: GramTable, scored: Scored, shape: CandidateShape) -> np.ndarray:
     """(K, 3), the force of an effect that is fitted together with all nuisance parameters."""
-    fitted = regression(t, scored.candidate, scored.shape)
-    entry = t.entries[scored.candidate][scored.shape]
-    beta = dict(zip(fitted.use.tolist(), fitted.fitted(t.total).beta.tolist(), strict=False))
-    force = shape.columns @ np.array([beta.get(k, 0.0) for k in entry.columns])
+    columns = t.entries[scored.candidate][scored.shape].columns
+    beta = fitted_columns(t, scored.candidate, scored.shape)
+    force = shape.columns @ np.array([beta.get(k, 0.0) for k in columns])
     return force if shape.offset is None else force + shape.offset
 
 

@@ -112,6 +112,12 @@ def regression(t: GramTable, candidate: int, shape: int) -> CandidateRegression:
     return CandidateRegression(target, use, live.size, precision, offset, entry.nonlinear, t.unit[use])
 
 
+def fitted_columns(t: GramTable, candidate: int, shape: int) -> dict[int, float]:
+    """Of each column of a candidate's shape that is fitted its coefficient, by all data."""
+    r = regression(t, candidate, shape)
+    return dict(zip(r.use.tolist(), r.fitted(t.total).beta.tolist(), strict=False))
+
+
 @dataclass(frozen=True, eq=False)
 class Scored:
     """A candidate with its cross-validated loss.

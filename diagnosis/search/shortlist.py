@@ -22,7 +22,7 @@ from .candidates import (
     model_error,
 )
 from .gram import GramTable, Nuisance, gram_table, noise
-from .map_regression import Scored, regression, score
+from .map_regression import Scored, fitted_columns, score
 from .most_likely import ridge
 from .refinement import (
     CandidateStart,
@@ -240,10 +240,9 @@ def reweighted(
 def start(at: RefinedModel, ranking: Ranking, best: Scored) -> CandidateStart:
     """A candidate's parameters by the linear fit; those without any data stay out."""
     shape = ranking.candidates[best.candidate].shapes[best.shape]
-    mine = regression(ranking.table, best.candidate, best.shape)
-    beta = dict(zip(mine.use.tolist(), mine.fitted(ranking.table.total).beta, strict=False))
+    beta = fitted_columns(ranking.table, best.candidate, best.shape)
     columns = ranking.table.entries[best.candidate][best.shape].columns
-    found = {n: float(beta[k]) for n, k in zip(shape.fitted, columns, strict=True) if k in beta}
+    found = {n: beta[k] for n, k in zip(shape.fitted, columns, strict=True) if k in beta}
     values = {n: shape.given.get(n, 0.0) + found.get(n, 0.0) for n in (*shape.given, *found)}
     fitted = [n for n in values if timed(at.start.ship, n) is None]
     size = len(fitted)
