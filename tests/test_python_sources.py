@@ -46,6 +46,19 @@ def test_units_stand_in_the_names_of_columns_or_in_attrs(run, tmp_path):
         diagnosis.load(table(run, y="y [furlong]"))
 
 
+def test_units_in_the_names_of_columns_count_beside_a_side_car_that_has_others(run, tmp_path):
+    named = table(run, x="x [mm]", psi="heading").assign(**{"x [mm]": 1e3 * run.pose[:, 0]})
+    named.to_csv(tmp_path / "run.csv", index=False)
+    (tmp_path / "run.csv.json").write_text('{"columns": {"psi": "heading"}}')
+    (found,) = diagnosis.load(tmp_path / "run.csv")
+    np.testing.assert_allclose(found.run.pose, run.pose, rtol=1e-9, atol=1e-12)
+    # What the side-car says of a column itself stands.
+    told = '{"columns": {"psi": "heading", "x": {"name": "x [mm]", "factor": 0.002}}}'
+    (tmp_path / "run.csv.json").write_text(told)
+    (found,) = diagnosis.load(tmp_path / "run.csv")
+    np.testing.assert_allclose(found.run.pose[:, 0], 2.0 * run.pose[:, 0], rtol=1e-9, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("sources", "said"),
     [([], "there is no run"), (3, "not of type int"), ([None], "not of type NoneType")],

@@ -13,9 +13,9 @@ called, in which unit it is, and how its axis lies::
         },
     }
 
-Columns that it does not name keep their names and SI units. ``columns.json`` in a folder says the same
-of all files there, and the file next to a measurement goes over it. What each signal means:
-docs/measurements.md.
+Columns that it does not name keep their names, in SI or in the units that stand there (``x [mm]``).
+``columns.json`` in a folder says the same of all files there, and the file next to a measurement goes
+over it. What each signal means: docs/measurements.md.
 """
 
 import codecs
@@ -224,12 +224,33 @@ def layout_of(
         named = dict(zip((*POSE, *TAU), read_options(folder).roles.of("pose", "force"), strict=True))
         if set(named.values()) <= set(names):
             return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
+    return with_units_of_names(Layout(), names, units, where, of)
+
+
+def with_units_of_names(
+    layout: Layout, names: Sequence[str], units: Mapping[str, str], where: str, of: Ship
+) -> Layout:
+    """A layout with the units of further columns that are signals by their own names, as ``x [mm]``.
+
+    Args:
+        layout: which columns it has, and what it says of them, stays.
+        names, units, where, of: as of :func:`layout_of`.
+
+    Raises:
+        InputError: a unit that the signal cannot have.
+    """
     known = quantities(of)
     stated = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
     stated |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
-    columns = {s: {"name": name, "unit": unit} for s, (name, unit) in stated.items()}
-    return checked(Layout, {"columns": columns}, where, strict=False)
+    taken = {column.name for column in layout.columns.values()}
+    columns = {
+        signal: {"name": name, "unit": unit}
+        for signal, (name, unit) in stated.items()
+        if signal not in layout.columns and name not in taken
+    }
+    further = checked(Layout, {"columns": columns}, where, strict=False).columns
+    return layout.model_copy(update={"columns": {**further, **layout.columns}})
 
 
 def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:

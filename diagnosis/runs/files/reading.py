@@ -35,6 +35,7 @@ from ..columns.columns import (
     side_cars,
     signals,
     to_si,
+    with_units_of_names,
 )
 from ..columns.unit_check import LARGEST, UNITS, remedy
 from ..run_constants import NEGLIGIBLE
@@ -190,7 +191,11 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
     given = layout or read_layout(path)
     with as_table(path):
         names = column_names(path, given or Layout())
-        layout = given or layout_of(names, {}, f"'{path}'", of, path.parent)
+        where = f"'{path}'"
+        if given is None:
+            layout = layout_of(names, {}, where, of, path.parent)
+        else:
+            layout = with_units_of_names(given, names, {}, where, of)
         used = [layout.column(s) for s in signals(layout, names, f"'{path}'", of)]
         wanted = {name for column in used for name in (column.name, column.sign) if name}
         if absent := next((c.sign for c in used if c.sign and c.sign not in names), None):
