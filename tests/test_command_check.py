@@ -1,12 +1,15 @@
 """Commands that the thrusters cannot give: the axis that is named, and how often, by a count of the cells."""
 
+from dataclasses import replace
+from itertools import groupby
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis import Model, Run
-from diagnosis.assessment.command_check import beyond_thrusters, lasting
+from diagnosis.assessment.command_check import beyond_thrusters, idle, lasting
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors.thrust import full_thrust
 
@@ -52,6 +55,23 @@ def test_the_axis_farthest_beyond_its_thrust_is_named_with_its_rows(ratios):
         assert f"in {rows} of {len(ratios)} rows" in text
         assert f"the {FULL[axis]:.4g} {'N.m' if axis == 2 else 'N'} that" in text
     assert ("--ship" in text) == (2 * rows > len(ratios)) or len(ties) < 3
+
+
+@pytest.mark.filterwarnings("error")
+@given(
+    st.lists(st.booleans(), min_size=1, max_size=ROWS),
+    st.lists(st.booleans(), min_size=ROWS, max_size=ROWS),
+)
+def test_rows_are_idle_where_all_commands_are_zero_for_long_whatever_times_are_missing(zero, missing):
+    run = run_of([(0.0, 0.0, 0.0) if z else (0.0, 0.5, 0.0) for z in zero])
+    time = np.where(missing[: len(zero)], np.nan, run.time)
+    expected, start = [], 0
+    for z, rows in groupby(zero):
+        stamps = time[start : start + len([*rows])]
+        known = stamps[np.isfinite(stamps)]
+        expected += [z and known.size > 0 and known[-1] - known[0] >= 0.45] * stamps.size
+        start += stamps.size
+    assert idle(replace(run, time=time), 0.45).tolist() == expected
 
 
 @pytest.mark.parametrize("axis", range(3))

@@ -24,6 +24,7 @@ from diagnosis.report.pictures import figures, tracks
 from diagnosis.report.pictures.chart import Chart, Panel
 from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
+from diagnosis.runs.measured_channels import UNUSED
 from diagnosis.runs.sensors.sensor_finding import SensorFinding
 from diagnosis.verdict.prediction_gain import PairedChange, PredictionGain
 
@@ -60,8 +61,16 @@ TRIAL = {"tactical_diameter": [3.4, 3.0, 3.35], "overshoot": [[0.2, 0.1, 0.19], 
 FAULT = SensorFinding("r", "scale", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "r reads too much", (), False)
 RATE = SensorFinding("time", "clock_rate", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "its clock is fast")
 OURS = SimpleNamespace(parametric=True, description=lambda: None)
+SPEEDS = [
+    MeasuredChannel(name, 10.0, 0.0, 0.01, 0.5, "m/s", "estimated", 0.0, 0.0, 0, why=why)
+    for name, why in (
+        ("u", "both are 2 % too large"),
+        ("v", "both are 2 % too large"),
+        ("speed", UNUSED),
+    )
+]
 CHANNELS = [
-    ("a", [MeasuredChannel("x", 20.0, 0.0, 0.002, 0.0, "m", "given", 0.0, 0.0, 2, (1.5, 3.0))]),
+    ("a", [MeasuredChannel("x", 20.0, 0.0, 0.002, 0.0, "m", "given", 0.0, 0.0, 2, (1.5, 3.0)), *SPEEDS]),
     ("b", [MeasuredChannel("x", 10.0, 0.5, 0.004, 0.0, "m", "given", 0.0, 0.0, 1, (7.0,))]),
 ]
 DERIVED = {"channels": CHANNELS, "trials": [None, TRIAL], "measured": [{}, {"port.thrust": (12.0, 3.0)}]}
@@ -119,7 +128,12 @@ a 96.04 s 100 1 2 3 94
 b 48 s 100 1 2 3 94
 Channels, medians of all runs
 channel rate held noise outliers used
-x 15 Hz 25 % 0.003 m given 3: a 1.5 s yes
+x 15 Hz 25 % 0.003 m given 3 yes
+u 10 Hz 0 % 0.01 m/s uncertain 0 no
+v 10 Hz 0 % 0.01 m/s uncertain 0 no
+speed 10 Hz 0 % 0.01 m/s uncertain 0 no
+x: first outlier in a at 1.5 s
+u, v: not used: both are 2 % too large
 Found in the data
 a: a gap
 Faults that redundant channels show

@@ -148,6 +148,7 @@ def idle(run: Run, least: float) -> np.ndarray:
     zero = np.abs(run.tau_cmd if run.commands is None else run.commands).max(axis=1) == 0.0
     part = np.cumsum(np.diff(zero, prepend=zero[0]))
     begin, end = (np.full(part[-1] + 1, sign * np.inf) for sign in (1.0, -1.0))
-    np.minimum.at(begin, part, run.time)
-    np.maximum.at(end, part, run.time)
+    stamped = np.isfinite(run.time)
+    np.minimum.at(begin, part[stamped], run.time[stamped])
+    np.maximum.at(end, part[stamped], run.time[stamped])
     return zero & (end - begin >= least)[part]

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 from math import degrees
 
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -12,6 +12,7 @@ from rich.text import Text
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN, WIDTH
 from ..runs import MeasuredChannel, by_name, sensor_lines
+from ..runs.measured_channels import UNUSED
 from ..session import CalibratedModel
 from .formatting import number, percent
 from .headline import (
@@ -164,22 +165,27 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
 def channel_table(
     of_runs: Sequence[tuple[str, Sequence[MeasuredChannel]]],
 ) -> Iterator[RenderableType]:
-    """A row for each channel of some runs, by their names; nothing where there is none."""
+    """A row for each channel of some runs, by their names, and lines of what is longer than a cell."""
     table = plain_table("channel", "rate", "held", "noise", "", "outliers", "used")
+    notes: dict[str, list[str]] = {}  # line -> the channels that it is of
     for c in by_name(c for _, channels in of_runs for c in channels):
-        runs = ((run, x) for run, channels in of_runs for x in channels if x.name == c.name)
-        first = next((f": {run} {_number(x.outlier_times[0])} s" for run, x in runs if x.outliers), "")
         table.add_row(
             c.name,
             f"{_number(c.rate)} Hz",
             _percent(c.held),
             f"{'at most ' if c.noise_at_most else ''}{_number(c.noise, 2)} {c.unit}",
             c.noise_from if c.known else "uncertain",
-            f"{c.outliers}{first}",
-            c.why or "yes",
+            str(c.outliers),
+            "yes" if c.used else "no",
         )
+        runs = ((run, x) for run, channels in of_runs for x in channels if x.name == c.name)
+        if found := next(((run, x.outlier_times[0]) for run, x in runs if x.outliers), None):
+            notes.setdefault(f"first outlier in {found[0]} at {_number(found[1])} s", []).append(c.name)
+        if c.why not in ("", UNUSED):
+            notes.setdefault(f"not used: {c.why}", []).append(c.name)
+    lines = Text("\n".join(f"{', '.join(names)}: {line}" for line, names in notes.items()))
     if of_runs:
-        yield from _titled("Channels, medians of all runs", table)
+        yield from _titled("Channels, medians of all runs", Group(table, lines) if notes else table)
 
 
 def _effect(e: ReportedEffect) -> Iterator[str]:
