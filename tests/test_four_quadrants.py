@@ -18,6 +18,7 @@ from fmus.effects import Motion
 from fmus.frames import air_velocity
 from fmus.hull_functions import low_speed, swept
 from fmus.ship import ship
+from fmus.ships.wind import Superstructure, regression, wind_by_regression
 from fmus.signals import Force
 from fmus.vessel import vessel
 
@@ -116,12 +117,16 @@ def rudder_force(u, v, r, n, delta):
     )
 
 
-def wind_force(u, v, psi, W, zeta):
+AREAS = ("frontal_area", "lateral_area")
+ABOVE = Superstructure(0.13544, 0.52038, -0.01299, 0.10359, 0.1423, -0.06209, 0.294, 1.225)
+
+
+def wind_force(u, v, psi, W, zeta, B=0.48925, of=ABOVE):
     """Fujiwara's regression, from its tables of coefficients."""
-    B, A_T, A_L, A_OD, C, C_BR, H_BR, H_C = 0.48925, 0.13544, 0.52038, 0.1423, -0.01299, -0.06209, 0.294, 0.10359  # fmt: skip
+    A_T, A_L, C, H_C, A_OD, C_BR, H_BR, rho = of
     a, b = W * cos(zeta - psi) + u, W * sin(zeta - psi) + v  # from where it seems to blow
     V2, g = a * a + b * b, -atan2(b, a)
-    q = 0.5 * 1.225 * V2
+    q = 0.5 * rho * V2
     X = np.dot([-0.330, 0.293, 0.0193, 0.682], [1.0, B * H_BR / A_T, C / H_C, A_OD / L**2])
     X += cos(g) * np.dot(
         [-1.353, 1.700, 2.870, -0.463, -0.570, -6.640, -0.0123, 0.0202],
@@ -199,6 +204,21 @@ def test_the_ship_file_is_the_published_model(psi, u, v, r, n, delta, blows):
     found = acceleration(psi, (u, v, r), (n, delta), *blows)
     expected = published((0.0, 0.0, psi), (u, v, r), n, delta, *blows)
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-10)
+
+
+size = st.floats(0.1, 2.0)
+place = st.floats(-1.0, 1.0)
+
+
+@given(st.builds(Superstructure, size, size, place, size, size, place, size, size), size, wind)
+def test_the_wind_on_any_superstructure_is_that_of_the_published_regression(above, B, blows):
+    W, zeta = blows
+    s = Motion(0.0, 0.0, 0.3, 0.4, -0.1, 0.0, 0.0)
+    described = regression(L, B, above) | dict(zip(AREAS, above[:2], strict=True))
+    W_n, W_e = air_velocity(W, zeta)
+    found = wind_by_regression(s, W_n, W_e, wind_length=L, air_density=above.air_density, **described)
+    expected = wind_force(s.u, s.v, s.psi, W, zeta, B, above)
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize(("u", "n"), [(0.4, 12.0), (-0.3, 12.0), (0.4, -12.0)])
