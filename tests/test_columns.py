@@ -13,7 +13,8 @@ from diagnosis import propose_columns
 from diagnosis.predictors import ship_with
 from diagnosis.runs import FOLDER_FILE, line_beside, prepare, propose, read
 from diagnosis.runs.columns.columns import Named, quantities
-from diagnosis.runs.columns.likely_columns import meaning_of_words
+from diagnosis.runs.columns.likely_columns import meaning_of_words, motion_of
+from diagnosis.runs.columns.unit_check import UNITS
 
 TANKER = ship_with((), "kvlcc2")
 NAMES = {
@@ -205,6 +206,48 @@ def test_blanks_have_likely_columns_by_the_motion(tmp_path: Path) -> None:
     blank["columns"] |= {"rudder.delta": "channel 7", "propeller.n": "channel 4"}
     (tmp_path / "a.csv.json").write_text(json.dumps(blank))
     np.testing.assert_allclose(read(path, of=TANKER).commands, table[["channel 4", "channel 7"]])
+
+
+def test_the_motion_of_a_pose_is_that_which_made_it() -> None:
+    h = 0.01
+    t = np.arange(0.0, 60.0, h)
+    made = {
+        "surge": 1.0 + 0.3 * np.sin(0.2 * t),
+        "sway": -0.4 + 0.2 * np.sin(0.3 * t),
+        "yaw": 0.25 + 0.05 * np.sin(0.1 * t),
+    }
+    psi = 0.7 + h * np.cumsum(made["yaw"])
+    u, v = made["surge"], made["sway"]
+    north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+    found = motion_of({"time": t, "x": h * np.cumsum(north), "y": h * np.cumsum(east), "psi": psi})
+    inner = slice(200, -200)  # rates are differences over a second
+    for axis, speed in made.items():
+        np.testing.assert_allclose(found[f"{axis} speed"][inner], speed[inner], atol=0.02)
+        acceleration = np.gradient(speed, h)
+        np.testing.assert_allclose(found[f"{axis} acceleration"][inner], acceleration[inner], atol=0.01)
+    drift = np.angle(np.exp(1j * (found["course"] - psi - np.arctan2(v, u))))
+    np.testing.assert_allclose(drift[inner], 0.0, atol=0.02)
+
+
+def test_units_have_their_factors_by_definition() -> None:
+    minute, degree, foot = 60.0, np.pi / 180.0, 0.3048
+    others = {
+        "time": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": minute},
+        "length": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": foot, "in": foot / 12.0},
+        "angle": {"deg": degree, "°": degree},
+        "force": {"mN": 1e-3, "kN": 1e3},
+        "moment": {"N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
+        "command": {"%": 0.01},
+        "shaft speed": {"rps": 1.0, "rpm": 1.0 / minute, "rad/s": 0.5 / np.pi},
+        "speed": {"mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1e3 / 3600.0, "kn": 1852.0 / 3600.0},
+        "rate": {"deg/s": degree, "°/s": degree, "deg/min": degree / minute},
+        "acceleration": {"mm/s2": 1e-3, "g": 9.80665},
+        "angular acceleration": {"deg/s2": degree},
+    }
+    for quantity, units in UNITS.items():
+        (_, one), *rest = units.items()  # the first is that of SI
+        assert one == 1.0
+        assert dict(rest) == pytest.approx(others[quantity], rel=1e-12)
 
 
 def test_a_heading_in_degrees_is_likely_by_the_course(tmp_path: Path) -> None:

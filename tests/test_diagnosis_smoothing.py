@@ -14,7 +14,7 @@ from diagnosis.runs.smoothing import smoother
 from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
 from diagnosis.runs.smoothing.penalised import LinearSystem, Problem, Rates, Spline, solve
-from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, roughness, third
+from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, middles, roughness, third
 
 pytestmark = pytest.mark.numerical
 N = 3000
@@ -233,6 +233,15 @@ def test_run_of_crumbs_is_refused():
         crumbs[k : k + 10] = base().pose[k : k + 10]
     with pytest.raises(InputError, match="fewer than 20 samples between long gaps"):
         smooth(clean(replace(base(), pose=crumbs)))
+
+
+def test_rows_of_the_roughness_have_the_times_of_their_intervals():
+    """Those of all intervals of a stretch, and two behind it, a spacing apart."""
+    grid = knots(np.array([1.0, 20.0]), np.array([2.0, 20.3]), 0.1)
+    found = middles(grid)
+    assert found.size == len(roughness(grid, np.ones(13))[0].values) == 17
+    np.testing.assert_allclose(found[:12], np.arange(1.05, 2.2, 0.1))
+    np.testing.assert_allclose(found[12:], [20.05, 20.15, 20.25, 20.35, 20.45])
 
 
 def test_spline_is_exact_for_a_quintic():

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from cosim import InputError
+from diagnosis.execution.progress import silent
 from diagnosis.fmu_parameters import parameter_fit as fits
+from diagnosis.fmu_parameters import sensitivity
 from diagnosis.fmu_parameters.additional_force import AdditionalForce, EarthDirection
 from diagnosis.fmu_parameters.force_search import Accepted, candidates
 from diagnosis.fmu_parameters.measured_system import Window
@@ -101,6 +103,20 @@ def test_a_fit_is_the_posterior_of_a_linear_model(seed):
     assert (f.fixed, none.fixed) == (False, True)
     assert none.setting == START
     assert none.data_cost == pytest.approx(e @ e)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.3, 0.4), (-0.2, 2.1)])
+def test_a_range_ends_where_the_fmu_begins_to_fail(low, high):
+    """Within a 64th of three prior standard deviations, and on the side on which it works."""
+    r = problem(0)[0]
+    a = r.parameters[0]
+    r.processes.failing = lambda start: not a.at(low) < start["a"] < a.at(high)
+    found = sensitivity.sensitivities(r, silent).each[0]
+    ends = found.parameter
+    for end, limit, side in ((ends.min, low, 1.0), (ends.max, high, -1.0)):
+        inside = side * (a.z(end) - limit)
+        assert 0.0 < inside <= 3.0 / 64.0
+    assert found.fault.count("the FMU fails: it fails") == 2
 
 
 @settings(max_examples=12)

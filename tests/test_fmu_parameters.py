@@ -334,6 +334,8 @@ def test_start_values_are_those_of_the_motion(fmu):
     for w in found:
         assert w.course.start["x0"] == pytest.approx(np.sin(w.begin), abs=4.0 * w.start_std["x0"])
         assert w.course.start["v0"] == pytest.approx(np.cos(w.begin), abs=4.0 * w.start_std["v0"])
+        # At most as uncertain as three times one sample, and not as certain as the mean of all.
+        assert 3e-3 > w.start_std["x0"] > 1e-3 / np.sqrt(t.size)
 
 
 def test_playback_adds_a_force_as_the_fmu_has_it(fmu):
