@@ -1,6 +1,7 @@
 """Mistakes in a file are told by the data, with the line that mends them; right files are never refused."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -28,7 +29,15 @@ from diagnosis.assessment.plausibility import (
     same_columns,
 )
 from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
-from diagnosis.assessment.readings import AS_READ, Reading, of_commands, of_pose, reread, swapped
+from diagnosis.assessment.readings import (
+    AS_READ,
+    Reading,
+    of_commands,
+    of_pose,
+    readings,
+    reread,
+    swapped,
+)
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs.columns.columns import POSE, Named
@@ -112,6 +121,49 @@ def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
         assert odds.log_density(reading) < right
     assert odds.log_density(Reading("", motion=np.diag([np.nan, 1.0, 1.0]))) == -np.inf
     assert odds.log_density(of_pose("", (1e200, 1.0, 1.0))) == -np.inf
+
+
+GROUPS = {
+    "its position": ("x", "y"),
+    "its heading": ("psi",),
+    "its commands": ("tau_X", "tau_Y", "tau_N"),
+}
+FACTORS = {
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "km": 1e3,
+    "ft": 0.3048,
+    "in": 0.0254,
+    "mN": 1e-3,
+    "kN": 1e3,
+    "N.mm": 1e-3,
+    "N.cm": 1e-2,
+    "kN.m": 1e3,
+    "degrees": np.pi / 180.0,
+    "°": np.pi / 180.0,
+    "rpm": 1.0 / 60.0,
+    "rad/s": 0.5 / np.pi,
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "signals"), [("cse1", ()), ("gunnerus", ("azimuth.alpha", "azimuth.n"))]
+)
+def test_a_reading_in_another_unit_scales_what_it_names_and_nothing_else(name, signals):
+    commands = np.ones((base().time.size, len(signals))) if signals else None
+    run = replace(base(), commands=commands, signals=signals)
+    seen = set()
+    for r in readings(run, Model(ship=ship_with((), name))):
+        told = re.fullmatch(r"(.+) (?:is|are) in (\S+)(?: and (\S+))?", r.mistake)
+        if not told:
+            continue
+        who, unit, moment = told.groups()
+        named = [s for part in who.split(" and ") for s in GROUPS.get(part, (part,))]
+        expected = {s: FACTORS[moment if s == "tau_N" and moment else unit] for s in named}
+        assert {s: c.factor for s, c in r.changes.items()} == pytest.approx(expected)
+        assert all(c == Named(name=s, factor=c.factor) for s, c in r.changes.items())
+        seen.add(unit)
+    assert seen >= ({"rpm", "°"} if signals else {"ft", "mN", "N.cm"})
 
 
 @pytest.mark.parametrize("pace", [1.0, 4.0])

@@ -120,7 +120,7 @@ def test_commands_far_beyond_their_limit_are_refused_and_say_since_when(ship, ru
 @pytest.mark.parametrize(
     ("read_as", "told", "fix"),
     [
-        (lambda n: n / 16.541, "are shares of their limits", {"factor": 16.54}),
+        (lambda n: n / 16.541, "are in shares of the limits", {"factor": 16.54}),
         (lambda n: -n, "commands have the wrong sign", {"flip": True}),
     ],
 )

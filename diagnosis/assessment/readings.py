@@ -62,6 +62,14 @@ def of_commands(mistake: str, factors: Sequence[float], signals: Sequence[str] =
     return Reading(mistake, _scaled(signals, factors), commands=np.diag(factors))
 
 
+def _in_unit(unit: str, factors: Sequence[float], signals: Sequence[str]) -> Reading:
+    """Those commands in another unit that have a factor (k,)."""
+    changed = [*_scaled(signals, factors)]
+    return of_commands(
+        f"{' and '.join(changed)} {'are' if changed[1:] else 'is'} {unit}", factors, signals
+    )
+
+
 def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, Named]:
     pairs = zip(signals, factors, strict=True)
     return {s: Named(name=s, factor=f) for s, f in pairs if f != 1.0}
@@ -136,18 +144,13 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
         for size, other in {x: n for n, x in UNITS[quantity].items() if n != SI_UNIT[quantity]}.items():
             factors = np.where(unit == si, size, 1.0)
             if (factors != 1.0).any():
-                yield of_commands(
-                    f"{' and '.join(_scaled(names, factors.tolist()))} are in {other}",
-                    factors.tolist(),
-                    names,
-                )
+                yield _in_unit(f"in {other}", factors.tolist(), names)
     limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for whole, name in ((1.0, "shares"), (100.0, "percent")):
         meant = (np.abs(commands).max(axis=0) <= whole) & (limits > 1.0)
         factors = np.where(meant, limits / whole, 1.0)
         if meant.any():
-            changed = " and ".join(_scaled(names, factors.tolist()))
-            yield of_commands(f"{changed} are {name} of their limits", factors.tolist(), names)
+            yield _in_unit(f"in {name} of the limits", factors.tolist(), names)
 
 
 def other_factors(run: Run, k: float) -> Iterator[Reading]:
