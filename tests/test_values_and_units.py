@@ -1,7 +1,9 @@
 """Values on their way into an FMU: units, start values, their types and limits, and bindings of SSP."""
 
 import math
+from itertools import product
 from pathlib import PurePosixPath
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -12,7 +14,7 @@ from cosim import InputError, Unit
 from cosim.conversion import SAME, Conversion, conversion
 from cosim.dispatch.places import check_address, check_workers
 from cosim.export.portable import _is_start
-from cosim.fmu.fmu_model import INT_LIMIT, FmuVariable
+from cosim.fmu.fmu_model import INT_LIMIT, FmuModel, FmuVariable
 from cosim.formats.bindings import Bindings, file_inside, is_unit_kept, linear
 from cosim.formats.documents import start_value
 from cosim.formats.namespaces import SSM, SSP_SPACES
@@ -109,6 +111,24 @@ def test_a_value_is_the_start_value_that_the_fmu_states(start, other):
     assert _is_start(real, start)
     assert not _is_start(real, other)
     assert not _is_start(variable(), start)
+
+
+def test_states_that_can_be_set_are_locals_and_outputs_with_an_exact_start_that_may_change():
+    """FMI 2.0, 2.2.7."""
+    kinds = product(
+        ("exact", "approx", "calculated", None),
+        ("constant", "fixed", "discrete", "continuous", None),
+        ("local", "output", "input", "parameter", None),
+    )
+    names = ("initial", "variability", "causality")
+    listed = [SimpleNamespace(name=str(kind), **dict(zip(names, kind, strict=True))) for kind in kinds]
+    model = SimpleNamespace(description=SimpleNamespace(modelVariables=listed))
+    expected = {
+        str(("exact", variability, causality))
+        for variability in ("fixed", "discrete", "continuous", None)
+        for causality in ("local", "output", None)
+    }
+    assert FmuModel.exact.func(model) == expected
 
 
 @pytest.mark.parametrize(
