@@ -10,7 +10,15 @@ from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, omega
 from diagnosis.predictors import read_model, weak_windows, write_model
-from diagnosis.search.candidates import SMALL, additions, candidate, covered, model_error
+from diagnosis.search.candidates import (
+    SMALL,
+    CandidateShape,
+    additions,
+    candidate,
+    covered,
+    curve,
+    model_error,
+)
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.nonlinear.multistart import Landscape, best_values
 from diagnosis.search.prior import NominalPrior
@@ -18,6 +26,7 @@ from diagnosis.search.refinement import RefinedModel, TrainingSet
 from diagnosis.search.shortlist import rank, reweighted
 from fmus.declare import Range, Variable
 from fmus.effects import effect
+from fmus.scale import REFERENCE, Scale
 
 SPANS = [(8.0, 14.0), (25.3, 28.0), (40.0, 52.0)]
 
@@ -186,3 +195,21 @@ def test_a_slope_that_depends_on_its_step_is_none(growth, rough, monkeypatch):
     assert places == [("left", 0.0), ("left below", pytest.approx(-0.2 * SMALL))]
     assert not profile.is_rough(t, at, "loss_surge"), "a linear one has one slope"
     assert len(places) == 2
+
+
+def test_a_curve_of_a_larger_ship_bends_as_much_in_its_own_units():
+    """Its nodes, its values' prior and the columns stay, with forces and units at the size of the ship."""
+    rng = np.random.default_rng(2)
+    force = rng.standard_normal((40, 3, 6)) * [0.0, 1.0, 1.0, 2.0, 1.0, 0.0]
+    base, names = rng.standard_normal((40, 3)), [f"node_{k}" for k in range(6)]
+
+    def made(scale, unit):
+        forces = np.array(scale.forces)
+        shape = CandidateShape({}, names, None, force * forces[:, None] / unit, np.full(6, unit))
+        (found,) = curve(base * forces, shape, scale)
+        return found
+
+    same, other = made(REFERENCE, 1.0), made(Scale(7.0), 50.0)
+    assert other.fitted == same.fitted == names[1:5]
+    np.testing.assert_allclose(other.precision * 50.0**2, same.precision, rtol=1e-9)
+    assert other.columns.shape == (40, 3, 4)
