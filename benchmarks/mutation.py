@@ -110,7 +110,7 @@ class Judge:
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, 9)
                 return Outcome(None, "")
-        fails = re.findall(r"^(?:FAILED|ERROR) (\S+)", told, re.MULTILINE)
+        fails = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", told, re.MULTILINE)  # ids have blanks
         return Outcome(process.returncode, fails[0] if fails else "")
 
 
