@@ -109,6 +109,14 @@ def test_a_step_of_its_own_travels_to_osp_only(chain, tmp_path):
     assert log_of(chain, tmp_path / "a")[1] == log_of(tmp_path / "osp", tmp_path / "b")[1]
 
 
+@pytest.mark.parametrize(("algorithm", "later"), [("gauss_seidel", True), ("jacobi", False)])
+def test_values_that_arrive_a_step_later_in_other_tools_are_noted(chain, tmp_path, algorithm, later):
+    chain["algorithm"] = algorithm
+    for how, suffix in ((export_ssp, ".ssp"), (export_osp, "")):
+        notes = write(chain, tmp_path / f"s{suffix}", how)
+        assert any("values arrive one step later" in note for note in notes) == later
+
+
 def test_a_transformation_needs_a_connection(chain, tmp_path):
     chain["transformations"] = {"gain.x": {"factor": 2.0}}
     with pytest.raises(InputError, match=r"gain\.x is not connected; did you mean 'gain\.u'"):

@@ -62,6 +62,8 @@ def renamed(path, old, new):
         (["resources/caf\u00e9", "resources/cafe\u0301"], "same file on some operating systems"),
         (["resources", "resources/a"], "is a file, and the folder of"),
         (["Resources", "resources/a"], "is a file, and the folder of"),
+        (["resources", "resources/a/b/c"], "is a file, and the folder of"),
+        (["resources/a/b", "resources/a/b/c/d"], "is a file, and the folder of"),
     ],
 )
 def test_archive_that_leaves_its_folder_or_means_two_things_is_refused(tmp_path, entries, message):
