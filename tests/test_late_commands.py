@@ -41,6 +41,23 @@ def lines(folder, table, ship=None):
     return path, [line for line in w.smoothed.notes if " late (odds" in line]
 
 
+@pytest.mark.parametrize("late", [0.0, 0.2, 0.5, 1.0, 1.7, 3.0])
+def test_a_command_that_is_late_by_a_part_of_a_row_is_its_mean_over_the_row(late, tmp_path):
+    """Such as an angle that is sampled: between two rows it acts half a row earlier."""
+    table = made().iloc[:200]
+    fine = np.repeat(table["tau_X"].to_numpy(), 10)  # held, at a tenth of a row
+    rows = np.arange(len(table) - 5) * 10 + round(10 * late)
+    expected = np.array([fine[k : k + 10].mean() for k in rows])
+    path = tmp_path / "a.csv"
+    table.to_csv(path, index=False)
+    path.with_name("a.csv.json").write_text(
+        json.dumps({"columns": {"tau_X": {"name": "tau_X", "late": late * H}}})
+    )
+    run = diagnosis.read(path)
+    np.testing.assert_allclose(run.tau_cmd[: rows.size, 0], expected, rtol=1e-9)
+    np.testing.assert_array_equal(run.tau_cmd[:, 1:], table[["tau_Y", "tau_N"]])
+
+
 @pytest.mark.parametrize("names", [["tau_X"], ["tau_N"], ["tau_X", "tau_Y", "tau_N"]])
 def test_late_commands_are_reported_with_odds_and_the_line_that_mends_them(names, tmp_path):
     path, (line,) = lines(tmp_path, late(made(), *names))

@@ -14,6 +14,9 @@ from ..search.shortlist import TIE
 from ..search.significance import predicts_worse
 from .validation_data import ValidationData
 
+# Group of coefficients -> the kind of force that they make up with others.
+KIND = {"mass": "inertia", "added_mass": "inertia", "place": "thrust"}
+
 
 @dataclass(frozen=True)
 class PairedChange:
@@ -123,7 +126,9 @@ def without_gain(
 ) -> set[str]:
     """Ids of the findings that predictions do not show: calibration alone predicts as well.
 
-    An effect that is a change of coefficients, as an added mass or a lag, is a calibration, and stays.
+    An effect that is a change of coefficients of one kind, as an added mass or a lag, is a calibration,
+    and stays. What only inertia, damping and thrust together make up, each far from its prior, is none: so
+    is a sway force by u r, as the equation of each axis may be multiplied by a factor.
     Waves and failures in times of one run are in no prediction of other data.
 
     Args:
@@ -139,8 +144,11 @@ def without_gain(
     shown = [f for f in found.effects if not f.of_runs and effects[f.id].search.by != "spectrum"]
     if gain.over == "initial" or not shown:
         return {f.id for f in shown}
-    base = model_error(runs, start)
-    by_coefficients = _columns(runs, start, base, coefficients, found.sigma)
+    base, kinds = model_error(runs, start), dict[str, list[str]]()
+    for n in coefficients:
+        group = start.ship.coefficients[n].group
+        kinds.setdefault(KIND.get(group, group), []).append(n)
+    by_kind = [_columns(runs, start, base, names, found.sigma) for names in kinds.values()]
     lags = any(start.declared(n).unit == "s" for n in coefficients)
 
     def is_coefficient(f: Finding) -> bool:
@@ -148,9 +156,8 @@ def without_gain(
         of_time = effects[f.id].kind == "actuator" and all(
             start.declared(n).unit == "s" for n in f.values
         )
-        return (lags and of_time) or _spanned(
-            _columns(runs, start, base, [*f.values], found.sigma), by_coefficients
-        )
+        own = _columns(runs, start, base, [*f.values], found.sigma)
+        return (lags and of_time) or any(_spanned(own, of_kind) for of_kind in by_kind)
 
     return {f.id for f in shown if not is_coefficient(f)}
 

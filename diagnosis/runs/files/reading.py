@@ -293,10 +293,18 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
 
 
 def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
-    """A command (n,) that is logged late by some seconds, at the times (n,) at which it acted."""
+    """A command (n,) that is logged late by some seconds, at the times (n,) at which it acted.
+
+    Where it changes within a row it is the mean over the row.
+    """
     order = np.argsort(time, kind="stable")
-    at = np.searchsorted(time[order], time + late * (1.0 + FUZZ), side="right") - 1
-    return command[order][at]
+    t, held = time[order], command[order]
+    at = np.searchsorted(t, time + late * (1.0 + FUZZ), side="right") - 1
+    after = np.minimum(at + 1, t.size - 1)
+    row = np.maximum(t[after] - t[at], FUZZ * late)
+    part = np.clip((time + late - t[at]) / row, 0.0, 1.0)
+    mean = (1.0 - part) * held[at] + part * held[after]
+    return np.where((part > FUZZ) & np.isfinite(mean), mean, held[at])
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:
