@@ -56,8 +56,10 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
 
     path = options.file[0]
     target = beside(path)
-    _refuse_there(options, target)
+    there = stated_layout(path)
     found = propose(path, craft)
+    if there is None or not there.columns:  # columns that are stated stay, and others are added
+        _refuse_there(options, target)
     if found.run is None:
         shown = [f"'{path}': no column is known for {', '.join(found.likely)}"]
     else:
@@ -67,7 +69,7 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
     shown = list(map(printable, [*shown, *_blanks([found], options)]))
     if not found.needed:
         return Done(0, [*shown, printable(f"no side-car is needed for '{path}'")])
-    if found.layout == stated_layout(path):
+    if found.layout == there:
         return Done(0, [*shown, printable(f"the side-car of '{path}' is complete")])
     return Done(0, [*shown, *_stated(target, found.needed, options.write)])
 

@@ -277,6 +277,41 @@ def test_a_blank_that_is_there_is_filled_where_it_is_known(tmp_path: Path) -> No
     assert propose(path, TANKER).needed == {"columns": NAMES}
 
 
+def test_a_blank_that_is_filled_gets_the_unit_in_its_name(tmp_path: Path) -> None:
+    """The file that is there is completed; what is stated of a column stays."""
+    table = zigzag(**{"propeller.n": "engine_rpm", "rudder.delta": "helm angle [deg]"})
+    table["engine_rpm"] *= 60.0
+    table["helm angle [deg]"] = np.degrees(table["helm angle [deg]"])
+    path = written(tmp_path / "a.csv", table)
+    beside = tmp_path / "a.csv.json"
+    filled = {"propeller.n": "engine_rpm", "rudder.delta": {"name": "helm angle [deg]", "noise": 0.1}}
+    beside.write_text(json.dumps({"columns": filled}))
+    done = command(propose_columns.main, path, "--ship", "kvlcc2", "--write", "--anyway")
+    assert (done.returncode, done.stderr) == (0, "")
+    told = json.loads(beside.read_text())["columns"]
+    assert told["propeller.n"] == {"name": "engine_rpm", "unit": "rpm"}
+    assert told["rudder.delta"] == {"name": "helm angle [deg]", "unit": "deg", "noise": 0.1}
+    run = read(path, of=TANKER)
+    np.testing.assert_allclose(np.ptp(run.commands, axis=0), [8.0, 0.6], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("Rel. wind speed [kn]", "wind_speed_relative"),
+        ("Relative wind speed [m/s]", "wind_speed_relative"),
+        ("AWA [deg]", "wind_direction_relative"),
+        ("rel wind dir [deg]", "wind_direction_relative"),
+        ("True wind dir [deg]", "wind_direction"),
+    ],
+)
+def test_winds_are_known_by_their_usual_names(tmp_path: Path, name: str, signal: str) -> None:
+    path = written(tmp_path / "a.csv", zigzag(time="Time UTC").assign(**{name: 5.0}))
+    found = propose(path, TANKER).layout
+    assert found.column(signal).name == name
+    assert found.column("time").name == "Time UTC"
+
+
 def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     for k, name in enumerate("abc"):
         written(tmp_path / f"{name}.csv", zigzag(100.0 + 20.0 * k))

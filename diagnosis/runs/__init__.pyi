@@ -16,11 +16,11 @@ from .columns.columns import to_si as to_si
 from .columns.likely_columns import LikelyColumn as LikelyColumn
 from .columns.proposal import Proposal as Proposal
 from .columns.proposal import common_layout as common_layout
-from .columns.proposal import meaning as meaning
 from .columns.proposal import propose as propose
 from .columns.side_car import as_json as as_json
 from .columns.side_car import line_beside as line_beside
 from .columns.unit_check import UNITS as UNITS
+from .columns.usual_names import meaning as meaning
 from .files.reading import Run as Run
 from .files.reading import layout_beside as layout_beside
 from .files.reading import read as read

@@ -16,7 +16,7 @@ from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import gain, harm, predicts_worse
-from .confidence import confidence_of
+from .confidence import FOUND, confidence_of
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -38,6 +38,11 @@ class Conclusion(NamedTuple):
 def any_finding(found: Findings, start: Model) -> bool:
     """Whether any effect is a finding, and not only a possibility."""
     return any(confidence_of(f, start).is_finding for f in found.effects)
+
+
+def any_sure(found: Findings, start: Model) -> bool:
+    """Whether any effect is a sure finding by its own evidence."""
+    return any(confidence_of(f, start).own >= FOUND for f in found.effects)
 
 
 def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Conclusion:
@@ -101,11 +106,11 @@ def better_calibration(
     data: ValidationData,
     drives: Callable[[Model, Model], bool],
 ) -> RefitOutcome | None:
-    """The calibration of the nominal coefficients alone, where a model without a finding predicts worse.
+    """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
     Args:
         calibration: the fit; None: there is none.
-        found: the end of a search without a finding; the initial model if nothing was learned.
+        found: the end of a search without a sure finding; the initial model if nothing was learned.
         data: the data that decide.
         drives: whether the hull of a model drives the ship on more than that of another.
 

@@ -25,7 +25,7 @@ from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
 from ..search.prior import NominalPrior
-from .coefficients import any_finding, better_calibration, calibrated, concluded
+from .coefficients import any_finding, any_sure, better_calibration, calibrated, concluded
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .law_in_parts import in_parts, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
@@ -143,12 +143,12 @@ def judge(
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (changed and not left)
-    if calibrates and not any_finding(fit.findings, start):
+    if calibrates and not any_sure(fit.findings, start):
         advance("calibration")
         now = _predicting(fit.findings, data, changed)
-        other = calibrated(fit.findings, data, prior) or better_calibration(
-            calibration, now, data, drives
-        )
+        believed = any_finding(fit.findings, start)
+        other = None if believed else calibrated(fit.findings, data, prior)
+        other = other or better_calibration(calibration, now, data, drives)
         if other is not None:
             dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
     advance("residual")

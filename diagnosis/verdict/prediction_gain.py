@@ -127,9 +127,9 @@ def without_gain(
     """Ids of the findings that predictions do not show: calibration alone predicts as well.
 
     An effect that is a change of coefficients of one kind, as an added mass or a lag, is a calibration,
-    and stays. What only inertia, damping and thrust together make up, each far from its prior, is none: so
-    is a sway force by u r, as the equation of each axis may be multiplied by a factor.
-    Waves and failures in times of one run are in no prediction of other data.
+    and stays. What only inertia, damping and thrust together make up, each far from its prior, is none:
+    a sway force by u r is, as the equation of each axis may be multiplied by a factor. Waves and
+    failures in times of one run are in no prediction of other data.
 
     Args:
         gain: of the search over calibration; None: not known, so that nothing follows.

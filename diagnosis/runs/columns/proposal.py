@@ -1,7 +1,6 @@
 """The content of the file beside a measurement, proposed by a look at the measurement itself."""
 
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -22,7 +21,6 @@ from ..row_order import in_order
 from ..run_constants import NEGLIGIBLE
 from .columns import (
     POSE,
-    QUANTITY,
     UNITS,
     UTF_8,
     WITH_UNIT,
@@ -49,65 +47,12 @@ from .likely_columns import (
 )
 from .side_car import as_json, refuse_sentences, refuse_thousands
 from .unit_check import OFTENEST, RAREST, SI_UNIT, doubts, likely_unit, spelt
+from .usual_names import meaning
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 NO_UNIT = ("", "-")
 # Units that a name may end in; u_1 is the first of several, and not a fraction.
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
-# Other names of signals that files use, without case, blanks and marks between words.
-CALLED: dict[str, tuple[str, ...]] = {
-    "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
-    "x": ("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
-    "y": ("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
-    "psi": (
-        *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
-        *("hdm", "compass", "gyro", "gyrocompass"),
-    ),
-    "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
-    "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
-    "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
-    "u": ("surgespeed", "surgevelocity", "velocitysurge"),
-    "v": ("swayspeed", "swayvelocity", "velocitysway"),
-    "r": ("yawrate", "rateofturn", "rot", "psidot", "headingrate"),
-    "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
-    "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
-    "speed": ("sog", "speedoverground"),
-    "course": ("cog", "courseoverground"),
-    "u_water": ("stw", "speedthroughwater"),
-    "wind_speed": ("truewindspeed", "tws"),
-    "wind_direction": ("truewinddirection", "twd"),
-}
-OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
-
-
-def _folded(name: str) -> str:
-    """A name without case, blanks and marks between words."""
-    return re.sub(r"[\W_]", "", name).casefold()
-
-
-# What a column may be called -> signal, and whether its axis points the other way.
-MEANT = (
-    {_folded(name): (signal, True) for name, signal in OPPOSITE.items()}
-    | {_folded(name): (signal, False) for signal, names in CALLED.items() for name in names}
-    | {_folded(signal): (signal, False) for signal in QUANTITY}
-)
-
-
-def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
-    """Which of some signals a name means, and whether its axis points the other way.
-
-    Of a name with a path, as ``/gnss/pose/position/x``, the last two parts or the last one count.
-
-    Returns:
-        An empty name where it means none of them.
-    """
-    known = MEANT | {_folded(signal): (signal, False) for signal in signals}
-    parts = name.split("/")
-    for part in (name, "".join(parts[-2:]), parts[-1]):
-        found = known.get(_folded(part), ("", False))
-        if found[0] in signals:
-            return found
-    return "", False
 
 
 class Proposal(NamedTuple):
@@ -165,14 +110,16 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
     units = _units_line(path, text) if text.units_line else [""] * len(names)
-    kept = {s: c for s, c in stated.columns.items() if c.name.strip()}
+    below = dict(zip(names, units, strict=False))
+    named = {s: c for s, c in stated.columns.items() if c.name.strip()}
+    kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
     columns = _columns(path, names, units, quantity, kept)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     if blank := missing(layout, names, of):
-        below = {n: unit for n, unit in zip(names, units, strict=False) if n in unused}
-        return _with_blanks(path, layout, kept, {n: below.get(n, "") for n in unused}, blank, quantity)
+        left = {n: below.get(n, "") for n in unused}
+        return _with_blanks(path, layout, kept, left, blank, quantity)
     try:
         signals(layout, names, f"'{path}'", of)
     except InputError as error:
@@ -299,6 +246,18 @@ def _columns(
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
     columns |= _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _in_unit_of_name(
+    stated: Column, signal: str, below: Mapping[str, str], quantity: Mapping[str, str]
+) -> Column:
+    """A column of which only the name is stated, in the unit that stands in that or below it."""
+    if stated.model_fields_set & {"unit", "factor", "offset"}:
+        return stated
+    bare, unit = _without_unit(stated.name, below.get(stated.name, ""))
+    factors = UNITS.get(quantity.get(signal, ""), {})
+    unit = unit or unit_in(bare)
+    return stated.model_copy(update={"unit": unit}) if factors.get(unit, 1.0) != 1.0 else stated
 
 
 def _by_words(

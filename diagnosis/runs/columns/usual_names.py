@@ -1,0 +1,72 @@
+"""Names that columns of measurements usually have, and the signals that they mean."""
+
+import re
+from collections.abc import Iterable
+
+from .columns import QUANTITY
+
+# Other names of signals that files use, without case, blanks and marks between words.
+CALLED: dict[str, tuple[str, ...]] = {
+    "time": (
+        *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
+        *("timestamputc", "gpstime", "elapsedtime", "seconds"),
+    ),
+    "x": ("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
+    "y": ("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
+    "psi": (
+        *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
+        *("hdm", "compass", "gyro", "gyrocompass"),
+    ),
+    "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
+    "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
+    "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
+    "u": ("surgespeed", "surgevelocity", "velocitysurge"),
+    "v": ("swayspeed", "swayvelocity", "velocitysway"),
+    "r": ("yawrate", "rateofturn", "rot", "psidot", "headingrate"),
+    "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
+    "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
+    "speed": ("sog", "speedoverground"),
+    "course": ("cog", "courseoverground"),
+    "u_water": ("stw", "speedthroughwater"),
+    "wind_speed": ("truewindspeed", "tws"),
+    "wind_direction": ("truewinddirection", "truewinddir", "truewindangle", "twd"),
+    "wind_speed_relative": (
+        *("relativewindspeed", "relwindspeed", "windspeedrel", "apparentwindspeed", "rws", "aws"),
+    ),
+    "wind_direction_relative": (
+        *("relativewinddirection", "relativewinddir", "relativewindangle", "relwinddirection"),
+        *("relwinddir", "relwindangle", "winddirectionrel", "apparentwinddirection"),
+        *("apparentwindangle", "rwd", "rwa", "awa"),
+    ),
+}
+OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
+
+
+def _folded(name: str) -> str:
+    """A name without case, blanks and marks between words."""
+    return re.sub(r"[\W_]", "", name).casefold()
+
+
+# What a column may be called -> signal, and whether its axis points the other way.
+MEANT = (
+    {_folded(name): (signal, True) for name, signal in OPPOSITE.items()}
+    | {_folded(name): (signal, False) for signal, names in CALLED.items() for name in names}
+    | {_folded(signal): (signal, False) for signal in QUANTITY}
+)
+
+
+def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
+    """Which of some signals a name means, and whether its axis points the other way.
+
+    Of a name with a path, as ``/gnss/pose/position/x``, the last two parts or the last one count.
+
+    Returns:
+        An empty name where it means none of them.
+    """
+    known = MEANT | {_folded(signal): (signal, False) for signal in signals}
+    parts = name.split("/")
+    for part in (name, "".join(parts[-2:]), parts[-1]):
+        found = known.get(_folded(part), ("", False))
+        if found[0] in signals:
+            return found
+    return "", False
