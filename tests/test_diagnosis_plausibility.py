@@ -17,7 +17,7 @@ from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, 
 import diagnosis
 from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
-from diagnosis import InputError, Model, Run, propose_columns, weak_windows
+from diagnosis import InputError, Model, Run, omega, propose_columns, weak_windows
 from diagnosis.assessment import plausibility
 from diagnosis.assessment.command_check import without_force
 from diagnosis.assessment.gains import gains
@@ -260,9 +260,12 @@ def test_a_force_where_no_actuator_pushes_is_a_question():
     (w,) = diagnosis.load(otter(), ship="otter")
     model = Model(ship=ship_with((), "otter"))
     assert pushed_aside(w, model) is None
+    stream = model.plus({"F_n": 400.0, "F_e": 300.0})  # such as a current that the model does not have
+    assert np.abs(omega(w, stream)[:, 1]).max() > 239.0
+    assert pushed_aside(w, stream) is None
     said = pushed_aside(reread(w, of_pose("", (100.0, 100.0, 1.0)), model), model)
     assert said is not None
-    assert " sideways, where no actuator acts, and all actuators together give 239 N" in said
+    assert " sideways, where no actuator acts on a ship at rest, and all together give 239 N" in said
 
 
 def test_a_propeller_that_cannot_reverse_gives_no_force():

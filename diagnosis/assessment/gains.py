@@ -98,14 +98,20 @@ def other_forces(w: WeakWindows, a: np.ndarray, z: np.ndarray) -> list[np.ndarra
         w: windows of a run.
         a, z: (K, 3), inertial force and that which the motion needs.
     """
-    psi = w.smoothed.eta[:, 2]
     u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
-    north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
     found = []
-    for j, earth in enumerate(([north, east], [-east, north], [])):
-        states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v, *earth]
-        found.append(np.column_stack([(z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]))
+    for j, constant in enumerate(constant_forces(w)):
+        states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v]
+        found.append(np.column_stack([(z - a)[:, j], constant, *(w.smooth @ s for s in states)]))
     return found
+
+
+def constant_forces(w: WeakWindows) -> list[np.ndarray]:
+    """Forces on surge, sway, yaw that are constant in the axes of ship or earth, columns (K, m) of each."""
+    psi, one = w.smoothed.eta[:, 2], np.ones(len(w.middle))
+    north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
+    earth = ([north, east], [-east, north], [])
+    return [np.column_stack([one, *(w.smooth @ s for s in each)]) for each in earth]
 
 
 def _own(command: np.ndarray, others: Sequence[np.ndarray]) -> float:

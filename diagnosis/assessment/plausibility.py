@@ -21,8 +21,9 @@ from ..predictors import Model, WeakWindows, omega
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
+from ..runs.smoothing.delay import least_squares
 from .command_check import beyond_thrusters, contradicted_commands
-from .gains import gains
+from .gains import constant_forces, gains
 from .late_commands import late_commands
 from .reading_odds import ReadingOdds, most_thrust
 from .readings import AS_READ, Reading, other_factors, readings, reread
@@ -105,9 +106,13 @@ def _late(w: WeakWindows, model: Model) -> Misreading | None:
 
 
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:
-    """A clause about a force that a ship cannot give, on an axis that no actuator commands."""
+    """A clause about a force that a ship cannot give, on an axis that no actuator commands.
+
+    What a current or a wind may give does not count, a constant force in the ship's or the earth's axes.
+    """
     e, T = omega(w, model), w.held @ w.run.tau_cmd
-    lacking, full = np.sqrt((e**2).mean(axis=0)), most_thrust(w, model)
+    left = [each - x @ least_squares(x, each) for x, each in zip(constant_forces(w), e.T, strict=True)]
+    lacking, full = np.sqrt(np.mean(np.square(left), axis=1)), most_thrust(w, model)
     idle = ~T.any(axis=0) & (lacking > SETTINGS.much * full)
     if not idle.any():
         return None
@@ -115,7 +120,7 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     unit = "N.m" if k == 2 else "N"
     return (
         f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no "
-        f"actuator acts, and all actuators together give {full[k]:.3g} {unit}: check columns, "
+        f"actuator acts on a ship at rest, and all together give {full[k]:.3g} {unit}: check columns, "
         "units and axes"
     )
 
