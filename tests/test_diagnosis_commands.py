@@ -274,6 +274,7 @@ UGLY = {
         ["a.csv", "--horizon", "1000"],
         "longer than every run; the longest has",
     ),
+    "a horizon within a row": (["a.csv", "--horizon", "0.001"], "shorter than the"),
     "effects that are none": (["a.csv", "--effects", "none.py"], "registers no effect"),
 }
 

@@ -121,6 +121,10 @@ def test_the_command_takes_a_file_and_says_how_it_predicts(tmp_path, file):
         ("def acceleration(state, commands):\n    return 0.0, 0.0", "must return u_dot, v_dot, r_dot"),
         ("def acceleration(state, commands):\n    return commands['rudder'], 0, 0", "fails: KeyError"),
         ("def acceleration(state, commands):\n    return [0.0, 0.0], 0.0, 0.0", "fails: ValueError"),
+        (
+            "def acceleration(state, commands):\n    return state.u * float('nan'), 0.0, 0.0",
+            "'bad.py' gives the accelerations nan, 0, 0 in a measured state: u = ",
+        ),
     ],
 )
 def test_a_function_that_is_none_is_refused_in_one_line(runs, tmp_path, content, message):

@@ -107,7 +107,7 @@ def other_forces(w: WeakWindows, a: np.ndarray, z: np.ndarray) -> list[np.ndarra
 
 
 def constant_forces(w: WeakWindows) -> list[np.ndarray]:
-    """Forces on surge, sway, yaw that are constant in the axes of ship or earth, columns (K, m) of each."""
+    """Forces on surge, sway, yaw that are constant in the axes of ship or earth, columns (K, m)."""
     psi, one = w.smoothed.eta[:, 2], np.ones(len(w.middle))
     north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
     earth = ([north, east], [-east, north], [])

@@ -48,8 +48,9 @@ def gather(
         For each run its windows of the weak form; names are unique.
 
     Raises:
-        InputError: a horizon that is not positive or longer than every run; or a run that cannot be
-            used, is given twice by whatever name, or seems to be misread.
+        InputError: a horizon that is not positive, longer than every run or shorter than the time
+            between two samples; or a run that cannot be used, is given twice by whatever name, or seems
+            to be misread.
     """
     if not paths:
         raise InputError("there is no run to read")
@@ -67,6 +68,11 @@ def gather(
     if horizon is not None and horizon > longest:
         raise InputError(
             f"the horizon, {horizon:g} s, is longer than every run; the longest has {longest:.4g} s"
+        )
+    rarest = max(s.track.period for s in smoothed)
+    if horizon is not None and horizon < rarest:
+        raise InputError(
+            f"the horizon, {horizon:g} s, is shorter than the {rarest:.3g} s between two samples"
         )
     return usable(smoothed, model, anyway, horizon)
 

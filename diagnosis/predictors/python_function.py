@@ -89,7 +89,14 @@ class FunctionPredictor(BlackBox):
     def accelerations(self, signals: Signals) -> np.ndarray:
         none = np.zeros(next(iter(signals.values())).shape)
         state = vessel.State._make([*(signals[name] for name in MOTION), none])
-        return np.column_stack(self.answer(state, signals))
+        found = np.column_stack(self.answer(state, signals))
+        sound = np.isfinite(np.column_stack([signals[name] for name in (*MOTION, *TAU)])).all(axis=1)
+        if (wrong := sound & ~np.isfinite(found).all(axis=1)).any():
+            k = int(np.argmax(wrong))
+            at = ", ".join(f"{name} = {signals[name][k]:.4g}" for name in ("u", "v", "r"))
+            told = ", ".join(f"{x:g}" for x in found[k])
+            raise InputError(f"'{self.name}' gives the accelerations {told} in a measured state: {at}")
+        return found
 
     def answer(self, state: vessel.State, commands: Signals) -> list[np.ndarray]:
         """What the function returns, three arrays (n,).

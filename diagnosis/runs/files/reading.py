@@ -269,7 +269,13 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         raise InputError(
             f"{where}: commands reach {np.abs(tau).max():g} N, more than any thruster gives"
         )
-    missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*TAU, *own, *settings)) if s in columns]
+    given = [s for s in dict.fromkeys((*TAU, *own, *settings)) if s in columns]
+    if empty := next((s for s in given if not np.isfinite(columns[s]).any()), None):
+        raise InputError(
+            f"{where}: the command {empty} has no value in any row; if it was never given, leave out "
+            "its column, or fill in zeros"
+        )
+    missing = [~np.isfinite(columns[s]) for s in given]
     lost = sum(gaps.any() for gaps in missing)
     if tau is None:
         assert commands is not None
