@@ -4,6 +4,7 @@ import json
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
 from support.measured import jumps, sail, slow_swings, table_of
 
@@ -88,6 +89,14 @@ def test_of_commands_in_time_or_early_nothing_is_reported(rows, tmp_path):
 
 def test_commands_that_change_slowly_do_not_show_it(tmp_path):
     assert not lines(tmp_path, late(made(slow_swings), "tau_X"))[1]
+
+
+def test_a_controller_that_commands_what_its_ship_has_just_done_is_not_late(tmp_path):
+    """The moment follows the yaw acceleration by 0.4 s, with a size that is not the force's."""
+    table = made()
+    r = np.gradient(np.unwrap(table["psi"]), H)
+    acceleration = pd.Series(np.gradient(r, H)).rolling(5, center=True, min_periods=1).mean()
+    assert not lines(tmp_path, late(table.assign(tau_N=acceleration.clip(-0.3, 0.3)), "tau_N"))[1]
 
 
 @pytest.mark.parametrize("cause", ["none", "lag", "current"])

@@ -8,7 +8,9 @@ the likelihood
     2 log L = -sum_axes n log sum (r^2 + s^2).
 
 A column is late if that is far likelier than commands as they are, later, or of actuators with a
-smaller lag than in the ship's file, and if the blocks of the run agree (Student's test). Of one column
+smaller lag than in the ship's file, and if the blocks of the run agree (Student's test). The factor of
+the force must be one to MEASURED, or nearer to one than as it is logged. A controller commands what its
+ship has just done, so that disturbances look like commands to come, with another factor. Of one column
 and all of them the first is reported, unless all are far likelier.
 """
 
@@ -21,7 +23,7 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import Integral
-from ..predictors.uncertainty import correlated_windows, omega_std
+from ..predictors.uncertainty import MEASURED, correlated_windows, omega_std
 from ..predictors.weak_form import OF_MOTION, OVERLAP, needed_force
 from ..runs import Run
 from ..runs.cleaning import BRIEF
@@ -30,6 +32,7 @@ from ..runs.run_constants import CHANCE, PARTS
 from ..runs.smoothing.delay import LONGEST, least_squares, surely_positive
 from .gains import other_forces
 from .readings import inertial
+from .settings import SETTINGS
 
 
 class Late(NamedTuple):
@@ -41,11 +44,19 @@ class Late(NamedTuple):
 
 
 class _Score(NamedTuple):
-    """Logarithm of the likelihood, size (3,) of the residual, and its squares of blocks (blocks, 3)."""
+    """How well a force of the thrusters explains the inertial force.
+
+    Attributes:
+        total: logarithm of the likelihood.
+        size: (3,), of the residual.
+        squares: (blocks, 3), of the residual.
+        factor: (3,), by which the force acts.
+    """
 
     total: float
     size: np.ndarray
     squares: np.ndarray
+    factor: np.ndarray
 
 
 def earlier(run: Run, columns: Sequence[int], seconds: float, model: Model) -> Run:
@@ -95,26 +106,28 @@ class Timing:
         """(K, 3), force of the thrusters by the commands as they are logged."""
         return self.force((), 0.0)
 
-    def _left(self, force: np.ndarray) -> np.ndarray:
-        """(K, 3), what a force of the thrusters leaves of the inertial force."""
-        left = np.zeros_like(self._a)
+    def _regressed(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(K, 3), what a force of the thrusters leaves of the inertial force, and its factor (3,)."""
+        left, factor = np.zeros_like(self._a), np.zeros(3)
         for j, others in enumerate(self._others):
             x = np.column_stack([force, others])
-            left[:, j] = self._a[:, j] - x @ least_squares(x, self._a[:, j])
-        return left
+            fitted = least_squares(x, self._a[:, j])
+            left[:, j], factor[j] = self._a[:, j] - x @ fitted, fitted[j]
+        return left, factor
 
     @cached_property
     def independent(self) -> np.ndarray:
         """(3,), independent windows by the residual of the commands as they are logged."""
-        left = self._left(self.as_logged)
+        left, _ = self._regressed(self.as_logged)
         return len(left) / np.maximum(OVERLAP, correlated_windows([self.w], left))
 
     def score(self, force: np.ndarray) -> _Score:
         """The likelihood of a force of the thrusters."""
-        left = self._left(force) ** 2
+        left, factor = self._regressed(force)
+        left = left**2
         size = left.sum(axis=0) + self._noise
         squares = np.stack([np.bincount(self._block, each) for each in left.T], axis=1)
-        return _Score(-0.5 * float(self.independent @ np.log(size)), size, squares)
+        return _Score(-0.5 * float(self.independent @ np.log(size)), size, squares, factor)
 
     def likeliest(self, columns: Sequence[int], times: np.ndarray) -> tuple[float, _Score]:
         """The likeliest of some times [s] for columns."""
@@ -153,5 +166,9 @@ def late_commands(w: WeakWindows, model: Model) -> Late | None:
     odds = best.total - as_given.total - np.log(tries)
     fall = (as_given.squares - best.squares) @ (timing.independent / best.size)
     if not (odds > asked and surely_positive(fall, CHANCE / tries)):
+        return None
+    axis = int(np.argmax(timing.independent * np.log(as_given.size / best.size)))
+    off = abs(timing.score(timing.as_logged).factor[axis] - 1.0)
+    if abs(best.factor[axis] - 1.0) > max(MEASURED, min(off, SETTINGS.much)):
         return None
     return Late([names[k] for k in columns], seconds, float(odds))
