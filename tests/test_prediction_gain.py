@@ -7,13 +7,20 @@ import numpy as np
 import pytest
 from support.measured import sail, smoothed
 
-from diagnosis import Finding, Findings, Model, weak_windows
+from benchmarks.ship_effects import causes
+from benchmarks.ship_effects import sail as sail_of
+from diagnosis import Finding, Findings, Model, load, weak_windows
+from diagnosis.predictors import ship_with
+from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
-from diagnosis.verdict.coefficients import better_calibration
+from diagnosis.verdict.coefficients import any_sure, better_calibration
+from diagnosis.verdict.confidence import confidence_of
 from diagnosis.verdict.prediction_gain import (
     PairedChange,
     PredictionGain,
+    _columns,
+    _spanned,
     gain_of_search,
     prediction_gain,
     without_gain,
@@ -162,3 +169,58 @@ def test_what_calibration_predicts_as_well_is_not_shown_but_for_changes_of_coeff
     coefficients = [*NominalPrior.of(start).std]
     assert without_gain(gain, findings, start, run(), coefficients) == unshown
     assert not without_gain(None, findings, start, run(), coefficients)
+
+
+BOAT = """
+name = "boat"
+title = "a boat"
+source = "made"
+length = 2.0
+beam = 0.8
+thrust_allocation = false
+[inertia]
+m = { value = 50, rel_std = 0.03 }
+I_z = { value = 12, rel_std = 0.2 }
+X_udot = { value = -4, rel_std = 0.5 }
+Y_vdot = { value = -30, rel_std = 0.3 }
+N_rdot = { value = -8, rel_std = 0.3 }
+[hull]
+terms = [
+    { axis = "X", product = "|u|u", value = -15, rel_std = 0.2 },
+    { axis = "Y", product = "|u|v", value = -90, rel_std = 0.3 },
+    { axis = "N", product = "|u|r", value = -30, rel_std = 0.3 },
+    { axis = "N", product = "uv", value = 20, rel_std = 0.3 },
+]
+[[actuators]]
+name = "pod"
+law = "azimuth"
+x = { value = -1.0, rel_std = 0.0 }
+y = { value = 0.0, rel_std = 0.0 }
+k_ahead = { value = 0.1, rel_std = 0.1 }
+k_astern = { value = 0.1, rel_std = 0.1 }
+n_max = 20.0
+n_min = -20.0
+alpha_max = 0.6
+"""
+
+
+def test_what_only_all_coefficients_together_make_up_is_no_change_of_coefficients(tmp_path):
+    """Of surge and sway each equation may have a factor, and with it m - X_udot in both another value."""
+    path = tmp_path / "boat.toml"
+    path.write_text(BOAT)
+    boat = ship_with((), str(path))
+    start = Model(ship=boat)
+    runs = load(sail_of(boat, causes(boat)["none"], np.random.default_rng(1), None, seconds=120.0), ship=path)
+    values = {"Y_ur": {"delta_Y_ur": 20.0}, "added_mass_Y": {"added_mass_Y": 9.0}}
+    each = [Finding(i, v, {}, 0.9, [], 1.0, 1.0, start) for i, v in values.items()]
+    findings = Findings(each, model=start, sigma=np.ones(3))
+    change = PairedChange(1.0, 1.0, 0.0, 1.0)
+    gain = PredictionGain("validation runs", 9, change, change, False, "calibrated")
+    names = [*NominalPrior.of(start).std]
+    columns = [
+        _columns(runs, start, model_error(runs, start), x, np.ones(3)) for x in (["delta_Y_ur"], names)
+    ]
+    assert _spanned(*columns)
+    assert without_gain(gain, findings, start, runs, names) == {"Y_ur"}
+    sure = confidence_of(each[0], start).own >= 0.8
+    assert (sure, any_sure(Findings(each[:1], model=start), start, {"Y_ur"})) == (True, False)

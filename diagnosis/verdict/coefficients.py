@@ -1,6 +1,6 @@
 """Nominal coefficients in place of effects: where they alone explain the data, or predict better."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import gain, harm, predicts_worse
-from .confidence import FOUND, confidence_of
+from .confidence import FOUND, Doubts, confidence_of
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -40,9 +40,10 @@ def any_finding(found: Findings, start: Model) -> bool:
     return any(confidence_of(f, start).is_finding for f in found.effects)
 
 
-def any_sure(found: Findings, start: Model) -> bool:
-    """Whether any effect is a sure finding by its own evidence."""
-    return any(confidence_of(f, start).own >= FOUND for f in found.effects)
+def any_sure(found: Findings, start: Model, without_gain: Collection[str]) -> bool:
+    """Whether any effect is a sure finding by its own evidence, and predictions show it."""
+    doubts = Doubts(without_gain=without_gain)
+    return any(confidence_of(f, start, doubts).own >= FOUND for f in found.effects)
 
 
 def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Conclusion:

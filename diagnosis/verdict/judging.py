@@ -143,33 +143,35 @@ def judge(
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (changed and not left)
-    if calibrates and not any_sure(fit.findings, start):
-        advance("calibration")
+    gain, unshown = None, set[str]()
+    if calibrates:
+        advance("gain of the search over calibration")
+        coefficients = None if calibration is None else calibration.findings
         now = _predicting(fit.findings, data, changed)
-        believed = any_finding(fit.findings, start)
-        other = None if believed else calibrated(fit.findings, data, prior)
-        other = other or better_calibration(calibration, now, data, drives)
+        gain = gain_of_search(data, start, coefficients, fit.findings, now)
+        unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
+        other = None
+        if not any_finding(fit.findings, start):
+            other = calibrated(fit.findings, data, prior)
+        if other is None and not any_sure(fit.findings, start, unshown):
+            other = better_calibration(calibration, now, data, drives)
         if other is not None:
             dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
+            now = _predicting(fit.findings, data, changed)
+            gain = gain_of_search(data, start, coefficients, fit.findings, now)
     advance("residual")
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
     explained = shares(fit.findings, start, data.validate)
     alone = unique_shares(fit.findings, start, train, data.validate)
-    gain = None
-    if calibrates:
-        advance("gain of the search over calibration")
-        coefficients = None if calibration is None else calibration.findings
-        now = _predicting(fit.findings, data, changed)
-        gain = gain_of_search(data, start, coefficients, fit.findings, now)
     doubts = Doubts(
         residual=unexplained_axes(fit.findings, remainder, start),
         of_data=doubt_of_data(train),
         replaceable=replaceable(fit.findings, start, explained, alone),
         on_one_line=on_one_line(fit.findings, start, train),
         smoothed=faster_than_smoothing(fit.findings, start, train),
-        without_gain=without_gain(gain, fit.findings, start, train, [*prior.std]),
+        without_gain=unshown,
     )
     learned = with_confidence(fit.findings, start, doubts)
     known, force = fit.posterior, fit.unrecorded
