@@ -48,9 +48,8 @@ def gather(
         For each run its windows of the weak form; names are unique.
 
     Raises:
-        InputError: a horizon that is not positive, longer than every run or shorter than the time
-            between two samples; or a run that cannot be used, is given twice by whatever name, or seems
-            to be misread.
+        InputError: a horizon that is not positive, longer than every run or shorter than a row; a run
+            that cannot be used, is given twice by whatever name, or seems to be misread.
     """
     if not paths:
         raise InputError("there is no run to read")
