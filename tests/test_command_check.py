@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from diagnosis import Model, Run
 from diagnosis.assessment.command_check import beyond_thrusters, idle, lasting
 from diagnosis.assessment.settings import SETTINGS
+from diagnosis.predictors import ship_with
 from diagnosis.predictors.thrust import full_thrust
 
 MODEL = Model()
@@ -72,6 +73,17 @@ def test_rows_are_idle_where_all_commands_are_zero_for_long_whatever_times_are_m
         expected += [z and known.size > 0 and known[-1] - known[0] >= 0.45] * stamps.size
         start += stamps.size
     assert idle(replace(run, time=time), 0.45).tolist() == expected
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_axis_without_thrust_or_command_is_not_the_one_named():
+    """A log of another ship: the force ahead of one whose actuators are weaker, and none sideways."""
+    tanker = Model(ship=ship_with((), "kvlcc2"))
+    assert full_thrust(tanker)[1] == 0.0
+    tau = np.tile([1e6 * full_thrust(tanker)[0], 0.0, 0.0], (ROWS, 1))
+    text = beyond_thrusters(Run("made", 0.1 * np.arange(ROWS), np.zeros_like(tau), tau), tanker)
+    assert text.startswith("tau_X reaches ")
+    assert "--ship" in text
 
 
 @pytest.mark.parametrize("axis", range(3))

@@ -210,7 +210,9 @@ def test_what_only_all_coefficients_together_make_up_is_no_change_of_coefficient
     path.write_text(BOAT)
     boat = ship_with((), str(path))
     start = Model(ship=boat)
-    runs = load(sail_of(boat, causes(boat)["none"], np.random.default_rng(1), None, seconds=120.0), ship=path)
+    runs = load(
+        sail_of(boat, causes(boat)["none"], np.random.default_rng(1), None, seconds=120.0), ship=path
+    )
     values = {"Y_ur": {"delta_Y_ur": 20.0}, "added_mass_Y": {"added_mass_Y": 9.0}}
     each = [Finding(i, v, {}, 0.9, [], 1.0, 1.0, start) for i, v in values.items()]
     findings = Findings(each, model=start, sigma=np.ones(3))

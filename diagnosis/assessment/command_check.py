@@ -23,7 +23,8 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     share = (size * beyond).sum(axis=0) / np.maximum(size.sum(axis=0), np.finfo(float).tiny)
     if share.max() <= SETTINGS.negligible:
         return None
-    k = int(np.argmax((size / full).max(axis=0) * (share > SETTINGS.negligible)))
+    ratio = size.max(axis=0) / np.maximum(full, np.finfo(float).tiny)
+    k = int(np.argmax(np.where(share > SETTINGS.negligible, ratio, 0.0)))
     rows, unit = int(beyond[:, k].sum()), "N.m" if k == 2 else "N"
     seen = (
         f"{TAU[k]} reaches {size[:, k].max():.4g} {unit}, more than {SETTINGS.most_gain:g} times "
