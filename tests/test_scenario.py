@@ -380,7 +380,7 @@ def test_a_hidden_file_is_not_proposed_as_a_scenario(tmp_path, monkeypatch):
 
 def test_an_empty_file_is_called_so(tmp_path):
     (tmp_path / "s.json").write_text(" \n")
-    with pytest.raises(InputError, match="cannot be read as a scenario: it is empty$"):
+    with pytest.raises(InputError, match=r"cannot be read as a scenario: it is empty$"):
         load_scenario(tmp_path / "s.json")
 
 
