@@ -1,7 +1,6 @@
 """What every command does around its own work: exit codes, signals, broken pipes."""
 
 import argparse
-import os
 import sys
 from collections import namedtuple
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from cybership.command_arguments import (
 )
 from cybership.message_text import printable
 from cybership.renamed import OPTIONS, old_names
+from cybership.standard_streams import FAILED, code_of
 
 from .interrupts import (
     INTERRUPTED,
@@ -46,8 +46,8 @@ __all__ = [
     "whole_number",
 ]
 
-# Exit codes; 130 is what shells report after Ctrl-C (128 + SIGINT).
-BAD_INPUT, FAILED = 2, 3
+# Exit codes, with FAILED; 130 is what shells report after Ctrl-C (128 + SIGINT).
+BAD_INPUT = 2
 # Libraries that not every installation has, as they are imported -> the extra that brings them.
 EXTRAS = {
     "cryptography": "diagnosis",
@@ -103,16 +103,6 @@ class Output(Console):
         raise BrokenPipeError
 
 
-def _code_of(main: Callable[[], int]) -> int:
-    """Exit code of a command; argparse raises its own after it has written help or what is wrong."""
-    try:
-        return main()
-    except SystemExit as request:
-        if request.code is None or isinstance(request.code, int):
-            return request.code or 0
-        return FAILED
-
-
 def run_command(main: Callable[[], int]) -> NoReturn:
     """Run a command's ``main`` and exit with its code; an exception becomes one line on standard error.
 
@@ -123,9 +113,7 @@ def run_command(main: Callable[[], int]) -> NoReturn:
     try:
         raise_on_interrupt()
         try:
-            done = _code_of(main)
-            sys.stdout.flush()
-            code = done
+            code = code_of(main)
         finally:
             ignore_interrupts()
     except KeyboardInterrupt as interrupt:
@@ -134,10 +122,6 @@ def run_command(main: Callable[[], int]) -> NoReturn:
         # CPython ends by the signal itself if KeyboardInterrupt left an exec(), as of a named tuple that
         # was being made, though it was caught; making another one clears that mark.
         namedtuple("Cleared", ())
-    except BrokenPipeError:
-        code = 0
-    except OSError as error:
-        complain(error)
     except ModuleNotFoundError as error:
         line = missing_extra(error)
         complain(line or f"internal error: {error!r}; please report it")
@@ -150,6 +134,4 @@ def run_command(main: Callable[[], int]) -> NoReturn:
         else:
             complain(f"internal error: {error!r}; please report it")
     STATE.end(code)
-    # Text left in the buffer of a closed pipe must not raise again while Python exits.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)

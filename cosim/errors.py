@@ -1,5 +1,6 @@
 """The two ways in which a run can go wrong, parts of messages, and keys that occur twice."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ class SimulationError(PrintableError):
 
 def not_written(folder: Path, error: OSError) -> str:
     """The message about a result folder that cannot be written to."""
-    if folder.is_file():
+    if os.path.isfile(folder):  # Path.is_file raises for names that are too long
         return f"cannot write to '{folder}': it is a file, not a folder"
     return f"cannot write to '{folder}': {error.strerror or error}"
 

@@ -17,8 +17,9 @@ from cybership.scratch_folder import atomic_write
 
 from .command import BAD_INPUT, Output, command_parser, complain, run_command
 from .errors import InputError
-from .results.log import CSV, Log, read_log
+from .results.log import Log, read_log
 from .results.performance import MetricsError, compute, over_time, table
+from .results.result_files import FILES
 from .results.run_options import read_options
 from .scenario.roles import Roles
 from .trials.trial_outcome import sheet, simulated_trial
@@ -92,8 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stop = run.stop if options.stop is None else options.stop
         metrics = compute(log, start, stop, run.roles)
         if options.out is not None:
-            if options.out.resolve().parent == options.folder.resolve() and options.out.name == CSV:
-                raise InputError(f"'{options.out}' is the log itself; name another file")
+            if options.out.resolve().parent == options.folder.resolve() and options.out.name in FILES:
+                raise InputError(f"'{options.out}' is a file of the run itself; name another file")
             _write_csv(options.out, over_time(log, start, stop, run.roles))
     except (InputError, MetricsError) as error:
         complain(error)

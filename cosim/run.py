@@ -12,6 +12,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from cybership.message_text import counted
+
 from .command import (
     BAD_INPUT,
     FAILED,
@@ -167,11 +169,12 @@ def _progress(console: Console, scenario: Scenario, quiet: bool) -> Iterator[Cal
 
 
 def _report(result: Result, quiet: bool) -> None:
+    kept_rows = f"{counted(result.rows, 'row')} {'is' if result.rows == 1 else 'are'} kept in"
     if result.status == "failed":
-        kept = f"; {result.rows} rows are kept in '{result.folder}'" if result.rows else ""
+        kept = f"; {kept_rows} '{result.folder}'" if result.rows else ""
         complain(f"{result.message}{kept}")
     elif result.status == "interrupted":
-        complain(f"{result.rows} rows are kept in '{result.folder}'", kind="interrupted: ")
+        complain(f"{kept_rows} '{result.folder}'", kind="interrupted: ")
     if quiet:
         return
     output = Output(highlight=False)
@@ -184,7 +187,7 @@ def _report(result: Result, quiet: bool) -> None:
             f"jitter {1e3 * result.pace['jitter_rms']:.2f} ms RMS"
         )
     if result.status == "done":
-        output.print(printable(f"{result.rows} rows in {result.folder}"), soft_wrap=True)
+        output.print(printable(f"{counted(result.rows, 'row')} in {result.folder}"), soft_wrap=True)
     if kind := kind_of(result.native):
         output.print(kind, soft_wrap=True)
 

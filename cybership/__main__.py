@@ -8,6 +8,7 @@ if __name__ == "__main__":
 import runpy
 import sys
 
+from .standard_streams import code_of
 from .subcommands import SUBCOMMANDS, all_modules, purpose
 
 USAGE = """usage: cybership COMMAND [...]
@@ -57,4 +58,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(code_of(main))

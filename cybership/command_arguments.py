@@ -4,15 +4,20 @@ import argparse
 import re
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from .message_text import most_alike, printable
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 
 def complain(message: object, kind: str = "error: ") -> None:
     """Say on standard error why the command ends, in one line."""
-    print(f"{kind}{printable(str(message))}", file=sys.stderr, flush=True)
+    with suppress(OSError):  # its reader has left, or the disk is full: the exit code remains
+        print(f"{kind}{printable(str(message))}", file=sys.stderr, flush=True)
 
 
 def program(module: str) -> str:
@@ -22,6 +27,10 @@ def program(module: str) -> str:
 
 class _Parser(argparse.ArgumentParser):
     """A parser that names the nearest option where there is no such option."""
+
+    def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print the help; argparse itself hides that it cannot be written."""
+        print(self.format_help(), end="", file=file)
 
     def error(self, message: str) -> NoReturn:
         options = [option[2:] for action in self._actions for option in action.option_strings]

@@ -1,9 +1,9 @@
 """Shell completion: ``eval "$(cybership completion bash)"``; so for zsh, for fish with ``source``."""
 
-import sys
 from collections.abc import Sequence
 
 from cosim import shipped_names
+from cosim.command import run_command
 from cybership.command_arguments import command_parser
 from cybership.subcommands import all_modules
 
@@ -60,4 +60,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -46,6 +46,11 @@ def brief(text: str) -> str:
     return _cut(_words_cut(text, LONGEST_VALUE + 4), LONGEST_FAULT)  # quotes and punctuation around it
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things: "1 row", "2 rows"."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 def quoted(value: object) -> str:
     """A value of a file as a message repeats it: as Python writes it, and cut."""
     return _cut(repr(value), LONGEST_VALUE)

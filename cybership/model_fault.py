@@ -8,6 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from .message_text import Location, brief, name_of, nearest, quoted
 
+TYPES = {"extra_forbidden": 0, "finite_number": 1}  # of faults that come before others
 Special = Callable[[str, Location, object], str]
 
 
@@ -19,14 +20,15 @@ def no_special(*_: object) -> str:
 def first_fault(error: ValidationError, form: object, special: Special = no_special) -> str:
     """The first fault of a file in one line.
 
-    A key that is not known comes before the one that it leaves missing.
+    A key that is not known comes before the one that it leaves missing, and a number that is not finite
+    before what else could stand in its place.
 
     Args:
         error: of the content.
         form: the model of the content, or another type; tells which keys there are in each place.
         special: what is said of a fault by its type, place and value; empty: what pydantic says.
     """
-    fault = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+    fault = min(error.errors(), key=lambda each: TYPES.get(each["type"], len(TYPES)))
     kind, at, text, value = fault["type"], fault["loc"], fault["msg"], fault["input"]
     place, known = _place(at[:-1] if kind == "extra_forbidden" else at, form)
     if kind == "extra_forbidden":

@@ -53,6 +53,10 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         from .acceptance import read_criteria
 
         criteria = read_criteria(options.criteria)
+    if options.sign is not None:
+        from .acceptance import public_key
+
+        public_key(options.sign)  # whose faults are reported before the work
     with together(options.out, (*FILES, MAP, *RECORD)) as new:
         craft = ship_with(options.effects, options.ship or ship_of_model(options.model))
         model = open_model(options.model, options.map, craft, execution_of(options))

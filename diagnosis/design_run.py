@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field
 
 from cosim import InputError
 from cosim.command import command_parser, positive, run_command
-from cosim.scenario import checked, json_content
+from cosim.scenario import checked, find_parameters, json_content
 
 from .commands.command_line import Done, out_options, run
 from .execution.progress import Advance
@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def design(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.diagnosis
+    if options.simulate is not None:
+        list(find_parameters([options.simulate]))  # whose faults are reported before the work
     content = _diagnosis(folder / DIAGNOSIS)
     task = _task(folder / POSTERIOR)
     if "parameters" in content:
@@ -169,6 +171,16 @@ def _count(text: str) -> int:
     return int(text)
 
 
+def _criterion(text: str) -> str:
+    from .design import check_criterion
+
+    try:
+        check_criterion(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
 def _seed(text: str) -> int:
     if not text.isdecimal() or int(text) >= 2**31:
         raise argparse.ArgumentTypeError(f"needs a whole number from 0 to {2**31 - 1}, not '{text}'")
@@ -209,6 +221,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument(
         "--criterion",
+        type=_criterion,
         default="certainty",
         metavar="NAME",
         help="certainty, box-hill, buzzi-ferraris, d-optimal or a-optimal (default: certainty)",

@@ -33,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def trial(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.run
+    _check_log(options)
     if read_options(folder).trial is not None and options.trial is None:
         found, notes = simulated_trial(folder, options.start, options.stop), []
     else:
@@ -43,6 +44,26 @@ def trial(options: argparse.Namespace, advance: Advance) -> Done:
     title = f"Trial: {found.kind}, {folder.name}"
     written = f"{' and '.join(FILES)} in {options.out}"
     return Done(0, [sheet(found, title), *map(printable, [*notes, written])])
+
+
+def _check_log(options: argparse.Namespace) -> None:
+    """Refuse a ship or a kind of trial that is not that of the log of a simulated run.
+
+    Raises:
+        InputError: one is another than the log states.
+    """
+    log = read_options(options.run)
+    ship = log.ship or (log.outline and log.outline.name)
+    stated = {
+        "ship": (options.ship, ship, Path(options.ship or "").resolve() == Path(ship or "").resolve()),
+        "trial": (options.trial, log.trial and log.trial.kind, False),
+    }
+    for name, (given, told, same) in stated.items():
+        if given and told and given != told and not same:
+            raise InputError(
+                f"'{options.run}' is a log, and states the {name} '{told}'; --{name} {given} "
+                f"contradicts that: leave --{name} out"
+            )
 
 
 def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutcome, list[str]]:

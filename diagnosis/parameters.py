@@ -16,6 +16,7 @@ from rich.text import Text
 
 from cosim import InputError
 from cosim.command import printable, run_command
+from cybership.message_text import counted
 
 from .commands.command_line import Done, execution_of, fmu_parser, run
 from .execution.progress import Advance
@@ -68,7 +69,11 @@ def parameters(options: argparse.Namespace, advance: Advance) -> Done:
     options.write.parent.mkdir(parents=True, exist_ok=True)
     write_parameters(options.write, chosen)
     return Done(
-        0, [*shown, printable(f"'{options.write}' has {len(chosen)} parameters: check their priors")]
+        0,
+        [
+            *shown,
+            printable(f"'{options.write}' has {counted(len(chosen), 'parameter')}: check their priors"),
+        ],
     )
 
 

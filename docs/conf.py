@@ -37,7 +37,7 @@ def write_live_page(app: Sphinx, exception: Exception | None) -> None:
     """Write the page that the front page embeds, in which a scenario runs."""
     if exception is None and app.builder.name == "html":
         page = Path(app.outdir, "_static", "ellipse.html")
-        options = ["ellipse", "--stop", "60", "--out", str(page)]
+        options = ["ellipse", "--stop", "60", "--out", str(page), "--overwrite"]
         subprocess.run([sys.executable, "-m", "cosim.live", *options], check=True, cwd=app.outdir)
 
 

@@ -27,6 +27,8 @@ def read_archive(path: Path) -> tuple[list[zipfile.ZipInfo], bytes]:
     Raises:
         BadFileError: not there, no FMU, or a bomb.
     """
+    if path.is_dir():
+        raise BadFileError(f"'{path}' is a folder, not an FMU")
     if not path.is_file():
         raise BadFileError(f"no such FMU: '{path}'")
     try:

@@ -6,12 +6,14 @@ import os
 import signal
 import sys
 
+from cybership.standard_streams import code_of
+
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import NoReturn
 
-BAD_INPUT, INTERRUPTED = 2, 130  # exit codes; 128 + SIGINT, as shells have it
+INTERRUPTED = 130  # exit code; 128 + SIGINT, as shells have it
 # Wall time that an interrupted command has to end what it began [s]; then it ends at once. Chosen: with
 # that, and the end of the process, it has ended within 2 s, also where Python has lost the interrupt.
 GRACE = 1.5
@@ -48,14 +50,11 @@ def run_interruptible(main: Callable[[], int]) -> NoReturn:
     try:
         _on_interrupt(_raise)
         try:
-            code = main()
+            code = code_of(main)
         finally:
             _on_interrupt(signal.SIG_IGN)
             if hasattr(signal, "setitimer"):
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
     except KeyboardInterrupt:
         _leave()  # past what libraries do at exit, which may wait
-    except OSError as error:
-        sys.stderr.write(f"error: {error}\n")
-        code = BAD_INPUT
     sys.exit(code)

@@ -336,6 +336,7 @@ SHARED = {
         "model_fault",
         "renamed",
         "scratch_folder",
+        "standard_streams",
         "user_cache",
     )
 }

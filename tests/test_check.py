@@ -403,6 +403,11 @@ def test_command_is_content_with_a_sound_fmu(tmp_path):
     assert "no findings in 1 FMU" in done.stdout
 
 
+def test_a_folder_is_not_an_fmu(tmp_path):
+    done = run_check(tmp_path, "--no-run", "--only", "xsd")
+    assert (done.returncode, done.stderr) == (2, f"error: '{tmp_path}' is a folder, not an FMU\n")
+
+
 def test_a_reader_that_leaves_is_no_mistake(tmp_path, monkeypatch):
     def leave(*_):
         raise BrokenPipeError

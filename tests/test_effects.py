@@ -431,6 +431,7 @@ def test_one_function_in_one_file_adds_an_effect_to_the_fmu(tmp_path):
         (OWN.format(body=GOOD).replace('"force"', '"farce"'), "no kind 'farce'"),
         (OWN.format(body=GOOD).replace('    """A moment of my own."""\n', ""), "docstring"),
         ("x = 1", "registers no effect"),
+        ("class Other:\n    pass", "registers no effect"),
         ("import nowhere_at_all", "nowhere_at_all"),
     ],
 )

@@ -5,6 +5,7 @@ import re
 import sys
 from itertools import pairwise
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -40,6 +41,7 @@ from diagnosis.fmu_parameters.parameter_file import (
 )
 from diagnosis.fmu_parameters.residuals import Setting, WindowResiduals
 from diagnosis.fmu_parameters.sensitivity import confounded
+from diagnosis.fmu_parameters.ship_task import ShipTask
 from diagnosis.fmu_parameters.system_map import SystemMap, check_map, force_inputs
 from diagnosis.fmu_parameters.system_remainder import (
     _beyond,
@@ -688,3 +690,15 @@ def test_values_with_which_the_fmu_fails_in_a_fit_are_stated(work, capsys):
     assert found["verdict"] == "unexplained"
     assert found["parameters"][0]["value"] <= 11.0
     assert "The FMU fails with" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_time_that_is_none_has_no_state():
+    smoothed = SimpleNamespace(
+        nu=np.zeros((3, 3)),
+        time=np.arange(3.0),
+        track=SimpleNamespace(period=1.0, run=SimpleNamespace(name="a")),
+    )
+    task: Any = SimpleNamespace(runs={"train": [SimpleNamespace(smoothed=smoothed)]})
+    for time in (1e9, float("nan")):
+        with pytest.raises(InputError, match="run 'a' has no state at"):
+            ShipTask.state_at(task, time)

@@ -276,6 +276,12 @@ def test_two_versions_in_one_process_run_their_own_code(tmp_path, opened):
         ),
         ("import sys\nsys.exit(5)\n", "fails when imported"),
         (OWN.format(gain="float('nan')"), "k starts at nan"),
+        (
+            OWN.format(gain=20.0)
+            .replace('"gain"]', '"gain", Range(0.0, 10.0)]')
+            .replace("import Component", "import Component, Range"),
+            "k starts at 20, outside its range of 0 to 10",
+        ),
         (OWN.format(gain=1.0).replace('"N/m"', '"furlong"'), "unknown unit 'furlong'"),
         (OWN.format(gain=1.0).replace('"controller_mine"', '"../mine"'), "cannot be the name of an FMU"),
         (

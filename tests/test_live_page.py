@@ -186,6 +186,25 @@ def refused(content, folder):
     return line
 
 
+def test_files_that_are_no_such_page_are_not_replaced(tmp_path):
+    file, other, page = (tmp_path / name for name in ("s.json", "other.html", "page.html"))
+    file.write_text(json.dumps(scenario(stop=3.0)))
+    other.write_text("<!DOCTYPE html>")
+    (tmp_path / "folder").mkdir()
+    for out, more, said in (
+        (file, ("--overwrite",), "is an input of the page"),
+        (other, (), "exists and is not such a page; --overwrite replaces it"),
+        (tmp_path / "folder", ("--overwrite",), "is a folder"),
+    ):
+        before = out.is_file() and out.read_bytes()
+        done = command(main, file, "--out", out, *more)
+        assert (done.returncode, said in done.stderr) == (2, True)
+        assert (out.is_file() and out.read_bytes()) == before
+    assert command(main, file, "--out", other, "--overwrite").returncode == 0
+    assert command(main, file, "--out", other).returncode == 0, "its own page"
+    assert command(main, file, "--out", other / page.name).returncode == 2, "not in a file"
+
+
 def test_fmus_of_others_are_refused(fmus, tmp_path):
     content = scenario()
     content["fmus"]["vessel"]["path"] = str(fmus["vessel"])

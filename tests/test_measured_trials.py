@@ -146,6 +146,21 @@ def test_compare_writes_them(sailed, tmp_path):
         assert "overshoot_1" in page
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--ship", "kvlcc2"), "states the ship 'otter'; --ship kvlcc2 contradicts that"),
+        (("--trial", "zigzag"), "states the trial 'circle'; --trial zigzag contradicts that"),
+    ],
+)
+def test_what_contradicts_the_log_is_refused(sailed, tmp_path, arguments, said):
+    done = command(trial_main, sailed / "circle", *arguments, "--out", tmp_path / "out")
+    line = done.stderr.splitlines()[-1]
+    assert (done.returncode, said in line) == (2, True)
+    same = ("--ship", "otter", "--trial", "circle")
+    assert command(trial_main, sailed / "circle", *same, "--out", tmp_path / "out").returncode == 0
+
+
 def test_a_log_of_a_trial_is_one_to_the_diagnosis(sailed):
     found = errors([sailed / "zigzag"], "otter")[0]
     assert found["overshoot"][0][1] == pytest.approx(found["overshoot"][0][0], abs=0.005)

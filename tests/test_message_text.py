@@ -13,6 +13,7 @@ from cybership.message_text import (
     LONGEST_VALUE,
     LONGEST_WORD,
     brief,
+    counted,
     printable,
 )
 from cybership.model_fault import first_fault
@@ -106,3 +107,7 @@ def test_a_missing_measurement_is_compared_with_measurements_only(tmp_path):
     (tmp_path / "run2.csv").touch()
     with pytest.raises(cosim.InputError, match=r"did you mean 'run2\.csv'\?$"):
         diagnosis.read(tmp_path / "run1.csv")
+
+
+def test_one_thing_is_no_plural():
+    assert [counted(n, "row") for n in range(3)] == ["0 rows", "1 row", "2 rows"]

@@ -357,6 +357,14 @@ class TestPlots:
         )
         assert "nowhere" in capsys.readouterr().err
 
+    @pytest.mark.parametrize(
+        ("width", "said"), [("1000", "pixels in one direction"), ("0.5", "has no room")]
+    )
+    def test_a_width_that_cannot_be_drawn_is_refused(self, width, said, folder, tmp_path, capsys):
+        assert plots_main([str(folder(wild())), "--out", str(tmp_path / "drawn"), "--width", width]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert said in line
+
     def test_a_picture_is_drawn_once(self, tmp_path, monkeypatch):
         """Measuring its letters, or a first pass for its size, would take as long again."""
         from matplotlib.figure import Figure

@@ -83,6 +83,16 @@ def test_users_effect_is_compiled(tmp_path, opened_here):
     assert force == pytest.approx(2.0 * (1.0 - math.exp(-u * u)), rel=1e-12)
 
 
+def test_nothing_to_verify_or_to_list_is_reported(monkeypatch):
+    monkeypatch.setattr("fmus.build.__main__.came_compiled", lambda name: False)
+    for options, said in (
+        (["--verify"], "needs the name"),
+        (["--list", "--native"], "no FMU is precompiled"),
+    ):
+        done = command(main, *options)
+        assert (done.returncode, done.stdout, said in done.stderr) == (2, "", True)
+
+
 def test_builds_are_kept_and_repeatable(native, tmp_path, monkeypatch):
     assert build(["vessel"], native=native_targets()) == [native["vessel"]]
     assert command(main, "--verify", native["vessel"]).returncode == 0

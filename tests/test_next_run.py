@@ -506,6 +506,12 @@ def test_without_a_posterior_the_advice_is_that_of_the_diagnosis(folder):
         (None, ["--runs", "0"], "from 1 to 9"),
         ({"runs": []}, [], "task"),
         ({"runs": ["missing.csv"]}, [], "missing.csv"),
+        (None, ["--criterion", "certanty"], "did you mean 'certainty'?"),
+        (
+            {"runs": ["missing.csv"]},
+            ["--simulate", "nothere.ssv"],
+            "no such parameter set: 'nothere.ssv'",
+        ),
         ({"runs": ["missing.csv"]}, ["--basin", "6x"], "basin"),
         ({"runs": ["missing.csv"]}, ["--basin", "6x-4"], "basin"),
         ({"runs": ["missing.csv"]}, ["--basin", "none.json"], "none.json"),

@@ -73,6 +73,13 @@ def test_bad_recordings_are_refused(chain, tmp_path, inputs, told):
         prepare(cosim.load_scenario(recording(chain, tmp_path, **named)))
 
 
+def test_columns_of_one_name_are_refused(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time,a,a\n0,1,2\n1,1,2\n")
+    with pytest.raises(cosim.InputError, match="has 2 columns 'a'"):
+        read_recording(path, {"a": None})
+
+
 @pytest.mark.parametrize(
     "text", ["", "time,a\n", "time,a\n0,1\n0,2\n", "time,a\n0,x\n", "time,a\n0\n", "time,a\nnan,1\n"]
 )

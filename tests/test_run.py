@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.command import command as in_this_process
+from support.command import without_progress
 from support.cosim_run import SSV, command, in_a_process, parameter, start
 from support.events import once_there
 from support.plain import GAIN
@@ -405,11 +406,20 @@ def test_full_disk_is_one_message(scenario, tmp_path):
     assert not list((tmp_path / "out").glob(".*"))
 
 
-def test_metrics_never_overwrite_the_log(scenario, tmp_path):
+@pytest.mark.parametrize("name", ["log.csv", "log.json", "metrics.json"])
+def test_metrics_never_overwrite_files_of_the_run(scenario, tmp_path, name):
     command(scenario(), "--out", tmp_path / "out", "--no-plots")
-    done = in_this_process(metrics.main, tmp_path / "out", "--out", tmp_path / "out" / "log.csv")
+    before = (tmp_path / "out" / name).read_bytes()
+    done = in_this_process(metrics.main, tmp_path / "out", "--out", tmp_path / "out" / name)
     assert done.returncode == 2
-    assert "is the log itself" in done.stderr
+    assert "is a file of the run itself" in done.stderr
+    assert (tmp_path / "out" / name).read_bytes() == before
+
+
+def test_result_folder_whose_name_is_too_long_is_bad_input(scenario, tmp_path):
+    done = command(scenario(), "--out", tmp_path / ("x" * 300))
+    (line,) = without_progress(done.stderr).splitlines()
+    assert (done.returncode, line.startswith("error: cannot write to ")) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -376,3 +376,25 @@ def test_a_hidden_file_is_not_proposed_as_a_scenario(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="there are ") as error:  # those that are shipped
         cosim.load_scenario("qqq")
     assert ".settings" not in str(error.value)
+
+
+def test_an_empty_file_is_called_so(tmp_path):
+    (tmp_path / "s.json").write_text(" \n")
+    with pytest.raises(InputError, match=r"cannot be read as a scenario: it is empty$"):
+        load_scenario(tmp_path / "s.json")
+
+
+def test_one_more_fault_is_one(ellipse):
+    assert refused(ellipse | {"stop": "x", "step": "y"}).endswith("(and 1 more fault)")
+
+
+def test_folders_in_place_of_files_are_named_as_such(tmp_path):
+    with pytest.raises(InputError, match="is a folder; a map is a file"):
+        cosim.scenario.json_content(tmp_path, "a map")
+    with pytest.raises(InputError, match="is a folder; a parameter set is a file"):
+        list(cosim.scenario.find_parameters([tmp_path]))
+
+
+def test_a_value_that_is_no_number_needs_a_finite_one(ellipse):
+    ellipse["fmus"]["vessel"]["parameters"] = {"x_0": float("nan")}
+    assert "finite number; got nan" in refused(ellipse)

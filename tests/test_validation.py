@@ -438,6 +438,13 @@ def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
         sign(b"", key)
 
 
+def test_a_key_is_read_before_the_work(tmp_path, capsys):
+    criteria = write_criteria(tmp_path / "criteria.json", {"horizon": 4.0})
+    given = ["--criteria", str(criteria), "--sign", "nothere.pem", "--out", str(tmp_path / "out")]
+    assert compare.main(["nothere.csv", *given]) == 2
+    assert "the key 'nothere.pem' cannot be read" in capsys.readouterr().err
+
+
 def test_a_signature_is_of_criteria(tmp_path, capsys):
     assert compare.main([str(tmp_path), "--sign", "key.pem", "--out", str(tmp_path / "out")]) == 2
     assert "--criteria FILE.json is missing" in capsys.readouterr().err

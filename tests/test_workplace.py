@@ -66,7 +66,7 @@ def test_a_run_by_name_has_log_metrics_and_pictures(tmp_path, monkeypatch):
         (lambda: cosim.simulate("ellipse", stop=1, set=["vessel.m=1"]), "set is a dict of paths and values"),
         (lambda: cosim.simulate("ellipse", stop=1, log="al"), "log is 'all' or 'compact', not 'al'"),
         (lambda: cosim.load_scenario(3), "not of type int"),
-        (lambda: cosim.simulate("ellipse", stop=1, parameters="/"), "'/' cannot be read as a parameter set"),
+        (lambda: cosim.simulate("ellipse", stop=1, parameters="/"), "'/' is a folder; a parameter set is a file"),
         (lambda: diagnosis.load([]), "there is no run to read"),
         (lambda: diagnosis.diagnose([]), "there is no run to read"),
         (lambda: diagnosis.load(3), "not of type int"),

@@ -107,6 +107,8 @@ def read_parameters(path: Path) -> ParameterSet:
         root = ElementTree.fromstring(content)
     except FileNotFoundError:
         raise InputError(f"no such parameter set: '{path}'") from None
+    except IsADirectoryError:
+        raise InputError(f"'{path}' is a folder; a parameter set is a file") from None
     except (OSError, ElementTree.ParseError, LookupError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a parameter set (XML, .ssv): {error}") from None
     if root.tag != f"{{{SSV}}}ParameterSet":

@@ -16,7 +16,7 @@ from ..errors import InputError, SimulationError
 from ..scenario.scenario_options import add_scenario_options, chosen_scenario
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
-from .page_file import write_live_page
+from .page_file import check_replaceable, write_live_page
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,9 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         overrides = list(find_parameters(options.parameters))
         # The page starts from values of the FMUs in Python, which no compiler has to make.
         scenario = chosen_scenario(options, ("native", False))
+        out = options.out or Path(f"{scenario.name}.html")
+        inputs = (options.scenario, *options.parameters, options.ship or "")
+        check_replaceable(out, inputs, options.overwrite)
         system = prepare(scenario, overrides)
         try:
-            out = options.out or Path(f"{scenario.name}.html")
             with console.status("writing the page"):
                 write_live_page(system, out, overrides)
         finally:
@@ -62,6 +64,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--out", type=Path, metavar="PAGE.html", help="file to write (default: <name>.html)"
+    )
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace an existing file that is not such a page"
     )
     add_scenario_options(parser, "--stop", "--seed", "--ship", "--set", "--parameters")
     return parser

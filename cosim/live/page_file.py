@@ -3,8 +3,10 @@
 import hashlib
 import html
 import json
+import os
 import zlib
 from base64 import b64encode
+from collections.abc import Iterable
 from pathlib import Path
 from string import Template
 
@@ -36,7 +38,7 @@ def write_live_page(system: System, path: Path, overrides: Overrides = ()) -> Pa
         The path.
 
     Raises:
-        InputError: the page would be too large, or cannot run the scenario.
+        InputError: the page would be too large, cannot run the scenario, or cannot be written.
     """
     check_runnable(system)
     master = Master(system, lambda _: None)
@@ -53,10 +55,36 @@ def write_live_page(system: System, path: Path, overrides: Overrides = ()) -> Pa
             f"the page would have {size / 1e6:.1f} MB, and at most {LARGEST / 1e6:g} MB are allowed: "
             "end the run earlier (--stop SECONDS)"
         )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(path) as scratch:
+            scratch.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be written: {error.strerror or error}") from None
     return path
+
+
+def check_replaceable(path: Path, inputs: Iterable[str | Path], overwrite: bool = False) -> None:
+    """Refuse to replace a folder, an input of the page, or a file that is not such a page.
+
+    Args:
+        path: of the page.
+        inputs: files, or names that need not be of files, that the page is made from.
+        overwrite: whether any other file may be replaced.
+
+    Raises:
+        InputError: the path is of one of these.
+    """
+    if not os.path.exists(path):
+        return
+    if path.is_dir():
+        raise InputError(f"'{path}' is a folder; give the name of a file, as '{path / 'page.html'}'")
+    if any(os.path.exists(each) and path.samefile(each) for each in inputs):
+        raise InputError(f"'{path}' is an input of the page; give another --out")
+    begin = (TEMPLATES / "live.html").read_bytes().partition(b"$")[0]
+    with path.open("rb") as file:
+        if not overwrite and file.read(len(begin)) != begin:
+            raise InputError(f"'{path}' exists and is not such a page; --overwrite replaces it")
 
 
 def check_runnable(system: System) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from cybership.scratch_folder import atomic_write
 
+from ..errors import InputError
 from .log import Log
 from .run_options import NO_COMMANDS
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from ..scenario.roles import Roles
 
 DPI = 120  # chosen
+MOST_PIXELS = 10_000  # of a picture in each direction, chosen: 0.4 GB of memory
 COMPRESSION = 3  # of a PNG, chosen: two thirds of the usual time, files a fifth larger
 WIDTH = 8.0  # of a picture [in], chosen
 MAX_POINTS = 2000  # of a line over time: more than the pixels of its panel (WIDTH times DPI)
@@ -173,6 +175,23 @@ def finish(figure: Figure, panels: np.ndarray, runs: Runs, least: float = 0.0) -
     return arrange(figure)
 
 
+def check_size(figure: Figure, dpi: float) -> None:
+    """Refuse a figure that would need too much memory.
+
+    Args:
+        figure: of any size.
+        dpi: pixels per inch.
+
+    Raises:
+        InputError: it has more than MOST_PIXELS in one direction.
+    """
+    if (pixels := dpi * max(figure.get_size_inches())) > MOST_PIXELS:
+        raise InputError(
+            f"a picture would have {pixels:.0f} pixels in one direction; at most {MOST_PIXELS} are "
+            "allowed: reduce width or dpi"
+        )
+
+
 def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
     """Write a figure, completely or not at all; the ending of the name says in which format.
 
@@ -180,6 +199,9 @@ def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
         figure: what to write.
         file: ``.png``, ``.svg`` or ``.pdf``.
         dpi: pixels per inch of a PNG.
+
+    Raises:
+        InputError: a PNG would be too large.
     """
     form = file.suffix[1:]
     # Without a date the same figure is the same file.
@@ -188,6 +210,7 @@ def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
         if form == "png":
             from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+            check_size(figure, dpi)
             figure.set_dpi(dpi)
             # savefig would draw it twice
             FigureCanvasAgg(figure).print_png(scratch, pil_kwargs={"compress_level": COMPRESSION})

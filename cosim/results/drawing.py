@@ -85,7 +85,7 @@ def draw(
         model_error.png.
 
     Raises:
-        InputError: there is no such style.
+        InputError: there is no such style, or no such size.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError, nearest
-from .canvas import DPI, WIDTH, arrange, save
+from .canvas import DPI, WIDTH, arrange, check_size, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,10 +55,20 @@ class PictureOptions(NamedTuple):
             chosen.__exit__(None, None, None)
 
     def sized(self, figure: Figure) -> Figure:
-        """The figure in another size, of the same shape."""
+        """The figure in another size, of the same shape.
+
+        Raises:
+            InputError: it is too large to be drawn, or too small for anything beside the labels.
+        """
         scale = self.width / WIDTH
         figure.set_size_inches(scale * figure.get_figwidth(), scale * figure.get_figheight())
-        return arrange(figure)
+        check_size(figure, max(self.dpi, DPI))  # letters are measured at DPI
+        try:
+            return arrange(figure)
+        except ValueError:
+            raise InputError(
+                f"a picture of {self.width:g} in has no room beside its labels; increase its width"
+            ) from None
 
 
 class Drawn:

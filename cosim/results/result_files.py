@@ -1,6 +1,7 @@
 """The files of a run in its result folder."""
 
 import json
+import os
 from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
@@ -20,9 +21,9 @@ FILES = (
 
 def others_file(folder: Path) -> Path | None:
     """A file of a name that a run would write, in a folder that has no run; None if there is none."""
-    if (folder / SIDECAR).exists():
+    if os.path.exists(folder / SIDECAR):  # Path.exists raises for names that are too long
         return None
-    return next((folder / name for name in FILES if (folder / name).exists()), None)
+    return next((folder / name for name in FILES if os.path.exists(folder / name)), None)
 
 
 def clear_results(folder: Path) -> None:

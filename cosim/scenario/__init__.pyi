@@ -6,4 +6,5 @@ from .load import with_settings as with_settings
 from .roles import Roles as Roles
 from .schema import Scenario as Scenario
 from .schema import json_schema as json_schema
+from .shipped import find_parameters as find_parameters
 from .shipped import find_scenario as find_scenario

@@ -45,7 +45,11 @@ def json_content(path: Path, what: str, known: Iterable[str] = (), raw: bytes | 
         raise InputError(f"no such {what.removeprefix('a ')}: '{path}'{hint}") from None
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None
+    except IsADirectoryError:
+        raise InputError(f"'{path}' is a folder; {what} is a file") from None
     except json.JSONDecodeError as error:
+        if not error.doc.strip():
+            raise InputError(f"'{path}' cannot be read as {what}: it is empty") from None
         raise InputError(f"'{path}' cannot be read as {what}: it is not JSON: {error}") from None
     except RecursionError:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
@@ -72,7 +76,8 @@ def checked(
     try:
         return model.model_validate_json(json.dumps(content), strict=strict or None)
     except ValidationError as error:
-        more = f" (and {error.error_count() - 1} more faults)" if error.error_count() > 1 else ""
+        others = error.error_count() - 1
+        more = f" (and {others} more fault{'s' * (others > 1)})" if others else ""
         raise InputError(f"{where}: {first_fault(error, model, special)}{more}") from None
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{where} cannot be written as JSON: {error}") from None

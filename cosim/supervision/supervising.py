@@ -15,6 +15,8 @@ import sys
 import time
 from contextlib import suppress
 
+from cybership.standard_streams import open_closed_streams
+
 from ..interrupts import SIGNALS, leave_on_interrupt
 from ..process.call_watch import LOOK as LOOK_AT_CALL
 from ..process.call_watch import CallWatch
@@ -41,6 +43,7 @@ INDIFFERENT = ("SIGUSR1", "SIGUSR2", "SIGPIPE", "SIGQUIT", "SIGVTALRM", "SIGPROF
 def supervised() -> None:
     """Go on in a process that this one watches; this one never returns."""
     sys.excepthook = end_without_extra
+    open_closed_streams()
     if not hasattr(os, "fork"):
         leave_on_interrupt()
         return

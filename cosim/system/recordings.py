@@ -39,6 +39,20 @@ class Recorded:
         return effect
 
 
+def _places(names: Sequence[str], wanted: Sequence[str], path: Path) -> dict[str, int]:
+    """Column -> its place.
+
+    Raises:
+        InputError: a column is missing, or there twice.
+    """
+    for name in wanted:
+        if names.count(name) > 1:
+            raise InputError(f"recording '{path}' has {names.count(name)} columns '{name}'")
+        if name not in names:
+            raise InputError(f"recording '{path}' has no column '{name}'{nearest(name, names)}")
+    return {name: names.index(name) for name in wanted}
+
+
 def read_recording(
     path: Path, wanted: Mapping[str, None]
 ) -> tuple[list[float], dict[str, list[float | None]]]:
@@ -52,16 +66,14 @@ def read_recording(
         Times [s], and values by column; None for an empty cell, and NaN where that is written.
 
     Raises:
-        InputError: missing, unreadable, a column missing, a cell that is no number, times not growing.
+        InputError: missing, unreadable, a column missing or there twice, a cell that is
+            no number, times not growing.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file, skipinitialspace=True)
             names = [name.strip() for name in next(reader, [])]
-            for name in ("time", *wanted):
-                if name not in names:
-                    raise InputError(f"recording '{path}' has no column '{name}'{nearest(name, names)}")
-            places = {name: names.index(name) for name in ("time", *wanted)}
+            places = _places(names, ("time", *wanted), path)
             time: list[float] = []
             columns: dict[str, list[float | None]] = {name: [] for name in wanted}
             for cells in reader:

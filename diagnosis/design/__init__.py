@@ -2,7 +2,7 @@
 
 from .designing import Designer, Limits, ScoredPlan
 from .hypotheses import knowledge
-from .information import CRITERIA, SURE, Knowledge
+from .information import CRITERIA, SURE, Knowledge, check_criterion
 from .manoeuvre_library import DIMENSIONS, sequence
 from .next_plan import Question, plan_next, prepared
 from .planned_motion import Basin
@@ -24,6 +24,7 @@ __all__ = [
     "Question",
     "Rehearsal",
     "ScoredPlan",
+    "check_criterion",
     "knowledge",
     "plan_next",
     "prepared",

@@ -12,13 +12,12 @@ from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from cosim import InputError
-from cosim.errors import nearest
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from ..runs.run_constants import NEGLIGIBLE
 from .hypotheses import Space
-from .information import CRITERIA, Knowledge, inseparable
+from .information import CRITERIA, Knowledge, check_criterion, inseparable
 from .manoeuvre_library import (
     DIMENSIONS,
     LIBRARY,
@@ -109,11 +108,7 @@ class Designer:
     tried: list[ScoredPlan] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        if self.criterion not in CRITERIA:
-            raise InputError(
-                f"no criterion '{self.criterion}'{nearest(self.criterion, CRITERIA)}; "
-                f"there are {', '.join(CRITERIA)}"
-            )
+        check_criterion(self.criterion)
         room = self.basin.size - 2.0 * (self.margin + np.ptp(self.outline[:, 0]) / 2.0)
         if room.min() <= 0.0:
             need = self.basin.size - room

@@ -14,6 +14,9 @@ from itertools import permutations
 import numpy as np
 from scipy.special import logit, ndtr
 
+from cosim import InputError
+from cosim.errors import nearest
+
 SURE = 0.95  # 1, probability from which on a cause counts as certain; the aim of a design
 ODDS = float(logit(SURE))  # nats, the log odds of that
 SMALLEST = 1e-10  # 1, of the largest eigenvalue: what is less is rounding
@@ -261,3 +264,15 @@ def inseparable(k: Knowledge, grams: Sequence[np.ndarray]) -> list[tuple[int, in
         return max((projected(k, i, j, z, k.G + G) for G in grams), default=0.0)
 
     return [(i, j) for i, j in pairs(k) if i < j and min(best(i, j), best(j, i)) < 2.0 * ODDS]
+
+
+def check_criterion(name: str) -> None:
+    """Refuse what is not a criterion.
+
+    Raises:
+        InputError: names the nearest one, and all.
+    """
+    if name not in CRITERIA:
+        raise InputError(
+            f"no criterion '{name}'{nearest(name, CRITERIA)}; there are {', '.join(CRITERIA)}"
+        )

@@ -38,7 +38,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
         InputError: the folder cannot be written to.
     """
     with Held() as interrupts:
-        made = [folder for folder in (out, *out.parents) if not folder.exists()]
+        made = [f for f in (out, *out.parents) if not os.path.exists(f)]
         scratch = None
         try:
             try:

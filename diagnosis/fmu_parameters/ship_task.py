@@ -157,7 +157,7 @@ class ShipTask(CalibrationTask):
         s = self.runs["train"][0].smoothed
         known = np.flatnonzero(np.isfinite(s.nu).all(axis=1))
         row = known[np.argmin(np.abs(s.time[known] - time))]
-        if abs(float(s.time[row]) - time) > s.track.period:
+        if not abs(float(s.time[row]) - time) <= s.track.period:  # a time may be NaN
             raise InputError(f"run '{s.track.run.name}' has no state at {time:g} s")
         at = {n: x[row : row + 1] for n, x in at_samples(s).items()}
         both = {**self.predictor.of_variables("start", at), **self.predictor.of_variables("inputs", at)}

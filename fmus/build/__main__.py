@@ -5,10 +5,8 @@ if __name__ == "__main__":
 
     leave_on_interrupt()  # before all other imports, which take a while
 
-import os
-import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -111,8 +109,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ship = described_ship(options.ship)
         if options.verify:
             _verify(options.names)
+            lines = []
         elif options.list:
-            _print_list(options.names, make_ship(effects, ship), options.native)
+            lines = [*_listed(options.names, make_ship(effects, ship), options.native)]
         else:
             starts = None if options.parameters is None else read_starts(options.parameters)
             if (folder := options.source or options.webassembly) is not None:
@@ -131,14 +130,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 made = build(
                     options.names, options.out, starts, note, effects, native, options.overwrite, ship
                 )
-            for path in made:
-                print(path)
-        sys.stdout.flush()
-    except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            lines = list(map(str, made))
     except (BuildError, DeclarationError, OSError) as error:
         complain(error)
         return 2
+    for line in lines:
+        print(line)
     return 0
 
 
@@ -148,6 +145,8 @@ def _verify(names: Sequence[str]) -> None:
     Raises:
         BuildError: names the first such file; or a file cannot be read.
     """
+    if not names:
+        raise BuildError("--verify needs the name of an FMU file")
     for name in names:
         try:
             wrong = ledger.unknown_binary(Path(name), fmu_cache())
@@ -157,14 +156,23 @@ def _verify(names: Sequence[str]) -> None:
             raise BuildError(f"'{name}' was not built here: it holds '{wrong}'")
 
 
-def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
-    """Print the FMUs there are, or every variable of those that are named."""
+def _listed(names: Sequence[str], of: Ship, native: bool) -> Iterator[str]:
+    """The FMUs there are, or every variable of those that are named.
+
+    Raises:
+        BuildError: none of the FMUs came compiled.
+    """
+    if native and not names and not any(came_compiled(c.name) for _, c in of.components.values()):
+        raise BuildError(
+            "no FMU is precompiled in this installation; build --native compiles them, --list without "
+            "--native lists them"
+        )
     for _, component in of.components.values() if not names else ():
         if not native or came_compiled(component.name):
-            print(f"{component.name:24} {component.description}")
+            yield f"{component.name:24} {component.description}"
     for name in names:
         _, component = load(*which(name), of)
-        print(f"{component.name}: {component.description}")
+        yield f"{component.name}: {component.description}"
         kinds = [
             ("parameter", component.params),
             ("input", component.inputs),
@@ -173,7 +181,7 @@ def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
         for kind, group in kinds:
             for v in variables(group):
                 start = f"{v.start:g}" if kind != "output" else ""
-                print(f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{_limits(v.range)}")
+                yield f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{_limits(v.range)}"
 
 
 def _limits(allowed: Range) -> str:

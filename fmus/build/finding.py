@@ -9,7 +9,7 @@ from pathlib import Path
 from ..base_units import base_exponents
 from cybership.message_text import PrintableError
 
-from ..declare import Component, DeclarationError, nearest, width
+from ..declare import Component, DeclarationError, nearest, variables, width
 from ..effects import EffectSet
 from ..fmi.trace import trace_init, trace_step
 from ..ship import Ship, ship
@@ -63,6 +63,7 @@ def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str,
         raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")
     try:
         _check(component)
+        _check_ranges(component)
     except Exception as error:
         raise BuildError(f"{_place_of(error, own_file)}: {error}") from error
     return f"fmus.{own_file.stem}", component
@@ -80,6 +81,17 @@ def _check(component: Component) -> None:
         if len(trace.outputs) != width(component.outputs):
             raise DeclarationError(
                 f"step gives {len(trace.outputs)} outputs, {width(component.outputs)} are declared"
+            )
+
+
+def _check_ranges(component: Component) -> None:
+    """Refuse a start value outside the range of its variable."""
+    for v in (*variables(component.params), *variables(component.inputs)):
+        low = -math.inf if v.range.min is None else v.range.min
+        high = math.inf if v.range.max is None else v.range.max
+        if not low <= v.start <= high:
+            raise DeclarationError(
+                f"{v.name} starts at {v.start:g}, outside its range of {low:g} to {high:g}"
             )
 
 

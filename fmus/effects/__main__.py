@@ -1,7 +1,6 @@
 """Print the table of all model effects: ``python -m fmus.effects [FILE.py ...]``."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from cybership.command_arguments import complain, program
 
 from ..declare import DeclarationError, Variable
 from ..installed import plus_files
+from ..interruption import run_interruptible
 from ..ship import ship
 from . import STANDARD
 from .effect import Effect
@@ -97,4 +97,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_interruptible(main)

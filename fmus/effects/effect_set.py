@@ -108,7 +108,7 @@ class EffectSet(Mapping[str, Effect]):
                 (:func:`fmus.hull_functions.hull_function`), which register themselves.
 
         Raises:
-            DeclarationError: the file cannot be read, fails, or declares nothing, or what is taken.
+            DeclarationError: the file cannot be read, fails, or declares neither, or what is taken.
         """
         taken = {found.stem for found in (*ROOM.iterdir(), *self.files)}
         if not path.stem.isidentifier() or path.stem in taken:
@@ -120,7 +120,7 @@ class EffectSet(Mapping[str, Effect]):
         name = f"{__package__}.{path.stem}_{digest}"
         module = sys.modules.get(name) or _imported(name, path)
         found = effects_of(module)
-        laws = [*(x for x in vars(module).values() if isinstance(x, type)), *FUNCTIONS.values()]
+        laws = [*filter(_is_law, vars(module).values()), *FUNCTIONS.values()]
         if not found and all(law.__module__ != name for law in laws):
             raise DeclarationError(
                 f"'{path}' registers no effect; decorate a function with @effect(...)"
@@ -129,6 +129,11 @@ class EffectSet(Mapping[str, Effect]):
             return self.plus(found, path)
         except DeclarationError as error:
             raise DeclarationError(f"'{path}': {error}") from error
+
+
+def _is_law(value: object) -> bool:
+    """Whether something is a law of actuators: a class that is registered among those of its kind."""
+    return isinstance(value, type) and value in getattr(value, "known", {}).values()
 
 
 def _scaled(e: Effect, scale: Scale) -> Effect:

@@ -2,11 +2,11 @@
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 
 from cybership.command_arguments import program
 
+from ..interruption import run_interruptible
 from .ship_file import json_schema
 
 
@@ -22,4 +22,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_interruptible(main)
