@@ -41,9 +41,9 @@ def any_finding(found: Findings, start: Model) -> bool:
 
 
 def any_sure(found: Findings, start: Model, without_gain: Collection[str]) -> bool:
-    """Whether any effect is a sure finding by its own evidence, and predictions show it."""
+    """Whether any effect is a sure finding, or without a confidence, and predictions show it."""
     doubts = Doubts(without_gain=without_gain)
-    return any(confidence_of(f, start, doubts).own >= FOUND for f in found.effects)
+    return not all(confidence_of(f, start, doubts).own < FOUND for f in found.effects)
 
 
 def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Conclusion:
@@ -117,8 +117,10 @@ def better_calibration(
 
     Returns:
         None where it predicts no better, beyond chance, is worse than the initial model, or has a hull
-        that drives the ship on.
+        that drives the ship on; or the method does not fit its findings without a part of the data.
     """
+    if isinstance(found, Findings) and not data.judges(found):
+        return None
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
