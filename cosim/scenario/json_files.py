@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from cybership.message_text import counted
 from cybership.model_fault import Special, first_fault, no_special
 from cybership.renamed import with_new_names
 
@@ -77,7 +78,7 @@ def checked(
         return model.model_validate_json(json.dumps(content), strict=strict or None)
     except ValidationError as error:
         others = error.error_count() - 1
-        more = f" (and {others} more fault{'s' * (others > 1)})" if others else ""
+        more = f" (and {counted(others, 'more fault')})" if others else ""
         raise InputError(f"{where}: {first_fault(error, model, special)}{more}") from None
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{where} cannot be written as JSON: {error}") from None

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cybership.message_text import counted
 from fmus.effects import Effect, EffectSet
 from fmus.effects.text import Found
 
@@ -98,7 +99,7 @@ def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
 def listed(names: Sequence[str], joined: str = "or") -> str:
     """Names in a row: a, b or c; of many the first few, and how many more."""
     hidden = len(names) - SHOWN
-    more = [f"{hidden} other{'s' * (hidden > 1)}"] if hidden > 0 else []
+    more = [counted(hidden, "other")] if hidden > 0 else []
     *most, last = [*names[:SHOWN], *more]
     return f"{', '.join(most)} {joined} {last}" if most else last
 
