@@ -163,7 +163,7 @@ def test_the_files_agree_with_each_other_and_with_the_model(learned):
         name = c["name"].partition(".")[2]
         assert (c["before"], c["unit"]) == (start.value(name), start.declared(name).unit)
         assert c["after"] == pytest.approx(last.value(name))
-        half = 1.96 * std[c["name"]]
+        half = 1.959964 * std[c["name"]]
         assert c["ci95"] == pytest.approx((c["after"] - half, c["after"] + half))
         assert (c["origin"] == "learned") == (name == "delta_X_u")
     (effect,) = content["effects"]

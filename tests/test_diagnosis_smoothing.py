@@ -9,7 +9,7 @@ from scipy.linalg import cholesky_banded
 from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoothed, true_nu
 
 from diagnosis import InputError, Run, clean, read, smooth
-from diagnosis.runs.cleaning import FARTHEST
+from diagnosis.runs.columns.unit_check import LARGEST
 from diagnosis.runs.smoothing import smoother
 from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
@@ -202,7 +202,7 @@ def test_bursts_and_absurd_values_do_no_harm(size):
     rows = np.r_[500:503, 1000, 1500:1506]
     pose = base().pose[rows] + [size, 0.0, 0.0]
     s = smooth(clean(changed(base(), rows, pose)))
-    beyond = size > FARTHEST  # a value beyond the earth is no measurement: dropped, not a spike
+    beyond = size > LARGEST  # such a value is no measurement: dropped, not a spike
     assert (~s.track.fresh[rows, 0] if beyond else s.spikes[rows]).all()
     assert s.counts.dropped == smooth_base().counts.dropped + rows.size * beyond
     assert s.counts.spikes <= rows.size + 2

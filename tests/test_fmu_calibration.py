@@ -176,7 +176,7 @@ def test_intervals_are_those_of_the_normal_distribution_and_end_at_bounds(seed, 
     r, *_ = problem(seed)
     r.whiten_about(START)
     f = fits.fitted(r, START)
-    half = 1.96 * np.sqrt(inflation * np.diag(f.covariance))
+    half = 1.959964 * np.sqrt(inflation * np.diag(f.covariance))
     for p, z, x, (low, high) in zip(
         r.parameters, f.setting.z, half, fits.intervals(r, f, inflation), strict=True
     ):

@@ -26,14 +26,13 @@ from fmus.frames import rotate_to_body
 from ..predictors import Model
 from ..predictors.shooting import Shooting
 from ..runs import Fingerprint, Smoothed, fingerprints
-from ..runs.files.resolution import FUZZ
+from ..runs.run_constants import DIGITS
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
 from .criterion import JUDGED, InputStd
 from .predictions import Predictions, difference, judged
 
 # Parameters of the effects current and earth_force.
 CURRENT, WIND = ("V_n", "V_e"), ("F_n", "F_e")
-ROUNDING = 1e-9  # 1, of the motion: a change that is none, but of the last digits of a log; chosen
 # 1, order of convergence below which there is none; chosen, an explicit Euler method has 1
 SLOWEST = 0.5
 # 1, order above which halving did not act on each step; chosen, the method of Runge and Kutta has 4
@@ -65,7 +64,7 @@ class Learned(NamedTuple):
         p, known = self.posterior, model.values
         names = [name.partition(".")[2] for name in p.names]
         values = np.array([model.value(n) if "@" in n or n in known else np.nan for n in names])
-        reach = FUZZ * np.maximum(p.std, np.abs(p.mean))
+        reach = DIGITS * np.maximum(p.std, np.abs(p.mean))
         return bool(np.all(np.abs(values - p.mean) <= reach))
 
 
@@ -240,10 +239,10 @@ def _numerical(p: Predictions, base: np.ndarray) -> Variances:
         d, d_2, size = (judged(q, x) for x in (first, second, moved))
         with np.errstate(invalid="ignore", over="ignore"):
             one, two, all_ = (float(np.sqrt(np.mean(x**2))) for x in (d, d_2, size))
-        if one <= ROUNDING * all_:
+        if one <= DIGITS * all_:
             if p.predictor.parametric:
                 found[q] = d**2
-        elif isfinite(one) and two * 2.0**SLOWEST <= one <= two * 2.0**HIGHEST + ROUNDING * all_:
+        elif isfinite(one) and two * 2.0**SLOWEST <= one <= two * 2.0**HIGHEST + DIGITS * all_:
             found[q] = (d * one / (one - two)) ** 2
     if not found:
         raise InputError(

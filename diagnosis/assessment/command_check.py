@@ -9,7 +9,7 @@ from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import BLOCK, needed_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU, Named
-from ..runs.files.resolution import FUZZ
+from ..runs.run_constants import DIGITS
 from .readings import inertial
 from .settings import SETTINGS
 
@@ -81,7 +81,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
-    varies = np.ptp(tau, axis=0) > FUZZ * largest
+    varies = np.ptp(tau, axis=0) > DIGITS * largest
     if not varies.any():
         return (
             "all its commands are constant, so the response of the ship to commands cannot be estimated"
@@ -92,7 +92,7 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
         follows = (z[:, k] * given > 0.0).mean() >= SETTINGS.negligible
         opposed = not follows and size[k] > SETTINGS.least_gain * abs(given)
-        if opposed and abs(given) > FUZZ * largest:
+        if opposed and abs(given) > DIGITS * largest:
             return (
                 f"{name} is {given:.3g} {unit} in all rows, and the motion needs "
                 f"{z[:, k].mean():.3g} {unit} on average: it is another column, or it was not "

@@ -21,7 +21,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.prediction import FAR_OFF
 from ..predictors.uncertainty import correlated_windows
 from ..predictors.weak_form import OVERLAP, commanded_force, needed_force
-from ..runs.files.resolution import FUZZ
+from ..runs.run_constants import DIGITS
 from .readings import inertial
 from .settings import SETTINGS
 
@@ -67,7 +67,7 @@ class ThrustGains:
 def gains(w: WeakWindows, model: Model) -> ThrustGains:
     """The acceleration that the commands of a run give, as shares of what they give by a model."""
     a, z, T = inertial(w, model), needed_force(w, model), w.held @ commanded_force(w, model)
-    moves = T.std(axis=0) > FUZZ * np.abs(T).max()
+    moves = T.std(axis=0) > DIGITS * np.abs(T).max()
     surroundings = other_forces(w, a, z)
     value, error = np.full((2, 3), np.nan)
     left, told = np.zeros_like(a), np.zeros(3, bool)
@@ -75,7 +75,7 @@ def gains(w: WeakWindows, model: Model) -> ThrustGains:
         others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
         x = np.column_stack([T[:, j], *others, surroundings[j]])
         few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
-        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.hardly:
+        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.inexact**2:
             continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
         inverse = pinv(x / size)

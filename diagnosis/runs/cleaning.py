@@ -5,35 +5,31 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import chdtri, ndtri
 
 from cosim import InputError
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
-from .columns.unit_check import GO_ON, refuse_time, refuse_units
+from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .frozen import repeated, stuck
 from .row_order import missing_rows, ordered
-from .run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE, ORDER
+from .run_constants import EVERY, HORIZON, LEVEL, LONG, NEGLIGIBLE, ORDER, WIDTH
 
-# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
-
-
-FARTHEST = 4e7  # m, round the earth, and rad: farther values are not a pose
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
-
-# 1, rows from a new value to the next from which on a channel is slower than its log (half of one more).
-SLOWER = 1.5
 
 PLACE, HEADING = np.s_[:2], np.s_[2:]  # channels of the pose, each of one receiver
 
 
-# 1, standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
-NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
+def normal_within(share: float) -> float:
+    """Standard deviations of a normal distribution within which a share of it lies [1]."""
+    return float(ndtri((1.0 + share) / 2.0))
+
+
+Z95 = normal_within(LEVEL)
 
 
 class Counts(NamedTuple):
@@ -155,7 +151,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     where, run = f"run '{run.name}'", ordered(run, scale)
     notes = list(run.notes)
     run = replace(
-        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < FARTHEST, run.pose, np.nan)
+        run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < LARGEST, run.pose, np.nan)
     )
     row, seconds = refuse_short(run, scale)
     gone = (run.pose == 0.0).all(axis=1)
@@ -198,7 +194,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
         )
-    if period > SLOWER * row:  # a log that is faster than the measurement
+    if np.round(period / row) > 1.0:  # a log that is faster than the measurement
         after = np.searchsorted(fresh, np.arange(repeats.size))
         last = run.time[fresh][np.maximum(after - 1, 0)]
         between |= repeats & (run.time - last < period - 0.5 * row)
@@ -334,7 +330,7 @@ def perhaps_late(
         A mask (n,), and a line if there are any.
     """
     held = 2 * repeats.sum() > new.sum() > 1
-    if not held or not np.median(np.diff(time[new])) > SLOWER * row:
+    if not held or not np.round(np.median(np.diff(time[new])) / row) > 1.0:
         return np.zeros_like(new), []
     empty = np.append(False, ~(new | repeats)[:-1])
     late = new & (empty | (np.append(0.0, missing_rows(time)) > 0.0))
@@ -370,6 +366,11 @@ def noise(values: np.ndarray) -> np.ndarray:
 
     That some steps are longer than others does little harm, as the median is taken.
     """
-    third = np.abs(np.diff(values, ORDER, axis=0))
+    third = np.diff(values, ORDER, axis=0)
     factors = np.diff(np.eye(ORDER + 1), ORDER, axis=0)
-    return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(factors)
+    return median_std(third) / np.linalg.norm(factors)
+
+
+def median_std(values: np.ndarray) -> np.ndarray:
+    """Standard deviation of normal values (n, ...) about zero, by the median of their magnitudes."""
+    return np.median(np.abs(values), axis=0) / np.sqrt(chdtri(1.0, 1.0 / 2.0))

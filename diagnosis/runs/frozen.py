@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from .files.reading import Run
-from .run_constants import IN_A_ROW, LONG
-
-USUAL = 0.99  # 1, of the steps or lengths of a channel, which are usual; chosen: the rest may be spikes
+from .run_constants import CHANCE, IN_A_ROW, LONG
 
 
 def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
@@ -38,7 +36,7 @@ def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
         moves = step[step > 0.0]
         if not moves.size:
             continue
-        usual = float(np.quantile(moves, USUAL))
+        usual = float(np.quantile(moves, 1.0 - CHANCE))
         edges = np.flatnonzero(np.diff(np.concatenate([[False], step == 0.0, [False]])))
         for first, last in edges.reshape(-1, 2).tolist():
             at_end = last == step.size
@@ -87,7 +85,7 @@ def _constant(values: np.ndarray) -> Iterator[np.ndarray]:
     lengths = np.diff(np.append(new, rows.size))
     if not lengths.size:
         return
-    usual = np.sort(lengths)[: max(int(USUAL * lengths.size), 1)].max()
+    usual = np.sort(lengths)[: max(int((1.0 - CHANCE) * lengths.size), 1)].max()
     for first, length in zip(new.tolist(), lengths.tolist(), strict=True):
         if length > LONG * max(usual, IN_A_ROW):
             yield rows[first : first + length]

@@ -10,7 +10,7 @@ import numpy as np
 from fmus.ops import wrap
 
 from ..execution.short_text import SHOWN
-from .cleaning import noise
+from .cleaning import Z95, noise
 from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
 from .frozen import repeated
@@ -18,9 +18,6 @@ from .run_constants import DIGITS, ORDER
 from .sensors.evidence import SURE
 from .smoothing.smoother import Smoothed
 
-# 1, relative standard deviation from which on a noise is uncertain. Chosen: its 95 % interval then
-# begins below half of it.
-HARDLY_KNOWN = 0.3
 GIVEN, ESTIMATED = "given", "estimated"
 UNUSED = "not used for the motion"
 
@@ -66,8 +63,8 @@ class MeasuredChannel:
 
     @property
     def known(self) -> bool:
-        """Whether the noise is known so well that it tells anything."""
-        return self.noise_rel_std < HARDLY_KNOWN
+        """Whether the noise tells anything: its 95 % interval begins above a half of it."""
+        return Z95 * self.noise_rel_std < 1.0 / 2.0
 
     def content(self) -> dict[str, Any]:
         """What a result file has of it, beside its name."""

@@ -8,6 +8,7 @@ from bisect import bisect_left
 from dataclasses import replace
 
 import numpy as np
+from scipy import constants as c
 
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
@@ -15,9 +16,9 @@ from fmus.scale import REFERENCE, Scale
 from .files.reading import Run
 from .run_constants import CHANCE, HORIZON, LONG
 
-# s after which the time of a clock begins anew: of a day, of half a day, of minutes, of seconds.
-PERIODS = (86400.0, 43200.0, 3600.0, 60.0)
-ON_GRID = 0.2  # of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
+ON_GRID = (
+    0.2  # 1, of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
+)
 MOST_WRONG = 0.1  # 1, of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
 
 
@@ -142,7 +143,7 @@ def _begun_anew(run: Run) -> Run:
     if not (back.any() and (step > 0.0).any()):
         return run
     longest = LONG * float(np.median(step[step > 0.0]))
-    for period in PERIODS:
+    for period in (c.day, c.day / 2.0, c.hour, c.minute):
         on = step[back] + period
         if ((on > 0.0) & (on <= longest)).all():
             count = np.append(0, np.cumsum(back))

@@ -3,18 +3,23 @@
 Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 """
 
+import math
 import sys
 
 # s, of predictions, and of the shortest run. Chosen: motions of the unstable nominal hull of CyberShip
 # Enterprise 1 grow at up to 0.18 1/s.
 HORIZON = 8.0
-CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
+# 1, of a report where nothing is, in all places that are looked at together; contract. Share of the
+# values of a channel that may be spikes, or of another writer.
+CHANCE = 0.01
+LEVEL = 0.95  # 1, probability of the intervals of values, and of the sets of ids; contract
 # 1, share of a whole that may be left open. Contract, for an axis' first model error and the distance
 # from a limit. The same for commands and windows, what must be explained, a command before the run, and
 # numbers above their limits.
 NEGLIGIBLE = 0.05
-DIGITS = sys.float_info.epsilon**0.5  # 1, relative size of what rounding may have left
+DIGITS = math.sqrt(sys.float_info.epsilon)  # 1, relative size of what rounding may have left
 ORDER = 3  # 1, of the derivative with a penalty, and of the differences that noise is estimated by
+WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
 # s between two windows of the weak form, of the quickest motion, and of a gap. A gap is LONG sampling
 # periods if that is longer. Chosen: kernels over six of them average a velocity to 2 %. A command that
 # is wrong in one of them hardly counts.

@@ -14,10 +14,12 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ..predictors.evaluation import quantile
-from ..runs.run_constants import CHANCE, DIGITS, STEPS
+from ..runs.cleaning import normal_within
+from ..runs.run_constants import CHANCE, DIGITS, LEVEL, STEPS
 
-ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
-LEVEL = 0.95  # probability of the intervals of values, and of the sets of ids; contract
+ENOUGH = (
+    0.02  # 1, of cost: where a step promises less, parameters are within a seventh of their deviation
+)
 
 At = TypeVar("At")
 
@@ -47,7 +49,7 @@ def rise() -> float:
 
 def beyond(places: int) -> float:
     """Standard deviations beyond which one of some normal values is by CHANCE (Bonferroni)."""
-    return float(np.sqrt(quantile(1.0 - CHANCE / max(places, 1), 1)))
+    return normal_within(1.0 - CHANCE / max(places, 1))
 
 
 def ridge(H: np.ndarray, unit: np.ndarray | float = 1.0) -> np.ndarray:

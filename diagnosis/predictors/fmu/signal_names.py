@@ -7,13 +7,13 @@ the default, and ENU, whose x is east and whose heading goes from east to north.
 
 import re
 from collections.abc import Mapping
-from math import pi
 from typing import NamedTuple
 
 from cosim.fmu import FmuVariable
 
 from ...runs import UNITS, meaning
 from ...runs.columns.likely_columns import words_of
+from ...runs.columns.unit_check import largest
 
 # Words that say which frame or whose variable it is, and nothing of which signal.
 NOTHING = frozenset(
@@ -50,9 +50,6 @@ CORES = {
 # Vector of Fossen's notation -> its signals in six degrees of freedom.
 VECTORS = {"eta": ("x", "y", "psi"), "nu": ("u", "v", "r"), "tau": ("tau_X", "tau_Y", "tau_N")}
 VECTOR = re.compile(r"(eta|nu|tau)_?\[?([1-6])\]?", re.IGNORECASE)
-# Largest of an angle [rad] and of a rate of turn [rad/s] that are in radians; chosen: a turn with some
-# to spare, and a rate that no ship has.
-LARGEST = {"angle": 2.1 * pi, "rate": pi}
 
 
 class Meant(NamedTuple):
@@ -137,7 +134,7 @@ def _unit_by_range(v: FmuVariable, quantity: str) -> str | None:
     """The unit that limits and start value of a variable say; None: they fit SI."""
     known = [v.min, v.max, _number(v.start)]
     size = max((abs(x) for x in known if x is not None), default=0.0)
-    if quantity in LARGEST and LARGEST[quantity] < size < 1e4:
+    if quantity in ("angle", "rate") and largest(quantity) < size < 1e4:
         return "deg" if quantity == "angle" else "deg/s"
     return None
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...execution.short_text import SHOWN
-from ..run_constants import FEWEST
-from .unit_check import UNITS, doubts
+from ..run_constants import EVERY, FEWEST
+from .unit_check import UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
 FILLERS = frozenset(
@@ -42,10 +42,7 @@ ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "a
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
-SMOOTHED = 1.0  # s, over which speeds are taken (chosen)
 LIKELY = 0.4  # 1, correlation or likeness of names from which on it counts (chosen)
-# [deg, %] largest numbers of an angle and of a command in any unit, with what overshoots (chosen).
-LARGEST = {"angle": 400.0, "command": 105.0}
 
 
 class LikelyColumn(NamedTuple):
@@ -133,7 +130,7 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         return {}
     t = known["time"]
     apart = float(np.nanmedian(np.diff(t)))
-    width = max(int(SMOOTHED / apart), 1) if apart > 0.0 else 1
+    width = max(int(EVERY / apart), 1) if apart > 0.0 else 1
 
     def rate(values: np.ndarray) -> np.ndarray:
         half = (width + 1) // 2
@@ -201,7 +198,7 @@ def _evidence(
     moves = quantity in ("time", "length") or signal == "psi"  # a shaft may turn evenly
     if numbers.size < 2 or (moves and np.ptp(numbers) == 0.0) or unit not in ("", "-", *UNITS[quantity]):
         return None
-    if np.abs(numbers).max() > LARGEST.get(quantity, np.inf):
+    if np.abs(numbers).max() > largest(quantity) / min(UNITS[quantity].values()):
         return None
     known = WORDS.get(quantity, {})
     means = any(known.get(word) == signal for word in words_of(bare))

@@ -12,13 +12,12 @@ import pandas as pd
 from cosim import InputError
 from fmus.ship import Ship, ship
 
-from ..cleaning import lost
+from ..cleaning import WIDTH, lost
 from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..frozen import repeated
 from ..row_order import in_order
-from ..run_constants import NEGLIGIBLE
 from .columns import (
     POSE,
     UNITS,
@@ -37,7 +36,6 @@ from .columns import (
 from .geographic import geographic_pair, local_columns
 from .likely_columns import (
     ASTERN,
-    LARGEST,
     LikelyColumn,
     likely_columns,
     meaning_of_words,
@@ -46,7 +44,7 @@ from .likely_columns import (
     unit_in,
 )
 from .side_car import as_json, refuse_sentences, refuse_thousands
-from .unit_check import OFTENEST, RAREST, SI_UNIT, doubts, likely_unit, spelt
+from .unit_check import OFTENEST, SI_UNIT, doubts, largest, likely_unit, spelt
 from .usual_names import meaning
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
@@ -300,7 +298,7 @@ def _percent(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict
         return {}
     table = table_of_file(path, layout, _names_of(named))
     most = max(float(np.nanmax(np.abs(_numbers(table[n], "")), initial=0.0)) for n in _names_of(named))
-    if not 1.0 + NEGLIGIBLE < most <= LARGEST["command"]:
+    if not largest("command") < most <= largest("command") / UNITS["command"]["%"]:
         return {}
     return {s: column.model_copy(update={"unit": "%"}) for s, column in named.items()}
 
@@ -394,4 +392,4 @@ def _time_unit(time: np.ndarray) -> str | None:
     """The unit that times (n,) seem to be in; None: seconds."""
     time = time[in_order(time)]
     apart = float(np.median(np.diff(time))) if time.size > 1 else 1.0
-    return likely_unit(apart) if not OFTENEST < apart < RAREST else None
+    return likely_unit(apart) if not OFTENEST < apart < WIDTH else None

@@ -11,6 +11,8 @@ from scipy import constants as c
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
+from ..run_constants import NEGLIGIBLE, WIDTH
+
 # Quantity -> its units, that of SI first -> factor to that [1].
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": c.milli, "us": c.micro, "ns": c.nano, "min": c.minute},
@@ -36,11 +38,9 @@ SPELT = {
 SI_UNIT = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"
-# s between two samples, times the scale of the ship, whose own time constants are shorter (chosen)
-RAREST = 2.0
 OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 # s of a run, m or rad of a pose, N or N m of a force, times the full power: no ship has as much, and
-# sums of squares are far from overflow (chosen)
+# sums of squares are far from overflow (chosen). A pose beyond it is missing.
 LARGEST = 1e9
 # Beyond these no ship moves, so that the unit must be another one (chosen).
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
@@ -53,6 +53,16 @@ class Doubt(NamedTuple):
     signals: tuple[str, ...]
     unit: str
     reason: str
+
+
+def largest(quantity: str) -> float:
+    """The largest number in SI of a column or variable, with what overshoots: a turn, the full command.
+
+    Infinite for quantities of which none is known.
+    """
+    return (1.0 + NEGLIGIBLE) * {"angle": math.tau, "command": 1.0, "rate": QUICKEST}.get(
+        quantity, math.inf
+    )
 
 
 def spelt(unit: str) -> str:
@@ -68,7 +78,7 @@ def refuse_time(
     Raises:
         InputError: rows are too rare or too frequent, or the run is too long.
     """
-    rare = row > RAREST * scale.time
+    rare = row > WIDTH * scale.time
     if rare or row < OFTENEST:
         unit = likely_unit(row)
         what_to_do = f" {remedy(('time',), unit, called)}" if unit else ""
@@ -86,11 +96,8 @@ def refuse_units(
     """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
     Raises:
-        InputError: it goes or turns too fast, or is nowhere on earth.
+        InputError: it goes or turns too fast.
     """
-    far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
-    if far > LARGEST:
-        raise InputError(f"{where} is {far:.3g} m or rad from its origin: probably another column")
     for signals, unit, reason in () if anyway else doubts(time, pose):
         raise InputError(f"{where} {reason} {remedy(signals, unit, called)}; {GO_ON}")
 
@@ -145,4 +152,4 @@ def remedy(signals: Sequence[str], unit: str, called: Mapping[str, str] = NAMED_
 def likely_unit(row: float) -> str | None:
     """The unit of a time in which a row each so many seconds is neither too rare nor too frequent."""
     units = ((unit, row * size) for unit, size in UNITS["time"].items() if unit != "s")
-    return next((unit for unit, period in units if OFTENEST <= period < RAREST), None)
+    return next((unit for unit, period in units if OFTENEST <= period < WIDTH), None)

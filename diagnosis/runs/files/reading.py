@@ -37,10 +37,10 @@ from ..columns.columns import (
     to_si,
     with_units_of_names,
 )
-from ..columns.unit_check import LARGEST, UNITS, remedy
-from ..run_constants import NEGLIGIBLE
+from ..columns.unit_check import LARGEST, UNITS, largest, remedy
+from ..run_constants import DIGITS
 from .matlab_files import fits_matlab, read_matlab
-from .resolution import FUZZ, resolution
+from .resolution import resolution
 from .tables import as_table, column_names, date_stamps, is_cell, numbers, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
@@ -258,7 +258,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     power = None if power is None else np.maximum(power, 0.0)
     if units == {"1"} and commands is not None:
         most = float(np.abs(commands).max(initial=0.0))
-        if most > 1.0 + NEGLIGIBLE:  # far beyond rounding they are in another unit
+        if most > largest("command"):  # far beyond rounding they are in another unit
             raise InputError(
                 f"{where}: commands reach {most:g}; allowed is -1 to 1; are they in percent? "
                 f"{remedy(own, '%')}"
@@ -305,12 +305,12 @@ def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
     """
     order = np.argsort(time, kind="stable")
     t, held = time[order], command[order]
-    at = np.searchsorted(t, time + late * (1.0 + FUZZ), side="right") - 1
+    at = np.searchsorted(t, time + late * (1.0 + DIGITS), side="right") - 1
     after = np.minimum(at + 1, t.size - 1)
-    row = np.maximum(t[after] - t[at], FUZZ * late)
+    row = np.maximum(t[after] - t[at], DIGITS * late)
     part = np.clip((time + late - t[at]) / row, 0.0, 1.0)
     mean = (1.0 - part) * held[at] + part * held[after]
-    return np.where((part > FUZZ) & np.isfinite(mean), mean, held[at])
+    return np.where((part > DIGITS) & np.isfinite(mean), mean, held[at])
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:

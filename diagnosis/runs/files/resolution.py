@@ -2,9 +2,7 @@
 
 import numpy as np
 
-MOST_DIGITS = 12  # 1, of a number that counts as rounded; double precision has 15 (chosen)
-EXACT = 0.999  # 1, share of the numbers that are rounded so; chosen: a few may be of another writer
-FUZZ = 1e-6  # 1, of a step or a value, by which arithmetic may have moved a number (chosen)
+from ..run_constants import CHANCE, DIGITS
 
 
 def resolution(values: np.ndarray) -> np.ndarray:
@@ -13,12 +11,12 @@ def resolution(values: np.ndarray) -> np.ndarray:
     size = np.abs(values[counted])
     if not size.size:
         return np.zeros_like(values)
-    power = np.floor(np.log10(size * (1.0 + FUZZ)))  # of ten, of the first digit
-    for digits in range(1, MOST_DIGITS + 1):
+    power = np.floor(np.log10(size * (1.0 + DIGITS)))  # of ten, of the first digit
+    for digits in range(1, np.finfo(float).precision + 1):
         for first in (np.full_like(power, power.max()), power):  # decimals, significant digits
             step = 10.0 ** (first - digits + 1.0)
             off = np.abs(size - step * np.round(size / step))
-            if np.mean(off <= FUZZ * step + np.spacing(size)) >= EXACT:
+            if np.mean(off <= DIGITS * step + np.spacing(size)) >= 1.0 - CHANCE:
                 found = np.full_like(values, step.min())
                 found[counted] = step
                 return found

@@ -42,9 +42,10 @@ ANCHOR = 0.5
 # [1, m, rad] the same of a clock that may not be off; of a noise; inverse of the prior deviation of a
 # pose. It keeps the equations well-posed.
 NEGLIGIBLE = 1e-6
-SLOWEST = 0.1  # 1, true seconds in a second of the log, at the least: time does not fall; chosen
+LEAST = (
+    1e-3  # 1, of the noise, and of the walks over the whole run; with less a sea trial has another path
+)
 BEGIN = 0.1  # 1, of the walks in a second, times the noise or the rate; first guess
-LEAST = 1e-3  # 1, of the noise, and of the walks over the whole run; less changes no path (chosen)
 SWEEPS = 25  # 1, of the fixed point; chosen: the likelihood then changes by less than 0.1
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
@@ -259,6 +260,6 @@ def integral_of(edges: np.ndarray, clock: np.ndarray) -> np.ndarray:
 
     Between two nodes that noise has made fall the later one is put off: all others keep their time.
     """
-    least = SLOWEST * (edges - edges[0])
+    least = NEGLIGIBLE * (edges - edges[0])
     true = np.concatenate([[0.0], np.cumsum(clock * np.diff(edges))])
     return np.maximum.accumulate(true - least) + least

@@ -8,7 +8,7 @@ import numpy as np
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE
 
-from ..cleaning import NORMAL_MAD, long_gap, lost, noise
+from ..cleaning import long_gap, lost, median_std, noise
 from ..files.reading import Run
 from ..files.telegrams import filled
 from ..frozen import repeated
@@ -158,7 +158,7 @@ def large(values: np.ndarray) -> np.ndarray:
 
 def spread_of(values: np.ndarray) -> float:
     """Standard deviation of normal values about their median, by the median of their distances to it."""
-    return NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
+    return float(median_std(values - np.median(values)))
 
 
 def blocked_fit(

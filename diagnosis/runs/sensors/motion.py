@@ -14,6 +14,7 @@ from fmus.scale import Scale
 
 from ..cleaning import noise
 from ..files.reading import Run
+from ..run_constants import BLOCKS
 from .clock_path import DRIFT, HEADING, NEGLIGIBLE, TURN, Path, PathProblem, integral_of
 from .constants import DEVIATIONS, LEAST, FaultColumn, columns, deviations
 from .evidence import FEWEST, SURE, Evidence, evidence, large, spread_of, straight
@@ -21,7 +22,7 @@ from .gaps import gaps
 from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
-STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to locate its error; chosen
+STRETCH = 20.0  # s over which the rate is averaged to locate its error; with 15 s other clocks are found
 CLOCK_OR_SCALE = "the data have too little turning: a clock at this rate has the same effect"
 CLOCK_OR_COMPASS = "an offset of the compass has the same effect"
 CLOCK_OR_SPEED = (
@@ -282,7 +283,7 @@ class _Blocks(NamedTuple):
 def _blocks(path: Path) -> _Blocks:
     edges = path.problem.edges
     steps = np.where(path.problem.cut, 0.0, np.diff(edges))
-    wide = max(STRETCH, (edges[-1] - edges[0]) / MOST_STRETCHES)
+    wide = max(STRETCH, (edges[-1] - edges[0]) / BLOCKS)
     part = ((edges[:-1] - edges[0]) / wide).astype(int)
     weights = np.zeros((part.max() + 1, edges.size))
     weights[part, np.arange(part.size)] = steps

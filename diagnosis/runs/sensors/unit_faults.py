@@ -12,11 +12,10 @@ from ..cleaning import between
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
-from ..run_constants import IN_A_ROW
+from ..run_constants import HORIZON, IN_A_ROW
 from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
-WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
 NEAR = 0.15  # 1, relative distance within which a factor is that of a unit (chosen)
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is reversed"
@@ -103,7 +102,7 @@ def _position(e: Evidence) -> np.ndarray:
 def _windows(e: Evidence, *paths: np.ndarray) -> list[np.ndarray]:
     """What pose and channels say of each window, (k, d) each."""
     rows = e.rows
-    apart = max(1, round(WINDOW / float(np.median(np.diff(e.time[rows])))), 10)
+    apart = max(1, round(HORIZON / float(np.median(np.diff(e.time[rows])))), 10)
     return [np.diff(path[rows[::apart]], axis=0) for path in paths]
 
 

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.special import chdtri
 
-from ..cleaning import NORMAL_MAD
 from ..row_order import whole_periods
 from ..run_constants import CHANCE, DIGITS, ORDER
 from .likelihood import adapt, likeliest
@@ -27,7 +27,7 @@ from .outliers import REWEIGHTINGS, Inliers
 from .penalised import Problem
 from .spline import DEGREE
 
-GROWTH = 1.5  # from lag to lag, in samples
+GROWTH = 1.5  # 1, from lag to lag, in samples; chosen
 
 
 class Correlated(NamedTuple):
@@ -77,7 +77,7 @@ def hadamard(
     powers = np.arange(np.log(max(most, 1)) / np.log(GROWTH) + DIGITS)
     lags = np.unique(np.round(GROWTH**powers).astype(int))
     found = []
-    median = NORMAL_MAD**-2.0  # of the square of a standard normal variable
+    median = float(chdtri(1.0, 1.0 / 2.0))  # of the square of a standard normal variable
     density = np.exp(-median / 2.0) / np.sqrt(2.0 * np.pi * median)
     # Relative variance of a variance by the median of n independent squares, times n.
     spread = 1.0 / (2.0 * density * median) ** 2

@@ -5,16 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cleaning import Z95
-from ..run_constants import CHANCE
+from ..run_constants import CHANCE, STEPS
 from ..sensors.evidence import FAR
 from .likelihood import adapt, likeliest, with_noise
 from .penalised import Fit, Problem, solve
 from .spline import DEGREE, WIDTH
 
+# 1, most rounds of reweighting, and of each test; two or three are the rule, but a run of the real ship
+# takes more than six.
+REWEIGHTINGS = 10
 OUTLIER = 5.0  # 1, standard deviations: one in 1.7 million samples of normal noise is refused
-REWEIGHTINGS = 10  # 1, most rounds of reweighting, and of each test; two or three are the rule
-
-HALVINGS = 4  # 1, of the time constant of the first spline: to an eighth of a sampling period (chosen)
 
 
 class TooFewError(Exception):
@@ -56,7 +56,7 @@ def robust(p: Problem, local: np.ndarray, least: np.ndarray, resolved: bool) -> 
         TooFewError: in some stretch.
     """
     weights, halvings = robust_weights(p, local), 0
-    while (slow := _mostly_outside(p, weights)).any() and halvings < HALVINGS:
+    while (slow := _mostly_outside(p, weights)).any() and halvings < STEPS:
         local, halvings = np.where(slow, local / 2.0**DEGREE, local), halvings + 1
         weights = robust_weights(p, local)
     weights, rounds = (outlier_test(p, local, weights) if resolved else weights), 0
