@@ -21,6 +21,7 @@ from cybership.message_text import quoted
 from .commands.command_line import Done, execution_of, fmu_parser, out_options, run
 from .execution.progress import Advance
 from .execution.result_folder import together
+from .runs.run_constants import NEGLIGIBLE
 
 if TYPE_CHECKING:
     from cosim.fmu import FmuModel
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from .fmu_parameters.system_map import SystemMap
 
 FILES = ("linear.json", "linear.mat")
-DOUBTFUL = 0.02  # 1, change of A by longer steps, from which on it is reported; chosen
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -81,7 +81,7 @@ def linearise(options: argparse.Namespace, advance: Advance) -> Done:
 
 def _doubt(share: float) -> list[str]:
     """What longer steps say of rates that are differences."""
-    if share <= DOUBTFUL:
+    if share <= NEGLIGIBLE:
         return []
     return [
         f"A is uncertain by {share:.0%}: its rates are differences over short steps, and steps of twice "

@@ -213,19 +213,19 @@ def scored(candidate=0, blocks=(100.0,) * 40, prior=0.0, complexity=0.0, runs=No
 @pytest.mark.parametrize(
     ("best", "total", "accepted"),
     [
-        (scored(blocks=[90.0] * 40), 4000.0, True),
-        (scored(blocks=[90.0] * 40), 3600.0 / 0.95 - 1.0, False),  # 5 % of the model error
-        (scored(blocks=[90.0] * 40), 3600.0 / 0.95 + 1.0, True),
-        (scored(blocks=[99.8] * 40), 1e5, False),  # less than 10, and than 0.3 % of the error
-        (scored(blocks=[99.72] * 40), 1e5, False),  # more than 10
-        (scored(blocks=[99.69] * 40), 1e5, True),
-        (scored(blocks=[99.69] * 40, complexity=1.0), 1e5, False),
+        (scored(blocks=[180.0] * 40), 8000.0, True),
+        (scored(blocks=[180.0] * 40), 7200.0 / 0.95 - 1.0, False),  # 5 % of the model error
+        (scored(blocks=[180.0] * 40), 7200.0 / 0.95 + 1.0, True),
+        (scored(blocks=[199.8] * 40), 1e5, False),  # less than 10, and than 0.25 % of the error
+        (scored(blocks=[199.52] * 40), 1e5, False),  # more than 10
+        (scored(blocks=[199.48] * 40), 1e5, True),
+        (scored(blocks=[199.48] * 40, complexity=1.0), 1e5, False),
     ],
 )
 def test_a_candidate_explains_more_than_chance_does(best, total, accepted):
-    assert beyond_chance(scored(), best, total) == accepted
+    assert beyond_chance(scored(blocks=[200.0] * 40), best, total) == accepted
     fewer = replace(best, blocks=best.blocks / 100.0, complexity=0.0)
-    assert not beyond_chance(scored(blocks=[1.0] * 40), fewer, 1e5), "a fall below 10 is chance"
+    assert not beyond_chance(scored(blocks=[2.0] * 40), fewer, 1e5), "a fall below 10 is chance"
 
 
 def test_runs_that_a_candidate_was_not_fitted_to_count_with_what_the_prior_charges():

@@ -31,6 +31,7 @@ from diagnosis.assessment.stability import (
 )
 from diagnosis.predictors import Model, ship_with
 from diagnosis.predictors.weak_form import acceleration
+from diagnosis.runs.cleaning import BRIEF
 from fmus.declare import variables
 from fmus.hull import Damping
 
@@ -108,7 +109,7 @@ def test_the_damping_of_a_described_ship_and_its_changes_count():
 
 @pytest.mark.parametrize("before", [2.0, -2.0])
 def test_less_is_less_by_more_than_a_share_of_what_was_before(before):
-    share = 2.0 * SETTINGS.hardly
+    share = 2.0 * SETTINGS.inexact**2
     found = stability._less(before + share * np.array([1.1, -0.9, -1.1]), before)
     assert found.tolist() == [False, False, True]
 
@@ -253,10 +254,10 @@ def test_recorded_loop_gives_the_same_bits(model):
     reference = REFERENCES[1]._replace(seconds=6.0)
     now, step = closed_loop(reference, model)
     h, expected = 0.0, []
-    for _ in range(round(reference.seconds / SETTINGS.step)):
+    for _ in range(round(reference.seconds / BRIEF)):
         now, distance = step(now, h)
         expected.append(distance)
-        h = SETTINGS.step
+        h = BRIEF
     assert list(distances(reference, model)) == expected
     assert max(expected) > 0.01
 

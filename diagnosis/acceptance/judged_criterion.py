@@ -10,16 +10,17 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.frames import rotate_to_body
 
+from ..runs.run_constants import CHANCE, NEGLIGIBLE
 from .budget import Budget, Sources, budget
 from .criterion import Criterion
-from .predictions import LATE, Predictions, difference, judged
+from .predictions import Predictions, difference, judged
 from .statistics import Interval, independent, needed, root_mean_square, share
 
 Outcome = Literal["met", "not met", "cannot be judged"]
-EXPANDED = 2.0  # 1, standard uncertainties in the expanded one, about 95 % of a normal distribution
-# 1, of u_D: an RMS below it, and with less probability than the other, is that of no prediction. Half,
-# as noise may be stated too large (chosen).
-FAR_BELOW, CHANCE = 0.5, 1e-3
+EXPANDED = 2.0  # 1, standard uncertainties in the expanded one (ASME V&V 20, JCGM 100)
+# 1, of u_D: an RMS below it, with no more probability than CHANCE, is that of no prediction. Half, as
+# noise may be stated too large (chosen).
+FAR_BELOW = 0.5
 LEARNED, FEW = "the model was learned from it", "too few samples"
 
 
@@ -248,7 +249,7 @@ def _limits(c: Criterion) -> str:
 
 def _too_early(c: Criterion, after: np.ndarray) -> str:
     """A sentence where the samples that are judged are well before the horizon; else nothing."""
-    if np.mean(after) >= (1.0 - LATE) * c.horizon:
+    if np.mean(after) >= (1.0 - NEGLIGIBLE) * c.horizon:
         return ""
     return (
         f"Samples are rare: what is judged is {np.mean(after):.3g} s after the start of a prediction in "

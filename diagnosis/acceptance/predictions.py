@@ -12,9 +12,8 @@ from fmus.ops import wrap
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..runs import Smoothed
+from ..runs.run_constants import NEGLIGIBLE
 from .criterion import JUDGED
-
-LATE = 0.1  # 1, of the horizon, or 1.5 samples: by so much earlier the last sample may be; chosen
 
 
 class Predictions:
@@ -49,7 +48,7 @@ class Predictions:
         place = np.flatnonzero(self.windows.since <= until + 1e-9)
         window = self.windows.sample_window[place]
         last = place[np.append(window[1:] != window[:-1], True)] if place.size else place
-        late = max(LATE * horizon, 1.5 * self.smoothed.track.period)
+        late = max(NEGLIGIBLE * horizon, 1.5 * self.smoothed.track.period)
         last = last[self.windows.since[last] >= until - late]
         # Three samples of the same window give the slope of the pose at the last of them.
         last = last[last >= 2]

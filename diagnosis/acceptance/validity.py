@@ -7,13 +7,13 @@ import numpy as np
 from ..predictors import at_samples
 from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
+from ..runs.run_constants import NEGLIGIBLE
 from .criterion import MOTION
 from .predictions import Predictions
 
 QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
 # By the quantity of a command.
 SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
-SLOW = 0.1  # 1, of the speed that a run reaches, below which there is no drift angle; chosen
 
 
 def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
@@ -21,7 +21,7 @@ def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
     u, v, r = smoothed.nu.T
     speed = np.hypot(u, v)
     with np.errstate(invalid="ignore"):
-        under_way = speed > SLOW * np.nanmax(speed)
+        under_way = speed > NEGLIGIBLE * np.nanmax(speed)  # slower, it has no drift angle
     drift = np.where(under_way, np.arctan2(-v, u), np.nan)
     motion = {"u": u, "v": v, "r": r, "speed": speed, "drift": drift}
     known = {*motion, "x", "y", "psi"}

@@ -27,6 +27,7 @@ from fmus.signals import Estimate, Force, Measurement, Nothing, Target
 
 from ..predictors import Model
 from ..predictors.ship_model import parameters
+from ..runs.cleaning import BRIEF
 from .settings import SETTINGS
 
 
@@ -79,7 +80,7 @@ def closed_loop(
     That function gets the time [s] since controller and thrusters acted last, and gives the distance [m]
     between the ship and its target as well.
     """
-    length, h_path = model.ship.scale.length, SETTINGS.step * model.ship.scale.time
+    length, h_path = model.ship.scale.length, BRIEF * model.ship.scale.time
     start = {name: length * x for name, x in reference.start.items()}
     ship = LoopPart(model.ship.vessel, {**model.vessel, **start})
     serving = model.ship.serving
@@ -137,11 +138,11 @@ def distances(reference: ReferencePath, model: Model) -> Iterator[float]:
     first, step = closed_loop(reference, model)
     now, distance = step(first, 0.0)
     yield distance
-    tape, values, h = Tape(Kernels()), flatten(now), SETTINGS.step * model.ship.scale.time
+    tape, values, h = Tape(Kernels()), flatten(now), BRIEF * model.ship.scale.time
     names = [f"s{k}" for k in range(len(values))]
     after, further = step(rebuild(now, [tape.variable(name) for name in names]), h)
     advance = function(tape.recording([*flatten(after), further]), tape.kernels, *names)
-    for _ in range(round(reference.seconds / SETTINGS.step) - 1):
+    for _ in range(round(reference.seconds / BRIEF) - 1):
         *values, distance = advance(*values)
         yield distance
 
@@ -158,4 +159,4 @@ def largest_distance(reference: ReferencePath, model: Model) -> float:
         kept = [*takewhile(lambda distance: distance < bound, distances(reference, model))]
     except (OverflowError, ValueError, ZeroDivisionError):  # numbers beyond what a float holds
         return inf
-    return max(kept) if len(kept) == round(reference.seconds / SETTINGS.step) else inf
+    return max(kept) if len(kept) == round(reference.seconds / BRIEF) else inf

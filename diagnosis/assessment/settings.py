@@ -1,8 +1,10 @@
 """Constants by which this room decides; no command has an option for them."""
 
+import math
 from dataclasses import dataclass
 
 from ..predictors.uncertainty import MEASURED
+from ..runs import UNITS
 from ..runs.run_constants import CHANCE, NEGLIGIBLE, PARTS
 
 
@@ -18,9 +20,9 @@ class AssessmentSettings:
     # 1, of accelerations over commands, of commands over full thrust. Derived: half of the way, in
     # logarithms, between one thruster of two and the foot, the smallest of the units: sqrt(2 * 3.28).
     most_gain: float = 2.5
-    # 1. Derived: half of the way, in logarithms, to the nearest wrong unit, a hundredth. A thruster that
-    # gives a tenth, or none, is a matter of the diagnosis.
-    least_gain: float = 0.1
+    # 1. Half of the way, in logarithms, to the nearest wrong unit, a hundredth. A thruster that gives a
+    # tenth, or none, is a matter of the diagnosis.
+    least_gain: float = math.sqrt(UNITS["command"]["%"])
     windows: float = 10.0  # 1, independent ones that a model which is not exact is worth; chosen
     # 1, of the inertial force, that a model lacks at the least, and of the full thrust, deviation of a
     # force that is steady
@@ -28,9 +30,6 @@ class AssessmentSettings:
     # 1, share of a thrust: deviation of what of it is lost, and what of the full one nothing but an
     # actuator gives all the time; chosen
     much: float = 0.5
-    # 1, share of a command that follows from no other, or of a dissipation, that is none; chosen: no
-    # coefficient is known to 1 %.
-    hardly: float = 0.01
     neighbours: int = 5  # 1, windows by which that of a model error is predicted; chosen
     repeats: float = 0.25  # 1, share from which on an error is said to repeat; chosen
     # 1. Calibrated by tests/test_diagnosis_where.py: with one block three times as many regions were
@@ -44,7 +43,6 @@ class AssessmentSettings:
     least_region: float = 0.1  # 1, of the limits, so that an axis that hardly moves is checked; chosen
     limits: tuple[float, float, float] = (0.4, 0.2, 0.6)  # m/s, m/s, rad/s: 99 % of each published run
     runaway: float = 3.0  # 1, times the speeds of the region; chosen
-    step: float = 0.08  # s, of simulations; chosen, distances agree with those at 0.01 s to 3 %
     bound: float = 5.0  # m, four ship lengths, beyond which a ship is lost; chosen
 
 

@@ -23,6 +23,7 @@ from ..execution.parallel import for_each
 from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.thrust import FORGOTTEN
+from ..runs.cleaning import BRIEF
 from .closed_loop import REFERENCES, bound_of, largest_distance
 from .covariates import AXES
 from .settings import SETTINGS
@@ -253,7 +254,7 @@ def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
 
 
 def _less(after: Any, before: Any) -> Any:
-    return after < before - SETTINGS.hardly * np.abs(before)
+    return after < before - SETTINGS.inexact**2 * np.abs(before)
 
 
 def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: OperatingRegion) -> str:
@@ -280,7 +281,7 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     scale = model.ship.scale
     still = np.zeros(len(motions))
     s = vessel.State._make([still, still, still, *motions.T, still])
-    most, h = 0.0, SETTINGS.step
+    most, h = 0.0, BRIEF
     with np.errstate(all="ignore"):
         for _ in range(round(FORGOTTEN / h)):
             s = vessel.integrate(s, Force(0.0, 0.0, 0.0), model.hull.hull, h * scale.time)

@@ -10,9 +10,6 @@ from fmus.ops import wrap
 
 from ..runs import Smoothed
 
-# 1, of a steady Kalman filter of constant velocity, whose noise is white acceleration
-DAMPING = 0.5**0.5
-
 
 class Filters(NamedTuple):
     """Filters behind which x, y and psi are measured; zero: none.
@@ -20,13 +17,14 @@ class Filters(NamedTuple):
     Attributes:
         lag: (3,), time constants T [s] of low-pass filters of first order, T dz/dt = p - z.
         tracker: (3,), time constants T = 1/w [s] of trackers of constant velocity: with d = sqrt(1/2),
-            dy/dt = v + 2 d w (z - y), and dv/dt = w^2 (z - y).
+            dy/dt = v + 2 d w (z - y), and dv/dt = w^2 (z - y). That is the damping d of a steady Kalman
+            filter of constant velocity, whose noise is white acceleration.
         latency: (3,), ages T [s] at the time stamp, m(t) = y(t - T).
     """
 
     lag: tuple[float, float, float]
     tracker: tuple[float, float, float]
-    latency: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    latency: tuple[float, float, float]
 
     def __bool__(self) -> bool:
         return any(map(any, self))
@@ -39,13 +37,13 @@ class Filters(NamedTuple):
         """(3, n), factor by which undoing the filters multiplies what has a frequency w (n,) [rad/s]."""
         s = 1j * w
         lag, T = (np.array(each)[:, None] for each in (self.lag, self.tracker))
-        return np.abs((1.0 + s * lag) * (1.0 + (s * T) ** 2 / (1.0 + 2.0 * DAMPING * T * s)))
+        return np.abs((1.0 + s * lag) * (1.0 + (s * T) ** 2 / (1.0 + np.sqrt(2.0) * T * s)))
 
     def first_response(self, h: np.ndarray) -> np.ndarray:
         """(3,), share of a new sample in the output of a filter computed at intervals h (3,) [s]."""
         with np.errstate(divide="ignore"):
             lag, tracker = (h / np.array(each) for each in (self.lag, self.tracker))
-        return np.expm1(-lag) * np.expm1(-2.0 * DAMPING * tracker)
+        return np.expm1(-lag) * np.expm1(-np.sqrt(2.0) * tracker)
 
     @property
     def squared_time(self) -> np.ndarray:
@@ -111,7 +109,7 @@ def _undone(f: Filters, s: Smoothed) -> BeforeFilters:
     timely, timely_rate = eta.copy(), eta_dot.copy()
     for k, T in enumerate(f.tracker):
         if T:
-            tau = 2.0 * DAMPING * T
+            tau = np.sqrt(2.0) * T
             error = T**2 * _low_passed(s.time, eta_ddot[:, k], tau)
             rate = (T**2 * eta_ddot[:, k] - error) / tau
             eta[:, k] += error
@@ -162,10 +160,10 @@ def _tracking(p: np.ndarray, off: np.ndarray, rate: np.ndarray, T: float, h: flo
     """
     found, slopes = np.array(p), np.diff(p, axis=0) / h
     found[0] -= off
-    a = DAMPING / T  # rad/s, frequency and decay of the oscillation
+    a = 1.0 / (np.sqrt(2.0) * T)  # rad/s, frequency and decay of the oscillation
     decay, cos, sin = np.exp(-a * h), np.cos(a * h), np.sin(a * h)
     bb, bw, wb, ww = decay * (cos - sin), decay * sin / a, -2.0 * a * decay * sin, decay * (cos + sin)
-    velocity = rate - 2.0 * DAMPING / T * off
+    velocity = rate - 2.0 * a * off
     for n, slope in enumerate(slopes, start=1):
         slow = slope - velocity
         off, slow = bb * off + bw * slow, wb * off + ww * slow

@@ -21,6 +21,7 @@ from ..runs.cleaning import BRIEF
 from .prediction import WindowStarts, by_measurement, predict, predict_each
 from .ship_model import Model
 from .thrust import LONGEST_STEP
+from .uncertainty import NOISE_TOLERANCE
 from .weak_form import BLOCK, BLOCKS, HORIZON
 
 # Of a run that is predicted as a whole, times the scale of the ship.
@@ -30,7 +31,6 @@ ANY_TIME = (-np.inf, np.inf)  # s
 # m, times the scale of the ship, and rad; where predictions begin a velocity is known if its standard
 # deviation displaces the ship by no more over a window. Chosen: a tenth of its length.
 DISPLACED = 0.1
-SETTLED = 2.0  # 1, times the median of a run, or so well; chosen: at its ends it is three to four
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -276,7 +276,7 @@ def settled_time(smoothed: Smoothed, begin: float, length: float) -> float:
     size = np.array([smoothed.scale.length, smoothed.scale.length, 1.0])
     used = smoothed.used & (smoothed.time >= begin)
     usual = np.median(smoothed.nu_std[smoothed.used], axis=0)
-    most = np.maximum(SETTLED * usual, DISPLACED * size / length)
+    most = np.maximum(NOISE_TOLERANCE * usual, DISPLACED * size / length)
     rows = np.flatnonzero(used)
     known = (smoothed.nu_std[rows] <= most).all(axis=1)
     return float(smoothed.time[rows[known.argmax()]]) if known.any() else begin

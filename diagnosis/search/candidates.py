@@ -18,11 +18,11 @@ from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import FLOOR, undone_variance
 from ..predictors.weak_form import SMALL
+from ..runs.run_constants import NEGLIGIBLE
 from .nonlinear.multistart import MULTIPLES, Landscape, best_values, limits
 from .nonlinear.segmentation import intervals, problem
 
 # Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
-LEAST_SHARE = 0.003  # of a sum of squares: what is less changes no prediction; chosen
 SLIGHT = np.finfo(float).eps  # sum of squares of a force, in the units above, that is rounding
 
 
@@ -98,12 +98,12 @@ def shape(
 
 
 def covered(columns: np.ndarray) -> np.ndarray:
-    """(p,), which nodes of a curve have LEAST_SHARE of what all give together, and those between them.
+    """(p,), which nodes of a curve give a force that shows beside that of all, and those between them.
 
     What lies outside stays zero: there the curve is the model's. Columns (K, 3, p) are by node.
     """
     weight = np.square(columns).sum(axis=(0, 1))
-    reached = np.flatnonzero(weight > LEAST_SHARE * weight.sum())
+    reached = np.flatnonzero(weight > NEGLIGIBLE**2 * weight.sum())
     inside = np.zeros(weight.size, bool)
     if reached.size:
         inside[reached[0] : reached[-1] + 1] = True

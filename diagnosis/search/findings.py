@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from .refinement import RefinedModel
 
 
-MOST_REPORTED = 6  # effects, or disturbances, the clearest: with more, no one acts on the last; chosen
+MOST_REPORTED = (
+    6  # 1, effects, disturbances or forces, the clearest: with more, no one acts on the last; chosen
+)
 
 
 @dataclass(frozen=True, eq=False)

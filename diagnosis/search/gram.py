@@ -19,8 +19,8 @@ from ..runs.run_constants import PARTS
 from .candidates import SLIGHT, Candidate, CandidateShape
 from .most_likely import ridge
 
-FOLDS = 8  # of cross-validation over blocks
-WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
+FOLDS = 8  # 1, of cross-validation over blocks, and parts of a run whose scores are compared; chosen
+WHOLE_RUNS = 3  # 1, runs, from which on whole ones are left out in turn; contract
 
 
 @dataclass(frozen=True, eq=False)

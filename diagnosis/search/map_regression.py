@@ -23,7 +23,7 @@ from .candidates import SLIGHT
 from .gram import Folds, GramTable
 from .most_likely import ridge
 
-REPLICATES = 200  # of the block bootstrap: the standard error of a share is 3.5 % at the most
+REPLICATES = 200  # 1, of the block bootstrap: the standard error of a share is 3.5 % at the most
 
 
 def _form(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:

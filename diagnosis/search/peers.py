@@ -25,9 +25,9 @@ from .candidates import Candidate, CandidateShape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import FOLDS, block_numbers
 from .prior import Prior
+from .shortlist import LENGTH
 
-THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
-COMPONENTS = (1, 2, 3, 5, 8)  # latent variables to try; chosen
+THRESHOLDS = (0.03, 0.1, 0.3)  # 1, of standardised coefficients, from nearly all to only the largest
 
 
 class Features(NamedTuple):
@@ -194,7 +194,7 @@ class PartialLeastSquares(Peer):
     """
 
     name = "pls"
-    settings = COMPONENTS
+    settings = range(1, LENGTH + 1)  # latent variables
 
     def coefficients(self, A: np.ndarray, y: np.ndarray, setting: float) -> np.ndarray:
         """See :class:`Peer`."""

@@ -35,13 +35,13 @@ from .refinement import (
     timed,
 )
 
-LENGTH = 8  # of the shortlist
-CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
-# Least fall of the score that a candidate must be able to have in addition to those found. The score is
+LENGTH = 8  # 1, of the shortlist: candidates and hypotheses that have a fit of their own; chosen
+CHANGED = 1.5  # 1, ratio of an axis' weight from which on candidates are refined anew
+# 1, least fall of the score that a candidate must be able to have beside those found. The score is
 # twice a log likelihood ratio, and so the signal to noise, a sum of squares. Chance does not give this
 # fall among some fifty candidates (2 log 50 = 7.8).
 NEW = 10.0
-TIE = 2.0  # paired standard errors within which two candidates are indistinguishable
+TIE = 2.0  # 1, paired standard errors within which two candidates are indistinguishable; contract
 
 # By the effects of the measurement in the model, the candidates by id.
 MadeCandidates = dict[frozenset[str], dict[str, Candidate]]

@@ -11,7 +11,6 @@ from fmus.ship import Ship
 
 from ..predictors.uncertainty import SHARE_OF_COMMAND
 from ..runs.run_constants import NEGLIGIBLE
-from .candidates import LEAST_SHARE
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
 
@@ -26,7 +25,7 @@ def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
     """
     fall = nothing.score - best.score
     explains = float(best.blocks.sum()) < (1.0 - NEGLIGIBLE) * total
-    return explains and fall > max(LEAST_SHARE * nothing.score, NEW)
+    return explains and fall > max(NEGLIGIBLE**2 * nothing.score, NEW)
 
 
 def harmful(nothing: Scored, best: Scored) -> bool:

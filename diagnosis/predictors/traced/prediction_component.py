@@ -14,12 +14,11 @@ from fmus.signals import Force, Measurement
 from fmus.vessel import vessel
 
 from ...runs import Run
+from ...runs.run_constants import STEPS
 from ..prediction import nearer_pose, true_motion
 from ..ship_model import Model
 from .recorded_step import Inputs, Ready
 from .recorded_step import step as one_step
-
-SOLVED = 4  # 1, iterations of the pose behind measurement effects; those of the project need two
 
 # What a window starts from: measured pose and its rate [m, m, rad, m/s, m/s, rad/s], and the time [s].
 START = ("x", "y", "psi", "x_dot", "y_dot", "psi_dot", "t")
@@ -111,6 +110,6 @@ def with_values(model: Model, names: Sequence[str], values: Fields) -> Model:
 def solved_pose(measured: Sequence[Number], b: vessel.PreparedVessel) -> list[Number]:
     """As :func:`.prediction.true_pose`, of numbers and with as many iterations for all."""
     pose = [*measured]
-    for _ in range(SOLVED):
+    for _ in range(STEPS):
         pose, _ = nearer_pose(pose, measured, b)
     return pose

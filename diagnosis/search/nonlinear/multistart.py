@@ -21,9 +21,9 @@ from scipy.optimize import least_squares
 from fmus.declare import Variable
 from fmus.effects import Effect
 
-POINTS = 32  # of the Sobol sequence, besides the start; chosen: of one parameter every 3 % of the range
-REFINED = 3  # of the best; chosen
-# An effect without values of its own is tried at these multiples of the value at which its force is as
+POINTS = 32  # 1, of a Sobol sequence, besides the start; chosen: of one number every 3 % of its range
+REFINED = 3  # 1, best starts or plans that are examined further; chosen
+# 1; an effect without values of its own is tried at multiples of the value at which its force is as
 # large as the model error. A parameter without limits is tried as far to both sides of its scale;
 # chosen.
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)

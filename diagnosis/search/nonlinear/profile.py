@@ -31,7 +31,7 @@ from ..refinement import (
     slope,
 )
 
-REACH = 1.5  # factor to both sides within which the best value is looked for; chosen
+REACH = 1.5  # 1, factor to both sides within which the best value is looked for; chosen
 
 Interval = tuple[float, float]
 

@@ -31,13 +31,10 @@ from fmus.scale import Scale
 
 from ...predictors import Model, WeakWindows
 from ...predictors.ship_model import of_run
+from ...predictors.uncertainty import FLOOR
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
 from ...runs.cleaning import BRIEF
 from ..most_likely import ENOUGH, STEPS, ridge, rise
-
-# N, N, N m; of CyberShip Enterprise 1, times the scale of the ship. Chosen: what a fit leaves is less
-# only by the arithmetic, or where it has more columns than windows.
-FLOOR = np.array([1e-3, 1e-3, 3e-4])
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]

@@ -26,10 +26,10 @@ from ..map_regression import REPLICATES
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
-PEAK = 4.0  # times the spectrum around it, and its own flanks
-FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
+PEAK = 4.0  # 1, times the spectrum around it, and its own flanks
+FEW = 20.0  # 1, with one segment a peak must be so much higher, with n the n-th part of it
 SEGMENT = 25.0  # s; six periods of the slowest wave
-DRAWINGS = 3  # of noise, whose mean spectrum counts; chosen: of one, a line is low by chance
+DRAWINGS = 3  # 1, of noise, whose mean spectrum counts; chosen: of one, a line is low by chance
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ...predictors import Model, WeakWindows
 from ...predictors.shooting import Shooting
 from ..candidates import SMALL, model_error
 from ..findings import Findings
-from ..gram import WHOLE_RUNS
+from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance_summary import unrecorded
@@ -37,7 +37,7 @@ from .fit import (
 from .joint_posterior import JointPosterior
 from .refit import RefitOutcome
 
-# Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
+# 1; effects whose coefficients models of few terms leave out, and their prior deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
 # (1983, RINA 125, 45-68) gives such terms 2 to 25 units. Models have some of these by other terms. Half
 # a unit of X_uuu is three tenths of the resistance of both at their speed.
@@ -45,7 +45,7 @@ LIFT, RESISTANCE = 3.0, 0.5
 LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), LIFT)
 LEFT_OUT |= dict.fromkeys(("X_u", "X_uuu"), RESISTANCE)
 AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; chosen
-# Prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
+# 1, prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
 # for a ship of 34 m; chosen.
 STREAM = 0.05
 CONSTANTS = ("body_bias_Y", "body_bias_N")  # of each run
@@ -58,7 +58,10 @@ class Calibration(PredictionFit):
         constant: of each group of windows, by fold its rows, slopes of the constants and covariance.
     """
 
-    least = WHOLE_RUNS
+    @cached_property
+    def folds(self) -> list[tuple[int, np.ndarray]]:
+        """The folds of the runs, see :func:`.gram.run_folds`."""
+        return run_folds(self.runs)
 
     def information(self, at: RefinedModel) -> Information:
         model, q = at.model(self.prior), self.unit.size

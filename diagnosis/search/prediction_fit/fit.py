@@ -39,7 +39,7 @@ from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance, covariance, estimate
 
-LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
+LENGTHS = (0.5, 1.0, 2.0)  # 1, of the windows in which predictions are shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,12 +119,7 @@ class PredictionFit:
         runs, windows: to learn from.
         at: where to begin.
         prior: of the nominal coefficients.
-
-    Attributes:
-        least: number of runs from which on a fold is a whole one.
     """
-
-    least = WHOLE_RUNS - 1
 
     def __init__(
         self,
@@ -153,7 +148,7 @@ class PredictionFit:
     @cached_property
     def folds(self) -> list[tuple[int, np.ndarray]]:
         """The folds of the runs, see :func:`.gram.run_folds`."""
-        return run_folds(self.runs, self.least)
+        return run_folds(self.runs, WHOLE_RUNS - 1)
 
     @cached_property
     def fold_of_window(self) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ from ...runs import Fingerprint
 from ..prior import NominalPrior
 from .fit import Fitted
 
-TOGETHER = 0.97  # of a correlation, from which on two values are known only together; chosen
+TOGETHER = 0.97  # 1, of a correlation, from which on two values are known only together; chosen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
