@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from diagnosis.design.manoeuvre_library import (
     DIMENSIONS,
     LIBRARY,
-    SINES,
     USUAL,
     PlanStep,
     Reach,
@@ -20,6 +19,7 @@ from diagnosis.design.manoeuvre_library import (
     visits,
 )
 from diagnosis.design.order_library import ORDERS, USUAL_ORDERS, Orders
+from fmus.guidance.multisine import FREQUENCIES
 
 REACH = Reach(speed=0.5, rate=0.2, room=8.0, time=1.0, aft=-0.5, fore=0.4)
 H = 0.01
@@ -162,7 +162,7 @@ def test_a_zigzag_swings_by_its_angle_and_period_and_comes_back():
 def test_a_multisine_has_its_frequencies_and_shares():
     t, pose = course("multisine", (0.5, 0.2, 0.4, 0.6, 0.5), 100.0)
     inner = (t > 15.0) & (t < 85.0)
-    omega = 1.4 * SINES
+    omega = 1.4 * np.array(FREQUENCIES)
     for k, limit in enumerate((0.5 * 0.2, 0.5 * 0.4, 0.2 * 0.6)):
         waves = [w / 1.5 * limit / o * np.sin(o * t) for w, o in zip((1.0, 0.5), omega[k], strict=True)]
         assert pose[inner, k] == pytest.approx(sum(waves)[inner], abs=1e-6)

@@ -26,7 +26,6 @@ from diagnosis.design import (
     Basin,
     Limits,
     Question,
-    designing,
     plan_next,
     prepared,
     rehearsal,
@@ -48,12 +47,13 @@ from diagnosis.design.information import (
 )
 from diagnosis.design.limits import limits_of
 from diagnosis.design.manoeuvre_library import LIBRARY, PlanStep, Reach, poses, sequence, usual
-from diagnosis.design.planned_motion import EVERY, PlannedMotion
+from diagnosis.design.planned_motion import PlannedMotion
 from diagnosis.design.rehearsal import Rehearsal, RehearsedEffect
 from diagnosis.design.spread import drawn, followed
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest
 from diagnosis.predictors.weak_form import commanded
+from diagnosis.runs.cleaning import BRIEF
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 
@@ -79,7 +79,7 @@ def linear(seed=0, rows=12, alike=False):
     h = [Hypothesis((n,), np.concatenate([nuisance, o]), o) for n, o in zip("ab", own, strict=True)]
     precision = np.diag([*[1.0] * Q, *[0.1] * (2 * OWN)])
     prior = np.zeros(len(precision))
-    return Knowledge(h, np.array([0.5, 0.5]), X.T @ X, X.T @ y, precision, prior), X, y, rng
+    return Knowledge(h, np.array([0.5, 0.5]), X.T @ X, X.T @ y, precision, prior, 1.0), X, y, rng
 
 
 def gram(rng, rows=20, alike=False):
@@ -193,7 +193,7 @@ def test_precision_criteria_agree_with_pyomo_doe():
     information = np.array(doe.compute_FIM(method="sequential"))
     X = np.column_stack([np.ones(places.size), places]) / std
     h = Hypothesis(("line",), np.arange(2), np.arange(2))
-    k = Knowledge([h], np.ones(1), np.zeros((2, 2)), np.zeros(2), before, np.zeros(2))
+    k = Knowledge([h], np.ones(1), np.zeros((2, 2)), np.zeros(2), before, np.zeros(2), 1.0)
     grown = np.linalg.slogdet(information)[1] - np.linalg.slogdet(before)[1]
     assert d_optimal(k, X.T @ X) == pytest.approx(0.5 * grown, rel=1e-6)
     ratio = np.diag(np.linalg.inv(information)) / np.diag(np.linalg.inv(before))
@@ -386,7 +386,7 @@ def test_the_planned_motion_is_what_its_thrust_gives():
 
 def test_a_faster_motion_has_the_same_track(designer):
     d, _ = designer
-    slow = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), EVERY)
+    slow = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), BRIEF)
     fast = slow.faster(1.2)
     h = float(fast.time[1] - fast.time[0])
     assert fast.eta == pytest.approx(slow.eta)
@@ -398,7 +398,7 @@ def test_a_plan_keeps_a_margin_to_the_speed_at_which_a_ship_diverges(designer, m
     """A ship that is lost at any speed above that of the plan is outside of every basin."""
     d, k = designer
     s = d.scored(k, [PlanStep("legs", (0.5,) * NUMBERS, SECONDS, 0.0)])
-    track = d.motion(s.steps, s.size, EVERY)
+    track = d.motion(s.steps, s.size, BRIEF)
 
     def lost(models, motion):
         eta = np.tile(track.eta, (len(models), 1, 1))
@@ -446,7 +446,7 @@ def test_runs_needed_are_counted_at_first_and_for_all_larger_numbers():
 def test_the_loop_of_many_models_is_that_of_each_alone(designer):
     d, k = designer
     models = drawn(d.space, k, 0, np.random.default_rng(0))[:3]
-    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), EVERY)
+    motion = d.motion([PlanStep("legs", (0.5,) * NUMBERS, 20.0, 0.0)], (1.0, 1.0), BRIEF)
     short = PlannedMotion(*(x[:60] for x in (motion.time, motion.eta, motion.eta_dot, motion.eta_ddot)))
     together = followed(models, short)
     for n, model in enumerate(models):
@@ -464,11 +464,7 @@ def test_no_simulated_ship_leaves_the_basin(designer):
 
 
 @pytest.mark.slow
-def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path, monkeypatch):
-    for module, name, few in (
-        (designing, "LOG_POINTS", 4), (designing, "EVOLVED", 24), (rehearsal, "DRAWS", 20),
-    ):  # fmt: skip
-        monkeypatch.setattr(module, name, few)
+def test_a_plan_is_written_and_its_scenario_runs(question, tmp_path):
     plan = plan_next(question)
     assert plan.runs[0].sure > 0.9
     assert plan.runs[0].spread.margin.min() > 0.0
@@ -652,7 +648,7 @@ def test_a_ship_with_rudder_or_two_propellers_is_asked_what_it_can_do(steering):
     rng, craft = np.random.default_rng(1), d.model.ship
     for _ in range(2):
         plan = sequence(rng.random(2 * DIMENSIONS), d.limits.seconds, d.library)
-        asked = d.motion(plan, (1.0, 1.0), EVERY * d.scale).orders
+        asked = d.motion(plan, (1.0, 1.0), BRIEF * d.scale).orders
         if craft.description.allocates:
             assert not asked[:, 1].any()  # no force sideways
         else:

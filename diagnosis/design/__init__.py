@@ -2,7 +2,7 @@
 
 from .designing import Designer, Limits, ScoredPlan
 from .hypotheses import knowledge
-from .information import CRITERIA, SURE, Knowledge, check_criterion
+from .information import CRITERIA, Knowledge, check_criterion
 from .manoeuvre_library import DIMENSIONS, sequence
 from .next_plan import Question, plan_next, prepared
 from .planned_motion import Basin
@@ -14,7 +14,6 @@ __all__ = [
     "CRITERIA",
     "DIMENSIONS",
     "MOST_RUNS",
-    "SURE",
     "Basin",
     "Designer",
     "Knowledge",

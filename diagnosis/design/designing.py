@@ -15,13 +15,16 @@ from cosim import InputError
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
+from ..predictors.thrust import FORGOTTEN
+from ..runs.cleaning import BRIEF
 from ..runs.run_constants import NEGLIGIBLE
+from ..search.nonlinear.multistart import POINTS, REFINED
+from ..search.shortlist import LENGTH
 from .hypotheses import Space
 from .information import CRITERIA, Knowledge, check_criterion, inseparable
 from .manoeuvre_library import (
     DIMENSIONS,
     LIBRARY,
-    PIECE,
     USUAL,
     PlanStep,
     Reach,
@@ -30,18 +33,15 @@ from .manoeuvre_library import (
     usual,
 )
 from .order_library import ORDERS, USUAL_ORDERS, Orders
-from .planned_motion import EVERY, MOST_THRUST, Basin, PlannedMotion, as_windows, load
+from .planned_motion import Basin, PlannedMotion, as_windows, load, usable_thrust
 from .spread import MEMBERS, Spread, spread
 
 SECONDS = 40.0  # s, of a search at the most; a design with its check takes at most a minute
-LOG_POINTS = 6  # 1, of the number of Sobol points, to the base 2; chosen: a few seconds
 EVOLVED = 160  # 1, points tried by evolution at the most; chosen: some ten seconds
-POPULATION = 12  # 1, best points that evolve; chosen: each some ten times
 MOST_PIECES = 6  # 1, manoeuvres of a run; chosen: of more the search finds no good ones in its time
 FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used beyond its data (chosen)
 # 1, shares of the largest speeds and of the room that are tried until a plan keeps the limits; chosen.
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
-TRIES = 3  # 1, best plans whose spread is computed, until one keeps the basin; chosen: within the minute
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
     "basin, fewer minutes or a smaller margin"
@@ -116,7 +116,7 @@ class Designer:
                 f"the basin of {self.basin.size[0]:.3g} m by {self.basin.size[1]:.3g} m is too small: "
                 f"ship and margin need more than {need[0]:.3g} m"
             )
-        shortest = PIECE * self.scale / 2.0
+        shortest = FORGOTTEN * self.scale / 2.0
         if not shortest <= self.limits.seconds:
             raise InputError(f"a run takes {shortest / 60.0:.2g} minutes or more for this ship")
 
@@ -206,7 +206,7 @@ class Designer:
         found: dict[int, ScoredPlan] = {}
         for size in SMALLER:
             left = [n for n in range(len(plans)) if n not in found]
-            motions = self._motions([plans[n] for n in left], size, EVERY * self.scale) if left else []
+            motions = self._motions([plans[n] for n in left], size, BRIEF * self.scale) if left else []
             for n, motion in zip(left, motions, strict=True):
                 excess = self.excess(motion)
                 if excess == 0.0:
@@ -233,34 +233,34 @@ class Designer:
         share = (
             0.0
             if motion.orders is not None
-            else load(motion.thrust(self.model), self.model) / MOST_THRUST
+            else load(motion.thrust(self.model), self.model) / usable_thrust()
         )
         return max(outside, 0.0) + max(share - 1.0, 0.0) + max(fast - 1.0, 0.0)
 
     def search(
-        self, k: Knowledge, seed: int, log_points: int = LOG_POINTS, evolved: int = EVOLVED
+        self, k: Knowledge, seed: int, points: int = POINTS, evolved: int = EVOLVED
     ) -> ScoredPlan:
         """The best plan that is found, by the same seed the same unless time is short.
 
         Args:
             k: what is known.
             seed: of the points.
-            log_points: of the number of Sobol points, to the base 2.
+            points: of a Sobol sequence, a power of two.
             evolved: points that evolution tries at the most.
 
         Raises:
             InputError: no plan keeps the limits.
         """
         T, end = self.limits.seconds, time.monotonic() + SECONDS
-        pieces = int(np.clip(round(T / (PIECE * self.scale)), 1, MOST_PIECES))
-        points = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random_base2(log_points)
+        pieces = int(np.clip(round(T / (FORGOTTEN * self.scale)), 1, MOST_PIECES))
+        first: Any = qmc.Sobol(DIMENSIONS * pieces, rng=seed).random(points)
         found: list[tuple[ScoredPlan, np.ndarray]] = []
 
         def cost(some: np.ndarray) -> np.ndarray | float:
-            if time.monotonic() > end or len(found) >= len(points) + evolved:
+            if time.monotonic() > end or len(found) >= len(first) + evolved:
                 raise _OutOfTimeError
-            self.advance(f"searching a plan: {len(found)} of {len(points) + evolved}")
-            each = np.clip(some.T.reshape(-1, points.shape[1]), 0.0, 1.0 - 1e-9)
+            self.advance(f"searching a plan: {len(found)} of {len(first) + evolved}")
+            each = np.clip(some.T.reshape(-1, first.shape[1]), 0.0, 1.0 - 1e-9)
             plans = [sequence(point, T, self.library) for point in each]
             found.extend(zip(scored := self.scored_all(k, plans), each, strict=True))
             costs = np.array([-s.score for s in scored])
@@ -269,12 +269,12 @@ class Designer:
         # Simulated tracks take a fraction of the time at once; targets need no simulation.
         at_once = self.orders is not None
         with suppress(_OutOfTimeError):
-            for part in [points] if at_once else points:
+            for part in [first] if at_once else first:
                 cost(part.T)
-            first: Any = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:POPULATION]])
-            spans: Any = [(0.0, 1.0)] * len(points[0])
+            kept: Any = np.array([p for _, p in sorted(found, key=lambda f: -f[0].score)[:LENGTH]])
+            spans: Any = [(0.0, 1.0)] * len(first[0])
             how: Any = {"vectorized": True, "updating": "deferred"} if at_once else {}
-            differential_evolution(cost, spans, init=first, rng=seed, polish=False, **how)
+            differential_evolution(cost, spans, init=kept, rng=seed, polish=False, **how)
         best = max((s for s, _ in found), key=lambda s: s.score)
         if best.excess > 0.0:
             raise InputError(
@@ -289,13 +289,13 @@ class Designer:
 
     def spread(self, k: Knowledge, s: ScoredPlan, seed: int) -> Spread:
         """The tracks of a plan under every likely hypothesis."""
-        motion = self.motion(s.steps, s.size, EVERY * self.scale)
+        motion = self.motion(s.steps, s.size, BRIEF * self.scale)
         likely = [n for n, w in enumerate(k.weights) if w > NEGLIGIBLE] or [int(np.argmax(k.weights))]
         self.advance(f"closed loop of {len(likely) * MEMBERS} models along the plan")
         return spread(self.space, k, likely, motion, self.basin, self.outline, seed)
 
     def checked(
-        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = TRIES
+        self, k: Knowledge, found: ScoredPlan, seed: int, tries: int = REFINED
     ) -> tuple[ScoredPlan, Spread]:
         """The plan, or else the best of those that were tried, that keeps the basin with its spread.
 

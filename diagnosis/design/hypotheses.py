@@ -1,24 +1,23 @@
 """The candidate causes that a diagnosis leaves, and what their parameters do to the model error."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from ..execution.short_text import SHOWN
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import independent, omega_std
 from ..predictors.weak_form import OVERLAP
+from ..runs.run_constants import DIGITS
 from ..search.candidates import SMALL, CandidateShape, candidate, model_error
+from ..search.nonlinear.multistart import FAR
 from ..search.prior import NominalPrior
+from ..search.shortlist import LENGTH
 from .information import Hypothesis, Knowledge
-
-MOST = 8  # 1, hypotheses, the likeliest; chosen: criteria grow with their square
-FIRST = 4  # 1, of the ranking, where a diagnosis names no effect; chosen
-WIDE = 3.0  # 1, prior standard deviations of an effect: multiples of the size that explains all (chosen)
-EXACT = 1e9  # 1, prior precision of what is not fitted: it stays as it is
 
 
 class Rival(NamedTuple):
@@ -140,7 +139,7 @@ def rivals(content: Mapping[str, Any]) -> list[Rival]:
             ids = (e["id"], *e["indistinguishable"], *([""] if key == "possibilities" else []))
             found.append(Rival(ids, np.nan if e["confidence"] is None else e["confidence"]))
     if not found and content["verdict"] == "unexplained":
-        found = [Rival((*(r["id"] for r in content["ranking"][:FIRST]), ""), np.nan)]
+        found = [Rival((*(r["id"] for r in content["ranking"][:SHOWN]), ""), np.nan)]
     return found
 
 
@@ -172,10 +171,10 @@ def space_of(
     columns = space.rows(data)
     for name, place in space.places().items():
         norms = np.linalg.norm(columns[:, place[1:]], axis=0)
-        width = WIDE * size / np.maximum(norms, 1e-6 * max(norms.max(initial=0.0), size))
+        width = FAR * size / np.maximum(norms, 1e-6 * max(norms.max(initial=0.0), size))
         smooth = blocks[name].precision
         own = np.diag(1.0 / width**2) + (0.0 if smooth is None else smooth)
-        precision.append(np.asarray(block_diag(EXACT, own)))
+        precision.append(np.asarray(block_diag(1.0 / DIGITS, own)))
         mean.append(np.array([1.0 if blocks[name].given else 0.0, *np.zeros(len(width))]))
     return space, np.asarray(block_diag(*precision)), np.concatenate(mean)
 
@@ -230,13 +229,13 @@ def knowledge(
         own = np.concatenate([np.zeros(0, int), *(places[n] for n in names)])
         hypotheses.append(Hypothesis(names, np.concatenate([np.arange(q), own]), own))
     even = np.full(len(hypotheses), 1.0 / len(hypotheses))
-    k = Knowledge(hypotheses, even, A.T @ A, A.T @ y, precision, mean)
-    weights = _weights(k, found)
-    best = np.argsort(-weights, kind="stable")[:MOST]
-    kept = weights[best] / weights[best].sum()
     alone = [r.confidence for r in found if len(r.ids) == 1 and np.isfinite(r.confidence)]
     listed = min(alone, default=1.0)
-    return space, Knowledge([hypotheses[n] for n in best], kept, k.G, k.b, precision, mean, listed)
+    k = Knowledge(hypotheses, even, A.T @ A, A.T @ y, precision, mean, listed)
+    weights = _weights(k, found)
+    best = np.argsort(-weights, kind="stable")[:LENGTH]
+    kept = weights[best] / weights[best].sum()
+    return space, replace(k, hypotheses=[hypotheses[n] for n in best], weights=kept)
 
 
 def _weights(k: Knowledge, found: Sequence[Rival]) -> np.ndarray:

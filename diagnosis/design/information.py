@@ -17,9 +17,11 @@ from scipy.special import logit, ndtr
 from cosim import InputError
 from cosim.errors import nearest
 
-SURE = 0.95  # 1, probability from which on a cause counts as certain; the aim of a design
-ODDS = float(logit(SURE))  # nats, the log odds of that
-SMALLEST = 1e-10  # 1, of the largest eigenvalue: what is less is rounding
+from ..runs.run_constants import DIGITS
+from ..search.most_likely import LEVEL
+
+# nats, log odds of a cause that alone is the set with the probability LEVEL; the aim of a design
+ODDS = float(logit(LEVEL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,7 @@ class Knowledge:
     b: np.ndarray
     precision: np.ndarray
     prior: np.ndarray
-    listed: float = 1.0
+    listed: float
 
     def plus(self, G: np.ndarray) -> "Knowledge":
         """The knowledge after a planned run whose data agree with what is expected."""
@@ -150,7 +152,7 @@ class Prediction:
         hypotheses; G = L L^T has these.
         """
         values, vectors = np.linalg.eigh(G)
-        kept = values > SMALLEST * max(values[-1], np.finfo(float).tiny)
+        kept = values > DIGITS * max(values[-1], np.finfo(float).tiny)
         L = (vectors[:, kept] * np.sqrt(values[kept])).T
         mean = np.array([L @ e.mean for e in k.estimates])
         covariances = [
@@ -214,7 +216,7 @@ def a_optimal(k: Knowledge, G: np.ndarray) -> float:
 
 
 def certainty(k: Knowledge, G: np.ndarray) -> float:
-    """Probability that a run raises the true hypothesis above SURE against its worst rival [1].
+    """Probability that a run raises the true hypothesis above LEVEL against its worst rival [1].
 
     The log ratio of a pair is taken as normal, see :meth:`Prediction.log_ratio`. Hundredths are added,
     by which the search proceeds where this is zero or one everywhere: the mean of 1 - exp(-ratio) over
@@ -225,8 +227,8 @@ def certainty(k: Knowledge, G: np.ndarray) -> float:
     worst, gain = np.ones(n), 0.0
     for i, j in pairs(k):
         mean, std = p.log_ratio(i, j)
-        prior = np.log(max(k.weights[i], SMALLEST) / max(k.weights[j], SMALLEST))
-        worst[i] = min(worst[i], ndtr((mean + prior - ODDS) / max(std, SMALLEST)))
+        prior = np.log(max(k.weights[i], DIGITS) / max(k.weights[j], DIGITS))
+        worst[i] = min(worst[i], ndtr((mean + prior - ODDS) / max(std, DIGITS)))
         gain -= k.weights[i] * np.expm1(-mean) / max(n - 1, 1)
     narrower = [_own_gain(h, *(x.estimate(h).covariance for x in (k, after))) for h in k.hypotheses]
     return float(k.weights @ worst + 0.01 * gain + 0.01 * (k.weights @ narrower))

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fmus.guidance.multisine import FREQUENCIES
 from fmus.guidance.ramps import ramp
 
 
@@ -37,7 +38,6 @@ Course = Callable[[np.ndarray, float, Sequence[float], Reach], np.ndarray]
 DIMENSIONS = 7  # 1, of a manoeuvre: which one, how it begins, and five numbers from 0 to 1 of its own
 RISE = 2.0  # s, times the time scale; shortest change of speed, as of the guidance's pulses (chosen)
 SOFT = 5.0  # s, times the time scale; longest of them: three time constants of the surge motion (chosen)
-PIECE = 60.0  # s, times the time scale, of a manoeuvre: some ten changes of speed; chosen
 LIBRARY: dict[str, Course] = {}
 TEXTS: dict[str, str] = {}
 
@@ -178,14 +178,10 @@ def zigzag(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     return np.column_stack([pose[:, 0], side - side[-1] * moved(t, 1.0, T, 0.5 * T), swing])
 
 
-# rad/s, over the time scale: without a common period within an hour, as of fmus.guidance.multisine
-SINES = np.array([[0.11, 0.31], [0.13, 0.37], [0.17, 0.43]])
-
-
 @manoeuvre("multisine")
 def multisine(t: np.ndarray, T: float, x: Sequence[float], r: Reach) -> np.ndarray:
     """Multisine of surge, sway and yaw at once"""
-    omega = SINES * between(0.8, 2.0, x[0]) / r.time
+    omega = np.array(FREQUENCIES) * between(0.8, 2.0, x[0]) / r.time
     limit = np.array([r.speed, r.speed, r.rate]) * np.array([x[1], x[2], x[3]])
     share = np.array([1.0, x[4]]) / (1.0 + x[4])
     ends = moved(t, 1.0, 2.0 * SOFT * r.time, SOFT * r.time)

@@ -16,8 +16,9 @@ from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
 from ..predictors.black_box import TAU
-from .manoeuvre_library import PIECE, SOFT, TEXTS, PlanStep, between
-from .planned_motion import MOST_THRUST, Basin, PlannedMotion
+from ..predictors.thrust import FORGOTTEN
+from .manoeuvre_library import SOFT, TEXTS, PlanStep, between
+from .planned_motion import Basin, PlannedMotion, usable_thrust
 from .spread import driven
 
 # Time (n,) [s], duration [s], numbers from 0 to 1, time scale -> shares (n, 2) of thrust and rudder.
@@ -46,7 +47,7 @@ def _level(x: float) -> float:
 
 
 def _half_period(x: float, scale: float) -> float:
-    return scale * between(SOFT, PIECE / 2.0, x)  # up to half of a manoeuvre
+    return scale * between(SOFT, FORGOTTEN / 2.0, x)  # up to half of a manoeuvre
 
 
 @order("straight")
@@ -127,7 +128,7 @@ class Orders:
         used = [asked_of(w, ship) for w in data]
         most = faster * np.max([np.abs(x).max(axis=0) for x in used], axis=0)
         if ship.description.allocates:
-            full = MOST_THRUST * np.array(ship.layout.full(params))
+            full = usable_thrust() * np.array(ship.layout.full(params))
             thrust = np.array([min(most[0], full[0]), 0.0, 0.0])
             found = cls(TAU, -thrust, thrust, np.array([0.0, 0.0, min(most[2], 0.5 * full[2])]))
         else:

@@ -10,11 +10,14 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..predictors import Model, WeakWindows, weak_windows
+from ..predictors.uncertainty import MEASURED
 from ..runs import Run, Smoothed
 from .manoeuvre_library import PlanStep, Reach, poses
 
-EVERY = 0.2  # s, times the time scale: samples of a planned motion; ten in the shortest ramp
-MOST_THRUST = 0.8  # 1, of the limit of an actuator: the rest is for control and for what is not known
+
+def usable_thrust() -> float:
+    """Share of the limit of an actuator [1]: two standard deviations of a model remain for control."""
+    return 1.0 - 2.0 * MEASURED
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..assessment.covariates import AXES
 from ..assessment.remainder import remaining
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import omega_std
@@ -23,16 +24,18 @@ from ..search.effect_evidence import EffectEvidence, evidence
 from ..search.findings import Finding
 from ..search.gram import GramTable, Nuisance, block_numbers, gram_table
 from ..search.map_regression import first_share, regression, score
+from ..search.most_likely import LEVEL
 from ..search.shortlist import LENGTH
 from ..verdict.confidence import Doubts, confidence_of, doubt_of_data, probability
 from .hypotheses import Space, block_of
-from .information import SURE, Hypothesis, Knowledge
+from .information import Hypothesis, Knowledge
+from .spread import MEMBERS
 
-DRAWS = 60  # 1, simulated outcomes, so that the standard error of a probability is at most 0.065
 CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
 LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
 UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the diagnosis so far."
-UNIT = np.full(3, OVERLAP**-0.5)  # 1, noise of overlapping windows where that of one that counts is 1
+# Noise of overlapping windows where that of one that counts is 1.
+UNIT = np.full(len(AXES), np.reciprocal(np.sqrt(OVERLAP)))
 
 
 class RowsOfRuns(NamedTuple):
@@ -102,19 +105,19 @@ class Rehearsal:
 
     @property
     def doubts(self) -> list[str]:
-        """What keeps the confidence below SURE after any run, a line each."""
+        """What keeps the confidence below LEVEL after any run, a line each."""
         effects, text = self.space.start.ship.effects, doubt_of_data(self.data)
         found = [CAPPED.format(text)] if text else []
         for h, axes in zip(self.k.hypotheses, self.residual, strict=True):
             if any(axes & set(effects[i].axis) for i in h.ids):
                 found.append(LEFT.format(h.name, ", ".join(sorted(axes))))
-        return found if self.listed >= SURE else [*found, UNLISTED.format(self.listed)]
+        return found if self.listed >= LEVEL else [*found, UNLISTED.format(self.listed)]
 
-    def sure(self, planned: Sequence[WeakWindows], seed: int, draws: int = DRAWS) -> float:
-        """Probability that the true hypothesis has SURE or more after planned runs [1]."""
-        return float(self.listed * np.mean(self.confidences(planned, seed, draws) >= SURE))
+    def sure(self, planned: Sequence[WeakWindows], seed: int, draws: int = MEMBERS) -> float:
+        """Probability that the true hypothesis has LEVEL or more after planned runs [1]."""
+        return float(self.listed * np.mean(self.confidences(planned, seed, draws) >= LEVEL))
 
-    def confidences(self, planned: Sequence[WeakWindows], seed: int, draws: int = DRAWS) -> np.ndarray:
+    def confidences(self, planned: Sequence[WeakWindows], seed: int, draws: int = MEMBERS) -> np.ndarray:
         """(draws,), least confidence in an effect of the true hypothesis after planned runs [1]."""
         old, new = self.measured, self.rows(planned)
         both = RowsOfRuns(*(np.concatenate(pair) for pair in zip(old, new, strict=True)))

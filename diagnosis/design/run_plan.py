@@ -11,9 +11,10 @@ from ..execution.result_folder import together
 from ..execution.short_text import ShortRepr
 from ..report.formatting import write_json
 from ..runs.cleaning import Z95
+from ..search.most_likely import LEVEL
 from .designing import Designer, ScoredPlan
 from .hypotheses import Space
-from .information import CRITERIA, SURE, Knowledge, pairs, projected
+from .information import CRITERIA, Knowledge, pairs, projected
 from .manoeuvre_library import TEXTS
 from .run_files import commands_file, picture_file, scenario_file, write_run
 from .spread import Spread
@@ -42,7 +43,7 @@ class PlannedRun(ShortRepr):
         scored: its target and information.
         before: what is known before it.
         spread: its tracks.
-        sure: probability that the right candidate has more than SURE afterwards [1].
+        sure: probability that the right candidate has more than LEVEL afterwards [1].
         usual: usual run of the same length -> the same probability, and its information.
     """
 
@@ -173,7 +174,7 @@ class Plan:
             shown += [f"  {s.seconds:5.0f} s  {TEXTS[s.name]}" for s in r.scored.steps]
             least = float(r.spread.margin.min())
             shown.append(f"  least distance from the walls, under any likely candidate: {least:.2f} m")
-            shown.append(f"  probability that the right candidate is above {SURE:.0%} afterwards")
+            shown.append(f"  probability that the right candidate is above {LEVEL:.0%} afterwards")
             each = {"this run": r.sure} | {name: sure for name, (sure, _) in r.usual.items()}
             shown += [f"    {sure:4.0%}  {name}" for name, sure in each.items()]
             beyond = [name for name in r.designer.usual_runs if name not in r.usual]

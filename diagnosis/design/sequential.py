@@ -11,8 +11,8 @@ from ..assessment.gathering import gather
 from ..execution.progress import Advance, silent
 from ..report.content import file_content
 from ..report.report_data import ReportData
+from ..search.most_likely import LEVEL
 from ..session import begin
-from .information import SURE
 from .next_plan import Question, plan_next
 from .run_files import scenario_file
 from .run_plan import Plan
@@ -36,7 +36,7 @@ class Round(NamedTuple):
     @property
     def certain(self) -> bool:
         """Whether every effect that was found is certain."""
-        return self.verdict == "found" and min(self.effects.values()) >= SURE
+        return self.verdict == "found" and min(self.effects.values()) >= LEVEL
 
 
 def confidences(content: dict[str, Any]) -> dict[str, float]:

@@ -15,17 +15,18 @@ from fmus.signals import Estimate, Target
 
 from ..assessment.closed_loop import LoopPart
 from ..predictors import Model
+from ..predictors.black_box import POSE
 from ..predictors.prediction import merged
 from ..predictors.traced.recorded_law import stepped
 from ..predictors.uncertainty import MEASURED
+from ..runs.run_constants import CHANCE
 from .hypotheses import Space
 from .information import Knowledge
 from .planned_motion import Basin, PlannedMotion
 
-POSE = 3  # 1, numbers of a pose
-# 1, ships drawn from each hypothesis: if none of them leaves the basin, the next one does so with a
-# probability of 1 % (rule of succession).
-MEMBERS = 100
+# Ships drawn from each hypothesis: if none of them leaves the basin, the next one does so with this
+# chance (rule of succession). So many outcomes have a standard error of 5 % at the most.
+MEMBERS = round(np.reciprocal(CHANCE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,11 +167,11 @@ def _tracks(models: Sequence[Model], start: np.ndarray, given: np.ndarray, loop:
     with np.errstate(all="ignore"):  # a ship that runs away gives infinities, which count as outside
         first = seen(*ship.begin(craft.vessel.inputs()))
         now = loop.step(first, rows[0], *parts)
-        further = stepped(replace(loop, like=now), flatten(now), given[1:-1], parts, POSE)
+        further = stepped(replace(loop, like=now), flatten(now), given[1:-1], parts, len(POSE))
     count = max(len(models), given.shape[2], np.size(start[0]))
     poses = [np.broadcast_to(x, count) for x in first.pose]
     tracks = np.concatenate(
-        [np.stack(poses)[None], np.broadcast_to(further, (len(further), POSE, count))]
+        [np.stack(poses)[None], np.broadcast_to(further, (len(further), len(POSE), count))]
     )
     return tracks.transpose(2, 0, 1)
 
@@ -189,7 +190,7 @@ def spread(
     Args:
         space, k: the hypotheses and their parameters.
         ids: numbers of those that are likely.
-        motion: the target every ``EVERY`` times the time scale.
+        motion: the target every ``BRIEF`` times the time scale.
         basin, outline: walls, and corners of the hull (k, 2) [m].
         seed: of the draws.
     """

@@ -6,17 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..execution.progress import Advance
+from ..predictors.weak_form import SMALL
 from ..runs.run_constants import SAME
 from ..search.most_likely import LEVEL
+from ..search.shortlist import LENGTH
 from .additional_force import SYMBOLS, AdditionalForce
 from .parameter_fit import ParameterFit, added, fit
 from .residuals import Setting, WindowResiduals
 
-TRIED = 4  # 1, candidates that are fitted with all else, of those that promise most; chosen
-ROUNDING = 1e-3  # 1, of a slope that parameters do not explain; chosen
 # Central, forward, backward: how an FMU integrates decides which difference its own rate is.
 RATES = (np.gradient, lambda y: np.diff(y, append=y[-1]), lambda y: np.diff(y, prepend=y[0]))
-SMALL = 1e-2  # 1, of an input's usual size, a force by which the unit of a coefficient is found; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +137,7 @@ def _promising(
         beyond = beyond - Q @ (Q.T @ beyond)
         norm = float(np.linalg.norm(beyond))
         # What the parameters do as well is no candidate: its change is theirs to rounding.
-        if norm > ROUNDING * np.linalg.norm(s):
+        if norm > SMALL * np.linalg.norm(s):
             ranked.append((float(beyond @ e) ** 2 / norm**2, force, size, beyond / norm))
     ranked.sort(key=lambda x: -x[0])
     kept, same = [], {}
@@ -146,7 +145,7 @@ def _promising(
         twin = next((k for k in kept if _same(k[0], float(k[3] @ entry[3]))), None)
         if twin is not None:
             same.setdefault(twin[1].id, []).append(entry[1].id)
-        elif len(kept) < TRIED:
+        elif len(kept) < LENGTH:
             kept.append(entry)
     return [entry[:3] for entry in kept], same
 

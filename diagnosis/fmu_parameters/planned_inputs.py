@@ -24,13 +24,13 @@ from ..execution.progress import Advance, silent
 from ..execution.result_folder import together
 from ..report.formatting import write_json
 from ..runs.cleaning import Z95
+from ..search.nonlinear.multistart import POINTS
 from .measured_system import MeasuredRun, windows_of
 from .residuals import Setting, WindowResiduals
 from .sensitivity import confounded
 from .system_task import SystemTask
 
-LOG_COURSES = 5  # 1, of the number of courses that are tried, to the base 2; chosen: FMUs may be slow
-NUMBERS = 4  # 1, of an input: form, least and largest value, period
+COURSE = ("form", "least value", "largest value", "period")  # of an input, by a number each
 SHORTEST, LONGEST = 0.02, 0.5  # 1, of the length of a run: period of a course; chosen
 PAGE, JSON = "plan.md", "next.json"
 
@@ -158,13 +158,13 @@ def plan_inputs(
         rows = [_slopes(old, setting)]
         h = Hypothesis(tuple(q.name for q in task.parameters), np.arange(p), np.arange(p))
         none = np.zeros((p, p))
-        k = Knowledge([h], np.ones(1), none, np.zeros(p), np.eye(p), np.zeros(p)).plus(
+        k = Knowledge([h], np.ones(1), none, np.zeros(p), np.eye(p), np.zeros(p), 1.0).plus(
             rows[0].T @ rows[0]
         )
         end = time.monotonic() + SECONDS * runs
         for n in range(runs):
             best: tuple[float, MeasuredRun, np.ndarray] | None = None
-            points = qmc.Sobol(NUMBERS * len(task.map.inputs), rng=seed + n).random_base2(LOG_COURSES)
+            points = qmc.Sobol(len(COURSE) * len(task.map.inputs), rng=seed + n).random(POINTS)
             for tried, point in enumerate(points):
                 if best is not None and time.monotonic() > end:
                     break
@@ -195,11 +195,11 @@ def _slopes(r: WindowResiduals, setting: Setting) -> np.ndarray:
 
 
 def course(task: SystemTask, point: np.ndarray, seconds: float) -> MeasuredRun:
-    """The run at a point of the unit cube, NUMBERS for each input; outputs rest where a run began."""
+    """The run at a point of the unit cube, COURSE for each input; outputs rest where a run began."""
     first = task.runs["train"][0]
     t = np.arange(0.0, seconds, float(np.median(np.diff(first.time))))
     columns = {name: np.full(t.size, _first(first.columns[name])) for name in task.map.outputs}
-    for name, x in zip(task.map.inputs, point.reshape(-1, NUMBERS), strict=True):
+    for name, x in zip(task.map.inputs, point.reshape(-1, len(COURSE)), strict=True):
         every = np.concatenate([r.columns[name] for r in task.runs["train"]])
         low, high = np.nanmin(every), np.nanmax(every)
         ends = np.sort(low + (high - low) * x[1:3])

@@ -24,8 +24,7 @@ from .additional_force import AdditionalForce
 from .measured_system import Window
 from .parameter_file import CalibratedParameter
 
-STEP = 0.02  # 1, of a central difference at most, in prior standard deviations; chosen
-START_STEP = 0.05  # 1, of a difference by a start value, in its standard deviations; chosen
+STEP = 0.02  # 1, of a difference at most, in standard deviations of a prior or a start value; chosen
 LARGEST = np.sqrt(np.sqrt(np.finfo(float).max))  # of a residual: sums of squares of more may overflow
 LINEAR = 0.3  # 1, rms by which a prediction may differ from its slopes, in units of the noise; chosen
 
@@ -237,8 +236,8 @@ class WindowResiduals:
             return np.concatenate([np.nan_to_num(self._off(w, there), nan=LARGEST), z])
 
         def slopes(z: np.ndarray) -> np.ndarray:
-            base, *moved = (self._off(w, p) for p in at([z, *(z + START_STEP * np.eye(z.size))]))
-            S = np.column_stack([(r - base) / START_STEP for r in moved])
+            base, *moved = (self._off(w, p) for p in at([z, *(z + STEP * np.eye(z.size))]))
+            S = np.column_stack([(r - base) / STEP for r in moved])
             return np.where(np.isfinite(S).all(axis=0), S, 0.0)
 
         (here,) = at([z])

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..execution.progress import Advance
 from ..predictors.prediction import FAR_OFF
+from ..predictors.weak_form import SMALL
 from ..search.most_likely import STEPS
 from ..search.prediction_fit.joint_posterior import TOGETHER, connected
 from .parameter_file import CalibratedParameter
@@ -15,8 +16,6 @@ from .residuals import Setting, WindowResiduals
 # 1, share of its prior standard deviation that a value keeps with the runs, from which on they cannot
 # tell it. Chosen: a tenth less is hardly news.
 UNTOLD = 0.9
-# 1, of the squared length of a slope by differences, below which it is not known; chosen
-ROUNDING = 1e-5
 SHARED = 0.1  # 1, of a direction: part of a parameter in it, and cosine of two parts; chosen
 
 
@@ -94,7 +93,7 @@ def confounded(slopes: np.ndarray, names: Sequence[str]) -> list[list[str]]:
         return []
     unit = slopes / np.linalg.norm(slopes, axis=0)
     size, along = np.linalg.eigh(unit.T @ unit)
-    inflated = along**2 @ (1.0 / np.maximum(size, ROUNDING))
+    inflated = along**2 @ (1.0 / np.maximum(size, SMALL**2))  # what differences show of slopes
     weak = along[:, size < 1.0 - TOGETHER**2]  # an inflated variance has one at least
     shared = np.abs(weak @ weak.T)
     own = np.sqrt(np.diag(shared))

@@ -16,6 +16,7 @@ from ..predictors import Execution, Fmu, WeakWindows
 from ..predictors.black_box import MOTION, POSE, TAU, VELOCITY, at_samples
 from ..predictors.fmu.foreign_fmu import FmuPredictor
 from ..predictors.fmu.variable_map import BESIDE, DISTURBANCES
+from ..predictors.shooting import INSTANTS, PARTS
 from ..predictors.windows import step_of, usable_windows
 from ..runs import QUANTITY, Smoothed
 from ..runs.columns.unit_check import SI_UNIT
@@ -26,8 +27,6 @@ from .force_search import candidates
 from .measured_system import Window
 from .parameter_file import CalibratedParameter, proposed, read_parameters
 
-# 1, of a window; chosen: a pose hardly moves by more than a sixtieth of a window's motion.
-MOST_SAMPLES = 60
 # Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
 EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": np.pi / 2}, "F_e": {"tau_X": -np.pi / 2, "tau_Y": 0.0}}
 
@@ -136,7 +135,7 @@ class ShipTask(CalibrationTask):
         if rows.size < FEWEST // 2:
             return None
         if not p.whole:
-            rows = rows[:: max(1, rows.size // MOST_SAMPLES)]
+            rows = rows[:: max(1, rows.size // (INSTANTS * PARTS))]  # as many as steps
         steps = int(np.ceil(since[rows[-1]] / h - 1e-6))
         (course,) = p.requests(s, np.array([row]), h, steps)
         sure = dict(zip(MOTION, [*s.eta_std[row], *s.nu_std[row]], strict=True))

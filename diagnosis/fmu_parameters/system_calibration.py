@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2, norm
 
 from ..execution.progress import Advance, silent
+from ..predictors.evaluation import quantile
 from ..predictors.prediction import FAR_OFF
+from ..runs.cleaning import normal_within
 from ..runs.run_constants import CHANCE
+from ..search.findings import MOST_REPORTED
 from ..search.prediction_fit.joint_posterior import together
 from ..search.shortlist import TIE
 from ..verdict.confidence import EVEN_ODDS, FOUND
@@ -20,7 +22,6 @@ from .parameter_fit import ParameterFit, fit, fitted, intervals
 from .residuals import Setting, WindowResiduals, rms_of
 from .system_remainder import SystemRemainder, change_of_squares, inflation, remainder
 
-MOST_FORCES = 3  # 1, in one model; chosen
 Verdict = Literal["found", "ambiguous", "parameters", "unexplained", "none"]
 
 
@@ -121,7 +122,7 @@ def calibrate(
     def temper(f: ParameterFit) -> float:
         return 1.0 if left(f).by_chance else inflation(train, f.residuals, f.slopes, f.precision)
 
-    while possible and len(accepted) < MOST_FORCES and (left(best).significant or far(best)):
+    while possible and len(accepted) < MOST_REPORTED and (left(best).significant or far(best)):
         # Parameters that imitate a force may be far from where they are with it.
         held = Setting(start.z, best.setting.forces)
         others = [fit(train, held, best.sizes, range(len(start.z)))] if far(best) else []
@@ -189,9 +190,9 @@ def _moved(r: WindowResiduals, best: ParameterFit, grown: float) -> Moved:
         held = held.with_coefficients([0.0] * len(held.forces))
     other = fit(r, held, best.sizes, range(p))
     ratio = (other.data_cost - best.data_cost) / grown
-    some = ratio > float(chi2.ppf(1.0 - CHANCE, p))
+    some = ratio > quantile(1.0 - CHANCE, p)
     # Beyond the interval that holds all of them with 99 %.
-    wide = float(norm.ppf(1.0 - 0.5 * CHANCE / max(p, 1)))
+    wide = normal_within(1.0 - CHANCE / max(p, 1))
     std = np.sqrt(grown * np.diag(best.covariance)[:p])
     each = [some and abs(z) > wide * s for z, s in zip(best.setting.z, std.tolist(), strict=True)]
     return Moved(some, each)

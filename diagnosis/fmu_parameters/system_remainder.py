@@ -8,11 +8,11 @@ from scipy.stats import chi2
 
 from ..predictors.uncertainty import SHARE_OF_COMMAND
 from ..runs.run_constants import CHANCE, NEGLIGIBLE
+from ..search.gram import FOLDS
 from .measured_system import Window
 from .residuals import WindowResiduals
 
 BINS = (4, 16, 64)  # 1, samples whose mean is compared with that of white noise; chosen
-BLOCKS = 8  # 1, of a run, by which the correlation of residuals is judged; chosen
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def inflation(r: WindowResiduals, white: np.ndarray, slopes: np.ndarray, precisi
 
 def _blocks(r: WindowResiduals, w: Window) -> int:
     """Number of blocks of a window: those of its run, shared by its windows."""
-    return max(1, BLOCKS // sum(v.run == w.run for v in r.windows))
+    return max(1, FOLDS // sum(v.run == w.run for v in r.windows))
 
 
 def change_of_squares(
