@@ -194,7 +194,7 @@ class PartialLeastSquares(Peer):
     """
 
     name = "pls"
-    settings = range(1, LENGTH + 1)  # latent variables
+    settings = (*range(1, LENGTH + 1),)  # latent variables
 
     def coefficients(self, A: np.ndarray, y: np.ndarray, setting: float) -> np.ndarray:
         """See :class:`Peer`."""
