@@ -14,6 +14,7 @@ from fmpy.fmi2 import FMU2Slave
 from hypothesis import settings
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
+from support.processes import one_process, two_processes
 from support.project import ROOT
 from support.shared import keep_in, once, shared_folder
 from support.slow_tests import NODE, PROCESSOR, slow_tests
@@ -253,6 +254,19 @@ def serial(monkeypatch):
         return analyse_runs(scenarios, analyse, folders, 0, advance)
 
     monkeypatch.setattr("thesis.monte_carlo.analyse_runs", here)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _diagnosis_in_one_process():
+    with one_process():
+        yield
+
+
+@pytest.fixture(name="two_processes")
+def _two_processes():
+    """The diagnosis shares its work with a second process, as outside of the tests."""
+    with two_processes():
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")
