@@ -16,7 +16,7 @@ from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.processes import one_process, two_processes
 from support.project import ROOT
-from support.shared import keep_in, once, shared_folder
+from support.shared import keep_in, kept, once, shared_folder
 from support.slow_tests import NODE, PROCESSOR, slow_tests
 
 from cosim.dispatch import analyse_runs
@@ -266,6 +266,16 @@ def _diagnosis_in_one_process():
 def _two_processes():
     """The diagnosis shares its work with a second process, as outside of the tests."""
     with two_processes():
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _smooth_once(shared):
+    """A measured run that several tests read is smoothed once; test_diagnosis_smoothing.py smooths itself."""
+    from diagnosis.runs import prepared_run, smooth
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prepared_run, "smooth", lambda track, agreeing: kept(smooth, track, agreeing))
         yield
 
 
