@@ -71,7 +71,8 @@ def pytest_collection_modifyitems(items):
     """
     listed = slow_tests()
     for item in items:
-        if item.nodeid in listed and not item.get_closest_marker("numerical"):
+        stays = any(item.get_closest_marker(name) for name in ("numerical", "quick"))
+        if item.nodeid in listed and not stays:
             item.add_marker("slow")
     yield
     slow = [item.get_closest_marker("slow") is not None for item in items]
