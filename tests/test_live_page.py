@@ -219,6 +219,7 @@ def test_inputs_from_files_are_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_large_page_is_refused(tmp_path):
+def test_a_large_page_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.live.page_file.alternatives", lambda *_: [])
     line = refused(scenario(stop=2000.0), tmp_path)
     assert re.search(r"the page would have \d+\.\d MB, .*--stop", line)
