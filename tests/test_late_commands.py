@@ -88,8 +88,7 @@ def test_a_late_actuator_of_a_described_ship_is_named(tmp_path):
     assert line.startswith(f"{names[1]}: probably logged {LATE * h:.2g} s late")
 
 
-@pytest.mark.quick
-@pytest.mark.parametrize("rows", [0, -LATE])
+@pytest.mark.parametrize("rows", [pytest.param(0, marks=pytest.mark.quick), -LATE])
 def test_of_commands_in_time_or_early_nothing_is_reported(rows, tmp_path):
     assert not lines(tmp_path, late(made(), "tau_X", rows=rows))[1]
 
