@@ -14,8 +14,9 @@ from fmpy.fmi2 import FMU2Slave
 from hypothesis import settings
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
+from support.processes import one_process, two_processes
 from support.project import ROOT
-from support.shared import keep_in, once, shared_folder
+from support.shared import keep_in, kept, once, shared_folder
 from support.slow_tests import NODE, PROCESSOR, slow_tests
 
 from cosim.dispatch import analyse_runs
@@ -70,7 +71,8 @@ def pytest_collection_modifyitems(items):
     """
     listed = slow_tests()
     for item in items:
-        if item.nodeid in listed and not item.get_closest_marker("numerical"):
+        stays = any(item.get_closest_marker(name) for name in ("numerical", "quick"))
+        if item.nodeid in listed and not stays:
             item.add_marker("slow")
     yield
     slow = [item.get_closest_marker("slow") is not None for item in items]
@@ -253,6 +255,29 @@ def serial(monkeypatch):
         return analyse_runs(scenarios, analyse, folders, 0, advance)
 
     monkeypatch.setattr("thesis.monte_carlo.analyse_runs", here)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _diagnosis_in_one_process():
+    with one_process():
+        yield
+
+
+@pytest.fixture(name="two_processes")
+def _two_processes():
+    """The diagnosis shares its work with a second process, as outside of the tests."""
+    with two_processes():
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _smooth_once(shared):
+    """A measured run that several tests read is smoothed once; test_diagnosis_smoothing.py smooths itself."""
+    from diagnosis.runs import prepared_run, smooth
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prepared_run, "smooth", lambda track, agreeing: kept(smooth, track, agreeing))
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

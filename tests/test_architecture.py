@@ -405,7 +405,7 @@ def test_nothing_of_the_product_imports_the_thesis(package):
 
 def test_what_tests_share_is_in_support():
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
-        used = [n.module or "" for n in ast.walk(parsed(path)) if isinstance(n, ast.ImportFrom)]
+        used = re.findall(r"^\s*from\s+([\w.]+)\s+import\b", path.read_text("utf-8"), re.M)
         assert not [name for name in used if name.split(".")[-1].startswith("test_")], path.name
 
 

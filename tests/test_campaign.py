@@ -134,7 +134,7 @@ def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
         {
             "controller": {
                 "set": "controller",
-                "values": ["controller_cl_win_eps.fmu", "controller_bs.fmu"],
+                "values": ["controller_abs.fmu", "controller_bs.fmu"],
             },
             "k": {"set": "vessel.m", "values": [14.0, 18.0]},
         },

@@ -20,6 +20,7 @@ import pandas as pd
 import pytest
 from support.cse1 import EFFECTS
 from support.measured import sail, table_of
+from support.processes import two_processes
 from support.shared import once
 
 import diagnosis
@@ -89,7 +90,8 @@ def learned(runs, shared):
 
     def work(folder):
         write_logs(runs, folder)
-        done = run(learn.main, folder / "a", "--test", folder / "b", "--out", folder / "deep" / "er")
+        with two_processes():
+            done = run(learn.main, folder / "a", "--test", folder / "b", "--out", folder / "deep" / "er")
         (folder / "done").write_text(json.dumps(done))
 
     folder = once(shared / "learned", work)
@@ -424,16 +426,6 @@ def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):
     assert names[0] == "a", "whatever runs follow"
 
 
-@pytest.mark.slow
-def test_two_processes_give_what_one_gives(runs, monkeypatch):
-    files = [runs / "a.csv", runs / "b.csv"]
-    together = diagnosis.gather(files)
-    monkeypatch.setattr("diagnosis.execution.parallel._alone", True)
-    for one, two in zip(diagnosis.gather(files), together, strict=True):
-        np.testing.assert_array_equal(one.smoothed.nu, two.smoothed.nu)
-        assert one.run.name == two.run.name
-
-
 def write(out, text, error=None, names=("a", "b")):
     with together(out, ["a", "b"]) as new:
         for name in names:
@@ -548,9 +540,10 @@ def quick(runs, shared):
     """Folder, exit code and terminal of one run of learn --quick."""
 
     def work(folder):
-        done = run(
-            learn.main, runs / "a.csv", "--test", runs / "b.csv", "--quick", "--out", folder / "out"
-        )
+        with two_processes():
+            done = run(
+                learn.main, runs / "a.csv", "--test", runs / "b.csv", "--quick", "--out", folder / "out"
+            )
         (folder / "done").write_text(json.dumps(done))
 
     folder = once(shared / "quick", work)
@@ -571,6 +564,7 @@ def test_quick_stops_after_the_second_answer_and_says_what_is_left_out(quick):
 
 
 def test_python_gives_what_the_command_gives(quick, runs):
+    """The command in two processes, and this in one."""
     a, b = diagnosis.gather([runs / "a.csv", runs / "b.csv"])
     content = strict(quick[0] / learn.CALIBRATION)
     calibrated = diagnosis.calibrate([a], [b])

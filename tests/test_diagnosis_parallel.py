@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from diagnosis.execution.parallel import for_each, forks, one_thread
 
+pytestmark = pytest.mark.usefixtures("two_processes")
 forked = pytest.mark.skipif(not forks(), reason="needs fork and two cores")
 
 

@@ -303,6 +303,7 @@ def test_initial_state_alone_gives_its_own_covariance():
     np.testing.assert_allclose(np.diag(V[0, -1, :, -1]), [1.0 + 0.4, 2.0, 2.0], atol=1e-12)
 
 
+@pytest.mark.quick
 def test_push_is_recovered_from_what_it_leaves_in_the_windows():
     """An Ornstein-Uhlenbeck series of 0.1 N that lasts 2 s, seen through the windows of 32 runs."""
     w, rng = hidden(), np.random.default_rng(3)
@@ -328,6 +329,7 @@ def test_noise_alone_is_no_push():
     assert estimate([hidden()], error, std).size.max() < 0.005
 
 
+@pytest.mark.quick
 def test_fit_finds_what_was_hidden_within_its_interval():
     fit, prior = fitted()
     k = list(fit.names).index("delta_X_u")

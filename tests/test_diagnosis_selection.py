@@ -71,6 +71,7 @@ def test_model_error_vanishes_for_the_true_model_and_only_for_it(hidden):
     assert (wrong / [0.008, 0.012, 0.003]).max() > 2.0
 
 
+@pytest.mark.quick
 def test_model_error_is_the_force_that_was_hidden():
     """Two ways to the same: the weak form of the pose, and the force by the true velocity."""
     w, nu = data(ship={"delta_X_u": -3.0})

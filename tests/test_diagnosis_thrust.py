@@ -62,7 +62,7 @@ TOGETHER = {"delay and lag": {"delay": 0.36, "lag": 0.7}, "all": {**VALUES, "los
 @cache
 def sailed():
     """The run that is varied, and its true velocity (n, 3)."""
-    return sail(28.0, noise=0.0)
+    return sail(16.0, noise=0.0)
 
 
 def base():

@@ -611,6 +611,7 @@ def test_pose_younger_than_its_stamp_is_not_told_from_lags_that_are_too_long(nam
     assert ("the same effect" in seen.doubt) != sure
 
 
+@pytest.mark.quick
 def test_axis_that_is_never_commanded_has_the_force_of_the_ships_inertia():
     (w, *_) = voyages(**SHORT)
     model = Model()

@@ -83,13 +83,20 @@ def test_a_controller_that_a_notebook_writes_is_one(tmp_path):
     assert load("pull", tmp_path / "pull.py")[1].name == "controller_pull"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_links_lead_to_files(page):
-    for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
-        if "://" not in link:
-            assert (page.parent / link).exists(), link
+def in_pages(pattern):
+    """(page, groups) of each match in all pages."""
+    for page in PAGES:
+        for found in re.findall(pattern, page.read_text(encoding="utf-8")):
+            yield page, found
 
 
+def test_links_lead_to_files():
+    links = [(p, link) for p, link in in_pages(r"\]\(([^)#\s]+)[^)]*\)") if "://" not in link]
+    assert links
+    assert [(p.name, link) for p, link in links if not (p.parent / link).exists()] == []
+
+
+@cache
 def anchors(page):
     """Anchors of a page's headings, as GitHub and the site make them."""
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
@@ -97,19 +104,19 @@ def anchors(page):
     return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_links_lead_to_headings(page):
-    for file, anchor in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", page.read_text(encoding="utf-8")):
-        assert anchor in anchors(page.parent / file if file else page), f"{file}#{anchor}"
+def test_links_lead_to_headings():
+    wrong = [
+        (page.name, f"{file}#{anchor}")
+        for page, (file, anchor) in in_pages(r"\]\(([^)#\s:]*)#([^)\s]+)\)")
+        if anchor not in anchors(page.parent / file if file else page)
+    ]
+    assert wrong == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_files_that_a_page_names_exist(page):
-    text = page.read_text(encoding="utf-8")
-    for name in re.findall(
-        r"`((?:fmus|cosim|diagnosis|tests|studies|thesis|benchmarks)/[\w./]+)`", text
-    ):
-        assert (ROOT / name).exists() or name in EXAMPLES, name
+def test_files_that_a_page_names_exist():
+    named = r"`((?:fmus|cosim|diagnosis|tests|studies|thesis|benchmarks)/[\w./]+)`"
+    wrong = [(p.name, name) for p, name in in_pages(named) if not (ROOT / name).exists()]
+    assert [each for each in wrong if each[1] not in EXAMPLES] == []
 
 
 def blocks(kind):

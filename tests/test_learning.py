@@ -76,6 +76,7 @@ def test_lyapunov_function_of_the_loss_of_thrust_alone_never_grows():
     assert np.abs(last - loss).max() < 0.1, "and on a rich motion the losses are found"
 
 
+@pytest.mark.quick
 def test_lyapunov_output_is_the_sum_of_its_terms():
     component = COMPONENTS["controller_cl_win_eps"]
     gamma = ROTATIONAL.gamma()._replace(gamma_2=0.0)

@@ -187,7 +187,8 @@ def refused(content, folder):
     return line
 
 
-def test_files_that_are_no_such_page_are_not_replaced(tmp_path):
+def test_files_that_are_no_such_page_are_not_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.live.page_file.alternatives", lambda *_: [])  # which take seconds
     file, other = tmp_path / "s.json", tmp_path / "other.html"
     file.write_text(json.dumps(scenario(stop=3.0)))
     other.write_text("<!DOCTYPE html>")
@@ -218,6 +219,7 @@ def test_inputs_from_files_are_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_large_page_is_refused(tmp_path):
+def test_a_large_page_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.live.page_file.alternatives", lambda *_: [])
     line = refused(scenario(stop=2000.0), tmp_path)
     assert re.search(r"the page would have \d+\.\d MB, .*--stop", line)

@@ -413,7 +413,8 @@ def test_runs_in_one_process_leave_nothing(ellipse, tmp_path):
 
 @pytest.mark.slow
 @linux_only
-def test_campaign_in_small(tmp_path):
+def test_campaign_in_small(tmp_path, monkeypatch):
+    monkeypatch.setattr(campaigns, "LONGEST", 3.0)
     nothing = lambda: None  # noqa: E731
     assert mutations.broken_scenarios(6, 2, tmp_path, nothing) == []
     assert mutations.broken_files(4, 2, tmp_path, nothing) == []
@@ -434,7 +435,9 @@ def test_broken_ships_in_small(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @linux_only
-def test_killed_commands_in_small(tmp_path):
+def test_killed_commands_in_small(tmp_path, monkeypatch):
+    for longest in ("COMPARES", "BUILDS", "CAMPAIGNS"):
+        monkeypatch.setattr(killed_commands, longest, 1.5)
     nothing = lambda: None  # noqa: E731
     assert killed_commands.interrupted_compares(2, 2, tmp_path, nothing) == []
     assert killed_commands.killed_diagnoses(1, 2, tmp_path, nothing) == []

@@ -146,6 +146,7 @@ def test_component_predicts_as_windows_are_predicted(data):
         assert np.allclose(found, expected[1:, :, w], rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.quick
 def test_page_computes_the_errors_of_the_report_and_of_any_other_values(driven, report, data):
     found = driven(
         """found.first = errors(); press("Initial model"); found.initial = errors();

@@ -27,6 +27,7 @@ from .endings import (
 from .judgement import agreement_faults, line_faults
 from .mortal import WAYS
 
+LONGEST = 8.0  # wall time until the interrupt [s]; chosen: workers start, and runs end, within that
 RUNS = 4000  # of a campaign; more than end before the interrupt
 
 
@@ -49,7 +50,7 @@ def interrupted_campaigns(count: int, seed: int, work: Path, advance: Callable[[
         out, workers, native = work / f"campaign{k}", rng.choice((0, 2)), rng.random() < 0.7
         path, loop = campaign_file(work, native), rng.choice(({}, {"CYBERSHIP_LOOP": "plain"}))
         process = begin("cosim.campaign", path, "--workers", workers, "--out", out, **loop)
-        time.sleep(rng.uniform(0.0, 8.0))
+        time.sleep(rng.uniform(0.0, LONGEST))
         process.send_signal(rng.choice((signal.SIGINT, signal.SIGTERM)))
         asked = time.monotonic()
         stderr = finish(process)

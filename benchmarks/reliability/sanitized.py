@@ -28,7 +28,7 @@ from cosim.scenario import with_settings
 from fmus.build import build, native_targets
 
 ROOT = Path(__file__).parent.parent.parent
-FLAGS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all"
+FLAGS = "-O0 -g -fsanitize=address,undefined -fno-sanitize-recover=all"
 FMUS = ("vessel", "observer_mdf", "guidance_ellipse")
 SCENARIOS = ("ellipse",)
 MODULE = "benchmarks.reliability.sanitized"

@@ -1,8 +1,8 @@
-"""Tests that took long when they were measured: ``python tests/support/slow_tests.py junit.xml``.
+"""Tests that took long when they were measured: ``python tests/support/slow_tests.py junit.xml...``.
 
 Reads the processor times of ``python -m pytest -n auto --junitxml junit.xml`` and writes ``slow_tests.txt``, whose
-tests are marked slow besides those that say so themselves. Numerical ones stay in the quick part, which
-the gate runs as on several processors.
+tests are marked slow besides those that say so themselves. Those marked ``quick`` stay in the quick part, and
+numerical ones, as the gate runs them as on several processors. A run may be in several parts, with a report each.
 """
 
 import sys
@@ -31,4 +31,5 @@ def long_ones(report: Path) -> Iterator[str]:
 
 if __name__ == "__main__":
     header = f"# Took longer than {LONG} s of processor time; written by support/slow_tests.py."
-    LIST.write_text("\n".join([header, *sorted(long_ones(Path(sys.argv[1])))]) + "\n", encoding="utf-8")
+    long = {node for report in sys.argv[1:] for node in long_ones(Path(report))}
+    LIST.write_text("\n".join([header, *sorted(long)]) + "\n", encoding="utf-8")

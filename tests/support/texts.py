@@ -26,7 +26,14 @@ def module_texts(path: Path, fewest: int = FEWEST) -> Iterator[tuple[int, str]]:
     These are messages, warnings and notes, sentences of reports, labels, descriptions of variables and
     of keys, and help of options.
     """
+    return (found for found in _module_texts(path) if len(found[1].split()) >= fewest)
+
+
+@cache
+def _module_texts(path: Path) -> list[tuple[int, str]]:
+    """All of them, whatever their length: two tests want those of all modules."""
     tree = ast.parse(path.read_text("utf-8"))
+    found: list[tuple[int, str]] = []
     docstrings = {
         id(n.body[0].value)
         for n in ast.walk(tree)
@@ -43,8 +50,8 @@ def module_texts(path: Path, fewest: int = FEWEST) -> Iterator[tuple[int, str]]:
         strings = [p.value for p in parts if isinstance(p, ast.Constant) and isinstance(p.value, str)]
         if strings and id(node) not in docstrings:
             text = "".join(p.value if isinstance(p, ast.Constant) else "``" for p in parts)
-            if len(text.split()) >= fewest:
-                yield node.lineno, text
+            found.append((node.lineno, text))
+    return found
 
 
 def template_texts(path: Path) -> Iterator[tuple[int, str]]:

@@ -104,7 +104,7 @@ def test_improved_controller_loses_its_lag_and_the_originals_do_not(tmp_path, mo
         }
 
     monkeypatch.setattr(improved, "variants", shorter)
-    report = improved.study(tmp_path, range(1), 120.0, None)
+    report = improved.study(tmp_path, range(1), 70.0, None)
     laps = json.loads((tmp_path / "results.json").read_text())["laps"]["kalman"]
     size = {name: runs[0]["size"] for name, runs in laps.items()}
     assert all(size.pop(name) < 0.05 for name in (IMPROVED, SURGE_ONLY))

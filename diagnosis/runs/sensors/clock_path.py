@@ -47,6 +47,7 @@ LEAST = (
 )
 BEGIN = 0.1  # 1, of the walks in a second, times the noise or the rate; first guess
 SWEEPS = 25  # 1, of the fixed point; chosen: the likelihood then changes by less than 0.1
+Component = tuple[int, np.ndarray]  # 0, 1 or 2 for north, east or heading, and (n,) of directions
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
 
@@ -95,8 +96,9 @@ class PathProblem:
         moved = np.column_stack([e.gone, e.turned])
         measured = [0, 1] * (e.velocity is not None) + [2] * (e.rate is not None)
         entries: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # equation, unknown, factor
-        # Of each part of the equations that constants change: first one, axis, rows of begin and end.
-        self.parts: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
+        # Of the samples and of the nodes what constants change: rows of begin and end, and of each axis
+        # its first equation and its direction, of which only what is not zero everywhere.
+        self.parts: list[tuple[np.ndarray, np.ndarray, list[tuple[int, list[Component]]]]] = []
         right, groups, lengths = [], [], []
 
         def add(
@@ -116,22 +118,26 @@ class PathProblem:
         speed, turn = (np.linalg.norm(np.diff(x[nodes], axis=0), axis=1) for x in (e.gone, moved[:, 2:]))
         moves = np.array([x > still * steps for x, still in zip((speed, turn), e.still, strict=True)])
         moves = moves[[0, 0, 1]]  # along, across, heading
+        start, each = nodes[at], []
         for k in measured:  # samples of the pose
-            a, start = axes[k][rows], nodes[at]
+            a = axes[k][rows]
             of = [(STATES * at + i, a[:, i]) for i in range(clock) if a[:, i].any()]
             way, by_clock = ahead(a, start, rows), moves[k][at]
             of.append((STATES * at + clock, way * by_clock))
             y = (a * pose[rows]).sum(axis=1) - way * ~by_clock
-            self.parts.append((add(k, of, y, one), a, start, rows))
+            each.append((add(k, of, y, one), _components(a)))
+        self.parts.append((start, rows, each))
         j = np.flatnonzero(~self.cut)
+        start, end, each = nodes[j], nodes[j + 1], []
         for k in measured:  # from node to node
-            a, start, end = axes[k][nodes[j]], nodes[j], nodes[j + 1]
+            a = axes[k][start]
             of = [(STATES * j + i, -a[:, i]) for i in range(clock)]
             of += [(STATES * (j + 1) + i, a[:, i]) for i in range(clock)]
             way, by_clock = ahead(a, start, end), moves[k][j]
             of.append((STATES * j + clock, -way * by_clock))
             begin = add(TURN if k == HEADING else DRIFT, of, way * ~by_clock, steps[j])
-            self.parts.append((begin, -a, start, end))
+            each.append((begin, _components(-a)))
+        self.parts.append((start, end, each))
         j = np.flatnonzero(~self.cut[:-1] & ~self.cut[1:])
         of = [(STATES * (j + 1) + clock, one), (STATES * j + clock, -one)]
         add(CLOCK, of, np.zeros(j.size), 0.5 * (steps[j] + steps[j + 1]))
@@ -156,13 +162,15 @@ class PathProblem:
         """(equations, constants): what one unit of each constant changes, with a rate of the clock."""
         made = np.zeros((self.right.size, len(constants)))
         run = np.interp(self.evidence.time, self.edges, integral_of(self.edges, clock))
+        pace = np.diff(run) / np.diff(self.evidence.time)
         for k, fault in enumerate(constants):
-            path = fault.path
+            path = np.ascontiguousarray(fault.path.T)
             if fault.clocked:
-                steps = np.diff(path, axis=0) * (np.diff(run) / np.diff(self.evidence.time))[:, None]
-                path = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-            for begin, a, start, end in self.parts:
-                made[begin : begin + end.size, k] = np.einsum("ij,ij->i", a, path[end] - path[start])
+                path = np.hstack([np.zeros((3, 1)), np.cumsum(np.diff(path) * pace, axis=1)])
+            for start, end, axes in self.parts:
+                moved = path[:, end] - path[:, start]
+                for begin, direction in axes:
+                    made[begin : begin + end.size, k] = sum(a * moved[i] for i, a in direction)
         return made
 
     def solve(self, constants: Sequence[FaultColumn], fixed_clock: bool = False) -> "Path":
@@ -189,7 +197,8 @@ class PathProblem:
     def outliers(self, path: "Path") -> frozenset[int]:
         """Samples far from the path."""
         far: set[int] = set()
-        for begin, _, _, rows in self.parts[: len(self.parts) // 2]:
+        _, rows, axes = self.parts[0]
+        for begin, _ in axes:
             off = np.abs(path.residual[begin : begin + rows.size])
             far |= set(rows[off > OUTLIER].tolist())
         return frozenset(far)
@@ -243,6 +252,11 @@ class Path:
         variance = (right * self.system.inverse(right)).sum(axis=0)
         variance += (by_constants * (self.covariance @ by_constants)).sum(axis=0)
         return np.sqrt(variance)
+
+
+def _components(directions: np.ndarray) -> list[Component]:
+    """What is not zero everywhere of directions (n, 3): north, east, heading."""
+    return [(i, directions[:, i].copy()) for i in range(3) if directions[:, i].any()]
 
 
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:
