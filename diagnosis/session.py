@@ -40,6 +40,7 @@ from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import DecidedFindings, judge
+from .verdict.measured_commands import are_measured, log_odds, with_measured_commands
 from .verdict.prediction_gain import PredictionGain, prediction_gain
 from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
@@ -89,6 +90,7 @@ class CalibratedModel(ShortRepr):
         comparison: errors of the initial and of the calibrated model.
         gain: what it gains over the initial model in the data that decide; None where that is not known.
         prior: of the coefficients, as it was given.
+        odds: logarithm of those that commands are measured values, where they are read so; else None.
     """
 
     learned: Findings
@@ -97,6 +99,7 @@ class CalibratedModel(ShortRepr):
     comparison: Comparison
     gain: PredictionGain | None
     prior: Prior
+    odds: float | None = None
 
     @property
     def model(self) -> Model:
@@ -217,6 +220,8 @@ class Session(ShortRepr):
         harms: criterion of pruning.
         advance: receives the name of each step when it begins.
         seed: of everything random.
+        orders: the session that has the commands of the runs as orders, if this one has them as measured
+            values of the actuators; None: as they are read.
     """
 
     train: Sequence[WeakWindows]
@@ -228,6 +233,7 @@ class Session(ShortRepr):
     harms: Harm
     advance: Advance
     seed: int
+    orders: "Session | None" = None
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -266,6 +272,32 @@ class Session(ShortRepr):
         return None
 
     @well_posed()
+    def with_likelier_commands(self) -> "Session":
+        """The session with commands as measured values of the actuators, if these predict better.
+
+        Commands whose side-car states what they are, and those of a log of this project, stay.
+        """
+        given = self.train, self.validate, self.test
+        train, validate, test = ([with_measured_commands(w) for w in part] for part in given)
+        decide = zip([*train, *validate], self.runs, strict=False)
+        if all(a is b for a, b in decide) or self.calibration is None:
+            return self
+        other = replace(self, train=train, validate=validate, test=test, orders=self)
+        return other if are_measured(other.odds_of_commands) else self
+
+    @cached_property
+    def odds_of_commands(self) -> float:
+        """Logarithm of the odds that the commands are measured values, and not orders."""
+        losses = []
+        for session in (self.orders, self):
+            fit = session and session.calibration
+            if not (session and fit):
+                return -np.inf
+            (loss,) = session.data(fit.findings.sigma).losses(fit.findings)
+            losses.append(loss)
+        return log_odds(*losses)
+
+    @well_posed()
     def calibrate(self) -> CalibratedModel | None:
         """Second answer: the coefficients alone, without an effect; None: there is none to fit."""
         fit = self.calibration
@@ -273,7 +305,8 @@ class Session(ShortRepr):
             return None
         gain = prediction_gain(self.data(fit.findings.sigma), self.start, fit.findings)
         compared = self._compared(fit.findings.model)
-        return CalibratedModel(fit.findings, fit.posterior, self.start, compared, gain, self.prior)
+        odds = self.odds_of_commands if self.orders else None
+        return CalibratedModel(fit.findings, fit.posterior, self.start, compared, gain, self.prior, odds)
 
     @well_posed()
     def diagnose(self) -> Diagnosis:

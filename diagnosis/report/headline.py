@@ -5,6 +5,7 @@ from math import degrees
 
 import numpy as np
 
+from ..assessment.plausibility import odds_of
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
 from ..session import CalibratedModel
@@ -22,6 +23,11 @@ NO_CALIBRATION = (
 )
 CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
 CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of the initial model."
+MEASURED_COMMANDS = (
+    "The commands are read as measured values of the actuators, of which the mean over a row acts, and "
+    "not as orders, because predictions of data left out are then better (odds {}). State "
+    '"measured": true or false for each command in the side-car to decide it.'
+)
 NOTHING_FOUND = "These data show no missing effect."
 TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
 UNEXPLAINED = "A model error remains that no known effect explains."
@@ -100,6 +106,11 @@ def gain_of_search(r: ReportData) -> list[str]:
 def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]:
     """What calibration gained over the initial model; empty where that is not known."""
     return gain_sentences(calibrated.gain, CALIBRATION_GAINED, CALIBRATION_GAINED_NOTHING, r.lengths[0])
+
+
+def reading_of_commands(calibrated: CalibratedModel) -> list[str]:
+    """How commands are read, where that is not as the files state; else empty."""
+    return [] if calibrated.odds is None else [MEASURED_COMMANDS.format(odds_of(calibrated.odds))]
 
 
 def first_sentences(r: ReportData) -> str:
