@@ -7,7 +7,7 @@ and, with a normal distribution of unknown standard deviation, the likelihood
 
     2 log L = -n (2 log mean e_position^2 + log mean e_heading^2).
 
-Accelerations do not tell: a controller commands what its ship has just done, so that earlier commands
+Accelerations do not show it: a controller commands what its ship has just done, so that earlier commands
 seem to explain them better.
 """
 
