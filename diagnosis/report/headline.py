@@ -18,6 +18,10 @@ from .reported_effect import ReportedEffect
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
+OTHER_FIT = (
+    "It found no effect to add. It fits the same coefficients to accelerations first and to predictions "
+    "over several times then, so that its numbers differ from those of the calibration."
+)
 NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
 )
@@ -98,8 +102,11 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
 
 def gain_of_search(r: ReportData) -> list[str]:
     """What the search for effects gained over calibration alone; empty where that is not known."""
-    gain = None if r.diagnosis is None else r.diagnosis.gain
+    d = r.diagnosis
+    gain = None if d is None else d.gain
     said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
+    if d and gain and d.refitted and not d.learned.effects and gain.position.difference:
+        said.insert(1, OTHER_FIT)
     return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
 
 

@@ -16,7 +16,7 @@ from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import gain, harm, predicts_worse
-from .confidence import FOUND, Doubts, confidence_of
+from .confidence import FOUND, Doubts, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -109,6 +109,8 @@ def better_calibration(
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
+    Effects of which each may be none, by its intervals, have to predict better than it.
+
     Args:
         calibration: the fit; None: there is none.
         found: the end of a search without a sure finding; the initial model if nothing was learned.
@@ -124,7 +126,10 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    return calibration if predicts_worse(now, its) and not harm(its, first) else None
+    effects = found.effects if isinstance(found, Findings) else []
+    superfluous = bool(effects) and all(map(may_be_none, effects)) and not harm(its, now)
+    better = superfluous or predicts_worse(now, its)
+    return calibration if better and not harm(its, first) else None
 
 
 def _flows(fit: RefitOutcome) -> bool:
