@@ -36,7 +36,7 @@ from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
-from .search.prediction_fit.refit import RefitOutcome
+from .search.prediction_fit.refit import RefitOutcome, to_predictions
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import DecidedFindings, judge
@@ -120,6 +120,7 @@ class Diagnosis(DecidedFindings):
         seed: of everything random.
         gain: what the search for effects gains over calibration alone in the data that decide; None
             where that is not known.
+        odds: logarithm of those that commands are measured values, where they are read so; else None.
     """
 
     comparison: Comparison
@@ -129,6 +130,7 @@ class Diagnosis(DecidedFindings):
     prior: Prior
     seed: int
     gain: PredictionGain | None = None
+    odds: float | None = None
 
     @property
     def sound(self) -> bool:
@@ -220,8 +222,9 @@ class Session(ShortRepr):
         harms: criterion of pruning.
         advance: receives the name of each step when it begins.
         seed: of everything random.
-        orders: the session that has the commands of the runs as orders, if this one has them as measured
-            values of the actuators; None: as they are read.
+        orders: the session that has commands of the runs as orders, of which this one has the means over
+            rows, as of measured values; None: it has them as they are read.
+        odds: logarithm of the odds that they are measured values; None: as ``orders``.
     """
 
     train: Sequence[WeakWindows]
@@ -234,6 +237,7 @@ class Session(ShortRepr):
     advance: Advance
     seed: int
     orders: "Session | None" = None
+    odds: float | None = None
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -271,31 +275,32 @@ class Session(ShortRepr):
             return calibrator.coefficients() if calibrator.windows else None
         return None
 
-    @well_posed()
-    def with_likelier_commands(self) -> "Session":
-        """The session with commands as measured values of the actuators, if these predict better.
+    @cached_property
+    def measured(self) -> "Session | None":
+        """The session with the commands as measured values; None: they are, or files state this.
 
-        Commands whose side-car states what they are, and those of a log of this project, stay.
+        The commands of a log of this project are orders.
         """
         given = self.train, self.validate, self.test
         train, validate, test = ([with_measured_commands(w) for w in part] for part in given)
         decide = zip([*train, *validate], self.runs, strict=False)
-        if all(a is b for a, b in decide) or self.calibration is None:
-            return self
-        other = replace(self, train=train, validate=validate, test=test, orders=self)
-        return other if are_measured(other.odds_of_commands) else self
+        if self.orders is not None or all(a is b for a, b in decide):
+            return None
+        return replace(self, train=train, validate=validate, test=test, orders=self)
 
-    @cached_property
-    def odds_of_commands(self) -> float:
-        """Logarithm of the odds that the commands are measured values, and not orders."""
-        losses = []
-        for session in (self.orders, self):
-            fit = session and session.calibration
-            if not (session and fit):
-                return -np.inf
-            (loss,) = session.data(fit.findings.sigma).losses(fit.findings)
-            losses.append(loss)
-        return log_odds(*losses)
+    @well_posed()
+    def with_likelier_commands(self) -> "Session":
+        """The session with commands as measured values of the actuators, if these predict better."""
+        if self.measured is None or self.calibration is None or self.measured.calibration is None:
+            return self
+        return self._likelier(self.calibration.findings, self.measured.calibration.findings)
+
+    def _likelier(self, found: Findings, measured: Findings) -> "Session":
+        """This session, or that with measured values, by findings that are fitted to either."""
+        assert self.measured is not None
+        its, others = self.data(found.sigma), self.measured.data(found.sigma)
+        odds = log_odds(*its.losses(found), *others.losses(measured))
+        return replace(self.measured, odds=odds) if are_measured(odds) else self
 
     @well_posed()
     def calibrate(self) -> CalibratedModel | None:
@@ -305,8 +310,9 @@ class Session(ShortRepr):
             return None
         gain = prediction_gain(self.data(fit.findings.sigma), self.start, fit.findings)
         compared = self._compared(fit.findings.model)
-        odds = self.odds_of_commands if self.orders else None
-        return CalibratedModel(fit.findings, fit.posterior, self.start, compared, gain, self.prior, odds)
+        return CalibratedModel(
+            fit.findings, fit.posterior, self.start, compared, gain, self.prior, self.odds
+        )
 
     @well_posed()
     def diagnose(self) -> Diagnosis:
@@ -320,6 +326,16 @@ class Session(ShortRepr):
         verdict, gain = judge(
             found, data, self.known, self.harms, region, calibrates, calibration, self.advance
         )
+        if verdict.learned.effects and calibrates and self.measured is not None:
+            # What hides that commands are measured, as a rudder's bias, may be found by now.
+            self.advance("orders or measured values")
+            fits = [
+                to_predictions(verdict.learned, each.train, self.known, True).findings
+                for each in (self, self.measured)
+            ]
+            likelier = self._likelier(*fits)
+            if likelier is not self:
+                return likelier.diagnose()
         return self._concluded(verdict, region, gain)
 
     def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:
@@ -352,6 +368,7 @@ class Session(ShortRepr):
             prior=self.prior,
             seed=self.seed,
             gain=gain,
+            odds=self.odds,
         )
 
 

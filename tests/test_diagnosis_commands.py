@@ -334,6 +334,7 @@ def written(monkeypatch, tmp_path):
             evaluations=[], omega_std=[], predictor=DescribedShip(diagnosis.Model())
         ),
         files=None,
+        odds=None,
     )
 
     def report_of(found, model, files):
@@ -361,6 +362,7 @@ def written(monkeypatch, tmp_path):
     monkeypatch.setattr("diagnosis.assessment.gathering.gather", lambda paths, *_: list(paths))
     task = SimpleNamespace(
         compare=lambda: given.comparison,
+        with_likelier_commands=lambda: task,
         calibrate=lambda: None,
         diagnose=lambda: given,
         runs=[],

@@ -127,6 +127,7 @@ def file_content(r: ReportData) -> Content:
     found = {
         "verdict": d.verdict,
         "sentence": first_sentences(r),
+        "commands": " ".join(reading_of_commands(d)),
         "gain": gain_content(d.gain, gain_of_search(r)),
         "remainder": {
             "significant": d.remainder.significant,

@@ -8,7 +8,7 @@ import numpy as np
 from ..assessment.plausibility import odds_of
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
-from ..session import CalibratedModel
+from ..session import CalibratedModel, Diagnosis
 from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
@@ -115,9 +115,9 @@ def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]
     return gain_sentences(calibrated.gain, CALIBRATION_GAINED, CALIBRATION_GAINED_NOTHING, r.lengths[0])
 
 
-def reading_of_commands(calibrated: CalibratedModel) -> list[str]:
+def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
     """How commands are read, where that is not as the files state; else empty."""
-    return [] if calibrated.odds is None else [MEASURED_COMMANDS.format(odds_of(calibrated.odds))]
+    return [] if found.odds is None else [MEASURED_COMMANDS.format(odds_of(found.odds))]
 
 
 def first_sentences(r: ReportData) -> str:

@@ -69,6 +69,8 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     """Output of the third answer of ``diagnosis.learn``; the first one has shown the data."""
     d = r.diagnosis
     assert d is not None
+    if read := reading_of_commands(d):
+        yield from _lines("Commands", read)
     if gain := gain_of_search(r):
         yield from _lines("Gain of the search", map(_plain, gain))
     yield from _lines("Residual without explanation", [d.remainder.sentence])
