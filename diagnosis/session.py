@@ -36,7 +36,7 @@ from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
-from .search.prediction_fit.refit import RefitOutcome, to_predictions
+from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import DecidedFindings, judge
@@ -222,9 +222,7 @@ class Session(ShortRepr):
         harms: criterion of pruning.
         advance: receives the name of each step when it begins.
         seed: of everything random.
-        orders: the session that has commands of the runs as orders, of which this one has the means over
-            rows, as of measured values; None: it has them as they are read.
-        odds: logarithm of the odds that they are measured values; None: as ``orders``.
+        orders: the session with the commands as orders, where this one has them as measured values.
     """
 
     train: Sequence[WeakWindows]
@@ -237,7 +235,6 @@ class Session(ShortRepr):
     advance: Advance
     seed: int
     orders: "Session | None" = None
-    odds: float | None = None
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -275,32 +272,30 @@ class Session(ShortRepr):
             return calibrator.coefficients() if calibrator.windows else None
         return None
 
-    @cached_property
-    def measured(self) -> "Session | None":
-        """The session with the commands as measured values; None: they are, or files state this.
+    @well_posed()
+    def with_likelier_commands(self) -> "Session":
+        """The session with commands as measured values of the actuators, if these predict better.
 
-        The commands of a log of this project are orders.
+        Commands stay of which files state what they are, and those of a log of this project, orders.
         """
         given = self.train, self.validate, self.test
         train, validate, test = ([with_measured_commands(w) for w in part] for part in given)
         decide = zip([*train, *validate], self.runs, strict=False)
-        if self.orders is not None or all(a is b for a, b in decide):
-            return None
-        return replace(self, train=train, validate=validate, test=test, orders=self)
-
-    @well_posed()
-    def with_likelier_commands(self) -> "Session":
-        """The session with commands as measured values of the actuators, if these predict better."""
-        if self.measured is None or self.calibration is None or self.measured.calibration is None:
+        if all(a is b for a, b in decide):
             return self
-        return self._likelier(self.calibration.findings, self.measured.calibration.findings)
+        measured = replace(self, train=train, validate=validate, test=test, orders=self)
+        return measured if are_measured(measured.odds) else self
 
-    def _likelier(self, found: Findings, measured: Findings) -> "Session":
-        """This session, or that with measured values, by findings that are fitted to either."""
-        assert self.measured is not None
-        its, others = self.data(found.sigma), self.measured.data(found.sigma)
-        odds = log_odds(*its.losses(found), *others.losses(measured))
-        return replace(self.measured, odds=odds) if are_measured(odds) else self
+    @cached_property
+    def odds(self) -> float | None:
+        """Logarithm of the odds that commands are measured values; None: they are as they were read."""
+        losses = []
+        for session in (self.orders, self):
+            if session is None or session.calibration is None:
+                return None
+            fit = session.calibration.findings
+            losses += session.data(fit.sigma).losses(fit)
+        return log_odds(*losses)
 
     @well_posed()
     def calibrate(self) -> CalibratedModel | None:
@@ -326,16 +321,6 @@ class Session(ShortRepr):
         verdict, gain = judge(
             found, data, self.known, self.harms, region, calibrates, calibration, self.advance
         )
-        if verdict.learned.effects and calibrates and self.measured is not None:
-            # What hides that commands are measured, as a rudder's bias, may be found by now.
-            self.advance("orders or measured values")
-            fits = [
-                to_predictions(verdict.learned, each.train, self.known, True).findings
-                for each in (self, self.measured)
-            ]
-            likelier = self._likelier(*fits)
-            if likelier is not self:
-                return likelier.diagnose()
         return self._concluded(verdict, region, gain)
 
     def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:

@@ -1,6 +1,6 @@
 """Nominal coefficients in place of effects: where they alone explain the data, or predict better."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,10 +13,10 @@ from ..runs.run_constants import CHANCE
 from ..search.findings import Finding, Findings
 from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
-from ..search.prediction_fit.refit import RefitOutcome, to_predictions
+from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import gain, harm, predicts_worse
-from .confidence import FOUND, Doubts, confidence_of, may_be_none
+from .confidence import FOUND, Doubts, confidence_of
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -109,8 +109,6 @@ def better_calibration(
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
-    Effects of which each may be none, by its intervals, have to predict better than it.
-
     Args:
         calibration: the fit; None: there is none.
         found: the end of a search without a sure finding; the initial model if nothing was learned.
@@ -126,24 +124,7 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    superfluous = isinstance(found, Findings) and all_may_be_none(found) and not harm(its, now)
-    better = superfluous or predicts_worse(now, its)
-    return calibration if better and not harm(its, first) else None
-
-
-def all_may_be_none(found: Findings) -> bool:
-    """Whether findings have effects, and each may be none by the intervals of its values."""
-    return bool(found.effects) and all(map(may_be_none, found.effects))
-
-
-def without_superfluous(
-    found: Findings, data: ValidationData, prior: NominalPrior
-) -> Iterator[RefitOutcome]:
-    """The fit of the coefficients without the effects, where each of these may be none."""
-    if all_may_be_none(found) and found.refit is not None:
-        alone = without(found, [f.id for f in found.effects], data.start)
-        if alone.refitted is not None:
-            yield to_predictions(replace(alone, model=alone.refitted), data.train, prior, True)
+    return calibration if predicts_worse(now, its) and not harm(its, first) else None
 
 
 def _flows(fit: RefitOutcome) -> bool:

@@ -25,14 +25,7 @@ from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
 from ..search.prior import NominalPrior
-from .coefficients import (
-    any_finding,
-    any_sure,
-    better_calibration,
-    calibrated,
-    concluded,
-    without_superfluous,
-)
+from .coefficients import any_finding, any_sure, better_calibration, calibrated, concluded
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .law_in_parts import in_parts, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
@@ -161,9 +154,7 @@ def judge(
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
         if other is None and not any_sure(fit.findings, start, unshown):
-            fits = [calibration, *without_superfluous(fit.findings, data, prior)]
-            better = (better_calibration(each, now, data, drives) for each in fits)
-            other = next((each for each in better if each), None)
+            other = better_calibration(calibration, now, data, drives)
         if other is not None:
             dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
             now = _predicting(fit.findings, data, changed)

@@ -66,6 +66,6 @@ def log_odds(orders: Losses, measured: Losses) -> float:
     return total
 
 
-def are_measured(odds: float) -> bool:
-    """Whether the logarithm of the odds is enough to read commands otherwise than as orders."""
-    return 2.0 * odds > POSITIVE
+def are_measured(odds: float | None) -> bool:
+    """Whether the logarithm of the odds, if it is known, is enough to read commands not as orders."""
+    return odds is not None and 2.0 * odds > POSITIVE
