@@ -40,10 +40,26 @@ def test_samples_are_their_mean_from_row_to_row_whatever_the_order_of_the_rows()
     np.testing.assert_allclose(found, [2.0, 5.0, 0.0, 3.5])
 
 
+def test_rows_without_a_time_of_their_own_stay():
+    time = np.array([0.0, 1.0, 1.0, np.nan])
+    found = row_means(np.array([1.0, 3.0, 9.0, 4.0]), time)
+    np.testing.assert_allclose(found, [2.0, 3.0, 9.0, 4.0])
+
+
 def test_an_angle_takes_the_shorter_way_and_a_missing_sample_changes_no_other():
     angle = np.radians([170.0, -170.0, np.nan, 10.0])
     found = np.degrees(row_means(angle, np.arange(4.0), angle=True))
     np.testing.assert_allclose(found, [180.0, -170.0, np.nan, 10.0])
+
+
+def test_rows_that_are_filled_in_are_on_the_line_between_samples():
+    """Of finer rows the means are those of the line, so that their mean is that of the whole row."""
+    time, fine = np.arange(4.0), np.arange(0.0, 3.01, 0.25)
+    values = np.array([1.0, 3.0, -2.0, 5.0])
+    held = values[(fine + 1e-9).astype(int)]
+    found = row_means(held, fine, sampled=np.isin(fine, time))
+    np.testing.assert_allclose(found[:-1], np.interp(fine[:-1] + 0.125, time, values))
+    np.testing.assert_allclose(found[:-1].reshape(3, 4).mean(axis=1), row_means(values, time)[:-1])
 
 
 @pytest.mark.parametrize("measured", [True, False])

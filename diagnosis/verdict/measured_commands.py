@@ -19,6 +19,7 @@ from fmus.ship import ship
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OF_MOTION
+from ..runs.cleaning import Track
 from ..runs.columns.columns import TAU, log_of
 from ..runs.row_means import row_means
 from ..search.significance import Losses
@@ -37,11 +38,11 @@ def with_measured_commands(w: WeakWindows) -> WeakWindows:
         return w
     units = dict.fromkeys(TAU, "N") if run.commands is None else of.form_of(run.commands)
     means = (run.tau_cmd if run.commands is None else run.commands).copy()
-    names = []
+    names, logged = [], _logged(w.smoothed.track, means)
     for k, (name, unit) in enumerate(units.items()):
         column = run.layout.column(name)
         if column.measured is None and not column.late and np.ptp(means[:, k]) > 0.0:
-            means[:, k] = row_means(means[:, k], run.time, unit == "rad")
+            means[:, k] = row_means(means[:, k], run.time, unit == "rad", logged)
             names.append(name)
     if not names:
         return w
@@ -54,6 +55,12 @@ def with_measured_commands(w: WeakWindows) -> WeakWindows:
     track = replace(track, run=run, notes=(*track.notes, note))
     memory = {part: w.memory[part] for part in OF_MOTION if part in w.memory}
     return replace(w, smoothed=replace(w.smoothed, track=track), memory=memory)
+
+
+def _logged(track: Track, commands: np.ndarray) -> np.ndarray:
+    """(n,), rows with commands (n, k) of their own: rows between two that are filled in have none."""
+    new = np.any(np.diff(commands, axis=0, prepend=np.nan) != 0.0, axis=1)
+    return new | ~track.between
 
 
 def log_odds(orders: Losses, measured: Losses) -> float:
