@@ -9,7 +9,7 @@ import pytest
 
 from cosim import InputError
 from diagnosis.predictors import ship_with
-from diagnosis.runs import propose, read
+from diagnosis.runs import common_layout, propose, read
 from diagnosis.runs.columns.geographic import EQUATOR, SQUARED_ECCENTRICITY
 
 TIME = np.arange(0.0, 60.0, 0.5)
@@ -61,6 +61,24 @@ def test_latitude_and_longitude_become_metres(tmp_path: Path, latitude: float) -
     moved = found.run.pose[:, :2] - np.column_stack([NORTH, EAST])
     # The meridians converge: y to 60 m tan(latitude) 40 m / R.
     assert np.ptp(moved, axis=0).max() < 3e-3
+
+
+@pytest.mark.parametrize(("further", "one"), [(0.02, True), (3.0, False)])
+def test_the_runs_of_a_folder_have_one_origin_if_they_are_not_far_apart(
+    tmp_path: Path, further: float, one: bool
+) -> None:
+    paths = [tmp_path / name for name in ("a.csv", "b.csv")]
+    places = (63.44, 63.44 + further)
+    for path, latitude in zip(paths, places, strict=True):
+        degrees = dict(zip(("lat", "lon"), placed(latitude, 10.4), strict=True))
+        written(path, table(**degrees).drop(columns=["x", "y"]))
+    common, others = common_layout({path: propose(path) for path in paths})
+    assert ("x" in common.columns) is ("y" in common.columns) is one
+    assert not any(others.values()) or not one
+    if one:
+        north = [read(path, common).pose[:, 0] for path in paths]
+        arc = np.radians(further) * 6.37e6  # of a sphere: the ellipsoid's radius differs by 0.4 %
+        assert np.median(north[1]) - np.median(north[0]) == pytest.approx(arc, rel=0.01)
 
 
 @pytest.mark.parametrize("other", [{"lat": 6326.4 + TIME}, {"lat": 63.0 + TIME, "latitude": TIME}])

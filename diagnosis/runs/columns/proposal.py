@@ -34,7 +34,7 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import geographic_pair, local_columns
+from .geographic import geographic_pair, local_columns, one_origin
 from .likely_columns import (
     ASTERN,
     LARGEST,
@@ -162,6 +162,7 @@ def common_layout(
     """What one file for all measurements of a folder says, and the columns of each that it cannot have.
 
     A unit that the numbers of some alone show is that of all in which the column has the same name.
+    Latitudes and longitudes of all have one origin.
 
     Raises:
         InputError: their texts are laid out otherwise.
@@ -184,6 +185,7 @@ def common_layout(
             found = [column.model_copy(update={"unit": next(iter(units))}) for column in found]
         if all(column == found[0] for column in found):
             common[signal] = found[0]
+    common |= one_origin([layout.columns for layout in layouts.values()])
     own = {
         path: {s: c for s, c in layout.columns.items() if s not in common}
         for path, layout in layouts.items()
