@@ -1,6 +1,8 @@
 """Files as loggers write them: stamps, degrees of latitude, other words for a side; and those that are no table."""
 
 import json
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +157,21 @@ def test_a_table_may_have_any_ending(tmp_path: Path) -> None:
     found = propose(written(tmp_path / "a.txt", table().rename(columns={"x": "North"})))
     (tmp_path / "a.txt.json").write_text(json.dumps(found.needed))
     np.testing.assert_allclose(read(tmp_path / "a.txt").pose[:, 0], NORTH)
+
+
+@pytest.mark.parametrize("look", [propose, read])
+def test_a_spreadsheet_is_no_text(tmp_path: Path, look: Callable[[Path], object]) -> None:
+    path = tmp_path / "a.csv"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    with pytest.raises(InputError, match="is an archive, as a spreadsheet is; save its table as a CSV"):
+        look(path)
+
+
+def test_a_text_in_utf_16_is_named_with_the_line_that_reads_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    table().to_csv(path, index=False, encoding="utf-16")
+    with pytest.raises(InputError, match=r'UTF-16; put {"encoding": "utf-16"} into'):
+        read(path)
+    path.with_name("a.csv.json").write_text('{"encoding": "utf-16"}')
+    np.testing.assert_allclose(read(path).pose[:, 0], NORTH)

@@ -45,11 +45,10 @@ from .likely_columns import (
     signal_of_sign,
     unit_in,
 )
-from .side_car import as_json, refuse_sentences, refuse_thousands
+from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
 from .unit_check import OFTENEST, RAREST, SI_UNIT, doubts, likely_unit, spelt
 from .usual_names import meaning
 
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 NO_UNIT = ("", "-")
 # Units that a name may end in; u_1 is the first of several, and not a fraction.
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
