@@ -186,7 +186,7 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
                 learned = diagnosis.learned.model
                 notes = predictor.write(new, learned, [*task.train, *task.validate])
                 if predictor.parametric:
-                    made_of = _task(options) | {"measured_commands": diagnosis.odds is not None}
+                    made_of = _task(options) | {"measured_commands": diagnosis.measured}
                     diagnosis.posterior.write(new / POSTERIOR, learned.learned_from, made_of)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)

@@ -39,8 +39,9 @@ from .search.prediction_fit.joint_posterior import JointPosterior
 from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
+from .search.significance import Losses
 from .verdict.judging import DecidedFindings, judge
-from .verdict.measured_commands import are_measured, log_odds, with_measured_commands
+from .verdict.measured_commands import are_measured, with_measured_commands
 from .verdict.prediction_gain import PredictionGain, prediction_gain
 from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
@@ -90,7 +91,7 @@ class CalibratedModel(ShortRepr):
         comparison: errors of the initial and of the calibrated model.
         gain: what it gains over the initial model in the data that decide; None where that is not known.
         prior: of the coefficients, as it was given.
-        odds: logarithm of those that commands are measured values, where they are read so; else None.
+        measured: whether commands were taken as measured values, though files do not state this.
     """
 
     learned: Findings
@@ -99,7 +100,7 @@ class CalibratedModel(ShortRepr):
     comparison: Comparison
     gain: PredictionGain | None
     prior: Prior
-    odds: float | None = None
+    measured: bool = False
 
     @property
     def model(self) -> Model:
@@ -120,7 +121,7 @@ class Diagnosis(DecidedFindings):
         seed: of everything random.
         gain: what the search for effects gains over calibration alone in the data that decide; None
             where that is not known.
-        odds: logarithm of those that commands are measured values, where they are read so; else None.
+        measured: whether commands were taken as measured values, though files do not state this.
     """
 
     comparison: Comparison
@@ -130,7 +131,7 @@ class Diagnosis(DecidedFindings):
     prior: Prior
     seed: int
     gain: PredictionGain | None = None
-    odds: float | None = None
+    measured: bool = False
 
     @property
     def sound(self) -> bool:
@@ -222,7 +223,7 @@ class Session(ShortRepr):
         harms: criterion of pruning.
         advance: receives the name of each step when it begins.
         seed: of everything random.
-        orders: the session with the commands as orders, where this one has them as measured values.
+        measured: whether commands are taken as measured values, where files do not state what they are.
     """
 
     train: Sequence[WeakWindows]
@@ -234,7 +235,7 @@ class Session(ShortRepr):
     harms: Harm
     advance: Advance
     seed: int
-    orders: "Session | None" = None
+    measured: bool = False
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -283,19 +284,17 @@ class Session(ShortRepr):
         decide = zip([*train, *validate], self.runs, strict=False)
         if all(a is b for a, b in decide):
             return self
-        measured = replace(self, train=train, validate=validate, test=test, orders=self)
-        return measured if are_measured(measured.odds) else self
+        measured = replace(self, train=train, validate=validate, test=test, measured=True)
+        orders, others = self._losses, measured._losses
+        return measured if orders and others and are_measured(orders, others) else self
 
-    @cached_property
-    def odds(self) -> float | None:
-        """Logarithm of the odds that commands are measured values; None: they are as they were read."""
-        losses = []
-        for session in (self.orders, self):
-            if session is None or session.calibration is None:
-                return None
-            fit = session.calibration.findings
-            losses += session.data(fit.sigma).losses(fit)
-        return log_odds(*losses)
+    @property
+    def _losses(self) -> list[Losses]:
+        """Losses of the initial model and of the calibrated one; none if there is no calibration."""
+        if self.calibration is None:
+            return []
+        fit = self.calibration.findings
+        return self.data(fit.sigma).losses(self.start, fit)
 
     @well_posed()
     def calibrate(self) -> CalibratedModel | None:
@@ -306,7 +305,7 @@ class Session(ShortRepr):
         gain = prediction_gain(self.data(fit.findings.sigma), self.start, fit.findings)
         compared = self._compared(fit.findings.model)
         return CalibratedModel(
-            fit.findings, fit.posterior, self.start, compared, gain, self.prior, self.odds
+            fit.findings, fit.posterior, self.start, compared, gain, self.prior, self.measured
         )
 
     @well_posed()
@@ -353,7 +352,7 @@ class Session(ShortRepr):
             prior=self.prior,
             seed=self.seed,
             gain=gain,
-            odds=self.odds,
+            measured=self.measured,
         )
 
 

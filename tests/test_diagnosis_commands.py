@@ -334,7 +334,7 @@ def written(monkeypatch, tmp_path):
             evaluations=[], omega_std=[], predictor=DescribedShip(diagnosis.Model())
         ),
         files=None,
-        odds=None,
+        measured=False,
     )
 
     def report_of(found, model, files):

@@ -5,7 +5,6 @@ from math import degrees
 
 import numpy as np
 
-from ..assessment.plausibility import odds_of
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
 from ..session import CalibratedModel, Diagnosis
@@ -29,7 +28,7 @@ CALIBRATION_GAINED = "Calibration improves the predictions of the initial model.
 CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of the initial model."
 MEASURED_COMMANDS = (
     "The commands are read as measured values of the actuators, of which the mean over a row acts, and "
-    "not as orders, because predictions of data left out are then better (odds {}). State "
+    "not as orders, because the initial and the calibrated model then predict better. State "
     '"measured": true or false for each command in the side-car to decide it.'
 )
 NOTHING_FOUND = "These data show no missing effect."
@@ -117,7 +116,7 @@ def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]
 
 def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
     """How commands are read, where that is not as the files state; else empty."""
-    return [] if found.odds is None else [MEASURED_COMMANDS.format(odds_of(found.odds))]
+    return [MEASURED_COMMANDS] if found.measured else []
 
 
 def first_sentences(r: ReportData) -> str:

@@ -1,9 +1,9 @@
 """Whether commands are measured values of the actuators: runs read so are predicted better, or not.
 
 A log may have orders, which act from their row to the next, or samples of what the actuators do, whose
-mean acts. Both are usual, and they are half a row apart. With the coefficients calibrated to each,
-predictions of the data that decide have errors e of position (two components) and heading in n windows
-and, with a normal distribution of unknown standard deviation, the likelihood
+mean acts. Both are usual, and they are half a row apart. Predictions of the data that decide have errors
+e of position (two components) and heading in n windows and, with a normal distribution of unknown
+standard deviation, the likelihood
 
     2 log L = -n (2 log mean e_position^2 + log mean e_heading^2).
 
@@ -11,6 +11,7 @@ Accelerations do not show it: a controller commands what its ship has just done,
 seem to explain them better.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,6 +74,11 @@ def log_odds(orders: Losses, measured: Losses) -> float:
     return total
 
 
-def are_measured(odds: float | None) -> bool:
-    """Whether the logarithm of the odds, if it is known, is enough to read commands not as orders."""
-    return odds is not None and 2.0 * odds > POSITIVE
+def are_measured(orders: Sequence[Losses], measured: Sequence[Losses]) -> bool:
+    """Whether commands are measured values, by losses of the initial and of the calibrated model.
+
+    Coefficients may make up for half a row, and effects that are not known yet may look like it. So both
+    models have to predict better, and the calibrated one by more than is hardly worth a mention.
+    """
+    initial, calibrated = map(log_odds, orders, measured)
+    return bool(initial > 0.0 and 2.0 * calibrated > POSITIVE)

@@ -61,7 +61,7 @@ def diagnosis(**changes):
         "seed": 0,
         "gain": None,
         "refitted": False,
-        "odds": None,
+        "measured": False,
     }
     return SimpleNamespace(**made | changes)
 
