@@ -43,6 +43,7 @@ class Task(BaseModel):
     prior: float | dict[str, float] | None = None
     horizon: float | None = None
     anyway: bool = False
+    measured_commands: bool = False
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,6 +66,7 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     from .design import Question, plan_next
     from .design.limits import limits_of
     from .predictors import open_model, ship_of_model, ship_with
+    from .verdict.measured_commands import with_measured_commands
 
     limits = limits_of(options.minutes, options.basin)
     craft = ship_with([Path(e) for e in task.effects], task.ship or ship_of_model(task.model))
@@ -72,6 +74,8 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
     if start is None:
         return _advised(options, content, folder)
     runs = gather(task.runs, advance, task.anyway, start, task.horizon)
+    if task.measured_commands:
+        runs = [with_measured_commands(w) for w in runs]
     q = Question(runs, content, start, task.prior, limits, options.criterion, task.ship)
     if options.simulate is not None:
         return _played(options, q, advance)

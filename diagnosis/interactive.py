@@ -387,7 +387,8 @@ def _begun(
     train, decide, test = (
         p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
     )
-    return session.begin(train, test, prior, model, advance, validate=decide, **options)
+    begun = session.begin(train, test, prior, model, advance, validate=decide, **options)
+    return begun.with_likelier_commands()
 
 
 def calibrate(

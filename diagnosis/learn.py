@@ -68,6 +68,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         return
     task = _begun(options, advance)
     yield _compared(task, options)
+    task = task.with_likelier_commands()
     calibrated = _calibrated(task, options)
     if calibrated is not None:
         yield calibrated
@@ -185,7 +186,8 @@ def _diagnosed(task: "Session", options: argparse.Namespace, advance: Advance) -
                 learned = diagnosis.learned.model
                 notes = predictor.write(new, learned, [*task.train, *task.validate])
                 if predictor.parametric:
-                    diagnosis.posterior.write(new / POSTERIOR, learned.learned_from, _task(options))
+                    made_of = _task(options) | {"measured_commands": diagnosis.measured}
+                    diagnosis.posterior.write(new / POSTERIOR, learned.learned_from, made_of)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         early = [name for name in EARLY if (options.out / name).exists()]

@@ -24,7 +24,7 @@ from .execution.result_folder import together
 if TYPE_CHECKING:
     from fmus.ship import Ship
 
-    from .runs import Column, LikelyColumn, Proposal, Run
+    from .runs import Column, Layout, LikelyColumn, Proposal, Run
     from .runs.smoothing.smoother import Smoothed
 
 TABLES = (".csv", ".parquet")
@@ -58,8 +58,7 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
     target = beside(path)
     there = stated_layout(path)
     found = propose(path, craft)
-    if there is None or not there.columns:  # columns that are stated stay, and others are added
-        _refuse_there(options, target)
+    _refuse_there(options, target, there)
     if found.run is None:
         shown = [f"'{path}': no column is known for {', '.join(found.likely)}"]
     else:
@@ -90,7 +89,7 @@ def _seen(path: Path, run: "Run", craft: "Ship", anyway: bool, advance: Advance)
 
 def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Done:
     """One file for all measurements of a folder, and a table of them."""
-    from .runs import FOLDER_FILE, Layout, as_json, common_layout, propose, read
+    from .runs import FOLDER_FILE, Layout, as_json, common_layout, propose, read, stated_layout
 
     tables = [path for path in options.file if path.suffix in TABLES or not path.exists()]
     if not tables:
@@ -99,7 +98,7 @@ def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> 
         each = ", ".join(f"'{folder}'" for folder in sorted(folders))
         raise InputError(f"a side-car belongs to one folder, and these files are in several: {each}")
     target = tables[0].with_name(FOLDER_FILE)
-    _refuse_there(options, target)
+    _refuse_there(options, target, stated_layout(tables[0]))
     proposals = {path: propose(path, craft) for path in tables}
     common, others = common_layout(proposals)
     shown: list[RenderableType] = []
@@ -152,8 +151,10 @@ def _tabulated(
     return [table, *channel_table(channels), *map(printable, refused)]
 
 
-def _refuse_there(options: argparse.Namespace, target: Path) -> None:
-    if options.write and not options.overwrite and target.exists():
+def _refuse_there(options: argparse.Namespace, target: Path, there: "Layout | None") -> None:
+    """Refuse to replace a file that states no column; columns that are stated stay, others are added."""
+    states = there is not None and there.columns
+    if options.write and not options.overwrite and target.exists() and not states:
         raise InputError(f"'{target}' exists; --overwrite replaces it and keeps its entries")
 
 

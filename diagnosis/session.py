@@ -39,7 +39,9 @@ from .search.prediction_fit.joint_posterior import JointPosterior
 from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
+from .search.significance import Losses
 from .verdict.judging import DecidedFindings, judge
+from .verdict.measured_commands import are_measured, with_measured_commands
 from .verdict.prediction_gain import PredictionGain, prediction_gain
 from .verdict.pruning_criteria import USUAL, Harm, criterion
 from .verdict.validation_data import ValidationData
@@ -89,6 +91,7 @@ class CalibratedModel(ShortRepr):
         comparison: errors of the initial and of the calibrated model.
         gain: what it gains over the initial model in the data that decide; None where that is not known.
         prior: of the coefficients, as it was given.
+        measured: whether commands were taken as measured values, though files do not state this.
     """
 
     learned: Findings
@@ -97,6 +100,7 @@ class CalibratedModel(ShortRepr):
     comparison: Comparison
     gain: PredictionGain | None
     prior: Prior
+    measured: bool = False
 
     @property
     def model(self) -> Model:
@@ -117,6 +121,7 @@ class Diagnosis(DecidedFindings):
         seed: of everything random.
         gain: what the search for effects gains over calibration alone in the data that decide; None
             where that is not known.
+        measured: whether commands were taken as measured values, though files do not state this.
     """
 
     comparison: Comparison
@@ -126,6 +131,7 @@ class Diagnosis(DecidedFindings):
     prior: Prior
     seed: int
     gain: PredictionGain | None = None
+    measured: bool = False
 
     @property
     def sound(self) -> bool:
@@ -217,6 +223,7 @@ class Session(ShortRepr):
         harms: criterion of pruning.
         advance: receives the name of each step when it begins.
         seed: of everything random.
+        measured: whether commands are taken as measured values, where files do not state what they are.
     """
 
     train: Sequence[WeakWindows]
@@ -228,6 +235,7 @@ class Session(ShortRepr):
     harms: Harm
     advance: Advance
     seed: int
+    measured: bool = False
 
     @property
     def runs(self) -> list[WeakWindows]:
@@ -266,6 +274,29 @@ class Session(ShortRepr):
         return None
 
     @well_posed()
+    def with_likelier_commands(self) -> "Session":
+        """The session with commands as measured values of the actuators, if these predict better.
+
+        Commands stay of which files state what they are, and those of a log of this project, orders.
+        """
+        given = self.train, self.validate, self.test
+        train, validate, test = ([with_measured_commands(w) for w in part] for part in given)
+        decide = zip([*train, *validate], self.runs, strict=False)
+        if all(a is b for a, b in decide):
+            return self
+        measured = replace(self, train=train, validate=validate, test=test, measured=True)
+        orders, others = self._losses, measured._losses
+        return measured if orders and others and are_measured(orders, others) else self
+
+    @property
+    def _losses(self) -> list[Losses]:
+        """Losses of the initial model and of the calibrated one; none if there is no calibration."""
+        if self.calibration is None:
+            return []
+        fit = self.calibration.findings
+        return self.data(fit.sigma).losses(self.start, fit)
+
+    @well_posed()
     def calibrate(self) -> CalibratedModel | None:
         """Second answer: the coefficients alone, without an effect; None: there is none to fit."""
         fit = self.calibration
@@ -273,7 +304,9 @@ class Session(ShortRepr):
             return None
         gain = prediction_gain(self.data(fit.findings.sigma), self.start, fit.findings)
         compared = self._compared(fit.findings.model)
-        return CalibratedModel(fit.findings, fit.posterior, self.start, compared, gain, self.prior)
+        return CalibratedModel(
+            fit.findings, fit.posterior, self.start, compared, gain, self.prior, self.measured
+        )
 
     @well_posed()
     def diagnose(self) -> Diagnosis:
@@ -319,6 +352,7 @@ class Session(ShortRepr):
             prior=self.prior,
             seed=self.seed,
             gain=gain,
+            measured=self.measured,
         )
 
 

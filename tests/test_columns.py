@@ -331,6 +331,12 @@ def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     assert all(f"\n  {name} " in channels for name in ("x", "y", "psi"))
     for name in "abc":
         assert read(tmp_path / f"{name}.csv", of=TANKER).signals == ("propeller.n", "rudder.delta")
+    own = NAMES | {"y": {"name": NAMES["y"], "noise": 0.01}}
+    (tmp_path / FOLDER_FILE).write_text(json.dumps({"columns": own}))
+    again = command(propose_columns.main, *files, "--ship", "kvlcc2", "--write", "--anyway")
+    assert (again.returncode, again.stderr) == (0, ""), "what it states stays"
+    assert json.loads((tmp_path / FOLDER_FILE).read_text()) == {"columns": own}
+    (tmp_path / FOLDER_FILE).write_text('{"trial": "zigzag"}')
     again = command(propose_columns.main, *files, "--ship", "kvlcc2", "--write", "--anyway")
     assert (again.returncode, "columns.json' exists" in again.stderr) == (2, True)
 

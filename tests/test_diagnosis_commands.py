@@ -336,6 +336,7 @@ def written(monkeypatch, tmp_path):
             evaluations=[], omega_std=[], predictor=DescribedShip(diagnosis.Model())
         ),
         files=None,
+        measured=False,
     )
 
     def report_of(found, model, files):
@@ -363,6 +364,7 @@ def written(monkeypatch, tmp_path):
     monkeypatch.setattr("diagnosis.assessment.gathering.gather", lambda paths, *_: list(paths))
     task = SimpleNamespace(
         compare=lambda: given.comparison,
+        with_likelier_commands=lambda: task,
         calibrate=lambda: None,
         diagnose=lambda: given,
         runs=[],

@@ -1,6 +1,8 @@
 """Files as loggers write them: stamps, degrees of latitude, other words for a side; and those that are no table."""
 
 import json
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 from cosim import InputError
 from diagnosis.predictors import ship_with
-from diagnosis.runs import propose, read
+from diagnosis.runs import common_layout, propose, read
 from diagnosis.runs.columns.geographic import EQUATOR, SQUARED_ECCENTRICITY
 
 TIME = np.arange(0.0, 60.0, 0.5)
@@ -61,6 +63,24 @@ def test_latitude_and_longitude_become_metres(tmp_path: Path, latitude: float) -
     moved = found.run.pose[:, :2] - np.column_stack([NORTH, EAST])
     # The meridians converge: y to 60 m tan(latitude) 40 m / R.
     assert np.ptp(moved, axis=0).max() < 3e-3
+
+
+@pytest.mark.parametrize(("further", "one"), [(0.02, True), (3.0, False)])
+def test_the_runs_of_a_folder_have_one_origin_if_they_are_not_far_apart(
+    tmp_path: Path, further: float, one: bool
+) -> None:
+    paths = [tmp_path / name for name in ("a.csv", "b.csv")]
+    places = (63.44, 63.44 + further)
+    for path, latitude in zip(paths, places, strict=True):
+        degrees = dict(zip(("lat", "lon"), placed(latitude, 10.4), strict=True))
+        written(path, table(**degrees).drop(columns=["x", "y"]))
+    common, others = common_layout({path: propose(path) for path in paths})
+    assert ("x" in common.columns) is ("y" in common.columns) is one
+    assert not any(others.values()) or not one
+    if one:
+        north = [read(path, common).pose[:, 0] for path in paths]
+        arc = np.radians(further) * 6.37e6  # of a sphere: the ellipsoid's radius differs by 0.4 %
+        assert np.median(north[1]) - np.median(north[0]) == pytest.approx(arc, rel=0.01)
 
 
 @pytest.mark.parametrize("other", [{"lat": 6326.4 + TIME}, {"lat": 63.0 + TIME, "latitude": TIME}])
@@ -137,3 +157,21 @@ def test_a_table_may_have_any_ending(tmp_path: Path) -> None:
     found = propose(written(tmp_path / "a.txt", table().rename(columns={"x": "North"})))
     (tmp_path / "a.txt.json").write_text(json.dumps(found.needed))
     np.testing.assert_allclose(read(tmp_path / "a.txt").pose[:, 0], NORTH)
+
+
+@pytest.mark.parametrize("look", [propose, read])
+def test_a_spreadsheet_is_no_text(tmp_path: Path, look: Callable[[Path], object]) -> None:
+    path = tmp_path / "a.csv"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    with pytest.raises(InputError, match="is an archive, as a spreadsheet is; save its table as a CSV"):
+        look(path)
+
+
+def test_a_text_in_utf_16_is_named_with_the_line_that_reads_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    table().to_csv(path, index=False, encoding="utf-16")
+    with pytest.raises(InputError, match=r'UTF-16; put {"encoding": "utf-16"} into'):
+        read(path)
+    path.with_name("a.csv.json").write_text('{"encoding": "utf-16"}')
+    np.testing.assert_allclose(read(path).pose[:, 0], NORTH)

@@ -1,5 +1,6 @@
 """What the search for effects gained over calibration alone: paired errors, both ways."""
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
-from diagnosis.verdict.coefficients import any_sure, better_calibration
+from diagnosis.verdict.coefficients import any_sure, better_calibration, needless
 from diagnosis.verdict.confidence import confidence_of
 from diagnosis.verdict.prediction_gain import (
     PairedChange,
@@ -95,6 +96,21 @@ def test_without_a_finding_the_coefficients_stay_calibrated_where_that_predicts_
     assert better_calibration(fit, end, data, lambda *_: False) is (fit if taken else None)
     assert better_calibration(fit, end, data, lambda a, b: (a, b) == (BETTER, START)) is None
     assert better_calibration(None, end, data, lambda *_: False) is None
+
+
+@pytest.mark.parametrize(
+    ("interval", "unshown", "taken"),
+    [((-2.0, 0.5), {"X_u"}, True), ((-2.0, -0.5), {"X_u"}, False), ((-2.0, 0.5), set(), False)],
+)
+def test_an_effect_that_may_be_none_and_is_not_shown_gives_way_to_coefficients(interval, unshown, taken):
+    fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(1)
+    end = replace(end, effects=[replace(f, ci95={"delta_X_u": interval}) for f in end.effects])
+    data = Data({id(START): 9.0, id(fit.findings): 4.0, id(end): 4.0})
+    given = better_calibration(fit, end, data, lambda *_: False, unshown)
+    assert given is (fit if taken else None)
+    assert needless(end, unshown) is taken
+    assert not needless(found(0), unshown)
+    assert not needless(START, unshown)
 
 
 def test_the_standard_error_is_paired_and_covers_the_difference():

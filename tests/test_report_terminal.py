@@ -15,6 +15,7 @@ from diagnosis.report import notebook
 from diagnosis.report.content import gain_content
 from diagnosis.report.headline import (
     NOTHING_FOUND,
+    OTHER_FIT,
     SEARCH_GAINED,
     SEARCH_GAINED_NOTHING,
     first_sentences,
@@ -253,6 +254,22 @@ def test_what_the_search_gained_is_the_first_sentence(gained):
         "heading": vars(change),
         "sentence": "One. Two.",
     }
+
+
+def test_a_report_says_how_commands_are_read_where_files_do_not():
+    shown = " ".join(lines(show_diagnosis(found(measured=True), "out")))
+    assert shown.startswith("Commands The commands are read as measured values")
+    assert "measured values" not in " ".join(lines(show_diagnosis(found(), "out")))
+
+
+@pytest.mark.parametrize(
+    ("refitted", "now", "told"), [(True, 0.02, True), (True, 0.03, False), (False, 0.02, False)]
+)
+def test_a_search_without_an_effect_says_why_its_numbers_differ(refitted, now, told):
+    change = PairedChange(0.03, now, 0.03**2 - now**2, 1e-4)
+    gain = PredictionGain("validation runs", 54, change, change, False, "calibrated")
+    shown = " ".join(lines(show_diagnosis(found(gain=gain, refitted=refitted), "out")))
+    assert (OTHER_FIT in shown) is told
 
 
 def test_without_a_gain_nothing_is_said_of_it():

@@ -171,7 +171,7 @@ LAWS = {
     "tabulated_tunnel_thruster": {"F": 3.0},
     "tabulated_voith_schneider": {"F": 3.0},
     "azimuth": AZIMUTH,
-    "rudder": {"area": 0.02, "hull_force": 0.2, "wake": 0.1, "steering_deduction": 0.3},
+    "rudder": {"area": 0.02, "hull_force": 0.2, "wake": 0.1, "steering_deduction": 0.3, "bias": 0.1},
     "given_force": {"F_X": 3.0, "F_Y": 2.0},
     "propeller_behind_hull": {**OPEN_WATER, "C_2_plus": 1.6, "C_2_minus": 1.1},
     "rudder_in_race": RACE_RUDDER,

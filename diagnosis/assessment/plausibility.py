@@ -164,6 +164,8 @@ class Mistake(NamedTuple):
 def odds_of(logarithm: float) -> str:
     """Odds in words, by their logarithm."""
     ten = logarithm / np.log(10.0)
+    if ten < 2.0:
+        return f"{np.exp(logarithm):.2g} : 1"
     return f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
 
 

@@ -21,7 +21,7 @@ from ..runs.cleaning import Z95
 from ..session import CalibratedModel, Comparison, Diagnosis
 from ..verdict.prediction_gain import PredictionGain
 from .formatting import as_json, finite
-from .headline import first_sentences, gain_of_calibration, gain_of_search
+from .headline import first_sentences, gain_of_calibration, gain_of_search, reading_of_commands
 from .report_data import ReportData, seconds
 
 LIBRARIES = ("cybership", "numpy", "scipy")
@@ -127,6 +127,7 @@ def file_content(r: ReportData) -> Content:
     found = {
         "verdict": d.verdict,
         "sentence": first_sentences(r),
+        "commands": " ".join(reading_of_commands(d)),
         "gain": gain_content(d.gain, gain_of_search(r)),
         "remainder": {
             "significant": d.remainder.significant,
@@ -170,6 +171,7 @@ def calibration_content(calibrated: CalibratedModel, r: ReportData, left_out: Se
         "moved": calibrated.learned.moved,
         "correlation": part(calibrated.posterior, "names matrix=correlation together"),
         "prior": calibrated.prior,
+        "commands": " ".join(reading_of_commands(calibrated)),
         "left_out": [*left_out],
     }
     return Content.of(finite(known | file_content(r)))

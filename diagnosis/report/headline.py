@@ -7,7 +7,7 @@ import numpy as np
 
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
-from ..session import CalibratedModel
+from ..session import CalibratedModel, Diagnosis
 from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
@@ -17,11 +17,20 @@ from .reported_effect import ReportedEffect
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
+OTHER_FIT = (
+    "It found no effect to add. It fits the same coefficients to accelerations first and to predictions "
+    "over several times then, so that its numbers differ from those of the calibration."
+)
 NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
 )
 CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
 CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of the initial model."
+MEASURED_COMMANDS = (
+    "The commands are read as measured values of the actuators, of which the mean over a row acts, and "
+    "not as orders, because the initial and the calibrated model then predict better. State "
+    '"measured": true or false for each command in the side-car to decide it.'
+)
 NOTHING_FOUND = "These data show no missing effect."
 TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
 UNEXPLAINED = "A model error remains that no known effect explains."
@@ -92,14 +101,22 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
 
 def gain_of_search(r: ReportData) -> list[str]:
     """What the search for effects gained over calibration alone; empty where that is not known."""
-    gain = None if r.diagnosis is None else r.diagnosis.gain
+    d = r.diagnosis
+    gain = None if d is None else d.gain
     said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
+    if d and gain and d.refitted and not d.learned.effects and gain.position.difference:
+        said.insert(1, OTHER_FIT)
     return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
 
 
 def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]:
     """What calibration gained over the initial model; empty where that is not known."""
     return gain_sentences(calibrated.gain, CALIBRATION_GAINED, CALIBRATION_GAINED_NOTHING, r.lengths[0])
+
+
+def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
+    """How commands are read, where that is not as the files state; else empty."""
+    return [MEASURED_COMMANDS] if found.measured else []
 
 
 def first_sentences(r: ReportData) -> str:

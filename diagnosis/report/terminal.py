@@ -21,6 +21,7 @@ from .headline import (
     gain_of_calibration,
     gain_of_search,
     headline,
+    reading_of_commands,
     surest_first,
     verdict_title,
 )
@@ -51,8 +52,9 @@ def show_calibration(
     calibrated: CalibratedModel, r: ReportData, out: str = ""
 ) -> Iterator[RenderableType]:
     """Output of the second answer of ``diagnosis.learn``."""
-    gain = gain_of_calibration(calibrated, r)
-    if gain:
+    if read := reading_of_commands(calibrated):
+        yield from _lines("Commands", read)
+    if gain := gain_of_calibration(calibrated, r):
         yield from _lines("Gain of the calibration", map(_plain, gain))
     moved = calibrated.learned.moved
     furthest = sorted(moved, key=lambda name: -abs(moved[name]))[:SHOWN]
@@ -67,6 +69,8 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     """Output of the third answer of ``diagnosis.learn``; the first one has shown the data."""
     d = r.diagnosis
     assert d is not None
+    if read := reading_of_commands(d):
+        yield from _lines("Commands", read)
     if gain := gain_of_search(r):
         yield from _lines("Gain of the search", map(_plain, gain))
     yield from _lines("Residual without explanation", [d.remainder.sentence])

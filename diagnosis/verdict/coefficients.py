@@ -16,7 +16,7 @@ from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import gain, harm, predicts_worse
-from .confidence import FOUND, Doubts, confidence_of
+from .confidence import FOUND, Doubts, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -106,14 +106,18 @@ def better_calibration(
     found: Findings | Model,
     data: ValidationData,
     drives: Callable[[Model, Model], bool],
+    without_gain: Collection[str] = (),
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
+
+    It also takes the place of effects that predict no better, each with intervals that hold zero.
 
     Args:
         calibration: the fit; None: there is none.
         found: the end of a search without a sure finding; the initial model if nothing was learned.
         data: the data that decide.
         drives: whether the hull of a model drives the ship on more than that of another.
+        without_gain: ids of the effects that predictions do not show.
 
     Returns:
         None where it predicts no better, beyond chance, is worse than the initial model, or has a hull
@@ -124,7 +128,14 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    return calibration if predicts_worse(now, its) and not harm(its, first) else None
+    better = needless(found, without_gain) or predicts_worse(now, its)
+    return calibration if better and not harm(its, first) else None
+
+
+def needless(found: Findings | Model, without_gain: Collection[str]) -> bool:
+    """Whether each effect of some findings predicts no better, with intervals that hold zero."""
+    effects = found.effects if isinstance(found, Findings) else []
+    return bool(effects) and all(f.id in without_gain and may_be_none(f) for f in effects)
 
 
 def _flows(fit: RefitOutcome) -> bool:

@@ -107,7 +107,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     if limits := at_limit(start, f.id, f.values):
         return Confidence(0.0, 0.0, " and ".join(map(str, limits)))
     doubt = ""
-    if own > EVEN_ODDS and _may_be_none(f):
+    if own > EVEN_ODDS and may_be_none(f):
         own, doubt = EVEN_ODDS, MAY_BE_NONE
     elif _may_be_lags(f, start):
         own, doubt = min(own, EVEN_ODDS), MAY_BE_LAGS
@@ -144,7 +144,7 @@ def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
     return RARE if any(t.period > EVERY * t.scale.time + DIGITS for t in tracks) else ""
 
 
-def _may_be_none(f: Finding) -> bool:
+def may_be_none(f: Finding) -> bool:
     """Whether the 95 % intervals of all its values hold zero; a value without one is known."""
     return bool(f.values) and all(
         name in f.ci95 and f.ci95[name][0] <= 0.0 <= f.ci95[name][1] for name in f.values

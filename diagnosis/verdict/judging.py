@@ -25,7 +25,15 @@ from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
 from ..search.prior import NominalPrior
-from .coefficients import any_finding, any_sure, better_calibration, calibrated, concluded
+from ..search.significance import predicts_worse
+from .coefficients import (
+    any_finding,
+    any_sure,
+    better_calibration,
+    calibrated,
+    concluded,
+    needless,
+)
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .law_in_parts import in_parts, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
@@ -154,9 +162,17 @@ def judge(
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
         if other is None and not any_sure(fit.findings, start, unshown):
-            other = better_calibration(calibration, now, data, drives)
-        if other is not None:
-            dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, other
+            other = better_calibration(calibration, now, data, drives, unshown)
+        nothing = (
+            other is None
+            and needless(fit.findings, unshown)
+            and not predicts_worse(*data.losses(start, now))
+        )
+        if other is not None or nothing:
+            dropped, refitted, changed = [*dropped, *fit.findings.effects], not nothing, not nothing
+            learned = replace(found, effects=[], model=start, suspects=[])
+            fit = other or to_predictions(learned, train, prior, False)
+            fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
             gain = gain_of_search(data, start, coefficients, fit.findings, now)
     advance("residual")

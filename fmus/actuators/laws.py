@@ -8,7 +8,7 @@ from ..declare import POSITIVE, Range
 from ..effects.families import PROPELLERS, TUNNEL_THRUSTER
 from ..ops import Number, atan2, clip, cos, fmax, fmin, power, signed_root, sin, sqrt, where
 from ..ship_description import Part
-from .law import Command, Flow, Law, Race, Span
+from .law import Change, Command, Flow, Law, Race, Span
 
 DIVISOR = Range(min=1e-6)
 ASTERN = Range(max=0.0)
@@ -308,6 +308,7 @@ class Foil(NamedTuple):
     hull_force: Annotated[
         float, "1", "a_H, force of the rudder on the hull, relative to its normal force"
     ] = 0.0
+    bias: Annotated[float, "rad", "angle of the rudder at the command 0", Range(-0.5, 0.5)] = 0.0
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
 
 
@@ -323,6 +324,7 @@ class Rudder(Law[Foil]):
     components = "Y"
     pushes = "XY"
     limiting = ("delta_max",)
+    changes = (Change("bias", ("bias",), "angle at the command 0"),)
     Parameters = Foil
 
     @classmethod
@@ -331,7 +333,7 @@ class Rudder(Law[Foil]):
 
     @classmethod
     def force(cls, commands: tuple[Number, ...], flow: Flow, p: Foil) -> tuple[Number, Number]:
-        (delta,) = commands
+        delta = commands[0] + p.bias
         u = (1.0 - p.wake) * flow.u
         # U sin(delta + arctan(v / u)), the speed across the rudder, which holds astern as well.
         across = u * sin(delta) + flow.v * cos(delta)
@@ -343,19 +345,20 @@ class Rudder(Law[Foil]):
     @staticmethod
     def _full(flow: Flow, p: Foil) -> Number:
         """Sway force [N] at an angle of 45 degrees, without drift."""
-        return Rudder.force((0.5 * QUARTER,), Flow(flow.u, 0.0), p)[1]
+        return Rudder.force((0.5 * QUARTER - p.bias,), Flow(flow.u, 0.0), p)[1]
 
     @classmethod
     def reach(cls, flow: Flow, p: Foil) -> tuple[Span, ...]:
-        most = abs(Rudder._full(flow, p)) * sin(2.0 * fmin(p.delta_max, 0.5 * QUARTER))
-        return ((-most, most),)
+        full, half = Rudder._full(flow, p), 0.5 * QUARTER
+        a, b = (full * sin(2.0 * clip(side * p.delta_max + p.bias, -half, half)) for side in (-1.0, 1.0))
+        return ((fmin(a, b), fmax(a, b)),)
 
     @classmethod
     def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Foil) -> tuple[Number, ...]:
         # The force goes with sin(2 delta).
         full = Rudder._full(flow, p)
         sine = clip(forces[0] / where(abs(full) > SMALL, full, SMALL), -1.0, 1.0)
-        return (0.5 * atan2(sine, sqrt(1.0 - sine * sine)),)
+        return (0.5 * atan2(sine, sqrt(1.0 - sine * sine)) - p.bias,)
 
 
 class LargestForces(NamedTuple):

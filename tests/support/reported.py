@@ -60,6 +60,8 @@ def diagnosis(**changes):
         "prior": 0.1,
         "seed": 0,
         "gain": None,
+        "refitted": False,
+        "measured": False,
     }
     return SimpleNamespace(**made | changes)
 

@@ -128,6 +128,9 @@ class Column(Named):
     sign: str | None = None  # another column, which holds the sign
     negative: str = "-1"  # the cell of that in rows with a negative value
     late: NonNegativeFloat = Field(default=0.0, allow_inf_nan=False)  # s, of a command, behind the pose
+    # Of a command, whether it is sampled of what the actuator does, and is no order, which acts from its
+    # row to the next; None: not known.
+    measured: bool | None = None
 
     @field_validator("unit")
     @classmethod
@@ -173,8 +176,15 @@ class Layout(BaseModel):
             if column.factor == 0.0:
                 raise ValueError(f"{key}.factor is 0; give another number")
             own = QUANTITY | outputs([key])
-            if column.late and key in own and key not in TAU:
-                raise ValueError(f"{key}.late is {column.late:g}; allowed is the time [s] of a command")
+            if key in own and key not in TAU:
+                if column.late:
+                    raise ValueError(
+                        f"{key}.late is {column.late:g}; allowed is the time [s] of a command"
+                    )
+                if column.measured is not None:
+                    raise ValueError(
+                        f"{key}.measured: only a command can be an order or a measured value"
+                    )
             # Which commands there are is known with the ship.
             possible = [own[key]] if key in own else OF_UNIT.values()
             units = [unit for quantity in possible for unit in UNITS[quantity]]

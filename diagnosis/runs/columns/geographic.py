@@ -7,10 +7,11 @@ relative error of y is tan(latitude) times the distance to north over the earth'
 0.03 % for a kilometre.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..run_constants import NEGLIGIBLE
 from .columns import Column
 from .likely_columns import words_of
 from .unit_check import UNITS
@@ -63,3 +64,27 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
         factor = round(float(np.radians(radius[signal])), 3)  # m in a degree
         columns[signal] = Column(name=name, factor=factor, offset=round(-factor * origin[signal], 3))
     return columns
+
+
+def one_origin(files: Sequence[Mapping[str, Column]]) -> dict[str, Column]:
+    """How all of some files are read as x and y [m] of one origin, that of the first.
+
+    Args:
+        files: of each signals x and y -> its column, as of :func:`local_columns`.
+
+    Returns:
+        Empty where any has no latitude and longitude by the same names, or is so far to north or south
+        that the length of a degree of longitude differs by more than 0.25 %.
+    """
+    pairs = [{s: file.get(s, Column(name="")) for s in WORDS} for file in files]
+    for signal, words in WORDS.items():
+        columns = [pair[signal] for pair in pairs]
+        largest, least = (of(abs(c.factor) for c in columns) for of in (max, min))
+        if (
+            len({(c.name, c.unit, c.flip) for c in columns}) > 1
+            or largest > (1.0 + NEGLIGIBLE**2) * least
+        ):
+            return {}
+        if not (words & {*words_of(columns[0].name)} and all(c.factor != 1.0 for c in columns)):
+            return {}
+    return pairs[0]

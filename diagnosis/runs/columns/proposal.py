@@ -33,7 +33,7 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import geographic_pair, local_columns
+from .geographic import geographic_pair, local_columns, one_origin
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
@@ -43,11 +43,10 @@ from .likely_columns import (
     signal_of_sign,
     unit_in,
 )
-from .side_car import as_json, refuse_sentences, refuse_thousands
+from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
 from .unit_check import OFTENEST, SI_UNIT, doubts, largest, likely_unit, spelt
 from .usual_names import meaning
 
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 NO_UNIT = ("", "-")
 # Units that a name may end in; u_1 is the first of several, and not a fraction.
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
@@ -160,6 +159,7 @@ def common_layout(
     """What one file for all measurements of a folder says, and the columns of each that it cannot have.
 
     A unit that the numbers of some alone show is that of all in which the column has the same name.
+    Latitudes and longitudes of all have one origin.
 
     Raises:
         InputError: their texts are laid out otherwise.
@@ -182,6 +182,7 @@ def common_layout(
             found = [column.model_copy(update={"unit": next(iter(units))}) for column in found]
         if all(column == found[0] for column in found):
             common[signal] = found[0]
+    common |= one_origin([layout.columns for layout in layouts.values()])
     own = {
         path: {s: c for s, c in layout.columns.items() if s not in common}
         for path, layout in layouts.items()

@@ -20,6 +20,8 @@ THOUSANDS = {  # decimal mark -> numbers with separators of thousands, as 19,800
     ".": re.compile(r"[+-]?\d{1,3}(?:[, '’\u00a0\u202f]\d{3})+(?:\.\d*)?"),
     ",": re.compile(r"[+-]?\d{1,3}(?:[. '’\u00a0\u202f]\d{3})+(?:,\d*)?"),
 }
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
+ARCHIVE = b"PK\3\4"  # how a zip file begins
 SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,")  # how one of NMEA 0183 begins
 
 
@@ -85,15 +87,26 @@ def _changed(path: Path, layout: Layout, **changes: Any) -> str:
 
 def refuse_encoding(path: Path, layout: Layout) -> None:
     """Refuse a CSV file whose text is not UTF-8, with the line that states the encoding it may have."""
-    if layout.encoding == UTF_8 and b"\0" not in path.read_bytes():
+    content = path.read_bytes()
+    if layout.encoding != UTF_8:
+        return
+    if content.startswith(UTF_16):
+        line = _changed(path, layout, encoding="utf-16")
+        raise InputError(f"'{path}' is a text in UTF-16; {line}")
+    if b"\0" not in content:
         line = _changed(path, layout, encoding="latin-1")
         raise InputError(f"'{path}' is not a text in UTF-8; if its encoding is Latin-1, {line}")
 
 
 def refuse_sentences(path: Path) -> None:
-    """Refuse a text of NMEA 0183 sentences, which is not a table."""
+    """Refuse a text of NMEA 0183 sentences, and a spreadsheet, neither of which is a table."""
     with path.open("rb") as content:
-        if SENTENCE.match(content.read(200)):
+        begin = content.read(200)
+        if begin.startswith(ARCHIVE):
+            raise InputError(
+                f"'{path}' is an archive, as a spreadsheet is; save its table as a CSV file"
+            )
+        if SENTENCE.match(begin):
             raise InputError(
                 f"'{path}' has NMEA 0183 sentences; a measurement is a table: write a CSV file with a "
                 "row for each time and the columns time, latitude, longitude, heading and commands"

@@ -38,6 +38,7 @@ from ..columns.columns import (
     with_units_of_names,
 )
 from ..columns.unit_check import LARGEST, UNITS, largest, remedy
+from ..row_means import row_means
 from ..run_constants import DIGITS
 from .matlab_files import fits_matlab, read_matlab
 from .resolution import resolution
@@ -222,6 +223,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         columns[signal] = values
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
+    sampled = [s for s, c in layout.columns.items() if c.measured and s in columns]
+    columns |= {s: row_means(columns[s], columns["time"], quantity[s] == "angle") for s in sampled}
     late = {s: c.late for s, c in layout.columns.items() if c.late and s in columns}
     columns |= {s: _earlier(columns[s], columns["time"], by) for s, by in late.items()}
     run = _run(name, columns, where, of)

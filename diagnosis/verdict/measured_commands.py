@@ -1,0 +1,84 @@
+"""Whether commands are measured values of the actuators: runs read so are predicted better, or not.
+
+A log may have orders, which act from their row to the next, or samples of what the actuators do, whose
+mean acts. Both are usual, and they are half a row apart. Predictions of the data that decide have errors
+e of position (two components) and heading in n windows and, with a normal distribution of unknown
+standard deviation, the likelihood
+
+    2 log L = -n (2 log mean e_position^2 + log mean e_heading^2).
+
+Accelerations do not show it: a controller commands what its ship has just done, so that earlier commands
+seem to explain them better.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fmus.ship import ship
+
+from ..predictors import WeakWindows
+from ..predictors.weak_form import OF_MOTION
+from ..runs.cleaning import Track
+from ..runs.columns.columns import TAU, log_of
+from ..runs.row_means import row_means
+from ..search.significance import Losses
+
+# 1, of twice the logarithm of odds: positive evidence (Kass and Raftery 1995, section 3.2)
+POSITIVE = 2.0
+
+
+def with_measured_commands(w: WeakWindows) -> WeakWindows:
+    """The windows of a run whose commands are measured values, but for those of which more is stated.
+
+    The commands of a log of this project are orders.
+    """
+    run, of = w.run, ship(description=w.run.ship)
+    if run.layout == log_of(of.commands):
+        return w
+    units = dict.fromkeys(TAU, "N") if run.commands is None else of.form_of(run.commands)
+    means = (run.tau_cmd if run.commands is None else run.commands).copy()
+    names, logged = [], _logged(w.smoothed.track, means)
+    for k, (name, unit) in enumerate(units.items()):
+        column = run.layout.column(name)
+        if column.measured is None and not column.late and np.ptp(means[:, k]) > 0.0:
+            means[:, k] = row_means(means[:, k], run.time, unit == "rad", logged)
+            names.append(name)
+    if not names:
+        return w
+    if run.commands is None:
+        run = replace(run, tau_cmd=means)
+    else:
+        run = replace(run, commands=means, tau_cmd=of.commanded_force(means, run.power))
+    track = w.smoothed.track
+    note = f"read as measured values, not as orders: {', '.join(names)}"
+    track = replace(track, run=run, notes=(*track.notes, note))
+    memory = {part: w.memory[part] for part in OF_MOTION if part in w.memory}
+    return replace(w, smoothed=replace(w.smoothed, track=track), memory=memory)
+
+
+def _logged(track: Track, commands: np.ndarray) -> np.ndarray:
+    """(n,), rows with commands (n, k) of their own: rows between two that are filled in have none."""
+    new = np.any(np.diff(commands, axis=0, prepend=np.nan) != 0.0, axis=1)
+    return new | ~track.between
+
+
+def log_odds(orders: Losses, measured: Losses) -> float:
+    """Logarithm of the odds that commands are measured values, and not orders, by paired losses."""
+    total = 0.0
+    for a, b, components in zip(orders[1:], measured[1:], (2.0, 1.0), strict=True):
+        known = np.isfinite(a) & np.isfinite(b)
+        if known.any():
+            total += 0.5 * components * known.sum() * float(np.log(a[known].mean() / b[known].mean()))
+    return total
+
+
+def are_measured(orders: Sequence[Losses], measured: Sequence[Losses]) -> bool:
+    """Whether commands are measured values, by losses of the initial and of the calibrated model.
+
+    Coefficients may make up for half a row, and effects that are not known yet may look like it. So both
+    models have to predict better, and the calibrated one by more than is hardly worth a mention.
+    """
+    initial, calibrated = map(log_odds, orders, measured)
+    return bool(initial > 0.0 and 2.0 * calibrated > POSITIVE)
