@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..assessment.covariates import AXES
 from ..assessment.remainder import remaining
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import omega_std
@@ -34,8 +33,11 @@ from .spread import MEMBERS
 CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
 LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
 UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the diagnosis so far."
-# Noise of overlapping windows where that of one that counts is 1.
-UNIT = np.full(len(AXES), np.reciprocal(np.sqrt(OVERLAP)))
+
+
+def overlapping() -> np.ndarray:
+    """(3,), noise of overlapping windows where that of one that counts is 1."""
+    return np.full(3, OVERLAP**-0.5)
 
 
 class RowsOfRuns(NamedTuple):
@@ -180,14 +182,14 @@ class RehearsedEffect:
         known = sum((rows.X[..., places[i][0]] for i in others), np.zeros_like(like))
         effects = s.start.ship.effects
         every = [Candidate(effects[i], [shapes[i]]) for i in (effect, *(shapes.keys() - h.ids))]
-        table = gram_table(like - known, rows.blocks, every, nuisance, UNIT)
+        table = gram_table(like - known, rows.blocks, every, nuisance, overlapping())
         order = sorted(range(1, len(every)), key=lambda c: (_charged(table, c), every[c].effect.id))
         chosen = [every[c] for c in (0, *order[: LENGTH - 1])]
         return cls(chosen, nuisance, known, rows, s.blocks[effect].steps)
 
     def finding(self, y: np.ndarray, rng: np.random.Generator) -> Finding:
         """The effect as it is found for a model error (K, 3), with its evidence."""
-        table = gram_table(y - self.known, self.rows.blocks, self.rivals, self.nuisance, UNIT)
+        table = gram_table(y - self.known, self.rows.blocks, self.rivals, self.nuisance, overlapping())
         each = [score(table, c, 1) for c in (*range(len(self.rivals)), -1)]  # -1: none of them
         share = float(first_share(each, rng)[0])
         seen, values, std = self.judged(y)
@@ -199,7 +201,7 @@ class RehearsedEffect:
     def judged(self, y: np.ndarray) -> tuple[EffectEvidence, dict[str, float], dict[str, float]]:
         """Evidence of the effect without rivals, its values, and their standard deviations, SI."""
         y, s, nuisance = y - self.known, self.rivals[0].shapes[0], self.nuisance
-        table = gram_table(y, self.rows.blocks, self.rivals[:1], nuisance, UNIT)
+        table = gram_table(y, self.rows.blocks, self.rivals[:1], nuisance, overlapping())
         given = [] if s.offset is None else [s.offset[..., None]]
         A = np.concatenate([y[..., None], *given, s.columns, nuisance.columns], axis=2)
         r = regression(table, 0, 0)

@@ -26,7 +26,7 @@ from .planned_motion import Basin, PlannedMotion
 
 # Ships drawn from each hypothesis: if none of them leaves the basin, the next one does so with this
 # chance (rule of succession). So many outcomes have a standard error of 5 % at the most.
-MEMBERS = round(np.reciprocal(CHANCE))
+MEMBERS = round(1.0 / CHANCE)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,9 +25,6 @@ from ..runs.columns.columns import TAU, log_of
 from ..runs.row_means import row_means
 from ..search.significance import Losses
 
-# 1, of twice the logarithm of odds: positive evidence (Kass and Raftery 1995, section 3.2)
-POSITIVE = 2.0
-
 
 def with_measured_commands(w: WeakWindows) -> WeakWindows:
     """The windows of a run whose commands are measured values, but for those of which more is stated.
@@ -78,7 +75,8 @@ def are_measured(orders: Sequence[Losses], measured: Sequence[Losses]) -> bool:
     """Whether commands are measured values, by losses of the initial and of the calibrated model.
 
     Coefficients may make up for half a row, and effects that are not known yet may look like it. So both
-    models have to predict better, and the calibrated one by more than is hardly worth a mention.
+    models have to predict better, and the calibrated one by what is worth a mention: 1 in the logarithm
+    of odds (Kass and Raftery 1995, section 3.2).
     """
     initial, calibrated = map(log_odds, orders, measured)
-    return bool(initial > 0.0 and 2.0 * calibrated > POSITIVE)
+    return bool(initial > 0.0 and calibrated > 1.0)
