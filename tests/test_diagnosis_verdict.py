@@ -557,6 +557,32 @@ def test_the_judgement_is_sure_only_of_what_nothing_else_explains(monkeypatch):
     assert unsure.confidence == 0.5
 
 
+@pytest.mark.slow
+def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(monkeypatch):
+    """Calibrated coefficients, or the initial model where each effect may be none and predicts no better."""
+    runs = diagnosis.gather([sail(64.0, 0.1, {"delta_X_u": -2.0})[0]])
+    session = begin(runs)
+    found = session.method.fit(runs, session.start, session.prior, silent, 0)
+    data, calibration = session.data(found.sigma), session.calibration
+    for name, value in (("any_sure", False), ("needless", True), ("predicts_worse", False)):
+        monkeypatch.setattr(judging, name, lambda *_, value=value: value)
+
+    def seen(other):
+        monkeypatch.setattr(judging, "better_calibration", lambda *_: other)
+        decided, _ = judge(
+            found, data, session.known, session.harms, OPERATING, True, calibration, silent
+        )
+        assert not decided.learned.effects
+        assert [f.id for f in decided.dropped] == ["X_u"]
+        assert decided.learned.ranking == found.ranking != []
+        return decided
+
+    coefficients, nothing = seen(calibration), seen(None)
+    assert (coefficients.refitted, nothing.refitted) == (True, False)
+    assert (coefficients.changed, nothing.changed) == (True, False)
+    assert nothing.learned.model == session.start
+
+
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])
 def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     start = Model()
