@@ -23,6 +23,7 @@ from ..predictors.weak_form import OF_MOTION
 from ..runs.cleaning import Track
 from ..runs.columns.columns import TAU, log_of
 from ..runs.row_means import row_means
+from ..runs.run_constants import NEGLIGIBLE
 from ..search.significance import Losses
 
 
@@ -75,8 +76,7 @@ def are_measured(orders: Sequence[Losses], measured: Sequence[Losses]) -> bool:
     """Whether commands are measured values, by losses of the initial and of the calibrated model.
 
     Coefficients may make up for half a row, and effects that are not known yet may look like it. So both
-    models have to predict better, and the calibrated one by what is worth a mention: 1 in the logarithm
-    of odds (Kass and Raftery 1995, section 3.2).
+    models have to predict better, and one of them so that less than NEGLIGIBLE is left to orders.
     """
     initial, calibrated = map(log_odds, orders, measured)
-    return bool(initial > 0.0 and calibrated > 1.0)
+    return bool(min(initial, calibrated) > 0.0 and max(initial, calibrated) > -np.log(NEGLIGIBLE))
