@@ -146,7 +146,7 @@ def moves_on(w: WeakWindows, model: Model) -> str | None:
 
 def idle(run: Run, least: float) -> np.ndarray:
     """(n,), rows in which all commands are zero for so long [s] at least."""
-    zero = np.abs(run.tau_cmd if run.commands is None else run.commands).max(axis=1) == 0.0
+    zero = np.abs(run.given).max(axis=1) == 0.0
     part = np.cumsum(np.diff(zero, prepend=zero[0]))
     begin, end = (np.full(part[-1] + 1, sign * np.inf) for sign in (1.0, -1.0))
     stamped = np.isfinite(run.time)

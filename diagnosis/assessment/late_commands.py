@@ -15,7 +15,6 @@ and all of them the first is reported, unless all are far likelier.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -24,7 +23,7 @@ import numpy as np
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import Integral
 from ..predictors.uncertainty import MEASURED, correlated_windows, omega_std
-from ..predictors.weak_form import OF_MOTION, OVERLAP, needed_force
+from ..predictors.weak_form import OVERLAP, needed_force
 from ..runs import Run
 from ..runs.cleaning import BRIEF
 from ..runs.columns.columns import TAU
@@ -59,17 +58,15 @@ class _Score(NamedTuple):
     factor: np.ndarray
 
 
-def earlier(run: Run, columns: Sequence[int], seconds: float, model: Model) -> Run:
+def earlier(run: Run, columns: Sequence[int], seconds: float) -> Run:
     """A run with some columns of its commands earlier by a time [s]; the last one is held."""
-    given = run.tau_cmd if run.commands is None else run.commands
+    given = run.given
     steps = np.diff(run.time)
     edges = np.append(run.time, run.time[-1] + np.median(steps))
     moved = given.copy()
     whole = Integral(edges, given[:, columns], given[0, columns])(edges + seconds)
     moved[:, columns] = np.diff(whole, axis=0) / np.diff(edges)[:, None]
-    if run.commands is None:
-        return replace(run, tau_cmd=moved)
-    return replace(run, commands=moved, tau_cmd=model.ship.commanded_force(moved, run.power))
+    return run.with_given(moved)
 
 
 class Timing:
@@ -89,11 +86,8 @@ class Timing:
 
     def force(self, columns: Sequence[int], seconds: float, model: Model | None = None) -> np.ndarray:
         """(K, 3), force of the thrusters, of another model if one is given, with columns earlier."""
-        run, memory = self.w.run, {part: self.w.memory.setdefault(part, {}) for part in OF_MOTION}
-        if seconds:
-            run = earlier(run, columns, seconds, self.model)
-        s = self.w.smoothed
-        w = replace(self.w, smoothed=replace(s, track=replace(s.track, run=run)), memory=memory)
+        run = self.w.run
+        w = self.w.commanded_as(earlier(run, columns, seconds) if seconds else run)
         return np.nan_to_num(self._needed - omega(w, model or self.model))
 
     @property
@@ -149,7 +143,7 @@ class Timing:
 def late_commands(w: WeakWindows, model: Model) -> Late | None:
     """The commands of a run that are logged late; None: none surely is, or the run does not show it."""
     run, scale = w.run, w.scale
-    given = run.tau_cmd if run.commands is None else run.commands
+    given = run.given
     names = TAU if run.commands is None else run.signals
     varied = [k for k in range(len(names)) if np.ptp(given[:, k]) > 0.0]
     times = BRIEF * scale.time * np.arange(1, round(LONGEST / BRIEF) + 1)

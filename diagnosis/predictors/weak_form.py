@@ -86,6 +86,15 @@ class WeakWindows:
     def run(self) -> Run:
         return self.smoothed.track.run
 
+    def commanded_as(self, run: Run) -> "WeakWindows":
+        """The windows of a run that differs from this one in its commands alone.
+
+        Both remember what does not depend on commands in one place.
+        """
+        memory = {part: self.memory.setdefault(part, {}) for part in OF_MOTION}
+        track = replace(self.smoothed.track, run=run)
+        return replace(self, smoothed=replace(self.smoothed, track=track), memory=memory)
+
     @property
     def scale(self) -> Scale:
         """Of the ship."""

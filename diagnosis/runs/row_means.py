@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from fmus.ops import wrap
+
 
 def row_means(
     values: np.ndarray, time: np.ndarray, angle: bool = False, sampled: np.ndarray | None = None
@@ -18,7 +20,7 @@ def row_means(
     own = order if sampled is None else order[sampled[order]]
     steps = np.diff(values[own], append=np.nan)
     if angle:
-        steps = np.arctan2(np.sin(steps), np.cos(steps))
+        steps = wrap(steps)
     width = np.diff(time[own], append=np.inf)
     slope = np.where(np.isfinite(steps) & (width > 0.0), steps, 0.0) / np.where(width > 0.0, width, 1.0)
     at = np.searchsorted(time[own], time[order], side="right") - 1

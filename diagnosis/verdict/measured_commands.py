@@ -19,7 +19,6 @@ import numpy as np
 from fmus.ship import ship
 
 from ..predictors import WeakWindows
-from ..predictors.weak_form import OF_MOTION
 from ..runs.cleaning import Track
 from ..runs.columns.columns import TAU, log_of
 from ..runs.row_means import row_means
@@ -36,7 +35,7 @@ def with_measured_commands(w: WeakWindows) -> WeakWindows:
     if run.layout == log_of(of.commands):
         return w
     units = dict.fromkeys(TAU, "N") if run.commands is None else of.form_of(run.commands)
-    means = (run.tau_cmd if run.commands is None else run.commands).copy()
+    means = run.given.copy()
     names, logged = [], _logged(w.smoothed.track, means)
     for k, (name, unit) in enumerate(units.items()):
         column = run.layout.column(name)
@@ -45,15 +44,11 @@ def with_measured_commands(w: WeakWindows) -> WeakWindows:
             names.append(name)
     if not names:
         return w
-    if run.commands is None:
-        run = replace(run, tau_cmd=means)
-    else:
-        run = replace(run, commands=means, tau_cmd=of.commanded_force(means, run.power))
-    track = w.smoothed.track
     note = f"read as measured values, not as orders: {', '.join(names)}"
-    track = replace(track, run=run, notes=(*track.notes, note))
-    memory = {part: w.memory[part] for part in OF_MOTION if part in w.memory}
-    return replace(w, smoothed=replace(w.smoothed, track=track), memory=memory)
+    other = w.commanded_as(run.with_given(means))
+    track = other.smoothed.track
+    track = replace(track, notes=(*track.notes, note))
+    return replace(other, smoothed=replace(other.smoothed, track=track))
 
 
 def _logged(track: Track, commands: np.ndarray) -> np.ndarray:

@@ -116,6 +116,18 @@ class Run(ShortRepr):
             for s, c in zip(names, table.T, strict=True)
         }
 
+    @property
+    def given(self) -> np.ndarray:
+        """(n, k), :attr:`commands`, or (n, 3), the force of a run with the force alone."""
+        return self.tau_cmd if self.commands is None else self.commands
+
+    def with_given(self, given: np.ndarray) -> "Run":
+        """The run with other commands, in the form of :attr:`given`."""
+        if self.commands is None:
+            return replace(self, tau_cmd=given)
+        tau_cmd = ship(description=self.ship).commanded_force(given, self.power)
+        return replace(self, commands=given, tau_cmd=tau_cmd)
+
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
         columns = {f.name: getattr(self, f.name) for f in fields(self)}

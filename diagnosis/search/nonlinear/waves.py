@@ -107,8 +107,7 @@ def command_interval(run: Run) -> float:
 
     It is zero where most samples have commands of their own, or commands change at no regular times.
     """
-    given = run.tau_cmd if run.commands is None else run.commands
-    between = np.diff(run.time[1:][(np.diff(given, axis=0) != 0.0).any(axis=1)])
+    between = np.diff(run.time[1:][(np.diff(run.given, axis=0) != 0.0).any(axis=1)])
     sample = float(np.median(np.diff(run.time)))
     if not between.size or (usual := float(np.median(between))) < 1.5 * sample:
         return 0.0
