@@ -83,9 +83,21 @@ def test_the_runs_of_a_folder_have_one_origin_if_they_are_not_far_apart(
         assert np.median(north[1]) - np.median(north[0]) == pytest.approx(arc, rel=0.01)
 
 
-@pytest.mark.parametrize("other", [{"lat": 6326.4 + TIME}, {"lat": 63.0 + TIME, "latitude": TIME}])
+@pytest.mark.parametrize("letters", ["", "NE"])
+def test_degrees_and_minutes_of_nmea_are_refused_by_their_name(tmp_path: Path, letters: str) -> None:
+    content = table().drop(columns=["x", "y"])
+    for k, (name, degrees) in enumerate(zip(("lat", "lon"), placed(63.44, 10.4), strict=True)):
+        whole = np.floor(degrees)
+        minutes = 100.0 * whole + 60.0 * (degrees - whole)
+        content[name] = [f"{value:.5f}{letters[k : k + 1]}" for value in minutes]
+    said = "are no numbers: '6326" if letters else "degrees and minutes"
+    with pytest.raises(InputError, match=f"lat and lon .*{said}.*decimal degrees"):
+        propose(written(tmp_path / "a.csv", content))
+
+
+@pytest.mark.parametrize("other", [{"lat": 6371.4 + TIME}, {"lat": 63.0 + TIME, "latitude": TIME}])
 def test_other_latitudes_are_left_blank(tmp_path: Path, other: dict[str, np.ndarray]) -> None:
-    """Degrees and minutes in one number, or two columns of one meaning."""
+    """Numbers that are no latitude, or two columns of one meaning."""
     content = table(**other, longitude=10.0 + 1e-5 * TIME).drop(columns=["x", "y"])
     found = propose(written(tmp_path / "a.csv", content))
     assert found.run is None

@@ -10,6 +10,9 @@ relative error of y is tan(latitude) times the distance to north over the earth'
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
+
+from cosim import InputError
 
 from ..run_constants import NEGLIGIBLE
 from .columns import Column
@@ -64,6 +67,30 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
         factor = round(float(np.radians(radius[signal])), 3)  # m in a degree
         columns[signal] = Column(name=name, factor=factor, offset=round(-factor * origin[signal], 3))
     return columns
+
+
+def refuse_minutes(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> None:
+    """Refuse positions in degrees and minutes (ddmm.mmmm), or with a letter, as NMEA 0183 has them.
+
+    Args:
+        pair: of :func:`geographic_pair`.
+        cells: signals x and y -> the cells (n,) of their columns.
+
+    Raises:
+        InputError: minutes beyond 90 and 180 degrees, or letters.
+    """
+    names, there = " and ".join(pair.values()), {s: each.dropna() for s, each in cells.items()}
+    numbers = {s: pd.to_numeric(each, errors="coerce") for s, each in there.items()}
+    advice = "write decimal degrees, negative to south and west"
+    for signal, each in there.items():
+        if len(each) and numbers[signal].isna().all():
+            raise InputError(f"{names} are no numbers: '{each.iloc[0]}'; {advice}")
+    values = {s: np.abs(np.asarray(each.dropna(), float)) for s, each in numbers.items()}
+    beyond = any(
+        v.max(initial=0.0) > most for v, most in zip(values.values(), (90.0, 180.0), strict=True)
+    )
+    if beyond and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values.values()):
+        raise InputError(f"{names} seem to be degrees and minutes (ddmm.mmmm); {advice}")
 
 
 def one_origin(files: Sequence[Mapping[str, Column]]) -> dict[str, Column]:

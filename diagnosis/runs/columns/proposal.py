@@ -33,7 +33,7 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import geographic_pair, local_columns, one_origin
+from .geographic import geographic_pair, local_columns, one_origin, refuse_minutes
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
@@ -288,6 +288,7 @@ def _geographic(
     if not pair or not layout.columns.keys().isdisjoint(pair):
         return {}
     table = table_of_file(path, layout, set(pair.values()))
+    refuse_minutes(pair, {signal: table[name] for signal, name in pair.items()})
     return local_columns(pair, {signal: _numbers(table[name], signal) for signal, name in pair.items()})
 
 
