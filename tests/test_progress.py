@@ -28,7 +28,7 @@ def search(effects: int, likely: int) -> list[tuple[str, float]]:
     """The steps of a search that finds so many effects of those likely, and what each takes [s]."""
     steps = []
     for k in range(1, effects + 2):
-        turn = f"effect {k}, about {likely} likely: "
+        turn = f"effect {k}{f', about {likely} likely' if k > 1 else ''}: "
         steps += [turn + name for name in ROUND[k == 1 :]]
         if k <= effects:
             steps += [f"effect {j}: its place searched again" for j in range(1, k)]
@@ -56,12 +56,12 @@ class Clock:
 def test_remaining_time_is_right_within_a_factor_of_two_on_slow_and_fast_machines(
     effects, likely, speed
 ):
-    """It is stated once the number of likely effects is known, at every step from there on."""
+    """It is stated once an effect is accepted, or none is, at every step from there on."""
     clock, steps = Clock(), search(effects, likely)
     left, whole = RemainingTime(clock), speed * sum(t for _, t in steps)
     for k, (what, took) in enumerate(steps):
         left.begin(what)
-        if k < len(BEFORE):
+        if k <= len(BEFORE):
             assert left.seconds is None
             assert left.share is None
         elif whole - clock.time > 0.05 * whole:
@@ -72,7 +72,7 @@ def test_remaining_time_is_right_within_a_factor_of_two_on_slow_and_fast_machine
 def test_more_likely_effects_take_longer_and_the_time_is_told_in_words():
     def begun(likely):
         left = RemainingTime(Clock())
-        left.begin(f"effect 1, about {likely} likely: {ROUND[1]}")
+        left.begin(f"effect 2, about {likely} likely: {ROUND[0]}")
         return left
 
     few, some, many = (begun(likely).seconds for likely in (0, 3, 6))
@@ -93,7 +93,7 @@ RECORDED = [
     ("calibration of the coefficients", 2.3),
     ("predicting a", 0.3),
     ("every effect as a candidate", 4.0),
-    ("effect 1, about 6 likely: the best candidates refined", 7.9),
+    ("effect 1: the best candidates refined", 7.9),
     ("effect 2, about 6 likely: every effect as a candidate", 3.7),
     ("effect 2, about 6 likely: the best candidates refined", 3.5),
     ("effect 1: its place searched again", 4.0),
@@ -150,7 +150,7 @@ def test_of_a_recorded_search_with_six_effects():
             assert 0.5 * rest < left.seconds < 2.0 * rest, what
             stated.append(what)
         clock.time += took
-    assert stated[0].startswith("effect 1, about 6 likely")
+    assert stated[0].startswith("effect 2, about 6 likely")
 
 
 def test_a_part_of_a_step_has_the_time_of_that_step():
@@ -192,7 +192,7 @@ def test_the_line_is_away_while_an_answer_is_printed():
         with line.paused():
             shown = len(text.getvalue())
             text.write("the answer")
-        line("effect 1, about 6 likely: the best candidates refined")
+        line("effect 2, about 6 likely: every effect as a candidate")
     assert text.getvalue()[shown:].startswith("the answer")
     assert "more" in text.getvalue()
 

@@ -1,8 +1,8 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
-The number of effects is known only in the end: the search forecasts it once, by regressions of all
-candidates (:mod:`diagnosis.search.forward_selection`). A kind of step that has ended takes what it took
-on average; any other one its usual time, scaled by what all steps took.
+The number of effects is known only in the end: with each effect that it accepts the search forecasts it
+anew, by regressions of all candidates (:mod:`diagnosis.search.forward_selection`). A kind of step that
+has ended takes what it took on average; any other one its usual time, scaled by what all steps took.
 """
 
 import math
@@ -40,7 +40,7 @@ LATE = 0.3
 
 
 class RemainingTime:
-    """The remaining time of ``learn``, once its search has regressed all candidates.
+    """The remaining time of ``learn``, once its search has accepted an effect, or ended without one.
 
     Args:
         now: the time [s].
@@ -52,7 +52,7 @@ class RemainingTime:
         self._likely = 0  # number of effects
         self._took: dict[str, list[float]] = {}  # kind of step -> how long each took, over its number
         self._number = 1.0  # of the present step: where it takes as long as several of its kind
-        self._left: dict[str, float] = {}  # of each kind of step
+        self._left: dict[str, float] | None = None  # number of each kind of step; None: not known yet
 
     @property
     def elapsed(self) -> float:
@@ -62,7 +62,7 @@ class RemainingTime:
     @property
     def seconds(self) -> float | None:
         """The remaining time [s]; None: not known yet."""
-        if not self._round:
+        if self._left is None:
             return None
         spent = self._now() - self._begun
         present = max(self._number * self._usual(self._step) - spent, LATE * spent)
@@ -98,12 +98,12 @@ class RemainingTime:
         turn = re.match(r"effect (\d+), about (\d+) likely", what)
         if turn:
             self._round, self._likely = int(turn[1]), int(turn[2])
-        if turn or step == AGAIN:
+        if turn or (step == AGAIN and self._round):
             self._again = self._again + 1 if step == AGAIN else 0
             found = self._round - (step != AGAIN)
             self._left = self._following(max(found, self._likely))
-        elif step in LAST and self._round:
-            effects = self._round - 1
+        elif step in LAST and ROUND[1] in self._took:
+            effects = max(self._round - 1, 0)
             self._number = max(effects, 1) if step == OF_EACH else 1
             self._left = _last(effects, LAST[LAST.index(step) + 1 :])
 

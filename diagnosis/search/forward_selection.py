@@ -91,12 +91,12 @@ def search(
     ranking = rank(t, at, set(), made)
     lacking, command = ranking.base, commanded(data, start)
     shows = partial(matters, lacking, command=command)
-    likely = likely_effects(ranking, start, shows)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
+    turn = "effect 1"
     while len(accepted) < MOST_REPORTED:
-        advance(f"{_in_turn(len(accepted) + 1, likely)}: the best candidates refined")
+        advance(f"{turn}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:
             t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
@@ -116,6 +116,7 @@ def search(
         if harms and before is not None:
             break
         before = (t, alone) if harms else None
+        likely = len(accepted) + likely_effects(ranking, start, shows)
         accepted.append(accepted_effect(best, rng))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
@@ -123,6 +124,9 @@ def search(
             at, accepted = searched_again(t, at, accepted, made, advance, rng)
         advance(f"{_in_turn(len(accepted) + 1, likely)}: every effect as a candidate")
         ranking = rank(t, at, {p.id for p in accepted}, made)
+        if likely > len(accepted):
+            likely = min(likely, len(accepted) + likely_effects(ranking, start, shows))
+        turn = _in_turn(len(accepted) + 1, likely)
     if before is not None:
         t, at = before
         del accepted[-1]

@@ -120,9 +120,9 @@ class GramTable:
         taken = self.entries[candidate][shape]
         grams = self.grams
         if taken.given >= 0:
-            change = np.eye(grams.shape[1])
-            change[taken.given, 0] = -1.0
-            grams = change.T @ grams @ change
+            grams = grams.copy()  # what is given is taken off the model error
+            grams[:, :, 0] -= grams[:, :, taken.given]
+            grams[:, 0, :] -= grams[:, taken.given, :]
         moved = taken.offset - self.entries[-1][0].offset
         entries = [
             [e._replace(offset=np.concatenate([e.offset + moved, taken.start])) for e in shapes]
