@@ -143,8 +143,9 @@ def judge(
     kept, unproven = proven(kept, data, criterion)
     learned, refitted, replaced = concluded(kept, data, prior)
     dropped = [*unproven, *replaced]
-    advance("fit to predictions")
     changed = bool(learned.effects) or refitted
+    if changed:
+        advance("fit to predictions")
     fit = to_predictions(learned, train, prior, changed)
     if changed and overfits(fit.findings, learned, data, criterion):
         fit = fit.about(learned)
