@@ -11,15 +11,17 @@ from diagnosis.predictors import Model, weak_windows
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.findings import Findings
 from diagnosis.search.prediction_fit.coefficient_calibration import (
+    AXIS,
     CONSTANTS,
     LEFT_OUT,
     Calibration,
+    Calibrator,
     begin,
 )
 from diagnosis.search.prediction_fit.fit import fit_to, shootings
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
-from diagnosis.verdict.coefficients import calibrated
+from diagnosis.verdict.coefficients import calibrated, calibrations
 from diagnosis.verdict.validation_data import ValidationData
 
 DRAG = -2.0  # N s/m, hidden
@@ -29,14 +31,16 @@ PRIOR = NominalPrior.of(Model())
 
 
 @cache
-def runs(drag=DRAG, east=0.0):
+def runs(drag=DRAG, east=0.0, axis=0.0):
     """Runs of a ship that may have more drag than the model, each turned by a constant of its own.
 
-    The water goes east [m/s].
+    The water goes east [m/s]; the heading is measured about an axis that is off by an angle [rad].
     """
     ships = [
         {"delta_X_u": drag, "body_bias_N": moment if drag else 0.0, "V_e": east} for moment in MOMENTS
     ]
+    if axis:
+        ships = [ship | {"heading_offset": axis} for ship in ships]
     tracks = [smoothed(sail(seed=k, ship=ship)[0]) for k, ship in enumerate(ships)]
     named = [
         replace(s, track=replace(s.track, run=replace(s.track.run, name=f"run {k}")))
@@ -76,6 +80,20 @@ def test_the_drag_is_found_beside_constants_of_each_run():
     assert after - true < 0.3 * (before - true)
     assert [model.value(n) for n in CONSTANTS] == [0.0, 0.0]
     assert len(fitted.fold_models) == 4
+
+
+@pytest.mark.slow
+def test_the_axis_of_the_heading_is_calibrated_where_several_runs_show_it():
+    """Constants of all runs would stand for it, and a run that is not known has none."""
+    found = runs(axis=AXIS)
+    fits = calibrations(Calibrator(nothing_found(), found[:3], Model(), PRIOR))
+    offset = [c.findings.model.value("heading_offset") for c in fits]
+    assert offset == pytest.approx([0.0, AXIS], abs=0.25 * AXIS)
+    unseen = Windows([found[3].smoothed])
+    alone, best = (np.ravel(unseen.errors(c.findings.model).over_all())[0] for c in fits)
+    assert best < alone
+    few = calibrations(Calibrator(nothing_found(), found[:2], Model(), PRIOR))
+    assert few.best is few.alone
 
 
 @pytest.mark.slow

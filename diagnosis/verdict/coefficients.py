@@ -21,6 +21,25 @@ from .pruning import without
 from .validation_data import ValidationData
 
 
+class Calibrations(NamedTuple):
+    """The coefficients fitted to predictions, without an effect.
+
+    Attributes:
+        alone: nothing else in the model.
+        best: the same, of three runs or more with the axis of the heading.
+    """
+
+    alone: RefitOutcome
+    best: RefitOutcome
+
+
+def calibrations(calibrator: Calibrator) -> Calibrations:
+    """Both; of fewer runs an axis and a force that acts in one run are indistinguishable."""
+    alone = calibrator.coefficients()
+    axis = len(calibrator.train) >= WHOLE_RUNS and "heading_offset" in calibrator.start.ship.effects
+    return Calibrations(alone, calibrator.with_axis() if axis else alone)
+
+
 class Conclusion(NamedTuple):
     """The model that findings amount to.
 

@@ -12,7 +12,7 @@ add up over a window.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -141,6 +141,12 @@ class Calibrator:
     def coefficients(self) -> RefitOutcome:
         """The first model with other values of the nominal coefficients, and nothing else."""
         return self._fitted(RefinedModel.at(self.start, self.prior))
+
+    def with_axis(self) -> RefitOutcome:
+        """The same with the axis of the heading, which the constants of all runs stand for otherwise."""
+        at = RefinedModel.at(self.start, self.prior)
+        values, precision = {"heading_offset": 0.0}, np.array([[AXIS**-2.0]])
+        return self._fitted(replace(at, values=values, precision=precision))
 
     def _fitted(self, at: RefinedModel) -> RefitOutcome:
         problem = Calibration(self.train, self.windows, at, self.prior)
