@@ -1,8 +1,8 @@
 """How long a search for effects still takes, by the steps that have ended and those that usually follow.
 
-The number of effects is known only in the end: with each effect that it accepts the search forecasts it
-anew, by regressions of all candidates (:mod:`diagnosis.search.forward_selection`). A kind of step that
-has ended takes what it took on average; any other one its usual time, scaled by what all steps took.
+The number of effects is known only in the end. The search forecasts it by regressions of all candidates,
+and anew beside each effect that it accepts (:mod:`diagnosis.search.forward_selection`). A kind of step
+that has ended takes its mean time; any other one its usual time, scaled by what all steps took.
 """
 
 import math
@@ -40,7 +40,7 @@ LATE = 0.3
 
 
 class RemainingTime:
-    """The remaining time of ``learn``, once its search has accepted an effect, or ended without one.
+    """The remaining time of ``learn``, once its search has an effect and a second forecast, or ended.
 
     Args:
         now: the time [s].
@@ -49,7 +49,7 @@ class RemainingTime:
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._started = now, now()
         self._step, self._begun, self._round, self._again = "", self._started, 0, 0
-        self._likely = 0  # number of effects
+        self._likely: int | None = None  # number of effects
         self._took: dict[str, list[float]] = {}  # kind of step -> how long each took, over its number
         self._number = 1.0  # of the present step: where it takes as long as several of its kind
         self._left: dict[str, float] | None = None  # number of each kind of step; None: not known yet
@@ -95,10 +95,11 @@ class RemainingTime:
             self._took.setdefault(self._step, []).append((now - self._begun) / self._number)
         self._step, self._begun = step, now
         self._number = FIRST if what == ROUND[0] else 1.0
-        turn = re.match(r"effect (\d+), about (\d+) likely", what)
+        turn = step in ROUND and re.match(r"effect (\d+)(?:, about (\d+) likely)?", what)
         if turn:
-            self._round, self._likely = int(turn[1]), int(turn[2])
-        if turn or (step == AGAIN and self._round):
+            self._round = int(turn[1])
+            self._likely = int(turn[2]) if turn[2] else self._likely
+        if self._likely is not None and (turn or step == AGAIN):
             self._again = self._again + 1 if step == AGAIN else 0
             found = self._round - (step != AGAIN)
             self._left = self._following(max(found, self._likely))

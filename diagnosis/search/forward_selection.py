@@ -91,6 +91,7 @@ def search(
     ranking = rank(t, at, set(), made)
     lacking, command = ranking.base, commanded(data, start)
     shows = partial(matters, lacking, command=command)
+    likely = likely_effects(ranking, start, shows)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
@@ -116,17 +117,17 @@ def search(
         if harms and before is not None:
             break
         before = (t, alone) if harms else None
-        likely = len(accepted) + likely_effects(ranking, start, shows)
         accepted.append(accepted_effect(best, rng))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
             at, accepted = searched_again(t, at, accepted, made, advance, rng)
-        advance(f"{_in_turn(len(accepted) + 1, likely)}: every effect as a candidate")
+        turn = f"effect {len(accepted) + 1}"
+        advance(f"{turn}: every effect as a candidate")
         ranking = rank(t, at, {p.id for p in accepted}, made)
         if likely > len(accepted):
             likely = min(likely, len(accepted) + likely_effects(ranking, start, shows))
-        turn = _in_turn(len(accepted) + 1, likely)
+        turn = f"{turn}, about {likely} likely"
     if before is not None:
         t, at = before
         del accepted[-1]
@@ -135,11 +136,6 @@ def search(
         at, intervals = profiled(t, at, p)
         accepted[k] = replace(p, intervals={**p.intervals, **intervals})
     return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
-
-
-def _in_turn(number: int, likely: int) -> str:
-    """The effect that is searched, and how many there may be."""
-    return f"effect {number}, about {likely} likely"
 
 
 def searched_again(
