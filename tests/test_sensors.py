@@ -465,7 +465,9 @@ def test_a_held_speed_does_not_make_the_motion_surer_than_it_is():
 def test_a_velocity_in_a_few_of_the_rows_is_one(every):
     """A receiver whose cells are empty in the rows between two of its telegrams."""
     run = made()
-    sparse = {n: np.where(np.arange(run.time.size) % every, np.nan, 0.95 * run.measured[n]) for n in "uv"}
+    sparse = {
+        n: np.where(np.arange(run.time.size) % every, np.nan, 0.95 * run.measured[n]) for n in "uv"
+    }
     found = examine(beside(run, **sparse), REFERENCE)
     (fault,) = found.findings
     assert (fault.channel, fault.kind, fault.value) == ("u", "scale", pytest.approx(0.95, abs=0.01))
