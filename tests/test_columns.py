@@ -14,7 +14,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.runs import FOLDER_FILE, line_beside, prepare, propose, read
 from diagnosis.runs.columns.columns import Named, quantities
 from diagnosis.runs.columns.likely_columns import meaning_of_words, motion_of
-from diagnosis.runs.columns.unit_check import UNITS
+from diagnosis.runs.columns.unit_check import UNITS, spelt
 
 TANKER = ship_with((), "kvlcc2")
 NAMES = {
@@ -248,6 +248,20 @@ def test_units_have_their_factors_by_definition() -> None:
         (_, one), *rest = units.items()  # the first is that of SI
         assert one == 1.0
         assert dict(rest) == pytest.approx(others[quantity], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("written_so", "unit"),
+    [("RPM", "rpm"), ("rev/min", "rpm"), ("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s")],
+)
+def test_usual_spellings_of_a_unit_are_that_unit(written_so: str, unit: str) -> None:
+    assert spelt(written_so) == unit
+
+
+@pytest.mark.parametrize("unit", ["MN", "KN", "Min", "S"])
+def test_capitals_count_in_symbols(unit: str) -> None:
+    assert spelt(unit) == unit
+    assert all(unit not in units for units in UNITS.values())
 
 
 def test_a_heading_in_degrees_is_likely_by_the_course(tmp_path: Path) -> None:

@@ -37,9 +37,7 @@ def test_every_effect_has_a_sentence_of_its_own_with_numbers(name):
         assert re.search(r"\d", said)
 
 
-SIGNS = (
-    "mass added_mass_X loss_bow loss_surge attack_point earth_force body_bias current heading_offset X_u"
-)
+SIGNS = "mass centre_of_gravity added_mass_X loss_bow loss_surge attack_point earth_force body_bias current heading_offset X_u"
 
 
 @pytest.mark.parametrize("name", [*SIGNS.split(), "marker_offset", "clock_offset", "Y_ur", "curve_X(u)"])

@@ -18,14 +18,19 @@ from diagnosis.predictors.shooting import Linear, Shooting
 from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
-from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.findings import Finding, Findings, Suspect
 from diagnosis.search.gram import block_folds
 from diagnosis.search.prediction_fit import disturbance as pushes
 from diagnosis.search.prediction_fit.disturbance import ForceDisturbance, covariance, estimate
-from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
+from diagnosis.search.prediction_fit.disturbance_summary import Unrecorded, box, unrecorded
 from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, shootings
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
-from diagnosis.search.prediction_fit.refit import fit_model_error, prediction_bands, to_predictions
+from diagnosis.search.prediction_fit.refit import (
+    RefitOutcome,
+    fit_model_error,
+    prediction_bands,
+    to_predictions,
+)
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
 from fmus.scale import REFERENCE
@@ -355,6 +360,26 @@ def test_an_effect_that_predictions_take_back_to_nothing_is_none():
     assert learned.effects[0].model is learned.model
     assert learned.model.value("lag") == 0.0
     assert learned.model.value("delta_X_u") == pytest.approx(DRAG, rel=0.2)
+
+
+def test_where_the_values_of_the_search_stay_coefficients_are_off_by_the_prior_of_the_fit():
+    """The search takes each as known to a tenth, so that its own standard deviations are others."""
+    stated = NominalPrior.of(Model(), 0.5)
+    tenth = {n: min(s, 0.1 * abs(stated.mean[n])) for n, s in stated.std.items()}
+    searched = replace(stated, std=tenth)
+    wide = max(stated.std, key=lambda n: stated.std[n] / searched.std[n])
+    assert stated.std[wide] == pytest.approx(5.0 * searched.std[wide])
+    off = 4.0 * searched.std[wide]
+    found = Findings(
+        suspects=[Suspect(wide, 4.0, searched.mean[wide] + off)], moved={wide: 4.0}, searched=searched
+    )
+    nothing = Unrecorded(NO_PUSH, {}, [])
+    kept = RefitOutcome(Findings(), JointPosterior.nothing(), nothing).about(found, stated).findings
+    assert not found.plausible
+    assert kept.plausible
+    assert kept.moved == {wide: pytest.approx(0.8)}
+    assert kept.suspects[0].z == pytest.approx(off / stated.std[wide])
+    assert kept.suspects[0].value == found.suspects[0].value
 
 
 @pytest.mark.slow

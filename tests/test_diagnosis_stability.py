@@ -272,6 +272,19 @@ def test_a_region_of_data_holds_nearly_all_of_them():
     assert OperatingRegion.of(np.full((3, 3), np.nan)) == pytest.approx(0.1 * np.array(OPERATING))
 
 
+@pytest.mark.parametrize(
+    ("name", "note"),
+    [("otter", stability.NO_THRUST), ("gunnerus", stability.NO_ALLOCATION), ("cybership2", None)],
+)
+def test_the_reason_why_no_controller_holds_a_ship_is_its_own(name, note, monkeypatch):
+    """Two azimuths give forces on every axis, of which none is requested."""
+    start = Model(ship=ship_with((), name))
+    monkeypatch.setattr(stability, "_bounded", lambda *_: (True, False))
+    monkeypatch.setattr(stability, "comes_to_rest", lambda *_: True)
+    reasons = {stability.NO_THRUST, stability.NO_ALLOCATION} & set(check_stability(start, start).notes)
+    assert reasons == ({note} if note else set())
+
+
 @pytest.mark.parametrize("harmful", [False, True])
 @pytest.mark.parametrize("nominal_rests", [False, True])
 @pytest.mark.parametrize("learned_rests", [False, True])

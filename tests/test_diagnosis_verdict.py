@@ -500,6 +500,31 @@ def test_a_law_beside_a_mere_possibility_of_its_family_stays_sure():
     assert [f.confidence for f in found] == [0.99, 0.3]
 
 
+@pytest.mark.parametrize(
+    ("moved", "sure"),
+    [
+        ({"N_absr_r": 4.8}, False),
+        ({"N_absr_r": 2.0}, True),
+        ({"X_absu_u": 4.8}, True),
+        ({"m": 9.0}, True),
+    ],
+)
+def test_a_law_beside_a_coefficient_of_its_family_far_from_its_prior_is_in_parts(moved, sure):
+    """More drag by the cube, and hardly any by the square, are a law of a higher power as well."""
+    start = Model()
+    made = [Finding("N_r", {"delta_N_r": -1.0}, {}, 0.99, [], 0.9, 0.9, together=0.99)]
+    (f,) = with_confidence(Findings(made, model=start, moved=moved), start, Doubts()).effects
+    assert f.confidence == (0.99 if sure else 0.5)
+    assert ("law of another shape" in f.doubt) != sure
+
+
+def test_a_coefficient_is_no_second_part_of_its_own_change():
+    start = Model()
+    made = [Finding("N_r", {"delta_N_r": -1.0}, {}, 0.99, [], 0.9, 0.9, together=0.99)]
+    (f,) = with_confidence(Findings(made, model=start, moved={"N_r": 5.0}), start, Doubts()).effects
+    assert f.confidence == 0.99
+
+
 @pytest.mark.parametrize(("own", "sure"), [(0.9, True), (0.01, False), (0.0, False), (None, True)])
 def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sure):
     """By shares of the first error; a method that cannot fit without it says nothing."""

@@ -175,16 +175,17 @@ def test_waves_have_the_strength_the_peak_and_the_drift_that_were_asked_for():
 
 
 @pytest.mark.parametrize(
-    ("name", "same"),
+    ("name", "value", "same"),
     [
-        ("mass", Inertia(m=14.79 + 2.0, I_z=1.76 * (1.0 + 2.0 / 14.79))),
-        ("added_mass_X", Inertia(X_udot=-4.0)),
-        ("added_mass_Y", Inertia(Y_vdot=-12.0)),
-        ("added_mass_N", Inertia(N_rdot=-3.0)),
+        ("mass", 2.0, Inertia(m=14.79 + 2.0, I_z=1.76 * (1.0 + 2.0 / 14.79))),
+        ("centre_of_gravity", 0.1, Inertia(x_g=0.0375 + 0.1)),
+        ("added_mass_X", 2.0, Inertia(X_udot=-4.0)),
+        ("added_mass_Y", 2.0, Inertia(Y_vdot=-12.0)),
+        ("added_mass_N", 2.0, Inertia(N_rdot=-3.0)),
     ],
 )
-def test_more_inertia_is_another_ship_and_a_model_error(name, same):
-    changed, out = sail(with_params(COMPONENT, **{name: 2.0}))
+def test_other_inertia_is_another_ship_and_a_model_error(name, value, same):
+    changed, out = sail(with_params(COMPONENT, **{name: value}))
     other, plain = sail(Params(inertia=same))
     assert changed == pytest.approx(other, abs=1e-12)
     assert any(abs(w) > 1e-4 for w in (out.omega_X, out.omega_Y, out.omega_N))

@@ -259,6 +259,13 @@ def over_ground(run):
     return replace(run, measured={"speed": speed, "course": np.radians(course)})
 
 
+def test_a_course_is_used_with_its_speed():
+    found = table(over_ground(sailed()))
+    assert found["speed"].used
+    assert found["course"].used
+    assert not found["course"].why
+
+
 @pytest.mark.parametrize(("channel", "until"), [("course", None), ("speed", None), ("speed", 800)])
 def test_a_channel_that_is_frozen_is_not_used_there_and_shows_no_fault_of_the_others(channel, until):
     """A course that stays for half of a run was taken as a clock that ran at a tenth of its rate."""

@@ -167,19 +167,19 @@ Little is left.
 Finding 1: sure
 There is sure.
 X = sure
-confidence 99 %, explains 90 % of the squared error
+confidence 99 %, explains 90 % of the squared error with the coefficients
 They differ.
 Run astern.
 Finding 2: doubtful
 Possibly doubtful or other (60 % for doubtful): There is doubtful.
 X = doubtful
-confidence 60 %, explains 90 % of the squared error, unique contribution 25 %
-(lost without this effect)
+confidence 60 %, explains 90 % of the squared error with the coefficients,
+unique contribution 25 % (lost without this effect)
 Possibility: unlikely
 Possibly unlikely (20 % for unlikely): There is unlikely. However, something
 acts. It is not in the learned model.
 X = unlikely
-confidence 20 %, explains 90 % of the squared error
+confidence 20 %, explains 90 % of the squared error with the coefficients
 Rejected
 gone: worse on held-out runs
 Suspect coefficients

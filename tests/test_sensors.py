@@ -461,6 +461,25 @@ def test_a_held_speed_does_not_make_the_motion_surer_than_it_is():
     assert np.sqrt((off**2).mean()) < 1.6, "the motion is as sure as it says"
 
 
+@pytest.mark.parametrize("every", [2, 3, 5])
+def test_a_velocity_in_a_few_of_the_rows_is_one(every):
+    """A receiver whose cells are empty in the rows between two of its telegrams."""
+    run = made()
+    sparse = {
+        n: np.where(np.arange(run.time.size) % every, np.nan, 0.95 * run.measured[n]) for n in "uv"
+    }
+    found = examine(beside(run, **sparse), REFERENCE)
+    (fault,) = found.findings
+    assert (fault.channel, fault.kind, fault.value) == ("u", "scale", pytest.approx(0.95, abs=0.01))
+    assert {"u", "v", "r"} == set(found.agreeing)
+
+
+def test_a_velocity_of_a_third_of_the_run_is_not_that_of_the_run():
+    run = made()
+    first = {n: np.where(run.time < SECONDS / 3, run.measured[n], np.nan) for n in "uv"}
+    assert set(examine(beside(run, **first), REFERENCE).agreeing) == {"r"}
+
+
 def test_the_smoother_is_sharper_with_channels_that_agree():
     run = made()
     rough = replace(run, pose=run.pose + 0.02 * np.random.default_rng(3).standard_normal(run.pose.shape))

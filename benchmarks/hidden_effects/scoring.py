@@ -19,6 +19,7 @@ EFFECTS = ship().effects
 # Coefficients whose change is the same as an effect that does not bear their name.
 SAME_AS = {
     "mass": {"m", "I_z"},
+    "centre_of_gravity": {"x_g"},
     "added_mass_X": {"X_udot"},
     "added_mass_Y": {"Y_vdot"},
     "added_mass_N": {"N_rdot"},

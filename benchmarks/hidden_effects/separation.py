@@ -58,6 +58,7 @@ SMALL = 1e-3
 DIFFERENTIABLE = {
     "current",
     "mass",
+    "centre_of_gravity",
     "added_mass_X",
     "added_mass_Y",
     "added_mass_N",

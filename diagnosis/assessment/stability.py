@@ -77,6 +77,10 @@ OPERATING = OperatingRegion()
 NOT_HELD = "the initial model is not held there either"
 NOR_NOMINAL = "nor does that of the initial model"
 NO_THRUST = "its thrusters give no force on some axis, so no reference controller can hold it"
+NO_ALLOCATION = (
+    "its thrusters get commands and no force request (thrust_allocation = false), so no reference "
+    "controller can hold it"
+)
 
 
 @dataclass(frozen=True)
@@ -157,7 +161,8 @@ def check_stability(
     if not held:
         advance("the decay of the motion without thrust")
         fastest = np.split(everywhere, SETTINGS.directions)[-1]
-        notes += [] if model.ship.fully_actuated else [NO_THRUST]
+        if not model.ship.fully_actuated:
+            notes.append(NO_THRUST if model.ship.description.allocates else NO_ALLOCATION)
         bounded = mass_definite and comes_to_rest(model, fastest, region, notes)
         both = not (bounded or comes_to_rest(nominal, fastest, region, []))
         notes += [NOR_NOMINAL] if both else []

@@ -202,7 +202,8 @@ def _effect(e: ReportedEffect) -> Iterator[str]:
     share = _percent(e.share_of_error)
     unique = f", unique contribution {_percent(e.share_unique)} (lost without this effect)"
     alone = "" if e.share_unique is None else unique
-    yield f"confidence {_percent(e.confidence)}, explains {share} of the squared error{alone}"
+    explained = f"explains {share} of the squared error with the coefficients{alone}"
+    yield f"confidence {_percent(e.confidence)}, {explained}"
     yield from filter(None, (e.separation, e.advice))
 
 

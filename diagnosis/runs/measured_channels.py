@@ -15,7 +15,7 @@ from .columns.columns import POSE, QUANTITY, outputs
 from .columns.unit_check import SI_UNIT
 from .frozen import repeated
 from .run_constants import DIGITS, ORDER
-from .sensors.evidence import SURE
+from .sensors.evidence import SURE, VELOCITIES
 from .smoothing.smoother import Smoothed
 
 GIVEN, ESTIMATED = "given", "estimated"
@@ -117,6 +117,8 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
     reasons = {name: f.sentence for f in s.sensors.findings for name in f.aside}
     delays = {f.channel: f.value for f in s.sensors.findings if f.kind == "delay"}
     time = s.sensors.run.time
+    used = set(s.sensors.agreeing)
+    used |= {name for pair in VELOCITIES if pair[0] in used for name in pair}  # a course by its speed
     for name, values in {**s.sensors.run.measured, **s.sensors.aside}.items():
         there = np.isfinite(values) & np.isfinite(time)
         new = there & ~repeated(values[:, None], there)
@@ -132,7 +134,7 @@ def channels_of(s: Smoothed) -> Iterator[MeasuredChannel]:
                 correlation=0.0,
                 latency=delays.get(name, 0.0),
                 outliers=0,
-                why="" if name in s.sensors.agreeing else reasons.get(name, UNUSED),
+                why="" if name in used else reasons.get(name, UNUSED),
             )
 
 

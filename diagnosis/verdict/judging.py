@@ -149,7 +149,7 @@ def judge(
         advance("fit to predictions")
     fit = to_predictions(learned, train, prior, changed)
     if changed and overfits(fit.findings, learned, data, criterion):
-        fit = fit.about(learned)
+        fit = fit.about(learned, prior)
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (changed and not left)

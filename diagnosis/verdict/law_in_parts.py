@@ -1,35 +1,51 @@
 """Findings that together make up a law which no candidate has, so that none of them is known."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import combinations
 
 import numpy as np
 
+from fmus.effects.effect import Effect
+
 from ..predictors import Model, WeakWindows, omega
-from ..runs.run_constants import NEGLIGIBLE
+from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
 from ..search.findings import Finding, Findings
 from .confidence import Confidence
 
 
 def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[str]:
-    """Axes on which two or more findings are laws of the hull of one family.
+    """Axes on which a finding and another one are laws of the hull of one family.
 
     Of a law in a shape that no candidate has, they make up the parts: of a cubic one, too much by its
-    square and too little by its line.
+    square and too little by its line. A coefficient that is FAR_OFF from its prior is such a part, too:
+    with it the fit has another law than the one that is described.
 
     Args:
         found: the findings.
         start: the initial model.
         alone: the confidence of each, all others left out of account.
     """
+    effects = start.ship.effects
     laws = [
         effect
         for f, c in zip(found.effects, alone, strict=True)
-        if c.is_finding and (effect := start.ship.effects[f.id]).kind == "force"
+        if c.is_finding and (effect := effects[f.id]).kind == "force"
     ]
-    count = Counter((law.axis, law.wording.family.name) for law in laws)
-    return {axis for (axes, _), n in count.items() if n > 1 for axis in axes}
+    moved = {f"delta_{name}" for name, z in found.moved.items() if abs(z) > FAR_OFF}
+    others = [e for e in effects.values() if e.kind == "force" and e not in laws and _all_of(e, moved)]
+    known, count = (Counter(map(_family, part)) for part in (laws, [*laws, *others]))
+    return {axis for family in known if count[family] > 1 for axis in family[0]}
+
+
+def _all_of(effect: Effect, moved: Collection[str]) -> bool:
+    """Whether an effect is a change of coefficients, and all of these have moved."""
+    return bool(effect.coefficients) and set(effect.coefficients) <= set(moved)
+
+
+def _family(law: Effect) -> tuple[str, str]:
+    """The axes of a law, and the manoeuvres that bring it out."""
+    return law.axis, law.wording.family.name
 
 
 def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:

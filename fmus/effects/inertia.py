@@ -53,6 +53,33 @@ def mass(
 
 
 @effect(
+    "centre_of_gravity",
+    "inertia",
+    "XYN",
+    formula="x_g + Δ, in M and C(nu)",
+    symbol="Δ",
+    sign="positive: ahead of the assumed place",
+    source=_SOURCE,
+    search=Search(differentiable=True),
+    wording=Wording(
+        lambda f: (
+            f"The centre of gravity is {number(abs(f['centre_of_gravity']))} m further "
+            f"{'ahead' if f['centre_of_gravity'] > 0.0 else 'astern'} than in the model."
+        ),
+        INERTIA,
+    ),
+)
+def centre_of_gravity(
+    i: Inertia,
+    centre_of_gravity: Annotated[
+        float, "m", "centre of gravity ahead of the assumed place", Range(-0.3, 0.3)
+    ] = 0.0,
+) -> Inertia:
+    """The centre of gravity at another place, as by a load fore or aft."""
+    return i._replace(x_g=i.x_g + centre_of_gravity)
+
+
+@effect(
     "added_mass_X",
     "inertia",
     "XN",

@@ -34,7 +34,11 @@ SPELT = {
     **dict.fromkeys(("degree", "degrees"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
+    **dict.fromkeys(("1/min", "r/min", "rev/min", "min-1", "min^-1"), "rpm"),
+    **dict.fromkeys(("°/min",), "deg/min"),
+    **{f"{unit}/sec": f"{unit}/s" for unit in ("m", "rad", "deg")},
 }
+WORDS = ("rpm", "rps", "deg", "degree", "degrees", "kts", "knot", "knots", "sec", "seconds")
 SI_UNIT = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"
@@ -66,8 +70,12 @@ def largest(quantity: str) -> float:
 
 
 def spelt(unit: str) -> str:
-    """A unit as this project spells it: ``Nm`` is ``N.m``; one that is not known stays."""
-    return SPELT.get(unit, unit)
+    """A unit as this project spells it: ``Nm`` is ``N.m``; one that is not known stays.
+
+    Capitals count in symbols (``mN``) and not in words (``Knots``).
+    """
+    word = unit.lower() if unit.lower() in WORDS else unit
+    return SPELT.get(word, word)
 
 
 def refuse_time(

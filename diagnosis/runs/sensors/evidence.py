@@ -114,9 +114,19 @@ def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _given(run: Run, name: str) -> bool:
-    """Whether a channel is there in at least half of the rows, and does not stand still."""
+    """Whether a channel is there for at least half of the time, and does not stand still.
+
+    Rows of other channels lie between the samples of a slow one: no share of the rows says so.
+    """
     values = run.measured.get(name)
-    return values is not None and np.isfinite(values).mean() > 0.5 and bool(np.nanstd(values) > 0.0)
+    if values is None:
+        return False
+    there = np.isfinite(values)
+    if not there.any() or not np.std(values[there]) > 0.0:
+        return False
+    step = np.diff(run.time[there])
+    between = step[step <= long_gap(float(np.median(step)), REFERENCE)]
+    return bool(between.sum() > 0.5 * (run.time[-1] - run.time[0]))
 
 
 def _whole(run: Run, name: str) -> np.ndarray:

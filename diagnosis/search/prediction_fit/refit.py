@@ -41,9 +41,19 @@ class RefitOutcome:
         push = self.unrecorded.push
         return prediction_bands(smoothed, windows, self.findings.model, self.posterior, push)
 
-    def about(self, found: Findings) -> "RefitOutcome":
-        """Other findings with the covariance of this fit, by the same parameters."""
+    def about(self, found: Findings, prior: NominalPrior) -> "RefitOutcome":
+        """Other findings with the covariance of this fit, by the same parameters.
+
+        Their coefficients are off by standard deviations of the prior of the fit, not of the search.
+        """
         values = [found.model.value(n.partition(".")[2]) for n in self.posterior.names]
+        if found.searched is not None:
+            ones = prior.rescaled(np.ones(prior.size), found.searched).tolist()
+            z = dict(zip(prior.mean, ones, strict=True))
+            suspects = [replace(s, z=s.z * z[s.name]) for s in found.suspects]
+            suspects.sort(key=lambda s: -abs(s.z))
+            moved = {n: k * z[n] for n, k in found.moved.items()}
+            found = replace(found, suspects=suspects, moved=moved)
         return replace(self, findings=found, posterior=replace(self.posterior, mean=np.array(values)))
 
 
