@@ -6,12 +6,14 @@ import json
 import os
 import signal
 import sys
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from hypothesis import settings
+from support.command import command, main_of
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.processes import one_process, two_processes
@@ -20,7 +22,7 @@ from support.shared import keep_in, kept, once, shared_folder
 from support.slow_tests import NODE, PROCESSOR, slow_tests
 
 from cosim.dispatch import analyse_runs
-from cosim.fmu import FmuModel, LocalInstance, archive_check
+from cosim.fmu import FmuModel, LocalInstance, archive_check, fmu_model
 from cosim.master import loop_surroundings
 from cosim.system import own_fmus
 from cybership.user_cache import cache_folder
@@ -33,6 +35,10 @@ EXAMPLES = (
 )
 settings.register_profile("by no clock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("by no clock")
+
+# New objects after which the young ones are searched for garbage, in place of 700: modules of tests, traces and
+# syntax trees are made by the ten thousands, and stay.
+YOUNG = 30_000
 
 # Reasons to skip that are no matter of what is installed; with CYBERSHIP_REQUIRE=all any other one fails.
 ACCEPTED = (
@@ -59,6 +65,7 @@ def pytest_configure(config):
     )
     if getattr(config.option, "numprocesses", None):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the worker processes take the cores
+    gc.set_threshold(YOUNG)
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -196,11 +203,12 @@ def opened_here(tmp_path):
 
 @pytest.fixture(autouse=True, scope="session")
 def _ask_the_builder_once(_session_cache):
-    """Scenarios that this process loads need one process of the builder for each FMU, not for each load.
+    """Scenarios that this process loads build an FMU once, not at each load, and in this process.
 
     Processes that the tests start, and tests with a cache of their own, ask it as always.
     """
     ask, cache, known = own_fmus.run_builder, cache_folder(), {}
+    here = SimpleNamespace(run=lambda line, **_: command(main_of(line[2]), *line[3:]))
 
     def builder(*arguments, warnings=None):
         after = arguments.index("--") + 1
@@ -210,7 +218,10 @@ def _ask_the_builder_once(_session_cache):
             return ask(*arguments, warnings=warnings)
         of_these = known.setdefault(options, {})
         if missing := [name for name in names if name not in of_these]:
-            of_these.update(zip(missing, ask(*options, *missing, warnings=warnings), strict=True))
+            with pytest.MonkeyPatch.context() as inner:
+                inner.setattr(own_fmus, "subprocess", here)
+                built = ask(*options, *missing, warnings=warnings)
+            of_these.update(zip(missing, built, strict=True))
         return [of_these[name] for name in names]
 
     with pytest.MonkeyPatch.context() as patch:
@@ -220,8 +231,9 @@ def _ask_the_builder_once(_session_cache):
 
 @pytest.fixture(autouse=True, scope="session")
 def _unpack_once(shared):
-    """Our FMUs are unpacked once for all runs, where the byte code of their modules stays, too."""
-    own, unpack = cache_folder(), FmuModel.unpack
+    """Our FMUs are read once by a process, and unpacked once for all, where their byte code stays, too."""
+    own, unpack, read = cache_folder(), FmuModel.unpack, fmu_model.read_model_description
+    described = cache(lambda path, _, **options: read(path, **options))
 
     def unpacked(model):
         if model._folder is None and own in model.path.parents:
@@ -232,8 +244,14 @@ def _unpack_once(shared):
             model._owns_folder = False
         return unpack(model)
 
+    def description(path, **options):
+        if own not in Path(path).parents:
+            return read(path, **options)
+        return described(path, os.stat(path).st_mtime_ns, **options)
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(FmuModel, "unpack", unpacked)
+        patch.setattr(fmu_model, "read_model_description", description)
         yield
 
 

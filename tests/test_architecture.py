@@ -13,6 +13,7 @@ from importlib import import_module
 
 import pytest
 from support.project import ROOT
+from support.syntax import nodes
 
 # Each may import those before it, and nothing else of the project.
 PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "cybership", "studies", "thesis", "benchmarks")
@@ -191,17 +192,11 @@ def on_demand(module, node):
         yield f"{module}{name}" if name.startswith(".") else name
 
 
-@cache
-def parsed(path):
-    """The syntax tree of a file, which several tests walk."""
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
 def statements(path):
     """All nodes of a file, and of the stub that says what an ``__init__`` imports on demand."""
     for each in (path, path.with_suffix(".pyi")):
         if each.exists():
-            yield from ast.walk(parsed(each))
+            yield from nodes(each)
 
 
 @cache
@@ -238,10 +233,9 @@ def public_names(module):
     path = sources(module.partition(".")[0])[module]
     stub = path.with_suffix(".pyi")
     if stub.exists():
-        return [alias.asname for node in parsed(stub).body for alias in getattr(node, "names", [])]
-    tree = parsed(path)
+        return [alias.asname for node in nodes(stub)[0].body for alias in getattr(node, "names", [])]
     defined = []
-    for node in tree.body:
+    for node in nodes(path)[0].body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
         if isinstance(node, (ast.Assign, ast.AnnAssign)) and ast.unparse(targets[0]) == "__all__":
             assert node.value is not None
@@ -257,7 +251,7 @@ def public_names(module):
 
 def module_aliases(module, path):
     """Local name -> module of this project that an import statement binds to it."""
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 if alias.name in known() and (alias.asname or "." not in alias.name):
@@ -269,16 +263,17 @@ def module_aliases(module, path):
                     yield alias.asname or alias.name, f"{base}.{alias.name}"
 
 
+@cache
 def attributes(module, path):
     """(module, attribute) of each ``module.attribute`` where the module is one of this project."""
     aliases = dict(module_aliases(module, path))
-    for node in ast.walk(parsed(path)):
-        if (
-            isinstance(node, ast.Attribute)
-            and isinstance(node.value, ast.Name)
-            and node.value.id in aliases
-        ):
-            yield aliases[node.value.id], node.attr
+    return [
+        (aliases[node.value.id], node.attr)
+        for node in nodes(path)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id in aliases
+    ]
 
 
 def foreign_uses(package, other, allowed):
@@ -453,7 +448,7 @@ def test_a_class_name_has_one_meaning():
     homes: dict[str, list[str]] = {}
     for package in ("fmus", "fmucheck", "cosim", "cybership", "diagnosis", "studies", "thesis"):
         for module, path in sources(package).items():
-            for node in ast.walk(parsed(path)):
+            for node in nodes(path):
                 if isinstance(node, ast.ClassDef):
                     homes.setdefault(node.name, []).append(module)
     assert {n: m for n, m in homes.items() if len(m) > 1 and n not in OF_COMPONENTS} == {}
@@ -481,13 +476,12 @@ OF_ONE_SHIP = {"fmus.ships.naming"}
 
 def words(path):
     """Names and texts of a file's code, docstrings left out."""
-    tree = parsed(path)
     docs = {
         node.body[0].value
-        for node in ast.walk(tree)
+        for node in nodes(path)
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node)
     }
-    for node in ast.walk(tree):
+    for node in nodes(path):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in docs:
             yield node.value
         for name in ("id", "attr", "arg", "name"):

@@ -8,6 +8,9 @@ import subprocess
 import sys
 import zipfile
 from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
@@ -41,6 +44,17 @@ OTHERS = (
     "guidance_waypoints", "watch_thrusters",
 )  # fmt: skip
 compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _one_schema():
+    """The toolbox would read the schema of FMI anew for each FMU, which takes longer than to check it."""
+    with pytest.MonkeyPatch.context() as patch:
+        if find_spec("fmu_manipulation_toolbox") is not None:
+            checker = import_module("fmu_manipulation_toolbox.checker")
+            schema = cache(checker.xmlschema.XMLSchema)
+            patch.setattr(checker, "xmlschema", SimpleNamespace(XMLSchema=schema))
+        yield
 
 
 def found(path, *names, timeout=30.0):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from support.events import once_there
 from support.foreign import build_lag, needs_compiler
-from support.plain import GAIN
+from support.plain import GAIN, make_fmu
 from support.spy import build_spy, found
 
 from cosim import InputError, SimulationError
@@ -139,11 +139,18 @@ TERMS = {
 }
 
 
+@pytest.fixture(scope="module")
+def fed_through(tmp_path_factory):
+    return make_fmu(
+        tmp_path_factory.mktemp("fed"), "Fed", FED_THROUGH, "self.y += h * self.x\nreturn True"
+    )
+
+
 @pytest.mark.parametrize("kind", TERMS)
-def test_a_whole_run_adds_to_its_inputs_what_follows_from_its_outputs(plain_fmu, kind):
+def test_a_whole_run_adds_to_its_inputs_what_follows_from_its_outputs(fed_through, kind):
     """The first output follows from the first input; each next one from the input and what is added to it."""
     terms, added = TERMS[kind]
-    confined = opened(plain_fmu("Fed", FED_THROUGH, "self.y += h * self.x\nreturn True"))
+    confined = opened(fed_through)
     inputs, h = [-1.0, 0.5, 2.0, 0.0], 0.1
     try:
         known, instance = confined.model.variables, confined.instance()

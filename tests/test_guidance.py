@@ -5,6 +5,7 @@ import random
 
 import numpy as np
 import pytest
+from support.ccode import stepped
 from support.project import COMPONENTS, with_values
 
 from fmus.declare import flatten, packer, variables
@@ -17,15 +18,9 @@ GUIDANCE = [n for n, c in COMPONENTS.items() if c.outputs is Target and not vari
 def follow(name, seconds, h=0.01, **parameters):
     """Rows of the target along a path, at steps of h [s], or of several in turn."""
     c = COMPONENTS[name]
-    p = with_values(c, **parameters)
-    s = c.init(c.inputs(), p)
-    rows = [c.step(s, c.inputs(), p, 0.0)[1]]
-    steps = np.atleast_1d(h).tolist()
-    for _ in range(round(seconds / sum(steps))):
-        for each in steps:
-            s, target = c.step(s, c.inputs(), p, each)
-            rows.append(target)
-    return np.array(rows)
+    path = stepped(c, with_values(c, **parameters), c.inputs())
+    steps = np.atleast_1d(h).tolist() * round(seconds / np.sum(h))
+    return np.array([path.advance([], each) for each in (0.0, *steps)])
 
 
 # What makes a path show all that it has.

@@ -75,7 +75,7 @@ def sailed(seconds=60.0, speed=0.3, ahead=0.08):
 VOYAGE = sailed()
 # Times and a play are drawn in place of it.
 OF_NO_SIZE = ("bow_failure", "bow_outage", "vsp_outage", "backlash")
-RUNS = [motion(VOYAGE, {}), motion(sailed(speed=0.5, ahead=0.0), {})]
+RUNS = [motion(sailed(30.0), {}), motion(sailed(30.0, speed=0.5, ahead=0.0), {})]
 
 
 @pytest.fixture(scope="module")

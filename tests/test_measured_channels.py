@@ -202,8 +202,9 @@ def test_files_hold_each_channel_by_its_name():
     assert data["channels"]["r"]["used"] is True
 
 
-@pytest.mark.parametrize("coordinate", [0, 1])
-@pytest.mark.parametrize(("until", "rounded"), [(400, None), (400, 3), (None, None)])
+@pytest.mark.parametrize(
+    ("coordinate", "until", "rounded"), [(0, 400, None), (1, 400, 3), (1, None, None)]
+)
 def test_a_coordinate_that_is_frozen_alone_is_no_measurement_of_the_place(coordinate, until, rounded):
     run = replace(sailed(), measured={})
     if rounded:

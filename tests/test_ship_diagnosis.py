@@ -190,7 +190,7 @@ def test_python_takes_the_ship_from_the_log(tmp_path):
 def otter_log(tmp_path_factory):
     folder = tmp_path_factory.mktemp("analysed") / "otter"
     options = {"vessel.X_u": -60.0}
-    cosim.simulate("otter_waypoints", folder, stop=120.0, pictures=False, set=options)
+    cosim.simulate("otter_waypoints", folder, stop=60.0, pictures=False, set=options)
     return folder
 
 

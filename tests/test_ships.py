@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from support.closed_form import Allocation, thrust
@@ -56,6 +56,8 @@ from fmus.signals import Force, VelocityInCurrent
 speed = st.floats(-2.0, 2.0)
 share = st.floats(0.0, 1.0)
 every_ship = pytest.mark.parametrize("name", SHIPS)
+# Examples of a property for each of many laws or terms, which have most of their code in common.
+few = settings(max_examples=15)
 REST = (0.0, 0.0, 0.0)
 
 
@@ -88,6 +90,7 @@ PRODUCTS = {
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("product", PRODUCTS)
+@few
 @given(speed, speed, speed)
 def test_a_term_is_the_product_of_its_name(product, axis, u, v, r):
     name = Term(axis="XYN"[axis], product=product, value=1.0).name
@@ -202,6 +205,7 @@ def test_every_law_is_tested():
 
 @every_law
 @pytest.mark.parametrize("flow", FLOWS)
+@few
 @given(share, share)
 def test_commands_give_the_force_that_is_asked_for_within_reach(name, flow, a, b):
     law = Law.known[name]
@@ -220,6 +224,7 @@ def test_commands_give_the_force_that_is_asked_for_within_reach(name, flow, a, b
 
 
 @every_law
+@few
 @given(share, share)
 def test_reach_is_what_commands_within_their_limits_give(name, a, b):
     law = Law.known[name]
@@ -236,6 +241,7 @@ def test_reach_is_what_commands_within_their_limits_give(name, a, b):
 
 
 @every_law
+@few
 @given(share, share)
 def test_one_source_serves_floats_and_arrays(name, a, b):
     law = Law.known[name]

@@ -14,6 +14,7 @@ from unittest.mock import patch
 
 from support.project import ROOT
 from support.public_api import PACKAGES
+from support.syntax import nodes
 
 FEWEST = 3  # words from which on a string is taken as a text
 NAMES = r"\w+(?:, \w+)*"  # of arguments, before their text
@@ -32,23 +33,19 @@ def module_texts(path: Path, fewest: int = FEWEST) -> Iterator[tuple[int, str]]:
 @cache
 def _module_texts(path: Path) -> list[tuple[int, str]]:
     """All of them, whatever their length: two tests want those of all modules."""
-    tree = ast.parse(path.read_text("utf-8"))
-    found: list[tuple[int, str]] = []
     docstrings = {
         id(n.body[0].value)
-        for n in ast.walk(tree)
+        for n in nodes(path)
         if isinstance(n, ast.Module | ast.ClassDef | ast.FunctionDef) and n.body and isinstance(n.body[0], ast.Expr)
     }  # fmt: skip
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
+    pieces = {id(p) for n in nodes(path) if isinstance(n, ast.JoinedStr) for p in n.values}
+    exempt = docstrings | pieces
+    found: list[tuple[int, str]] = []
+    for node in nodes(path):
+        if not isinstance(node, ast.JoinedStr | ast.Constant) or id(node) in exempt:
+            continue
         parts = node.values if isinstance(node, ast.JoinedStr) else [node]
-        if isinstance(node, ast.JoinedStr):
-            waiting += [p for p in parts if isinstance(p, ast.FormattedValue)]
-        else:
-            waiting += ast.iter_child_nodes(node)
-        strings = [p.value for p in parts if isinstance(p, ast.Constant) and isinstance(p.value, str)]
-        if strings and id(node) not in docstrings:
+        if any(isinstance(p, ast.Constant) and isinstance(p.value, str) for p in parts):
             text = "".join(p.value if isinstance(p, ast.Constant) else "``" for p in parts)
             found.append((node.lineno, text))
     return found
