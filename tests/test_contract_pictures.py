@@ -220,7 +220,8 @@ def test_hulls_are_drawn_at_equal_times_and_none_twice():
     assert half[0, 0] == pytest.approx([0.0, 0.25])
     assert len(track.outlines(drawn(straight(speed=0.0)), SHIP, 1.0)) == 1
     # Every 0.91 m: each second one is a whole length from the last that is drawn.
-    assert len(track.outlines(drawn(straight(speed=1.0 / 6.0)), SHIP, 1.0)) == 6
+    slow, long = drawn(straight(speed=1.0 / 6.0)), SHIP._replace(length=2.0)
+    assert [len(track.outlines(slow, *s)) for s in ((SHIP, 1.0), (long, 1.0), (long, 0.5))] == [6, 4, 6]
     turning = straight(speed=0.0)
     turning[ROLES.pose[2]] = np.linspace(0.0, 2.2, 121)
     assert len(track.outlines(drawn(turning), SHIP, 1.0)) == 3, "each radian"
