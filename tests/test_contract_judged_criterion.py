@@ -9,7 +9,7 @@ import pytest
 
 from cosim import InputError
 from diagnosis.acceptance.criterion import Criterion
-from diagnosis.acceptance.judged_criterion import FEW, LEARNED, Predicted, judge
+from diagnosis.acceptance.judged_criterion import FEW, LEARNED, Predicted, decide, judge
 from diagnosis.acceptance.record import validation, verification
 from diagnosis.acceptance.record.validation import _JudgedRuns, _not_covered, _rows
 from diagnosis.acceptance.record.verification import FORM, verify_record
@@ -169,6 +169,22 @@ def test_errors_far_below_those_of_the_measurement_are_said():
     assert not any("error of position" in flag for flag in few)
     heading = judge(criterion(), ["a"], [run(off=(0.1, 0.0), std=0.01)]).flags
     assert any("error of heading" in flag for flag in heading), "it is zero"
+
+
+@pytest.mark.parametrize(
+    ("size", "outcome"), [(0.9, "met"), (1.1, "cannot be judged"), (1.7, "not met")]
+)
+@pytest.mark.parametrize("statistic", ["fraction", "rms"])
+def test_an_error_beyond_the_tolerance_by_less_than_its_uncertainty_decides_nothing(
+    statistic, size, outcome
+):
+    """Twice u_val is 0.4 m, of a tolerance of 1 m."""
+    c = Criterion(**{**{k: v for k, v in WITHIN.items() if k != "coverage"}, "statistic": statistic})
+    errors = size * (1.0 + 0.01 * np.cos(np.arange(60)))
+    found, reason, _ = decide(c, errors, 60, 0.2)
+    assert found == outcome
+    assert ("2 u_val = 0.4 m" in reason) == (outcome == "cannot be judged")
+    assert decide(c, errors, 60, 0.51)[1].startswith("the tolerance is smaller than")
 
 
 # The record

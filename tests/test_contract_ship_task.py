@@ -198,3 +198,53 @@ def test_the_state_at_a_time_is_that_of_the_nearest_row(monkeypatch):
     for time in (5.4, 45.3, np.nan):
         with pytest.raises(InputError, match="run 'a' has no state at"):
             made.state_at(time)
+
+
+@pytest.mark.parametrize("given", ["parameters.json", None])
+def test_a_task_has_the_parameters_of_a_file_or_those_that_are_proposed(monkeypatch, given):
+    from diagnosis import predictors
+    from diagnosis.assessment import gathering
+
+    predictor, seen = Predictor(), []
+    fmu = SimpleNamespace(name="m.fmu", model="model", start="start", begun_on=lambda runs: predictor)
+    monkeypatch.setattr(predictors, "ship_with", lambda effects, ship: (effects, ship))
+    monkeypatch.setattr(ship_task, "Fmu", lambda *of: seen.append(of) or fmu)
+    monkeypatch.setattr(gathering, "gather", lambda paths, *_: [measured(p) for p in paths])
+    monkeypatch.setattr(
+        ship_task, "read_parameters", lambda path, model, mapped: [(path, model, mapped)]
+    )
+    monkeypatch.setattr(ship_task, "proposed", lambda model, mapped: ([(model, mapped)], ["a note"]))
+    options = SimpleNamespace(
+        effects=(),
+        ship="cse1",
+        fmu="m.fmu",
+        map="map.json",
+        anyway=False,
+        horizon=None,
+        parameters=given,
+    )
+    paths = {"train": ["a", "b"], "validate": [], "test": ["c"]}
+    made = ship_task.ship_task(options, paths, None, None)
+    assert seen == [("m.fmu", "map.json", ((), "cse1"), None)]
+    assert made.use == {"a": "train", "b": "train", "c": "test"}
+    mapped = {f"in.{s}" for s in ("tau_X", "tau_N")} | {"d.tau_Y"}
+    mapped |= {f"out.{s}" for s in (*POSE, "u")} | {f"start.{s}" for s in ("x", "r", "mass")}
+    if given:
+        assert (made.parameters, made.notes) == ([(given, "model", mapped)], [])
+    else:
+        assert (made.parameters, made.notes) == ([("model", mapped)], ["a note"])
+    del options.parameters
+    options.model = "other.fmu"
+    assert ship_task.ship_task(options, paths, None, None).notes == ["a note"]
+    assert seen[-1][0] == "other.fmu"
+    monkeypatch.setattr(ship_task, "proposed", lambda model, mapped: ([], []))
+    with pytest.raises(InputError, match="no parameter that can be calibrated"):
+        ship_task.ship_task(options, paths, None, None)
+    told = predictor.map.told
+    for outputs, wrong in ((POSE, False), (POSE[:2], True)):
+        predictor.map.told = lambda group, outputs=outputs: (
+            {s: cause(s) for s in outputs} if group == "outputs" else told(group)
+        )
+        message = "needs outputs for x, y and psi" if wrong else "no parameter"
+        with pytest.raises(InputError, match=message):
+            ship_task.ship_task(options, paths, None, None)
