@@ -1,5 +1,6 @@
 """A run that is played to FMUs: what they are fed, what they are connected to, and what is said of it."""
 
+import json
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +14,7 @@ from cosim import InputError
 from thesis.open_loop import playback, replay_report
 from thesis.open_loop.playback import OpenLoop, Played, fed
 from thesis.open_loop.replayed import Replay, replayed, stretches
-from thesis.open_loop.run_source import COMMAND, TARGET
+from thesis.open_loop.run_source import COMMAND, ERRORS, TARGET
 
 H, N = 0.1, 50
 NAN = np.nan
@@ -325,3 +326,114 @@ def test_pictures_have_a_panel_for_each_signal_with_what_was_blocked_and_stored(
     assert dots.get_xdata() == pytest.approx((H * np.arange(N))[1::2])
     assert line.get_ydata() == pytest.approx((H * np.arange(N)) ** 2)
     assert len(figure.axes[1].get_lines()) == 1
+
+
+# The FMUs to play a run to
+
+
+SCENARIO = {
+    "fmus": {
+        "observer": {"path": "observer_kalman.fmu", "parameters": {"a": 1.0}, "step": 0.1},
+        "guidance": {"path": "guidance_ellipse.fmu"},
+        "controller": {"path": "controller_abs.fmu", "parameters": {"K": 2.0}},
+        "thrusters": {"path": "thrusters.fmu", "parameters": {"l_vsp": 0.5, "loss_bow": 0.3}},
+        "vessel": {"path": "vessel.fmu", "parameters": {"m": 9.0}},
+    },
+    "connections": [["thrusters.tau_cmd_X", "controller.tau_cmd_X"], ["vessel.x", "observer.x_m"]],
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A log of this project, with the scenario that made it."""
+    (tmp_path / "log.json").write_text(json.dumps({"scenario": SCENARIO}))
+    allocated = SimpleNamespace(allocation_parameters={"l_vsp"})
+    monkeypatch.setattr(playback, "ship", lambda: allocated)
+    return tmp_path
+
+
+def test_the_fmus_of_a_log_are_its_own_and_never_its_plant(folder):
+    found = playback.loop_of(folder, "abs", None, None)
+    assert found.controller == SCENARIO["fmus"]["controller"]
+    assert found.observer == {"path": "observer_kalman.fmu", "parameters": {"a": 1.0}}
+    assert found.guidance == {"path": "guidance_ellipse.fmu"}
+    assert found.thrusters == {"path": "thrusters.fmu", "parameters": {"l_vsp": 0.5}}
+    assert (found.told, found.own) == (True, True)
+    assert playback.loop_of(folder / "log.csv", "abs", None, None) == found
+    assert playback.loop_of(folder / "log.csv", "abs", "kalman", None) == found
+
+
+def test_another_controller_or_observer_is_not_that_of_the_run(folder):
+    other = playback.loop_of(folder, "cl_win", None, None)
+    assert (other.controller, other.own, other.told) == ({"path": "controller_cl_win.fmu"}, False, True)
+    seen = playback.loop_of(folder, "abs", "mdf", None)
+    assert (seen.observer, seen.own) == ({"path": "observer_mdf.fmu"}, False)
+    silent = {**SCENARIO, "connections": SCENARIO["connections"][1:]}
+    (folder / "log.json").write_text(json.dumps({"scenario": silent}))
+    assert not playback.loop_of(folder, "abs", None, None).told, "it was not told in the run"
+    assert playback.loop_of(folder, "cl_win", None, None).told
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", None])
+def test_without_a_scenario_the_usual_fmus_are_taken(folder, text):
+    (folder / "log.json").unlink() if text is None else (folder / "log.json").write_text(text)
+    found = playback.loop_of(folder, "abs", None, None)
+    assert found.observer == {"path": "observer_mdf.fmu"}
+    assert (found.guidance, found.own, found.told) == (None, False, True)
+    assert found.thrusters == {"path": "thrusters.fmu", "parameters": {}}
+    (folder / "log.json").write_text(json.dumps({"scenario": SCENARIO}))
+    assert playback.loop_of(folder / "a.csv", "abs", None, None).guidance is None, (
+        "no log of this project"
+    )
+
+
+def test_a_scenario_that_is_given_counts_in_place_of_the_run_s(folder, monkeypatch):
+    given = json.loads(json.dumps(SCENARIO))
+    given["fmus"]["observer"]["path"] = "../own.fmu"
+    model = SimpleNamespace(model_dump=lambda mode, by_alias: given)
+    monkeypatch.setattr(playback.cosim, "load_scenario", lambda path: model)
+    found = playback.loop_of(folder, "abs", None, folder / "s" / "scenario.json")
+    assert found.observer["path"] == str((folder / "own.fmu").resolve())
+    assert not found.own
+
+
+def test_a_detector_takes_the_place_of_the_controller(folder):
+    found = playback.watch_loop(folder, "watch_thrusters", None, None)
+    assert found.controller == {"path": "watch_thrusters.fmu"}
+    assert (found.guidance, found.thrusters, found.told) == (None, None, True)
+    assert found.observer["path"] == "observer_kalman.fmu"
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [("abs", "controller_abs.fmu"), ("controller_abs", "controller_abs.fmu"), ("abs.fmu", "abs.fmu"),
+     ("watch_x", "watch_x.fmu")],
+)  # fmt: skip
+def test_a_bare_name_is_an_fmu_of_the_project(name, path):
+    assert playback._path(name, "controller") == path
+    assert playback._path("some/own.fmu", "controller") == str(Path("some/own.fmu").resolve())
+
+
+def test_the_page_has_pictures_of_what_was_learned(monkeypatch):
+    monkeypatch.setattr(replay_report, "_signals", lambda r, names: names)
+    monkeypatch.setattr(replay_report, "_over_time", lambda r, names: tuple(names))
+    r = reported(lost={"z": np.ones(N, bool)})
+    r.played.log.update({f"controller.phi_hat_{k}": np.zeros(N) for k in range(19)})
+    page = replay_report.document(r)
+    assert page.lead == "Run a: samples recovered: z 50."
+    first, errors, learning = page.sections
+    assert first.text == [*replay_report.sentences(r)][1:]
+    assert [p.figure for p in errors.plots] == [ERRORS[:3], ERRORS[3:], COMMAND]
+    names = replay_report.estimates(r)
+    assert len(names) == 21
+    shown = [p.figure for p in learning.plots]
+    assert shown == [
+        replay_report.OMEGA,
+        tuple(names[:8]),
+        tuple(names[8:16]),
+        ("sigma_min", "by_store", "by_now"),
+    ]
+    assert page.provenance["lost"] == "z"
+    plain = replay_report.document(replay())
+    assert plain.provenance["lost"] == "nothing"
+    assert [p.figure for p in plain.sections[2].plots] == [replay_report.OMEGA]
