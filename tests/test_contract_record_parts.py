@@ -281,7 +281,11 @@ def comparison(tmp_path, **predictor):
 
 @pytest.fixture
 def ours(monkeypatch):
+    """A predictor of the project; returns the modules that seem to be imported."""
     monkeypatch.setattr(provenance, "foreign", lambda predictor: False)
+    modules = {"sys": SimpleNamespace()}
+    monkeypatch.setattr(provenance, "sys", SimpleNamespace(modules=modules))
+    return modules
 
 
 def test_files_are_data_layout_and_model_each_once(tmp_path, ours):
@@ -316,13 +320,11 @@ def test_a_parameter_set_is_the_model_where_its_numbers_are(tmp_path, ours, monk
         provenance.files_of(made, {"model": ssv})
 
 
-def test_modules_next_to_a_model_of_a_user_are_hashed(tmp_path, ours, monkeypatch):
+def test_modules_next_to_a_model_of_a_user_are_hashed(tmp_path, ours):
     for name in ("own.py", "helper.py"):
         (tmp_path / name).write_text(name)
     made = comparison(tmp_path, files=[("model", tmp_path / "own.py", "")])
-    monkeypatch.setitem(
-        provenance.sys.modules, "helper_of_own", SimpleNamespace(__file__=str(tmp_path / "helper.py"))
-    )
+    ours["helper_of_own"] = SimpleNamespace(__file__=str(tmp_path / "helper.py"))
     found = provenance.files_of(made, {})
     assert [(f["role"], f["path"].rpartition("/")[2]) for f in found[2:]] == [
         ("model", "own.py"),

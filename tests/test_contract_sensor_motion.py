@@ -330,13 +330,12 @@ def test_speed_and_course_are_channels_of_their_own():
 # Delays that are taken off in steps
 
 
-@given(st.floats(-1.0, 1.0), st.floats(0.1, 1.0))
-def test_a_step_is_halved_where_the_last_one_went_too_far(delay, share):
-    same, back = np.copysign(0.3, delay), -np.copysign(0.3, delay)
+@given(st.floats(0.01, 1.0), st.sampled_from([-1.0, 1.0]), st.floats(0.1, 1.0))
+def test_a_step_is_halved_where_the_last_one_went_too_far(size, side, share):
+    delay, same, back = side * size, 0.3 * side, -0.3 * side
     assert motion._step(delay, same, share) == (share * delay, share)
     assert motion._step(delay, 0.0, share) == (share * delay, share)
-    if delay:
-        assert motion._step(delay, back, share) == (0.5 * share * delay, 0.5 * share)
+    assert motion._step(delay, back, share) == (0.5 * share * delay, 0.5 * share)
 
 
 def finding(channel, kind, value, half=0.1, start=0.0, end=1.0):
