@@ -412,3 +412,19 @@ def test_the_replay_is_shown_with_what_was_measured(monkeypatch, tmp_path):
     ((verdict,),) = page.results.values()
     assert verdict[1] is True
     assert [name for name, *_ in page.figures] == ["lost_signals"]
+
+
+def test_panels_have_the_style_of_the_page_and_texts_are_no_formulas():
+    figure = figure_of(1.5)
+    first, second = figure.subplots(2, 1)
+    for panel in (first, second):
+        assert not panel.spines["top"].get_visible()
+        assert not panel.spines["right"].get_visible()
+        assert panel.xaxis.get_gridlines()[0].get_visible()
+        assert panel.yaxis.label.get_fontsize() == 9.0
+    second.set_ylabel("$x$")
+    second.plot([0.0, 1.0], label="$y$")
+    second.legend()
+    text = figure.svg("f", "it")
+    assert ">$x$</text>" in text
+    assert ">$y$</text>" in text
