@@ -74,13 +74,9 @@ def test_other_angles_stay_as_they_are(seen):
 def test_a_line_that_is_too_slow_for_a_wrap_is_a_turn():
     """Over so many rows a ship may turn all round."""
     most = int(2.0 * np.pi / LEAST_TURN)
-    for rows, wrapped in ((most - 2, True), (most + 3, False)):
-        seen = np.concatenate(
-            [np.full(400, 3.14), np.linspace(3.14, -3.14, rows + 1), np.full(400, -3.14)]
-        )
-        # With a step of more than LEAST_TURN in each row, whatever their number.
-        if rows > most:
-            seen[400 : 400 + rows + 1] = np.linspace(3.14 + 0.5 * np.pi, -3.14 - 0.5 * np.pi, rows + 1)
+    for rows, wrapped in ((most - 2, True), (most, True), (most + 1, False), (most + 7, False)):
+        end = 0.5 * 1.05 * LEAST_TURN * rows
+        seen = np.concatenate([np.full(100, end), np.linspace(end, -end, rows + 1), np.full(100, -end)])
         assert (wraps.unwrapped(seen)[1].size > 0) == wrapped
 
 
