@@ -97,7 +97,6 @@ def as_model(c: np.ndarray, B: np.ndarray, columns: Sequence[str], of: Ship | No
         c: (3,) [N, N, N m].
         B: (3, m).
         columns: names of the m columns.
-        of: the ship, by :func:`~diagnosis.analysis.samples.model_error`; None: the default ship.
         of: the ship, by :func:`~thesis.analysis.samples.model_error`; None: CyberShip Enterprise 1.
     """
     of = of or ship()

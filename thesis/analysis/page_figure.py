@@ -2,12 +2,15 @@
 
 import io
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 from xml.etree import ElementTree
 
 import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from diagnosis.report import GRID, INK
 
@@ -15,7 +18,6 @@ WIDTH = 4.8  # in; that of the report's charts
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cybership",
-    "text.parse_math": False,  # a run may be called $x$
     "font.size": 9.0,
     "legend.fontsize": 8.5,
     "legend.frameon": False,
@@ -41,8 +43,22 @@ DIGITS = re.compile(r"(\.\d\d)\d+")  # of a path's coordinates: what follows 0.0
 LEFT_OUT = {f"{{{SVG}}}metadata", f"{{{SVG}}}style"}  # date and maker; a style for the whole page
 
 
+@contextmanager
+def styled() -> Iterator[None]:
+    """Context with the style of a page, whatever that of the user is."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
 class PageFigure(Figure):
     """A figure that a page shows."""
+
+    def subplots(self, *args: Any, **more: Any) -> Any:
+        """Panels of the page's style: what they are made of has that of its making."""
+        with styled():
+            return super().subplots(*args, **more)
 
     def svg(self, key: str, label: str) -> str:
         """The figure as an ``<svg>`` element of a page.
@@ -52,9 +68,9 @@ class PageFigure(Figure):
             label: its text for screen readers.
         """
         made = io.StringIO()
-        with matplotlib.rc_context():
-            matplotlib.rcdefaults()
-            matplotlib.rcParams.update(STYLE)
+        for text in self.findobj(Text):
+            text.set_parse_math(False)  # a run may be called $x$
+        with styled():
             FigureCanvasSVG(self).print_svg(made, metadata={"Date": None, "Creator": None})
         root = ElementTree.fromstring(made.getvalue().encode())
         for parent in list(root.iter()):
