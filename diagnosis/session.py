@@ -264,12 +264,12 @@ class Session(ShortRepr):
 
     @property
     def calibration(self) -> RefitOutcome | None:
-        """The better of both calibrations; None: there are no coefficients, or runs do not determine them."""
+        """The better of both calibrations; None: runs do not determine coefficients."""
         return self.calibrations and self.calibrations.best
 
     @cached_property
     def calibrations(self) -> Calibrations | None:
-        """The coefficients fitted to predictions; None: there are none, or runs do not determine them."""
+        """The coefficients fitted to predictions; None: runs do not determine any."""
         if not (self.predictor.parametric and any(self.known.std.values())):
             return None
         nothing = Findings(model=self.start, searched=self.known)
