@@ -79,17 +79,15 @@ def refuse_minutes(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> N
     Raises:
         InputError: minutes beyond 90 and 180 degrees, or letters.
     """
-    names, there = " and ".join(pair.values()), {s: each.dropna() for s, each in cells.items()}
-    numbers = {s: pd.to_numeric(each, errors="coerce") for s, each in there.items()}
-    advice = "write decimal degrees, negative to south and west"
-    for signal, each in there.items():
-        if len(each) and numbers[signal].isna().all():
+    names, advice = " and ".join(pair.values()), "write decimal degrees, negative to south and west"
+    values = []
+    for each in (cells[signal].dropna() for signal in pair):
+        numbers = np.abs(np.asarray(pd.to_numeric(each, errors="coerce"), float))
+        if numbers.size and np.isnan(numbers).all():
             raise InputError(f"{names} are no numbers: '{each.iloc[0]}'; {advice}")
-    values = {s: np.abs(np.asarray(each.dropna(), float)) for s, each in numbers.items()}
-    beyond = any(
-        v.max(initial=0.0) > most for v, most in zip(values.values(), (90.0, 180.0), strict=True)
-    )
-    if beyond and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values.values()):
+        values.append(numbers[np.isfinite(numbers)])
+    beyond = [v.max(initial=0.0) > most for v, most in zip(values, (90.0, 180.0), strict=True)]
+    if any(beyond) and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values):
         raise InputError(f"{names} seem to be degrees and minutes (ddmm.mmmm); {advice}")
 
 
