@@ -245,13 +245,13 @@ def test_channels_that_disagree_about_the_motion_are_not_used():
     )
 
 
-def test_channels_count_from_half_of_the_rows_on_and_the_best_pair_goes_first():
+def test_channels_count_from_half_of_the_time_on_and_the_best_pair_goes_first():
     run = run_with(PAIRS[0])
     every = {name: x for by in PAIRS for name, x in run_with(by).measured.items()}
-    half = np.where(np.arange(T.size) % 2, every["u"], np.nan)
     fewer = np.where(np.arange(T.size) % 4 == 1, every["u"], np.nan)
     more = np.where(np.arange(T.size) % 4, every["u"], np.nan)
-    for u, by in ((every["u"], 0), (more, 0), (half, 1), (fewer, 1), (0.0 * T, 1)):
+    ends, long = (np.where(T < T[0] + part * np.ptp(T), every["u"], np.nan) for part in (0.4, 0.6))
+    for u, by in ((every["u"], 0), (more, 0), (fewer, 0), (long, 0), (ends, 1), (0.0 * T, 1)):
         assert evidence(replace(run, measured=every | {"u": u})).by == PAIRS[by]
     kept = evidence(replace(run, measured=every | {"u": more}))
     np.testing.assert_allclose(kept.velocity[1:], evidence(run).velocity[1:], atol=1e-3)

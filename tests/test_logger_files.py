@@ -90,8 +90,8 @@ def test_degrees_and_minutes_of_nmea_are_refused_by_their_name(tmp_path: Path, l
         whole = np.floor(degrees)
         minutes = 100.0 * whole + 60.0 * (degrees - whole)
         content[name] = [f"{value:.5f}{letters[k : k + 1]}" for value in minutes]
-    said = "are no numbers: '6326" if letters else "degrees and minutes"
-    with pytest.raises(InputError, match=f"lat and lon .*{said}.*decimal degrees"):
+    said = "a cell of lat and lon is not a number: '6326" if letters else "degrees and minutes"
+    with pytest.raises(InputError, match=f"{said}.*decimal degrees"):
         propose(written(tmp_path / "a.csv", content))
 
 

@@ -84,7 +84,7 @@ def refuse_minutes(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> N
     for each in (cells[signal].dropna() for signal in pair):
         numbers = np.abs(np.asarray(pd.to_numeric(each, errors="coerce"), float))
         if numbers.size and np.isnan(numbers).all():
-            raise InputError(f"{names} are no numbers: '{each.iloc[0]}'; {advice}")
+            raise InputError(f"a cell of {names} is not a number: '{each.iloc[0]}'; {advice}")
         values.append(numbers[np.isfinite(numbers)])
     beyond = [v.max(initial=0.0) > most for v, most in zip(values, (90.0, 180.0), strict=True)]
     if any(beyond) and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values):
