@@ -250,7 +250,7 @@ def test_channels_count_from_half_of_the_time_on_and_the_best_pair_goes_first():
     every = {name: x for by in PAIRS for name, x in run_with(by).measured.items()}
     fewer = np.where(np.arange(T.size) % 4 == 1, every["u"], np.nan)
     more = np.where(np.arange(T.size) % 4, every["u"], np.nan)
-    ends, long = (np.where(T < T[0] + part * np.ptp(T), every["u"], np.nan) for part in (0.4, 0.6))
+    ends, long = (np.where(T[0] + part * np.ptp(T) > T, every["u"], np.nan) for part in (0.4, 0.6))
     for u, by in ((every["u"], 0), (more, 0), (fewer, 0), (long, 0), (ends, 1), (0.0 * T, 1)):
         assert evidence(replace(run, measured=every | {"u": u})).by == PAIRS[by]
     kept = evidence(replace(run, measured=every | {"u": more}))

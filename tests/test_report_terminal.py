@@ -9,7 +9,7 @@ from rich.console import Console
 from support.reported import STABILITY, diagnosis, effect, learned, ranked, report_data
 
 from cosim import InputError
-from diagnosis import Counts
+from diagnosis import Counts, Model
 from diagnosis.assessment.covariates import SPEED
 from diagnosis.report import notebook
 from diagnosis.report.content import gain_content
@@ -23,10 +23,12 @@ from diagnosis.report.headline import (
 )
 from diagnosis.report.pictures import figures, tracks
 from diagnosis.report.pictures.chart import Chart, Panel
-from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
+from diagnosis.report.terminal import as_text, show_calibration, show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.measured_channels import UNUSED
 from diagnosis.runs.sensors.sensor_finding import SensorFinding
+from diagnosis.search.findings import Findings
+from diagnosis.search.refinement import RefinedModel
 from diagnosis.verdict.prediction_gain import PairedChange, PredictionGain
 
 
@@ -395,3 +397,16 @@ def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
     assert "<tr><td>b (test)</td><td>252 → 1.46</td>" in text
     assert [name for name, *_ in drawn] == ["profile", "model_error"]
     assert text.count("<svg") == 2
+
+
+@pytest.mark.parametrize(
+    ("offset", "said"), [({"heading_offset": np.pi / 90}, "heading_offset is 2°"), ({}, "")]
+)
+def test_the_axis_of_the_heading_is_shown_with_calibrated_coefficients(offset, said):
+    start = Model()
+    at = RefinedModel(start, np.zeros(1), offset, np.eye(len(offset)))
+    found = Findings([], model=start.plus(offset), moved={"X_u": 1.0}, estimate=at)
+    calibrated = SimpleNamespace(learned=found, model=found.model, measured=False, gain=None)
+    text = as_text(show_calibration(calibrated, report_data(compared(False), **DERIVED)))
+    assert said in text
+    assert ("heading_offset is" in text) is bool(offset)
