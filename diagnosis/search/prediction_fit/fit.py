@@ -292,7 +292,8 @@ def whitened(W: np.ndarray, x: np.ndarray) -> np.ndarray:
     fine = running(W)
     flat = x.reshape(len(x), W.shape[1], -1)
     found = np.zeros(flat.shape)
-    found[fine] = W[fine] @ flat[fine]
+    with np.errstate(invalid="ignore"):  # another model may run away in a window: its cost is infinite
+        found[fine] = W[fine] @ flat[fine]
     return found
 
 
