@@ -264,8 +264,8 @@ class Session(ShortRepr):
 
     @property
     def calibration(self) -> RefitOutcome | None:
-        """The better of both calibrations; None: runs do not determine coefficients."""
-        return self.calibrations and self.calibrations.best
+        """The calibration with the axis of the heading; None: runs do not determine coefficients."""
+        return self.calibrations and self.calibrations.with_axis
 
     @cached_property
     def calibrations(self) -> Calibrations | None:

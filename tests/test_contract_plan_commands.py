@@ -3,13 +3,12 @@
 import json
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from cosim import InputError
-from diagnosis import design_run, linearise, propose_columns
+from diagnosis import Counts, design_run, linearise, propose_columns
 from diagnosis.fmu_parameters import measured_system, system_map
 from diagnosis.runs import Column, Layout
 
@@ -226,16 +225,6 @@ def proposal(run="run", unused=(), blank=None):
     return SimpleNamespace(
         run=run, unused=[*unused], likely=blank or {}, needed={"columns": {}}, layout=Layout()
     )
-
-
-class Counts(NamedTuple):
-    """Samples of a run, and what became of them."""
-
-    samples: int
-    frozen: int
-    dropped: int
-    spikes: int
-    used: int
 
 
 def smoothed(name):

@@ -93,7 +93,7 @@ def test_the_axis_of_the_heading_is_calibrated_where_several_runs_show_it():
     alone, best = (np.ravel(unseen.errors(c.findings.model).over_all())[0] for c in fits)
     assert best < alone
     few = calibrations(Calibrator(nothing_found(), found[:2], Model(), PRIOR))
-    assert few.best is few.alone
+    assert few.with_axis is few.alone
 
 
 @pytest.mark.slow

@@ -26,11 +26,11 @@ class Calibrations(NamedTuple):
 
     Attributes:
         alone: nothing else in the model.
-        best: the same, of three runs or more with the axis of the heading.
+        with_axis: of three runs or more the axis of the heading as well; of fewer the same as ``alone``.
     """
 
     alone: RefitOutcome
-    best: RefitOutcome
+    with_axis: RefitOutcome
 
 
 def calibrations(calibrator: Calibrator) -> Calibrations:

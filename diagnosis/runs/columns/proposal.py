@@ -288,8 +288,11 @@ def _geographic(
     if not pair or not layout.columns.keys().isdisjoint(pair):
         return {}
     table = table_of_file(path, layout, set(pair.values()))
-    refuse_minutes(pair, {signal: table[name] for signal, name in pair.items()})
-    return local_columns(pair, {signal: _numbers(table[name], signal) for signal, name in pair.items()})
+    degrees = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
+    columns = local_columns(pair, degrees)
+    if not columns:
+        refuse_minutes(pair, {signal: table[name] for signal, name in pair.items()})
+    return columns
 
 
 def _percent(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
