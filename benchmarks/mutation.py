@@ -32,6 +32,7 @@ from benchmarks.near_tests import FARTHEST, WHOLE, Nearness, around
 
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
 KILLED, SURVIVED, SAME, OPEN = "killed", "survived", "equivalent", "not judged"
+LATE = "time over"  # a survivor whose tests did not end
 FILES = 8  # the nearest, which run; chosen: they hardly ever end within the time
 ALONE = 45  # s of one test, after which it does not end
 PYTEST = (
@@ -75,7 +76,7 @@ class Judge:
         finally:
             target.write_text(whole, encoding="utf-8")
         if outcome.code in (pytest.ExitCode.OK, None):
-            return SURVIVED, " ".join(files)
+            return LATE if outcome.code is None else SURVIVED, " ".join(files)
         if outcome.code == pytest.ExitCode.NO_TESTS_COLLECTED:
             return OPEN, "no test of these files runs"
         test = outcome.failed or files[0]
@@ -120,17 +121,18 @@ def table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
     known = {(each["module"], each["after"]) for each in listed if each["reason"]}
     fates: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for row in rows:
-        same = row["fate"] == SURVIVED and (row["module"], row["after"]) in known
+        same = row["fate"] in (SURVIVED, LATE) and (row["module"], row["after"]) in known
         fate = SAME if same else row["fate"]
         for name in (row["module"].partition("/")[0], "all"):
             fates[name][fate] += 1
-        if fate == SURVIVED:
+        if fate in (SURVIVED, LATE):
             yield f"{row['module']}:{row['line']}\n  - {row['before']}\n  + {row['after']}"
     for name in (*(p for p in PACKAGES if p in fates), "all"):
         killed, made = fates[name][KILLED], fates[name].total() - fates[name][SAME] - fates[name][OPEN]
         low, high = binomtest(killed, made).proportion_ci() if made else (0.0, 1.0)
         interval = f"{100 * low:.0f} to {100 * high:.0f} %"
-        rest = f"{fates[name][SAME]} equivalent, {fates[name][OPEN]} not judged"
+        late = f"{fates[name][LATE]} of the survivors before all their tests had run"
+        rest = f"{late}, {fates[name][SAME]} equivalent, {fates[name][OPEN]} not judged"
         yield f"{name}: {killed} / {made} ({interval}), {rest}"
 
 
@@ -141,7 +143,7 @@ def main() -> None:
     log = options.out.resolve() / f"seed_{options.seed}.jsonl"
     done = _read(log)
     if options.again:
-        alive = [key for key, row in done.items() if row["fate"] in (SURVIVED, OPEN)]
+        alive = [key for key, row in done.items() if row["fate"] != KILLED]
         mutants = [m for key in alive if (m := again(*key))]
     else:
         drawn = draw(options.mutants, options.seed, options.packages)

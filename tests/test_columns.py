@@ -77,6 +77,7 @@ def written(path: Path, table: pd.DataFrame) -> Path:
         ("wind_dir_true", "rad", "wind_direction"),
         ("wind_velo_relative_mid", "m/s", ""),
         ("x_position_mid", "", ""),
+        ("utm_easting", "m", "y"),
     ],
 )
 def test_words_of_a_name_and_its_unit_tell_a_signal(name: str, unit: str, signal: str) -> None:
@@ -328,6 +329,12 @@ def test_winds_are_known_by_their_usual_names(tmp_path: Path, name: str, signal:
     found = propose(path, TANKER).layout
     assert found.column(signal).name == name
     assert found.column("time").name == "Time UTC"
+
+
+def test_coordinates_of_utm_are_known_by_their_usual_names(tmp_path: Path) -> None:
+    table = zigzag(x="utm_n [m]", y="UTM E [m]")
+    found = propose(written(tmp_path / "a.csv", table), TANKER).layout
+    assert [found.column(signal).name for signal in ("x", "y")] == ["utm_n [m]", "UTM E [m]"]
 
 
 def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ FILLERS = frozenset(
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
         *("sign", "gear"),
-        *("gyro", "compass"),
+        *("gyro", "compass", "utm"),
     )
 )
 # Quantity -> word that is left of a name -> signal.

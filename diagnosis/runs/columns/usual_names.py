@@ -11,8 +11,14 @@ CALLED: dict[str, tuple[str, ...]] = {
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
         *("timestamputc", "gpstime", "elapsedtime", "seconds"),
     ),
-    "x": ("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
-    "y": ("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
+    "x": (
+        *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
+        "utmn",
+    ),
+    "y": (
+        *("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
+        "utme",
+    ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
         *("hdm", "compass", "gyro", "gyrocompass"),
