@@ -264,8 +264,8 @@ class Session(ShortRepr):
 
     @property
     def calibration(self) -> RefitOutcome | None:
-        """The calibration with the axis of the heading; None: runs do not determine coefficients."""
-        return self.calibrations and self.calibrations.with_axis
+        """The better one of :attr:`calibrations`; None: runs do not determine coefficients."""
+        return self.calibrations and self.calibrations.best
 
     @cached_property
     def calibrations(self) -> Calibrations | None:
@@ -276,7 +276,7 @@ class Session(ShortRepr):
         calibrator = Calibrator(nothing, self.train, self.start, self.known)
         self.advance("calibration of the coefficients")
         with suppress(LinAlgError):  # the runs do not determine them
-            return calibrations(calibrator) if calibrator.windows else None
+            return calibrations(calibrator, self.data(nothing.sigma)) if calibrator.windows else None
         return None
 
     @well_posed()

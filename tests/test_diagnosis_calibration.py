@@ -27,17 +27,20 @@ from diagnosis.verdict.validation_data import ValidationData
 DRAG = -2.0  # N s/m, hidden
 MOMENTS = (0.02, -0.02, 0.01, -0.01)  # N m, of each run, that nobody recorded
 STREAM_EAST = 0.04  # m/s
+SHARED = 0.03  # N m, of all runs
 PRIOR = NominalPrior.of(Model())
 
 
 @cache
-def runs(drag=DRAG, east=0.0, axis=0.0):
+def runs(drag=DRAG, east=0.0, axis=0.0, moment=0.0):
     """Runs of a ship that may have more drag than the model, each turned by a constant of its own.
 
     The water goes east [m/s]; the heading is measured about an axis that is off by an angle [rad].
+    One more moment [N m] turns all.
     """
     ships = [
-        {"delta_X_u": drag, "body_bias_N": moment if drag else 0.0, "V_e": east} for moment in MOMENTS
+        {"delta_X_u": drag, "body_bias_N": moment + (own if drag else 0.0), "V_e": east}
+        for own in MOMENTS
     ]
     if axis:
         ships = [ship | {"heading_offset": axis} for ship in ships]
@@ -82,18 +85,35 @@ def test_the_drag_is_found_beside_constants_of_each_run():
     assert len(fitted.fold_models) == 4
 
 
+def tried(found):
+    """Calibrations of some runs, judged by each run without it."""
+    data = ValidationData(found, [], Model(), np.ones(3))
+    return calibrations(Calibrator(nothing_found(), found, Model(), PRIOR), data)
+
+
 @pytest.mark.slow
-def test_the_axis_of_the_heading_is_calibrated_where_several_runs_show_it():
+@pytest.mark.parametrize(
+    ("name", "value", "ship"),
+    [("heading_offset", AXIS, {"axis": AXIS}), ("body_bias_N", SHARED, {"moment": SHARED})],
+)
+def test_what_several_runs_share_is_calibrated(name, value, ship):
     """Constants of all runs would stand for it, and a run that is not known has none."""
-    found = runs(axis=AXIS)
-    fits = calibrations(Calibrator(nothing_found(), found[:3], Model(), PRIOR))
-    offset = [c.findings.model.value("heading_offset") for c in fits]
-    assert offset == pytest.approx([0.0, AXIS], abs=0.25 * AXIS)
+    found = runs(0.0, **ship)
+    fits = tried(found[:3])
+    values = [c.findings.model.value(name) for c in fits]
+    assert values == pytest.approx([0.0, value], abs=0.1 * abs(value))
     unseen = Windows([found[3].smoothed])
     alone, best = (np.ravel(unseen.errors(c.findings.model).over_all())[0] for c in fits)
-    assert best < alone
-    few = calibrations(Calibrator(nothing_found(), found[:2], Model(), PRIOR))
-    assert few.with_axis is few.alone
+    assert best < 0.5 * alone
+    few = tried(found[:2])
+    assert few.best is few.alone
+
+
+@pytest.mark.slow
+def test_what_runs_do_not_share_is_not_calibrated():
+    """Each run has a moment of its own, and their mean predicts a run without it no better."""
+    found = tried(runs()[:3])
+    assert found.best is found.alone
 
 
 @pytest.mark.slow

@@ -602,7 +602,7 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(monk
         assert decided.learned.ranking == found.ranking != []
         return decided
 
-    coefficients, nothing = seen(calibration.with_axis), seen(None)
+    coefficients, nothing = seen(calibration.best), seen(None)
     assert (coefficients.refitted, nothing.refitted) == (True, False)
     assert (coefficients.changed, nothing.changed) == (True, False)
     assert nothing.learned.model == session.start

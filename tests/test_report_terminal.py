@@ -400,13 +400,20 @@ def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
 
 
 @pytest.mark.parametrize(
-    ("offset", "said"), [({"heading_offset": np.pi / 90}, "heading_offset is 2°"), ({}, "")]
+    ("values", "said"),
+    [
+        (
+            {"heading_offset": 0.03, "body_bias_N": -2.0},
+            "heading_offset is 0.03 rad\n  body_bias_N is -2 N.m",
+        ),
+        ({}, ""),
+    ],
 )
-def test_the_axis_of_the_heading_is_shown_with_calibrated_coefficients(offset, said):
+def test_what_all_runs_share_is_shown_with_calibrated_coefficients(values, said):
     start = Model()
-    at = RefinedModel(start, np.zeros(1), offset, np.eye(len(offset)))
-    found = Findings([], model=start.plus(offset), moved={"X_u": 1.0}, estimate=at)
+    at = RefinedModel(start, np.zeros(1), values, np.eye(len(values)))
+    found = Findings([], model=start.plus(values), moved={"X_u": 1.0}, estimate=at)
     calibrated = SimpleNamespace(learned=found, model=found.model, measured=False, gain=None)
     text = as_text(show_calibration(calibrated, report_data(compared(False), **DERIVED)))
     assert said in text
-    assert ("heading_offset is" in text) is bool(offset)
+    assert ("What all runs share" in text) is bool(values)

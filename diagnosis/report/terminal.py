@@ -61,10 +61,11 @@ def show_calibration(
     by = (f"{n} is {_number(calibrated.model.value(n))} ({_number(moved[n], 2)})" for n in furthest)
     title = "Coefficients with the largest changes (the change in standard deviations of the prior)"
     yield from _lines(title, by)
-    at = calibrated.learned.estimate
-    if at is not None and "heading_offset" in at.values:
-        axis = f"heading_offset is {degrees(calibrated.model.value('heading_offset')):.2g}°"
-        yield from _lines("Axis of the heading", [axis])
+    at, model = calibrated.learned.estimate, calibrated.model
+    shared = at.values if at is not None else {}
+    if shared:
+        lines = (f"{n} is {_number(float(model.value(n)), 2)} {model.declared(n).unit}" for n in shared)
+        yield from _lines("What all runs share", lines)
     yield from _errors(r)
     yield from _files(r, out)
 

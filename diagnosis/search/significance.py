@@ -3,6 +3,7 @@
 Two models are compared on the same data, block by block and window by window.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -149,8 +150,12 @@ def predicts_worse(its: Losses, others: Losses) -> bool:
     return True
 
 
-def gain(its: Losses, others: Losses) -> float:
-    """Fall of the losses from a model to another: logarithms of their ratios, summed over the three."""
+def gain(its: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> float:
+    """Fall of the losses from a model to another: logarithms of their ratios, summed.
+
+    Args:
+        its, others: the three of :class:`Losses`, or some.
+    """
     pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))

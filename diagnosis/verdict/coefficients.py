@@ -26,18 +26,23 @@ class Calibrations(NamedTuple):
 
     Attributes:
         alone: nothing else in the model.
-        with_axis: of three runs or more the axis of the heading as well; of fewer the same as ``alone``.
+        best: the same, or with what all runs share, see :meth:`.Calibrator.with_shared`, where the data
+            that decide are predicted better so.
     """
 
     alone: RefitOutcome
-    with_axis: RefitOutcome
+    best: RefitOutcome
 
 
-def calibrations(calibrator: Calibrator) -> Calibrations:
-    """Both; of fewer runs an axis and a force that acts in one run are indistinguishable."""
+def calibrations(calibrator: Calibrator, data: ValidationData) -> Calibrations:
+    """Both; of fewer than three runs what they share and what acts in one are indistinguishable."""
     alone = calibrator.coefficients()
-    axis = len(calibrator.train) >= WHOLE_RUNS and "heading_offset" in calibrator.start.ship.effects
-    return Calibrations(alone, calibrator.with_axis() if axis else alone)
+    if len(calibrator.train) < WHOLE_RUNS:
+        return Calibrations(alone, alone)
+    shared = calibrator.with_shared()
+    first, second = data.losses(alone.findings, shared.findings)
+    better = gain((first.position, first.heading), (second.position, second.heading)) > 0.0
+    return Calibrations(alone, shared if better else alone)
 
 
 class Conclusion(NamedTuple):

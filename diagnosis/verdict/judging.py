@@ -156,17 +156,17 @@ def judge(
     gain, unshown = None, set[str]()
     if calibrates:
         advance("gain of the search over calibration")
-        alone, with_axis = (c.findings for c in calibration) if calibration else (None, None)
+        alone, best = (c.findings for c in calibration) if calibration else (None, None)
         now = _predicting(fit.findings, data, changed)
-        gain = gain_of_search(data, start, with_axis, fit.findings, now)
-        # The axis of the heading is an effect: only coefficients make others superfluous.
-        by_alone = gain if alone is with_axis else gain_of_search(data, start, alone, fit.findings, now)
+        gain = gain_of_search(data, start, best, fit.findings, now)
+        # What runs share is an effect: only coefficients make others superfluous.
+        by_alone = gain if alone is best else gain_of_search(data, start, alone, fit.findings, now)
         unshown = without_gain(by_alone, fit.findings, start, train, [*prior.std])
         other = None
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
         if other is None and not any_sure(fit.findings, start, unshown):
-            other = better_calibration(calibration and calibration.with_axis, now, data, drives, unshown)
+            other = better_calibration(calibration and calibration.best, now, data, drives, unshown)
         nothing = (
             other is None
             and needless(fit.findings, unshown)
@@ -178,7 +178,7 @@ def judge(
             fit = other or to_predictions(learned, train, prior, False)
             fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
-            gain = gain_of_search(data, start, with_axis, fit.findings, now)
+            gain = gain_of_search(data, start, best, fit.findings, now)
     advance("residual")
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs

@@ -19,11 +19,13 @@ import numpy as np
 
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import Shooting
+from ...predictors.uncertainty import measurement_std
 from ..candidates import SMALL, model_error
 from ..findings import Findings
 from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
+from .disturbance import ForceDisturbance
 from .disturbance_summary import unrecorded
 from .fit import (
     Information,
@@ -67,8 +69,8 @@ class Calibration(PredictionFit):
         model, q = at.model(self.prior), self.unit.size
         whole, pushes = push_of(self.runs, model_error(self.runs, model), self.std)
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
-        usual = np.median([p.size for p in pushes], axis=0)
-        unit = np.concatenate([self.unit, usual[1:]])
+        columns = [*self._columns, *([*steps].index(n) for n in CONSTANTS)]
+        unit = np.concatenate([self.unit, usual(pushes)])
         folds = len(self.folds)
         H, G, g = np.zeros((folds, q, q)), np.zeros((q, q)), np.zeros((folds, q))
         by_constants, missed, expected = np.zeros((q, q)), 0.0, 0.0
@@ -76,7 +78,7 @@ class Calibration(PredictionFit):
         for s, of in zip(self.windows, self.fold_of_window, strict=True):
             around = s.around(model, steps)
             W = self.whitening(s, around)
-            A, r = whitened(W, around.slopes * unit), whitened(W, around.residuals)
+            A, r = whitened(W, around.slopes[..., columns] * unit), whitened(W, around.residuals)
             V = self.scatter(s, around, W, pushes)
             missed += float(np.sum(r**2))
             expected += float(np.einsum("wii->", V))
@@ -142,10 +144,22 @@ class Calibrator:
         """The first model with other values of the nominal coefficients, and nothing else."""
         return self._fitted(RefinedModel.at(self.start, self.prior))
 
-    def with_axis(self) -> RefitOutcome:
-        """The same with the axis of the heading, which the constants of all runs stand for otherwise."""
+    def with_shared(self) -> RefitOutcome:
+        """The same with an axis of the heading and constants that all runs share.
+
+        The constants of each run stand for them otherwise, and another run is predicted without. The fit
+        begins with the mean of the model error, which is part of the disturbance otherwise.
+        """
         at = RefinedModel.at(self.start, self.prior)
-        values, precision = {"heading_offset": 0.0}, np.array([[AXIS**-2.0]])
+        error = model_error(self.train, self.start)
+        std = np.concatenate([measurement_std(w, self.start) for w in self.train])
+        _, pushes = push_of(self.train, error, std)
+        found = zip(CONSTANTS, usual(pushes).tolist(), error.mean(axis=0)[1:].tolist(), strict=True)
+        shared = {name: (size, mean) for name, size, mean in found if size > 0.0}
+        if "heading_offset" in self.start.ship.effects:
+            shared = {**shared, "heading_offset": (AXIS, 0.0)}
+        values = {name: mean for name, (_, mean) in shared.items()}
+        precision = np.diag([size**-2.0 for size, _ in shared.values()])
         return self._fitted(replace(at, values=values, precision=precision))
 
     def _fitted(self, at: RefinedModel) -> RefitOutcome:
@@ -158,6 +172,11 @@ class Calibrator:
         learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)
         posterior = JointPosterior.of(fitted, self.prior)
         return RefitOutcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
+
+
+def usual(pushes: Sequence[ForceDisturbance]) -> np.ndarray:
+    """Prior standard deviations (2,) of CONSTANTS: the sizes of the usual disturbance [N, N m]."""
+    return np.median([p.size for p in pushes], axis=0)[1:]
 
 
 def begin(
