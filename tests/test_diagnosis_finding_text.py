@@ -6,6 +6,7 @@ from itertools import combinations
 import pytest
 from support.cse1 import EFFECTS
 
+from diagnosis.predictors import Model
 from diagnosis.report.finding_text import (
     advice,
     discriminating_run,
@@ -14,6 +15,8 @@ from diagnosis.report.finding_text import (
     separation_note,
     unit,
 )
+from diagnosis.report.reported_effect import of_whole_hull
+from diagnosis.search.findings import Finding
 from fmus.effects import Effect
 from fmus.effects.families import UNKNOWN
 from fmus.effects.text import Found
@@ -79,6 +82,27 @@ def test_sentences(name, given, said):
 def test_force_of_a_damping_term_is_that_at_the_speeds_reached():
     said = sentence(Found(EFFECTS["X_|u|u"], {"delta_X_absu_u": -20.0}, (0.2, 0.0, 0.0)))
     assert said == "The ship has more surge drag than the model: 0.8 N more at 0.2 m/s."
+
+
+@pytest.mark.parametrize(
+    ("effect", "others", "said"),
+    [
+        ("X_uuu", {}, ""),
+        ("X_uuu", {"X_absu_u": -20.0}, ""),
+        ("X_uuu", {"X_absu_u": 30.0}, "differs by 0.4 N astern."),
+        ("X_uuu", {"X_absu_u": 150.0}, "differs by 4.4 N ahead."),
+        ("X_uuu", {"N_r": 5.0}, ""),
+        ("mass", {"X_absu_u": 150.0}, ""),
+    ],
+)
+def test_a_coefficient_whose_force_others_take_away_says_so(effect, others, said):
+    """A law of one shape is a sum of two of others: the first alone is not what the ship has more."""
+    values = {"delta_X_uuu": -200.0} if effect == "X_uuu" else {"mass": 1.0}
+    start = Model()
+    learned = start.plus(values).plus(others)
+    told = of_whole_hull(Finding(effect, values, {}, 0.9, [], 0.9, 0.9), start, learned, (0.2, 0.1, 0.1))
+    assert told.endswith(said)
+    assert bool(told) is bool(said)
 
 
 def test_an_effect_of_a_user_says_what_it_says_of_itself():

@@ -4,14 +4,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
-from fmus.effects.text import Found
+import numpy as np
 
+from fmus.effects.force import damping_sentence
+from fmus.effects.text import Found, towards
+
+from ..assessment.stability import force
+from ..predictors import Model
 from ..predictors.ship_model import of_one_run, parameter_and_run
 from ..search.findings import Finding
 from ..session import Diagnosis
 from .finding_text import advice, equation, sentence, separation_note, unit
 
 T = TypeVar("T")
+OTHERWISE = 2.0  # 1, ratio of two forces of which one does not stand for the other (chosen)
 AXES = ("X", "Y", "N", "XY")  # effects on other sets of axes count as XYN
 
 
@@ -105,7 +111,32 @@ def _sentence(d: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
 
     shown = _shown(d, values)
     runs = [run for run in f.of_runs if shown is values]
-    return " ".join(f"Run {run}: {told(of_one_run(values, run))}" for run in runs) or told(shown)
+    said = " ".join(f"Run {run}: {told(of_one_run(values, run))}" for run in runs) or told(shown)
+    return said + of_whole_hull(f, d.start, d.learned.model, d.speeds)
+
+
+def of_whole_hull(f: Finding, start: Model, learned: Model, speeds: tuple[float, float, float]) -> str:
+    """By what the force of the whole hull differs, if a change of one coefficient says something else.
+
+    Other coefficients of the axis are fitted with it, and may take away most of what it adds.
+
+    Args:
+        f: the finding.
+        start, learned: the initial and the learned model.
+        speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
+    """
+    axis, _, term = f.id.partition("_")
+    if start.ship.effects[f.id].wording.sentence is not damping_sentence or f.of_runs:
+        return ""
+    nu = np.array([[speed if name in term else 0.0 for name, speed in zip("uvr", speeds, strict=True)]])
+    own, whole = (
+        float((force(model, nu) - force(start, nu))[0, AXES.index(axis)])
+        for model in (start.plus(f.values), learned)
+    )
+    if whole * own > 0.0 and 1.0 / OTHERWISE < whole / own < OTHERWISE:
+        return ""
+    size = towards(whole, "N m" if axis == "N" else "N", axis)
+    return f" With all coefficients that are fitted, the force of the hull there differs by {size}."
 
 
 def _shown(d: Diagnosis, values: Mapping[str, T]) -> Mapping[str, T]:
