@@ -64,7 +64,7 @@ def show_calibration(
     at, model = calibrated.learned.estimate, calibrated.model
     shared = at.values if at is not None else {}
     if shared:
-        lines = (f"{n} is {_number(float(model.value(n)), 2)} {model.declared(n).unit}" for n in shared)
+        lines = (f"{n} is {_number(model.value(n), 2)} {model.declared(n).unit}" for n in shared)
         yield from _lines("What all runs share", lines)
     yield from _errors(r)
     yield from _files(r, out)

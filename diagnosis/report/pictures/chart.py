@@ -112,7 +112,7 @@ class ChartAxis:
         for x in (0.0, *ROUND):
             at = float(self.spaced(x))
             if low <= at <= high and all(abs(at - other) >= apart for other in chosen):
-                chosen[at] = number(x, 6)
+                chosen[at] = number(float(x), 6)
         return [*chosen.items()]
 
 
