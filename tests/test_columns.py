@@ -330,6 +330,23 @@ def test_winds_are_known_by_their_usual_names(tmp_path: Path, name: str, signal:
     assert found.column("time").name == "Time UTC"
 
 
+@pytest.mark.parametrize("start", [200.0, 1.0], ids=["beyond a turn", "jumps over north"])
+def test_directions_in_degrees_are_seen_by_their_values(tmp_path: Path, start: float) -> None:
+    """No angle in rad begins beyond a turn or jumps by more than half of one; unwrapped ones go on."""
+    table = zigzag().assign(TWS=8.0)
+    blows = (start + 25.0 * np.sin(np.arange(len(table)))) % 360.0
+    path = written(tmp_path / "a.csv", table.assign(TWD=blows))
+    told = propose(path, TANKER).needed["columns"]
+    assert told["wind_direction"] == {"name": "TWD", "unit": "deg"}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": told | {"wind_direction": "TWD"}}))
+    with pytest.raises(
+        InputError, match=r'wind_direction up to [23]\d\d.*: is it in deg.*"unit": "deg"'
+    ):
+        prepare(read(path, of=TANKER))
+    unwrapped = written(tmp_path / "b.csv", table.assign(TWD=np.linspace(6.0, 40.0, len(table))))
+    assert propose(unwrapped, TANKER).needed["columns"]["wind_direction"] == "TWD"
+
+
 def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     for k, name in enumerate("abc"):
         written(tmp_path / f"{name}.csv", zigzag(100.0 + 20.0 * k))
