@@ -277,12 +277,20 @@ def losses(omega=1.0, position=1.0, heading=1.0, seed=0, size=40):
     ],
 )
 def test_a_model_harms_where_a_loss_is_surely_larger(now, words):
-    """Where it predicts places better and headings worse, their relative changes count together."""
+    """Where it predicts places better and headings worse, both changes count together."""
     assert harm(now, losses()) == words
     assert predicts_worse(now, losses()) == words.startswith("predictions")
     assert harm(now, losses(), 5) == words
     none = np.zeros(0)
     assert not predicts_worse(now._replace(position=none, heading=none), Losses(none, none, none))
+
+
+@pytest.mark.parametrize(("position", "worse"), [(0.4, False), (0.6, True)])
+def test_of_two_models_at_most_one_predicts_worse(position, worse):
+    """One halves the mean square of the place, to 0.4 or 0.6, and doubles that of the heading."""
+    one, other = losses(position=position, heading=2.0), losses()
+    assert predicts_worse(one, other) is worse
+    assert predicts_worse(other, one) is not worse
 
 
 @given(st.tuples(*[st.floats(0.2, 5.0)] * 3))

@@ -138,14 +138,15 @@ def harm(its: Losses, others: Losses, more: int = 0) -> str:
 def predicts_worse(its: Losses, others: Losses) -> bool:
     """Whether a model predicts worse than another by more than two paired standard errors.
 
-    Where it predicts positions better and headings worse by as much, or the reverse, the relative
-    changes of both mean squares count together.
+    Where it predicts positions better and headings worse by as much, or the reverse, the logarithms of
+    the ratios of both mean squares count together: of two models at most one predicts worse.
     """
     pairs = [(its.position, others.position), (its.heading, others.heading)]
     if not its.position.size or not any(worse(a, b) for a, b in pairs):
         return False
     if any(worse(b, a) for a, b in pairs):
-        return bool(sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs) > 0.0)
+        none = np.zeros(0)
+        return gain(its._replace(omega=none), others._replace(omega=none)) > 0.0
     return True
 
 
