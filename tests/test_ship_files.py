@@ -239,6 +239,13 @@ def test_one_line_says_what_is_wrong(old: str, new: str, says: str, tmp_path: Pa
     assert done.stdout == ""
 
 
+def test_a_place_further_than_a_metre_away_is_in_metres() -> None:
+    effect = ship(description=read_ship("kvlcc2")).effects["marker_offset"]
+    found = Found(effect, {"marker_offset_dx": -61.5, "marker_offset_dy": 0.572})
+    assert effect.wording is not None
+    assert "61.5 m astern and 57.2 cm to starboard" in effect.wording.sentence(found)
+
+
 def test_no_text_of_a_file_is_a_format(tmp_path: Path) -> None:
     braces = "{0}{title} %s %(a)d ''' \""
     text = RIGHT.replace('title = "the raft"', f"title = {json.dumps(braces)}")
