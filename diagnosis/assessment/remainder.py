@@ -64,11 +64,11 @@ IN_ONE_RUN = (
     "something that differed in that run, such as its place, load, water or weather",
 )
 LASTS = (
-    ("depends on neither position, motion, command nor time, but lasts for about {0:.0f} s at a time"),
+    "shows no dependence on position, motion, command or time, and lasts for about {0:.0f} s at a time",
     "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
 )
 BRIEF = (
-    "depends on neither position, motion, command nor time, and is short",
+    "shows no dependence on position, motion, command or time, and is short",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 
