@@ -24,7 +24,7 @@ class Recurrence(NamedTuple):
 
     Attributes:
         shares: space -> share of the sum of squares that repeats in it; 0 where that is chance.
-        lasts: s, how long the error stays correlated.
+        lasts: s, how long the error stays correlated; infinite: through whole runs.
         in_part: whether it is in proportion to the command of its axis, at times more and at times less.
         run: the only one of several runs that has it, but for a negligible rest; empty: there is none.
     """
@@ -61,6 +61,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     shifts = round(1.0 / SETTINGS.chance) - 1
     offsets = rng.integers(least, max(len(left) - least, least + 1), shifts)
     lasts = data[0].every * correlated_windows(data, left)
+    lasts[lasts > max(np.ptp(w.middle) for w in data)] = np.inf
     half_block = round(BLOCK / (2 * EVERY))  # windows of one amplitude of a command
     stretch = numbered([np.arange(w.middle.size) // half_block for w in data])
     found = []

@@ -67,6 +67,11 @@ LASTS = (
     "shows no dependence on position, motion, command or time, and lasts for about {0:.0f} s at a time",
     "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
 )
+THROUGHOUT = (
+    "shows no dependence on position, motion, command or time, and lasts through whole runs",
+    "a force that differs from run to run, such as that of wind or current, or one that is commanded "
+    "otherwise than recorded",
+)
 BRIEF = (
     "shows no dependence on position, motion, command or time, and is short",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
@@ -284,6 +289,8 @@ def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
         return REPEATS[r.best]
     if r.run:
         return IN_ONE_RUN[0].format(r.run), IN_ONE_RUN[1]
+    if np.isinf(r.lasts):
+        return THROUGHOUT
     if r.lasts > briefly:
         return LASTS[0].format(r.lasts), LASTS[1]
     return BRIEF
