@@ -516,6 +516,14 @@ def test_a_shaft_that_turns_evenly_is_likely_by_its_unit(tmp_path: Path) -> None
     assert {c.name for c in found.likely["propeller.n"]} == {"A [rpm]", "B [rpm]"}
 
 
+def test_a_shaft_without_a_unit_is_likely_by_its_name(tmp_path: Path) -> None:
+    table = zigzag(**{"propeller.n": "Shaft speed"}).assign(**{"Shaft speed": 105.0})
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert [(c.name, c.reasons) for c in found.likely["propeller.n"]] == [
+        ("Shaft speed", ["by its name"])
+    ]
+
+
 def test_a_heading_that_wraps_is_likely_by_the_course(tmp_path: Path) -> None:
     table = boat().rename(columns={"psi": "a"})
     table["a"] = np.degrees(table["a"]) % 360.0
