@@ -446,6 +446,13 @@ def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does
     assert not beside.doubt
 
 
+@pytest.mark.parametrize(("slow", "unexplained"), [(0.9, {"X"}), (0.5, set())])
+def test_waves_account_for_a_quick_remainder_and_not_for_a_slow_one(slow, unexplained):
+    waves = Finding("waves", {"wave_peak": 1.0}, {}, 0.9, [], 0.9, 0.9, together=0.9)
+    axes = {"X": AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True)}
+    assert unexplained_axes(Findings([waves]), Remainder(axes, ""), Model()) == unexplained
+
+
 @pytest.mark.parametrize(
     ("ids", "sure"),
     [

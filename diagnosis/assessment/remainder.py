@@ -105,6 +105,11 @@ class AxisRemainder:
         """Whether more is left than noise gives, be it so little that it does not matter."""
         return self.p_value < level()
 
+    @property
+    def is_slow(self) -> bool:
+        """Whether most of it, beyond the noise, lasts longer than a window, which no wave does."""
+        return 2.0 * self.slow**2 > self.rms**2 - self.uncertainty**2
+
 
 def remaining(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
     """The residual of a model on each axis of some runs, compared with that of the first one."""
