@@ -75,6 +75,13 @@ class Range:
     min: float | None = None
     max: float | None = None
 
+    @property
+    def words(self) -> str:
+        """The interval in words; empty if both sides are open."""
+        if self.min is None:
+            return "" if self.max is None else f"at most {self.max:g}"
+        return f"{self.min:g} to {self.max:g}" if self.max is not None else f">= {self.min:g}"
+
 
 POSITIVE = Range(min=0.0)
 

@@ -337,6 +337,23 @@ def test_coordinates_of_utm_are_known_by_their_usual_names(tmp_path: Path) -> No
     assert [found.column(signal).name for signal in ("x", "y")] == ["utm_n [m]", "UTM E [m]"]
 
 
+@pytest.mark.parametrize("start", [200.0, 1.0], ids=["beyond a turn", "jumps over north"])
+def test_directions_in_degrees_are_seen_by_their_values(tmp_path: Path, start: float) -> None:
+    """No angle in rad begins beyond a turn or jumps by more than half of one; unwrapped ones go on."""
+    table = zigzag().assign(TWS=8.0)
+    blows = (start + 25.0 * np.sin(np.arange(len(table)))) % 360.0
+    path = written(tmp_path / "a.csv", table.assign(TWD=blows))
+    told = propose(path, TANKER).needed["columns"]
+    assert told["wind_direction"] == {"name": "TWD", "unit": "deg"}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": told | {"wind_direction": "TWD"}}))
+    with pytest.raises(
+        InputError, match=r'wind_direction up to [23]\d\d.*: is it in deg.*"unit": "deg"'
+    ):
+        prepare(read(path, of=TANKER))
+    unwrapped = written(tmp_path / "b.csv", table.assign(TWD=np.linspace(6.0, 40.0, len(table))))
+    assert propose(unwrapped, TANKER).needed["columns"]["wind_direction"] == "TWD"
+
+
 def test_one_file_holds_for_all_of_a_folder(tmp_path: Path) -> None:
     for k, name in enumerate("abc"):
         written(tmp_path / f"{name}.csv", zigzag(100.0 + 20.0 * k))
@@ -504,6 +521,14 @@ def test_a_shaft_that_turns_evenly_is_likely_by_its_unit(tmp_path: Path) -> None
     table["B [rpm]"] = table["A [rpm]"] = 480.0
     found = propose(written(tmp_path / "a.csv", table), TANKER)
     assert {c.name for c in found.likely["propeller.n"]} == {"A [rpm]", "B [rpm]"}
+
+
+def test_a_shaft_without_a_unit_is_likely_by_its_name(tmp_path: Path) -> None:
+    table = zigzag(**{"propeller.n": "Shaft speed"}).assign(**{"Shaft speed": 105.0})
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert [(c.name, c.reasons) for c in found.likely["propeller.n"]] == [
+        ("Shaft speed", ["by its name"])
+    ]
 
 
 def test_a_heading_that_wraps_is_likely_by_the_course(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from diagnosis.search.gram import (
 )
 from diagnosis.search.most_likely import beyond, ridge, rise
 from diagnosis.search.significance import Losses, gain, harm, predicts_worse
+from fmus.scale import REFERENCE
 
 seeds = st.integers(0, 10**6)
 
@@ -44,6 +45,9 @@ def test_neighbours_are_the_nearest_of_another_run_or_time(seed, least, count):
         nearest = np.argsort(np.hypot(*(x - x[k]).T), kind="stable")[:count]
         far = [j for j in nearest if run[j] != run[k] or abs(time[j] - time[k]) >= least]
         wanted = far[: SETTINGS.neighbours]
+        way = x[wanted].mean(axis=0) - x[k] if wanted else 0.0 - x[k]
+        if way @ way > SETTINGS.repeats * x.var(axis=0).sum():  # alone
+            wanted = []
         assert rows[k][there[k]].tolist() == wanted
         assert there[k].sum() == len(wanted)
     if least > 0.0:
@@ -71,6 +75,36 @@ def test_the_share_that_repeats_is_a_squared_correlation_beyond_chance(seed, rep
     )
     assert recurrences._share(error, near, np.array([0])) == 0.0, "no more than by a shift"
     assert recurrences._share(0.0 * error, near, offsets) == 0.0
+
+
+def test_speeds_that_are_reached_once_say_nothing_of_what_repeats():
+    """A drag with a hump repeats with the speed, though only one of the runs is fast."""
+    speed = np.concatenate([np.linspace(4.0, 12.0, 100), np.linspace(4.0, 8.0, 100)])
+    run, time = np.repeat([0, 1], 100), np.tile(np.arange(100.0), 2)
+    error = np.where(speed < 8.0, -np.exp(-((speed - 6.5) ** 2)), 0.3 * (speed - 8.0))
+    near = recurrences._neighbours(speed[:, None], run, time, 60.0, 130)
+    assert not near[1][speed > 10.0].any()
+    assert near[1][speed < 8.0].all()
+    assert recurrences._share(error, near, np.zeros(0, int)) > 0.3
+
+
+def test_an_error_of_short_runs_is_compared_with_itself_at_many_shifts(monkeypatch):
+    """By one shift alone half of all errors would repeat."""
+    offsets = []
+    monkeypatch.setattr(recurrences, "_share", lambda error, near, at: offsets.append(at) or 0.0)
+    rng, n = np.random.default_rng(0), 130
+    w = SimpleNamespace(
+        middle=np.arange(float(n)),
+        every=1.0,
+        scale=REFERENCE,
+        known=np.ones(n, bool),
+        smoothed=SimpleNamespace(eta=rng.standard_normal((n, 3)), nu=rng.standard_normal((n, 3))),
+        smooth=np.eye(n),
+        held=np.eye(n),
+        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one"),
+    )
+    recurrences.recurrence([w], rng.standard_normal((n, 3)))
+    assert all(np.unique(at).size > 20 for at in offsets)
 
 
 @given(seeds, st.sampled_from([0.3, 0.9]))
@@ -277,12 +311,20 @@ def losses(omega=1.0, position=1.0, heading=1.0, seed=0, size=40):
     ],
 )
 def test_a_model_harms_where_a_loss_is_surely_larger(now, words):
-    """Where it predicts places better and headings worse, their relative changes count together."""
+    """Where it predicts places better and headings worse, both changes count together."""
     assert harm(now, losses()) == words
     assert predicts_worse(now, losses()) == words.startswith("predictions")
     assert harm(now, losses(), 5) == words
     none = np.zeros(0)
     assert not predicts_worse(now._replace(position=none, heading=none), Losses(none, none, none))
+
+
+@pytest.mark.parametrize(("position", "worse"), [(0.4, False), (0.6, True)])
+def test_of_two_models_at_most_one_predicts_worse(position, worse):
+    """One halves the mean square of the place, to 0.4 or 0.6, and doubles that of the heading."""
+    one, other = losses(position=position, heading=2.0), losses()
+    assert predicts_worse(one, other) is worse
+    assert predicts_worse(other, one) is not worse
 
 
 @given(st.tuples(*[st.floats(0.2, 5.0)] * 3))

@@ -128,6 +128,14 @@ def test_part_of_a_command_that_comes_and_goes_is_told_from_a_force_that_does(la
     assert [axis.in_part for axis in recurrence(lap, left)] == [at_times] * 3
 
 
+def test_an_error_that_lasts_longer_than_a_run_lasts_through_whole_runs(lap):
+    (w,) = lap
+    parts = {name: getattr(w, name)[:40] for name in ("middle", "block", "smooth", "slope", "held")}
+    runs = [replace(w, **parts)] * 2
+    left = np.repeat([1.0, 2.0], 40)[:, None] * np.ones(3)
+    assert [axis.lasts for axis in recurrence(runs, left)] == [np.inf] * 3
+
+
 @pytest.mark.parametrize("alone", [True, False])
 def test_an_error_of_one_run_alone_is_told_from_one_of_all_runs(lap, alone):
     (w,) = lap
@@ -438,6 +446,13 @@ def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does
     assert not beside.doubt
 
 
+@pytest.mark.parametrize(("slow", "unexplained"), [(0.9, {"X"}), (0.5, set())])
+def test_waves_account_for_a_quick_remainder_and_not_for_a_slow_one(slow, unexplained):
+    waves = Finding("waves", {"wave_peak": 1.0}, {}, 0.9, [], 0.9, 0.9, together=0.9)
+    axes = {"X": AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True)}
+    assert unexplained_axes(Findings([waves]), Remainder(axes, ""), Model()) == unexplained
+
+
 @pytest.mark.parametrize(
     ("ids", "sure"),
     [
@@ -623,7 +638,14 @@ def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     [
         ("mass", -9.8, "mass = -9.8 kg is at the lower limit of the search, -10 kg (a ship of 4.99 kg: weigh it)"),
         ("mass", 99.0, "mass = 99 kg is at the upper limit of the search, 100 kg (a ship of 113.8 kg: weigh it)"),
-        ("loss_surge", 0.98, "loss_surge = 0.98 is at the upper limit of the search, 1"),
+        (
+            "loss_surge",
+            0.98,
+            "loss_surge = 0.98 is at the upper limit of the search, 1 (more would be a force against the command: "
+            "check its sign in the log)",
+        ),
+        ("loss_bow", 1.0, "loss_bow = 1 is at the upper limit of the search, 1 (more would be a force against the "
+         "command: check its sign in the log)"),
         ("added_mass_Y", -9.8, "added_mass_Y = -9.8 kg is at the lower limit of the search, -10 kg"),
         ("mass", 90.0, ""),
     ],

@@ -279,10 +279,11 @@ def test_which_intervals_a_region_may_be(covariate, count):
         (HEADING, -0.5 * np.pi, 0.25 * np.pi, "on headings of -90 to 45°"),
         (NORTH, None, -2.0, "south of -2 m"),
         (EAST, 2.0, None, "east of 2 m"),
+        (EAST, 412013.26, None, "east of 412013.3 m"),
     ],
 )
 def test_a_region_in_words(covariate, low, high, phrase):
-    region = Region("N", covariate, None, low, high, 0.31, 0.122, 0.25, 1e-3, 1.0)
+    region = Region("N", covariate, None, low, high, 0.31, 0.122, 0.25, 1e-3, 1.0, 30.0)
     assert region.phrase == phrase
     assert (
         region.sentence

@@ -404,7 +404,7 @@ def test_browser_has_nothing_to_complain_of_and_prints(report, browser, tmp_path
 
 @pytest.mark.parametrize(("by", "drawn"), [(EAST, True), (NORTH, True), (SPEED, False)])
 def test_what_is_found_at_a_place_has_a_picture_of_the_place(data, tmp_path, by, drawn):
-    region = Region("X", by, None, 1.0, None, 0.2, 0.1, 0.3, 0.0, 1.0)
+    region = Region("X", by, None, 1.0, None, 0.2, 0.1, 0.3, 0.0, 1.0, 2.0)
     c = compared([evaluate_run(w, Model()) for w in data[1:]], regions=[region])
     page = Page(write_report(tmp_path / "report.html", ReportData(c)))
     assert ("place-0.svg" in page.values("download")) is drawn

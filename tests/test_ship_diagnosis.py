@@ -108,9 +108,13 @@ def test_commands_far_beyond_their_limit_are_refused_and_say_since_when(ship, ru
     other.loc[half:, "port.n"] *= 60.0
     first = run["time"][int(np.argmax(np.abs(other["port.n"]) > 3.0 * 16.541))]
     assert first >= run["time"][half]
-    with pytest.raises(
-        InputError, match=rf"port\.n reaches .* times its limit, .*from {first:.4g} s on"
-    ):
+    since = (
+        rf"port\.n reaches .* times its limit, .*from {first:.4g} s on; probably its unit changes there"
+    )
+    with pytest.raises(InputError, match=since):
+        diagnosis.load(other, ship="otter")
+    other.loc[:half, "port.n"] = 0.0  # nothing has another unit before
+    with pytest.raises(InputError, match="s on; probably it is in another unit"):
         diagnosis.load(other, ship="otter")
     requested = run.copy()
     requested["port.n"] *= 1.5  # a request that was logged before it was clipped

@@ -113,12 +113,12 @@ CHANGES = [
     ('name = "starboard"', 'name = "port"', "actuators: port occurs twice"),
     ('name = "port"', 'name = "for"', "actuator 'for': a keyword of Python cannot be a name"),
     ("n_max = 10.0", "n_mx = 10.0", "actuator 'port': unknown key 'n_mx'; did you mean 'n_max'?"),
-    ("n_max = 10.0", "n_max = -10.0", "n_max = -10 1/s is out of its range"),
+    ("n_max = 10.0", "n_max = -10.0", "n_max = -10 1/s is out of its range (>= 0)"),
     ("n_min = -10.0", "n_min = 10.0", "n_min = 10 1/s is out of its range"),
     ("n_max = 10.0", "n_max = nan", "actuator 'port': n_max: Input should be a finite number"),
     ("n_max = 10.0", "n_max = [1]", "actuator 'port': n_max: Input should be a valid number"),
     ("n_max = 10.0", "n_max = {vlue = 1.0}", "n_max: vlue: unknown key; did you mean 'value'?"),
-    ("n_max = 10.0", "lag = 1e6", "lag = 1e+06 s is out of its range"),
+    ("n_max = 10.0", "lag = 1e6", "lag = 1e+06 s is out of its range (0 to"),
     ("beam = 1.0", f"beam = {'1' * 5000}", "cannot be read as TOML: Exceeds the limit"),
     ("beam = 1.0", f"beam = {'1' * 4000}", "beam: Input should be"),
     ('law = "fixed_propeller"', f'law = "{"y " * 50_000}"', "there is no law 'y y y"),
@@ -237,6 +237,13 @@ def test_one_line_says_what_is_wrong(old: str, new: str, says: str, tmp_path: Pa
     assert len(done.stderr) < 800
     assert done.stderr.isascii() or "é" in new
     assert done.stdout == ""
+
+
+def test_a_place_further_than_a_metre_away_is_in_metres() -> None:
+    effect = ship(description=read_ship("kvlcc2")).effects["marker_offset"]
+    found = Found(effect, {"marker_offset_dx": -61.5, "marker_offset_dy": 0.572})
+    assert effect.wording is not None
+    assert "61.5 m astern and 57.2 cm to starboard" in effect.wording.sentence(found)
 
 
 def test_no_text_of_a_file_is_a_format(tmp_path: Path) -> None:

@@ -49,12 +49,12 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
         beyond = size > SETTINGS.most_gain * most
         if (layout.round and layout.round[k]) or beyond.mean() <= SETTINGS.negligible:
             continue
-        first = float(run.time[int(np.argmax(beyond))])
+        first = int(np.argmax(beyond))
+        why = "its unit changes there" if size[:first].any() else "it is in another unit"
         rows = f"{int(beyond.sum())} of {len(size)} rows"
         return (
             f"{name} reaches {size.max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times "
-            f"its limit, {most:.4g} {unit}, in {rows}, from {first:.4g} s on; probably its unit "
-            "changes there"
+            f"its limit, {most:.4g} {unit}, in {rows}, from {run.time[first]:.4g} s on; probably {why}"
         )
     return None
 

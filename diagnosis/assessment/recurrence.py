@@ -24,7 +24,7 @@ class Recurrence(NamedTuple):
 
     Attributes:
         shares: space -> share of the sum of squares that repeats in it; 0 where that is chance.
-        lasts: s, how long the error stays correlated.
+        lasts: s, how long the error stays correlated; infinite: through whole runs.
         in_part: whether it is in proportion to the command of its axis, at times more and at times less.
         run: the only one of several runs that has it, but for a negligible rest; empty: there is none.
     """
@@ -52,15 +52,16 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     time = np.concatenate([w.middle for w in data])
     place, motion, command = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
     apart = 2 * BLOCK * data[0].scale.time
-    # A pass of so long to both sides has fewer windows.
-    count = SETTINGS.neighbours + 2 * round(apart / data[0].every) + 1
+    least = round(apart / data[0].every) + 1  # windows, of a shift after which none is its own neighbour
+    count = SETTINGS.neighbours + 2 * least  # a pass of so long to both sides has fewer windows
     spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
     rng = np.random.default_rng(0)
     shifts = round(1.0 / SETTINGS.chance) - 1
-    offsets = rng.integers(count, max(len(left) - count, count + 1), shifts)
+    offsets = rng.integers(least, max(len(left) - least, least + 1), shifts)
     lasts = data[0].every * correlated_windows(data, left)
+    lasts[lasts > max(np.ptp(w.middle) for w in data)] = np.inf
     half_block = round(BLOCK / (2 * EVERY))  # windows of one amplitude of a command
     stretch = numbered([np.arange(w.middle.size) // half_block for w in data])
     found = []
@@ -93,20 +94,27 @@ def _neighbours(
     """Rows (K, n) of the nearest windows of another run or time, and which of them there are.
 
     Nearest by places x (K, k), among so many, and apart by at least so many seconds; infinite: only of
-    other runs.
+    other runs. A window has none where it is alone, as at a speed that is reached once: of a linear
+    function of x too little repeats at such a distance.
     """
     rows = KDTree(x).query(x, min(count, len(x)))[1].reshape(len(x), -1)
     apart = (run[rows] != run[:, None]) | (np.abs(time[rows] - time[:, None]) >= least)
     order = np.argsort(~apart, axis=1, kind="stable")[:, : SETTINGS.neighbours]
-    return np.take_along_axis(rows, order, axis=1), np.take_along_axis(apart, order, axis=1)
+    rows, there = (np.take_along_axis(each, order, axis=1) for each in (rows, apart))
+    alone = np.sum((_mean(x, rows, there) - x) ** 2, axis=1) > SETTINGS.repeats * x.var(axis=0).sum()
+    return rows, there & ~alone[:, None]
+
+
+def _mean(x: np.ndarray, rows: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Mean over the neighbours (K, n) of each window, of x (K, k); zero where there is none."""
+    return np.einsum("kn,kn...->k...", there, x[rows]) / np.maximum(there.sum(axis=1), 1)[:, None]
 
 
 def _share(error: np.ndarray, near: tuple[np.ndarray, np.ndarray], offsets: np.ndarray) -> float:
     """Share of an error that its neighbours foretell; 0 if that is chance."""
 
     def foretold(x: np.ndarray) -> float:
-        rows, there = near
-        mean = (x[rows] * there).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+        mean = _mean(x[:, None], *near)[:, 0]
         size = float(np.sqrt((mean @ mean) * (x @ x)))
         return max(float(mean @ x), 0.0) ** 2 / size**2 if size > 0.0 else 0.0
 

@@ -112,6 +112,7 @@ class Region:
         share: of the windows inside.
         p_value: of Welch's test, corrected for the number of regions tried.
         contrast: variance of the logarithm that the division into inside and outside explains.
+        spread: of the covariate over all bins, in its unit.
     """
 
     axis: str
@@ -124,14 +125,15 @@ class Region:
     share: float
     p_value: float
     contrast: float
+    spread: float
 
     @property
     def phrase(self) -> str:
         """The region as a part of a sentence."""
         by = self.covariate
         ends = [x for x in (self.low, self.high) if x is not None]
-        apart, most = np.ptp(ends), np.abs(ends).max()
-        # Of the ends three digits, of two far from zero those that tell them apart.
+        apart, most = np.ptp(ends) or self.spread, np.abs(ends).max()
+        # Of the ends three digits, of those far from zero as many as show where in its spread one is.
         digits = 3 + max(int(np.log10(most / apart)) if apart > 0.0 else 0, 0)
         low, high = (
             None if x is None else f"{by.display_factor * x:.{digits}g}" for x in (self.low, self.high)
@@ -292,4 +294,7 @@ class _Design:
         low = float(p.edges[first]) if first > 0 or cyclic else None
         high = float(p.edges[(after - 1) % bins + 1]) if after < bins or cyclic else None
         contrast = share * (1.0 - share) * (a.mean - b.mean) ** 2
-        return Region(p.axis, p.covariate, p.run, low, high, inner, outer, share, p_value, contrast)
+        spread = float(np.ptp(p.edges))
+        return Region(
+            p.axis, p.covariate, p.run, low, high, inner, outer, share, p_value, contrast, spread
+        )

@@ -64,11 +64,16 @@ IN_ONE_RUN = (
     "something that differed in that run, such as its place, load, water or weather",
 )
 LASTS = (
-    ("depends on neither position, motion, command nor time, but lasts for about {0:.0f} s at a time"),
+    "shows no dependence on position, motion, command or time, and lasts for about {0:.0f} s at a time",
     "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
 )
+THROUGHOUT = (
+    "shows no dependence on position, motion, command or time, and lasts through whole runs",
+    "a force that differs from run to run, such as that of wind or current, or one that is commanded "
+    "otherwise than recorded",
+)
 BRIEF = (
-    "depends on neither position, motion, command nor time, and is short",
+    "shows no dependence on position, motion, command or time, and is short",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 
@@ -99,6 +104,11 @@ class AxisRemainder:
     def beyond_chance(self) -> bool:
         """Whether more is left than noise gives, be it so little that it does not matter."""
         return self.p_value < level()
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether most of it, beyond the noise, lasts longer than a window, which no wave does."""
+        return 2.0 * self.slow**2 > self.rms**2 - self.uncertainty**2
 
 
 def remaining(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
@@ -284,6 +294,8 @@ def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
         return REPEATS[r.best]
     if r.run:
         return IN_ONE_RUN[0].format(r.run), IN_ONE_RUN[1]
+    if np.isinf(r.lasts):
+        return THROUGHOUT
     if r.lasts > briefly:
         return LASTS[0].format(r.lasts), LASTS[1]
     return BRIEF

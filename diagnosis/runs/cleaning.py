@@ -12,6 +12,7 @@ from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
+from .columns.columns import other_angles
 from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
@@ -211,7 +212,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     of_heading = np.flatnonzero(measured[:, 2])
     turning = np.interp(run.time[fresh], run.time[of_heading], run.pose[of_heading, 2])
     as_read = np.column_stack([run.pose[fresh, :2], turning])
-    refuse_units(run.time[fresh], as_read, where, anyway, run.called or {})
+    angles = other_angles(run.measured)
+    refuse_units(run.time[fresh], as_read, angles, where, anyway, run.called or {})
     pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])

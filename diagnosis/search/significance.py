@@ -139,23 +139,28 @@ def harm(its: Losses, others: Losses, more: int = 0) -> str:
 def predicts_worse(its: Losses, others: Losses) -> bool:
     """Whether a model predicts worse than another by more than two paired standard errors.
 
-    Where it predicts positions better and headings worse by as much, or the reverse, the relative
-    changes of both mean squares count together.
+    Where it predicts positions better and headings worse by as much, or the reverse, the logarithms of
+    the ratios of both mean squares count together: of two models at most one predicts worse.
     """
     pairs = [(its.position, others.position), (its.heading, others.heading)]
     if not its.position.size or not any(worse(a, b) for a, b in pairs):
         return False
     if any(worse(b, a) for a, b in pairs):
-        return bool(sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs) > 0.0)
+        return gain_of_predictions(its, others) > 0.0
     return True
 
 
-def gain(its: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> float:
-    """Fall of the losses from a model to another: logarithms of their ratios, summed.
+def gain(its: Losses, others: Losses) -> float:
+    """Fall of the losses from a model to another: logarithms of their ratios, summed over the three."""
+    return _fall(its, others)
 
-    Args:
-        its, others: the three of :class:`Losses`, or some.
-    """
+
+def gain_of_predictions(its: Losses, others: Losses) -> float:
+    """The same of the predictions alone."""
+    return _fall(its[1:], others[1:])
+
+
+def _fall(its: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> float:
     pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))

@@ -15,7 +15,7 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import gain, harm, predicts_worse
+from ..search.significance import gain, gain_of_predictions, harm, predicts_worse
 from .confidence import FOUND, Doubts, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
@@ -40,8 +40,7 @@ def calibrations(calibrator: Calibrator, data: ValidationData) -> Calibrations:
     if len(calibrator.train) < WHOLE_RUNS:
         return Calibrations(alone, alone)
     shared = calibrator.with_shared()
-    first, second = data.losses(alone.findings, shared.findings)
-    better = gain((first.position, first.heading), (second.position, second.heading)) > 0.0
+    better = gain_of_predictions(*data.losses(alone.findings, shared.findings)) > 0.0
     return Calibrations(alone, shared if better else alone)
 
 

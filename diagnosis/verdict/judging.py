@@ -209,11 +209,10 @@ def _predicting(found: Findings, data: ValidationData, changed: bool) -> Finding
 
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
-    """Axes with a significant residual; none where waves are sure, which account for it."""
+    """Axes with a significant residual; where waves are sure, which account for it, with a slow one."""
     waves = [f for f in found.effects if start.ship.effects[f.id].search.by == "spectrum"]
-    if any(confidence_of(f, start).own >= FOUND for f in waves):
-        return set()
-    return {axis for axis, r in remainder.axes.items() if r.significant}
+    are_sure = any(confidence_of(f, start).own >= FOUND for f in waves)
+    return {axis for axis, r in remainder.axes.items() if r.significant and (r.is_slow or not are_sure)}
 
 
 def replaceable(

@@ -13,7 +13,7 @@ from pathlib import Path
 from cybership.command_arguments import command_parser, complain, folder_name
 from cybership.scratch_folder import sweep
 
-from ..declare import DeclarationError, Range, variables
+from ..declare import DeclarationError, variables
 from ..effects import STANDARD
 from ..installed import plus_files
 from ..interruption import run_interruptible
@@ -181,15 +181,8 @@ def _listed(names: Sequence[str], of: Ship, native: bool) -> Iterator[str]:
         for kind, group in kinds:
             for v in variables(group):
                 start = f"{v.start:g}" if kind != "output" else ""
-                yield f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{_limits(v.range)}"
-
-
-def _limits(allowed: Range) -> str:
-    if allowed.min is None:
-        return "" if allowed.max is None else f", at most {allowed.max:g}"
-    return (
-        f", {allowed.min:g} to {allowed.max:g}" if allowed.max is not None else f", >= {allowed.min:g}"
-    )
+                limits = f", {v.range.words}" if v.range.words else ""
+                yield f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{limits}"
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from .devices import SHARE, Devices, declared, parameter
 from .effect import Effect, Memory, Running, Search, Thrust, Wording, effect
 from .families import PROPELLERS, SIDE_THRUST, SYNC_PULSE, TIMING
 from .misplaced import place_parameters
-from .text import Found, lost, number, offset
+from .text import Found, against_command, lost, number, offset
 
 SLOTS = 64  # commands that a delay keeps; a longer one is remembered in coarser steps
 FORGOTTEN = 12.0  # time constants after which e^-12 = 6e-6 of an earlier command is left
@@ -135,6 +135,7 @@ loss_surge = _axis_loss(
             "X_u": "change the speed often, instead of holding it",
             "mass": "run steady and accelerating legs",
         },
+        measured=against_command,
     ),
 )
 loss_sway = _axis_loss(
@@ -145,6 +146,7 @@ loss_sway = _axis_loss(
         _axis_sentence("sway", "force"),
         SIDE_THRUST,
         {"Y_r": "crab to both sides with no turn"},
+        measured=against_command,
     ),
 )
 loss_yaw = _axis_loss(
@@ -155,6 +157,7 @@ loss_yaw = _axis_loss(
         _axis_sentence("yaw", "moment"),
         SIDE_THRUST,
         {"N_r": "turn on the spot, with starts and stops of the turn"},
+        measured=against_command,
     ),
 )
 

@@ -137,6 +137,7 @@ def declared(
     axis: str = "",
     apart: dict[str, str] | None = None,
     pictures: tuple[Picture, ...] = (),
+    measured: Callable[[float, Callable[[str], float]], str] | None = None,
     **more: Any,
 ) -> Callable[[EffectFunction], Effect]:
     """The decorator that makes an effect of actuators.
@@ -144,10 +145,10 @@ def declared(
     Args:
         d: the actuators.
         id, axis, parameters: of the effect; by default it acts on the axes of the actuators.
-        sentence, apart, pictures: see :class:`~fmus.effects.effect.Wording`.
+        sentence, apart, pictures, measured: see :class:`~fmus.effects.effect.Wording`.
         more: further arguments of :func:`~fmus.effects.effect.effect`.
     """
-    wording = Wording(sentence, d.family, apart or {}, pictures)
+    wording = Wording(sentence, d.family, apart or {}, pictures, measured)
     return effect(
         id, "actuator", axis or d.axis, parameters=parameters, wording=wording, apart=d.apart, **more
     )

@@ -7,7 +7,7 @@ from ..declare import POSITIVE, Variable
 from ..ops import Condition, Number, clip, fmax, where
 from .devices import SHARE, Devices, added, changed, declared, parameter
 from .effect import Effect, Running, Search, Thrust, Values
-from .text import Found, capital, lost, number, percent
+from .text import Found, against_command, capital, lost, number, percent
 
 INTERVALS = 8  # of an outage: the parameters of the FMU are so many
 INSTANT = 1e-9  # s; times that differ by less are the same
@@ -34,6 +34,7 @@ def loss(d: Devices, others: bool = True) -> Effect:
         }
         if others
         else {},
+        measured=against_command,
         formula="f (1 - δ)",
         symbol="δ",
         sign="positive: force is lost; negative: more power than specified",

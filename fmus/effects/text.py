@@ -66,10 +66,18 @@ def lost(name: str, sentence: Callable[[str, str], str]) -> Callable[[Found], st
     return lambda f: sentence(percent(f[name]), "less" if f[name] > 0.0 else "more")
 
 
+def against_command(share: float, model: object) -> str:
+    """What to check where all of a force seems lost, or more, which is beyond the end of a search."""
+    return "more would be a force against the command: check its sign in the log" if share > 0.0 else ""
+
+
 def offset(f: Found, name: str) -> str:
     """A place on the ship, by the parameters ``name_dx`` and ``name_dy`` [m]."""
-    ways = (towards(100.0 * f[f"{name}_dx"], "cm", "X"), towards(100.0 * f[f"{name}_dy"], "cm", "Y"))
-    return " and ".join(ways)
+    ways = ((f[f"{name}_dx"], "X"), (f[f"{name}_dy"], "Y"))
+    return " and ".join(
+        towards(way, "m", axis) if abs(way) >= 1.0 else towards(100.0 * way, "cm", axis)
+        for way, axis in ways
+    )
 
 
 def peak(f: Found) -> tuple[float, float]:

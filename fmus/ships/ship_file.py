@@ -342,7 +342,8 @@ def _values(
         limits: Range = known[name].range
         x = found[-1].value
         if (limits.min is not None and x < limits.min) or (limits.max is not None and x > limits.max):
-            raise DeclarationError(f"{where}: {name} = {x:g} {known[name].unit} is out of its range")
+            unit = "" if known[name].unit == "1" else f" {known[name].unit}"
+            raise DeclarationError(f"{where}: {name} = {x:g}{unit} is out of its range ({limits.words})")
     return tuple(found)
 
 

@@ -96,6 +96,11 @@ def quantities(of: Ship) -> dict[str, str]:
     return QUANTITY | outputs(own) | own | dict.fromkeys(of.power_settings, "command")
 
 
+def other_angles(measured: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Angles of what is measured in addition to pose and commands."""
+    return {signal: values for signal, values in measured.items() if BESIDE.get(signal) == "angle"}
+
+
 def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
     """The message about a unit that a signal cannot have."""
     return f"{quoted(unit)} is not a unit of {name_of(signal)}{nearest(unit, units)}"

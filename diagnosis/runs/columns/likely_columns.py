@@ -201,7 +201,10 @@ def _evidence(
     if np.abs(numbers).max() > largest(quantity) / min(UNITS[quantity].values()):
         return None
     known = WORDS.get(quantity, {})
-    means = any(known.get(word) == signal for word in words_of(bare))
+    words = words_of(bare)
+    means = any(known.get(word) == signal for word in words) or (
+        quantity == "shaft speed" and not REVOLUTIONS.isdisjoint(words)
+    )
     reasons, score, like = [], 0.0, 1.0 if means else _likeness(signal, bare)
     if quantity == "time":
         if not np.all(np.diff(numbers) > 0.0):

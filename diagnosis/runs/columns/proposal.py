@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from .columns import (
     log_of,
     missing,
     no_unit,
+    other_angles,
     quantities,
     signals,
     stated_layout,
@@ -44,7 +45,7 @@ from .likely_columns import (
     unit_in,
 )
 from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
-from .unit_check import OFTENEST, SI_UNIT, doubts, largest, likely_unit, spelt
+from .unit_check import OFTENEST, SI_UNIT, doubts, doubts_of_angles, largest, likely_unit, spelt
 from .usual_names import meaning
 
 NO_UNIT = ("", "-")
@@ -389,7 +390,8 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     fresh = there & ~repeated(run.pose, there)
     if fresh.sum() > 1:
         time = UNITS["time"][unit or "s"] * run.time[fresh]
-        for doubt in doubts(time, run.pose[fresh]):
+        angles = doubts_of_angles(other_angles(run.measured))
+        for doubt in chain(doubts(time, run.pose[fresh]), angles):
             yield from ((signal, doubt.unit) for signal in doubt.signals)
 
 

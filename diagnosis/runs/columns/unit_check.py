@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -99,14 +100,22 @@ def refuse_time(
 
 
 def refuse_units(
-    time: np.ndarray, pose: np.ndarray, where: str, anyway: bool, called: Mapping[str, str]
+    time: np.ndarray,
+    pose: np.ndarray,
+    angles: Mapping[str, np.ndarray],
+    where: str,
+    anyway: bool,
+    called: Mapping[str, str],
 ) -> None:
     """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
+    Args:
+        angles: other angles of the run, by their signals.
+
     Raises:
-        InputError: it goes or turns too fast.
+        InputError: it goes or turns too fast, or an angle is in degrees.
     """
-    for signals, unit, reason in () if anyway else doubts(time, pose):
+    for signals, unit, reason in () if anyway else chain(doubts(time, pose), doubts_of_angles(angles)):
         raise InputError(f"{where} {reason} {remedy(signals, unit, called)}; {GO_ON}")
 
 
@@ -137,6 +146,22 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     if in_rad < still and in_deg - still > AHEAD * (1.0 - still):
         reason = f"goes where its heading is only in degrees ({in_deg:.0%} of the way): is it in deg?"
         yield Doubt(("psi",), "deg", reason)
+
+
+def doubts_of_angles(angles: Mapping[str, np.ndarray]) -> Iterator[Doubt]:
+    """Angles (signal -> (n,), NaN where missing) that are in degrees: none in rad has such values.
+
+    One in rad is within a turn, or it begins there and goes on without a jump by half a turn.
+    """
+    turn = largest("angle")
+    for signal, values in angles.items():
+        values = values[np.isfinite(values)]
+        if values.size == 0 or np.quantile(np.abs(values), 0.9) <= turn:
+            continue
+        if abs(values[0]) > turn or np.abs(np.diff(values)).max() > math.pi:
+            yield Doubt(
+                (signal,), "deg", f"has {signal} up to {np.abs(values).max():.4g}: is it in deg?"
+            )
 
 
 def follows(way: np.ndarray, psi: np.ndarray) -> float:
