@@ -110,9 +110,16 @@ def test_what_is_sure_is_a_fact_and_comes_first():
 
 
 def test_headline_of_each_verdict():
-    def said(verdict, possibilities=(), suspects=(), something=False, calibrated=False):
+    def said(verdict, possibilities=(), suspects=(), something=False, calibrated=False, shared=None):
+        start = Model()
+        model = start.plus({"m": 0.1} | (shared or {}))
         d = diagnosis(
-            verdict=verdict, calibrated=calibrated, remainder=SimpleNamespace(beyond_chance=something)
+            verdict=verdict,
+            calibrated=calibrated,
+            remainder=SimpleNamespace(beyond_chance=something),
+            start=start,
+            learned=SimpleNamespace(model=model),
+            posterior=SimpleNamespace(std=dict.fromkeys(["m", "body_bias_N", *(shared or {})], 0.1)),
         )
         return headline.headline(report_data(None, d, [], possibilities, suspects=dict(suspects)))
 
@@ -125,7 +132,9 @@ def test_headline_of_each_verdict():
     assert ", mainly a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
     assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])
     assert "a (mass), b, c, d and 2 others; no" in said("coefficients", suspects=suspects)
-    assert "mainly" not in said("coefficients")
+    assert said("coefficients").endswith("explain these data; no effect is needed.")
+    shared = said("coefficients", shared={"heading_offset": 0.1, "body_bias_N": 2.0})
+    assert "what all runs share (body_bias_N and heading_offset); no other effect" in shared
 
 
 def test_names_in_a_row():

@@ -154,12 +154,20 @@ def headline(r: ReportData) -> str:
     if d.verdict == "coefficients":
         names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
         above = f", mainly {listed(names, 'and')}" if names else ""
-        return (
-            f"Other values of the nominal coefficients explain these data{above}; no effect is needed."
-        )
+        shared = _shared(d)
+        beside = f" with what all runs share ({listed(shared, 'and')})" if shared else ""
+        needed = "no other effect is needed" if shared else "no effect is needed"
+        return f"Other values of the nominal coefficients explain these data{beside}{above}; {needed}."
     if d.verdict == "unexplained":
         return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
+
+
+def _shared(d: Diagnosis) -> list[str]:
+    """What calibrated coefficients have beside them: parameters of effects that act in all runs."""
+    start, model = d.start, d.learned.model
+    fitted = (name for name in d.posterior.std if name not in start.ship.coefficients)
+    return [name for name in fitted if model.value(name) != start.value(name)]
 
 
 def boundedness(s: Stability) -> str:
