@@ -1,13 +1,17 @@
 """Waves: found where there are some, and not where commands are quicker than what noise lets one follow."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.cases import slow
 from support.measured import sail, smoothed
 
+from diagnosis.execution.progress import silent
 from diagnosis.predictors import Model
+from diagnosis.search import forward_selection
+from diagnosis.search.findings import Finding, Findings, Suspect
 from diagnosis.search.nonlinear.waves import (
     BAND,
     PEAK,
@@ -115,3 +119,17 @@ def test_a_burst_is_above_the_spectrum_in_one_segment_and_waves_are_in_most():
     assert segments_above(drawn, at, level) == 1
     drawn[12, 1] = 20.0 * np.random.default_rng(4).exponential(size=6)
     assert segments_above(drawn, at, level) >= 5
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_beside_waves_alone_no_coefficient_is_suspect(monkeypatch, others):
+    """Without another effect the model is the first one; suspects are those of a model with the effects."""
+    effects = [Finding("X_u", {"delta_X_u": -1.0}, {}, 0.9, [], 0.9, 0.9)] * others
+    found = Findings(effects, suspects=[Suspect("m", 3.0, 20.0)])
+    done = SimpleNamespace(model=Model(), findings=lambda ids=None: found)
+    peak = SimpleNamespace(peak=3.0, force=1.0, confidence=0.9, share=0.5)
+    monkeypatch.setattr(forward_selection, "search", lambda *_: done)
+    monkeypatch.setattr(forward_selection, "find_waves", lambda *_: peak)
+    learned = forward_selection.ForwardSelection().fit([], Model(), None, silent, 0)
+    assert [f.id for f in learned.effects] == ["waves", "X_u"][: 1 + others]
+    assert len(learned.suspects) == others

@@ -75,7 +75,9 @@ class ForwardSelection:
             if ids is not None and waves.id not in ids:
                 return found
             effects, ranking = [waves, *found.effects], [ranked, *found.ranking]
-            return replace(found, effects=effects, ranking=ranking, refit=with_waves)
+            # Without another effect the coefficients are those of the first model, and none is suspect.
+            suspects = found.suspects if found.effects else []
+            return replace(found, effects=effects, ranking=ranking, suspects=suspects, refit=with_waves)
 
         return with_waves()
 
