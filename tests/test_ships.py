@@ -27,6 +27,7 @@ from support.ships import (
 
 from fmus import hull_functions
 from fmus.actuators.actuation import actuators, command_names, forces, ordered, shared
+from fmus.actuators.actuator import twins
 from fmus.actuators.failings import failings
 from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import at_rest, command_response, total
@@ -50,6 +51,7 @@ from fmus.hull import (
 from fmus.hull_functions import cross_flow
 from fmus.ship import ship
 from fmus.ship_description import Value
+from fmus.ships.expansion import effects_of_ship
 from fmus.ships.ship_file import Term
 from fmus.signals import Force, VelocityInCurrent
 
@@ -500,6 +502,42 @@ def test_a_turned_force_keeps_its_size():
     angle = next(e for e in failings(a) if e.id == "angle_vsp")
     turned = angle(f, now, 0.5 * pi)
     assert (turned.X[0], turned.Y[0]) == pytest.approx((-f.Y[0], f.X[0]))  # ahead becomes starboard
+
+
+def test_twins_that_are_turned_alike_are_each_turned():
+    """Two thrusters abreast with commands of their own may be set up by one mistake."""
+    d = SHIPS["otter"]
+    f, now = pushing(d, commands_for(width_of(d)))
+    effects = effects_of_ship(d)
+    together = effects["angle_port_starboard"](f, now, 0.3)
+    each = effects["angle_starboard"](effects["angle_port"](f, now, 0.3), now, 0.3)
+    assert total(together) == pytest.approx(total(each), rel=1e-12)
+    assert together.Y != f.Y
+
+
+def test_twins_are_at_mirrored_places_and_have_commands_of_their_own():
+    d = SHIPS["gunnerus"]
+    assert twins(actuators(d)) == []  # they share their commands
+    own = d._replace(actuators=tuple([part._replace(order="") for part in d.actuators]))
+    assert [(a.part.name, b.part.name) for a, b in twins(actuators(own))] == [
+        ("azimuth_port", "azimuth_starboard")
+    ]
+    both = effects_of_ship(own)["bias_azimuth_port_azimuth_starboard"]
+    plant = ship(description=own).thrusters.params().plant
+    changed = both(plant, 0.1)
+    moved = [
+        {
+            name.removeprefix(f"plant_{a.part.name}_"): y - x
+            for name, x, y in zip(old._fields, old, new, strict=True)
+            if x != y
+        }
+        for a, old, new in zip(actuators(own), plant, changed, strict=True)
+    ]
+    assert moved == [{"bias": 0.1}, {"bias": 0.1}]
+    port, starboard = own.actuators
+    values = tuple([v._replace(value=-3.0) if v.name == "y" else v for v in port.values])
+    apart = own._replace(actuators=(port._replace(values=values), starboard))
+    assert twins(actuators(apart)) == []
 
 
 def test_another_place_adds_the_moment_of_the_way():

@@ -1,5 +1,7 @@
 """An actuator of a ship, as its law, its commands and its units make it."""
 
+from collections.abc import Sequence
+from itertools import combinations
 from math import pi
 from typing import NamedTuple
 
@@ -135,6 +137,32 @@ class Actuator(NamedTuple):
                 for k, name in enumerate(self.names)
             ]
         )
+
+
+def twins(every: Sequence[Actuator]) -> list[tuple[Actuator, Actuator]]:
+    """Actuators of one law at mirrored places, each with commands of its own."""
+    return [
+        (a, b)
+        for a, b in combinations(every, 2)
+        if a.law is b.law and a.order != b.order and _place(a, -1.0) == _place(b) != _place(b, -1.0)
+    ]
+
+
+def _place(a: Actuator, side: float = 1.0) -> tuple[float, float]:
+    return a.part.number("x"), side * a.part.number("y")
+
+
+def both(a: Actuator, b: Actuator) -> Devices:
+    """Two actuators as what one effect concerns."""
+    d, e = a.devices, b.devices
+    return d._replace(
+        name=f"{d.name}_{e.name}",
+        title=f"{d.title} and {e.title}",
+        label=f"{d.label} and {e.label}",
+        members=(*d.members, *e.members),
+        commands=(*d.commands, *e.commands),
+        plural=True,
+    )
 
 
 def goes_round(part: Part, law: type[Law]) -> tuple[bool, ...]:

@@ -7,23 +7,24 @@ from ..effects.effect import Effect, Search, Wording, effect
 from ..effects.text import Found
 from ..hull_functions import Change
 from ..ops import Number
-from .actuator import Actuator
+from .actuator import Actuator, twins
 
 
 def changed(alike: Sequence[Actuator], change: Change) -> Effect:
-    """Parameters of a law that are others than described, of all actuators that share its commands.
+    """Parameters of a law that are others than described, of some actuators by as much.
 
     Args:
-        alike: actuators with the same commands and law.
+        alike: actuators with the same law: those that share its commands, or twins.
         change: of that law.
     """
     a = alike[0]
-    name, title = f"{change.stem}_{a.order}", " and ".join([b.part.title for b in alike])
+    order = "_".join(dict.fromkeys([b.order for b in alike]))
+    name, title = f"{change.stem}_{order}", " and ".join([b.part.title for b in alike])
     known = {v.name: v for v in variables(a.law.Parameters)}
     parameters = tuple(
         [
             Variable(
-                f"delta_{a.order}_{p}",
+                f"delta_{order}_{p}",
                 known[p].unit,
                 f"addition to {known[p].description}: {title}",
                 0.0,
@@ -64,10 +65,6 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
 
 
 def changes(every: Sequence[Actuator]) -> list[Effect]:
-    """What the laws of a ship's actuators may have otherwise than described."""
-    return [
-        changed([b for b in every if (b.order, b.law) == (a.order, a.law)], change)
-        for a in every
-        if a.leads
-        for change in a.law.changes
-    ]
+    """What the laws of a ship's actuators may have otherwise than described, also of twins alike."""
+    alike = [[b for b in every if (b.order, b.law) == (a.order, a.law)] for a in every if a.leads]
+    return [changed(some, change) for some in [*alike, *twins(every)] for change in some[0].law.changes]

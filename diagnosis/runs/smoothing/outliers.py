@@ -105,7 +105,8 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
     stretch = np.searchsorted(p.spline.grid.first, b.first, side="right") - 1
     for _ in range(REWEIGHTINGS):
         fit = solve(p, smoothness, weights)
-        spread = p.share * b.variance(fit.covariance) / p.sigma**2
+        # Where the noise is far below what rounding leaves of a variance that may be below zero.
+        spread = np.maximum(p.share * b.variance(fit.covariance), 0.0) / p.sigma**2
         off = _deviations(p, fit)
         leverage = np.minimum(weights * spread, 0.999)
         expected = np.where(leverage > 0.0, np.sqrt(1.0 - leverage), np.sqrt(1.0 + spread))
