@@ -15,8 +15,7 @@ from cybership.message_text import quoted
 
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, TAU
-from ..predictors.fmu.fmu_playback import confined
-from ..predictors.fmu.short_steps import ShortSteps
+from ..predictors.fmu.fmu_playback import ShortSteps, confined
 from ..predictors.fmu.variable_map import VariableMap, propose
 from ..predictors.weak_form import SMALL
 from ..report.formatting import write_json

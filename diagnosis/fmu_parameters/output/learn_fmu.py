@@ -16,8 +16,7 @@ from ..sensitivity import sensitivities
 from ..ship_task import ship_task
 from ..system_calibration import calibrate
 from ..system_task import is_system, system_task
-from .system_content import FILES, CalibrationReport
-from .system_plots import plots_of
+from .system_content import FILES, CalibrationReport, plots_of
 
 OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.csv", "coefficients.tex")
 

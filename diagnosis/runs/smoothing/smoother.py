@@ -33,8 +33,7 @@ from .correlated_noise import with_correlated
 from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
-from .spline import DEGREE, Knots, basis, knots
-from .spline_covariance import SplineCovariance
+from .spline import DEGREE, Knots, SplineCovariance, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 
