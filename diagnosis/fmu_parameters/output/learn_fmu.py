@@ -71,11 +71,7 @@ def learn_fmu(
 
 
 def _only_known(task: CalibrationTask, parts: Mapping[str, WindowResiduals], advance: Advance) -> None:
-    """Leave to be calibrated what the runs can tell, within the range in which the FMU works.
-
-    Raises:
-        InputError: they can tell nothing.
-    """
+    """Leave to be calibrated what the runs can tell, within the range in which the FMU works."""
     found = sensitivities(parts["train"], advance)
     if not any(s.known for s in found.each):
         raise InputError(
