@@ -20,6 +20,7 @@ from cosim import InputError
 from ..design.designing import SECONDS
 from ..design.information import Hypothesis, Knowledge, a_optimal, d_optimal
 from ..design.run_files import commands_file
+from ..design.run_plan import JSON, PAGE
 from ..execution.progress import Advance, silent
 from ..execution.result_folder import together
 from ..report.formatting import write_json
@@ -32,7 +33,6 @@ from .system_task import SystemTask
 
 COURSE = ("form", "least value", "largest value", "period")  # of an input, by a number each
 SHORTEST, LONGEST = 0.02, 0.5  # 1, of the length of a run: period of a course; chosen
-PAGE, JSON = "plan.md", "next.json"
 
 
 @dataclass(frozen=True, eq=False)

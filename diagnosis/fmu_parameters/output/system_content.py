@@ -18,6 +18,7 @@ from ...report.document import Document, Plot, ReportSection, numbers, write_doc
 from ...report.document import Table as PageTable
 from ...report.formatting import write_json
 from ...report.pictures.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
+from ...report.report_data import USES
 from ...runs.cleaning import Z95
 from ..additional_force import AdditionalForce
 from ..calibration_task import CalibrationTask
@@ -284,7 +285,6 @@ ALONE = "To identify one of them alone, leave known ones out of the file of para
 PARAMETERS = ("parameter", "start", "value", "95 % interval", "unit", "")
 FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indistinguishable")
 ERRORS = ("run", "output", "rms before", "rms after", "unit")
-USES = {"train": "training", "validate": "validation", "test": "test"}
 
 
 def advice(f: Accepted) -> str:
