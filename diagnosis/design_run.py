@@ -64,7 +64,7 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
         return _advised(options, content, folder)
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .design import Question, plan_next
-    from .design.limits import limits_of
+    from .design.designing import limits_of
     from .predictors import open_model, ship_of_model, ship_with
     from .verdict.measured_commands import with_measured_commands
 
@@ -116,12 +116,8 @@ def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path)
 def _of_fmu(
     options: argparse.Namespace, content: dict[str, Any], task: Task | None, advance: Advance
 ) -> Done:
-    """Inputs over time that determine the parameters of an FMU.
-
-    Raises:
-        InputError: the FMU is of a ship, or the diagnosis does not state its runs.
-    """
-    from .design.limits import limits_of
+    """Inputs over time that determine the parameters of an FMU."""
+    from .design.designing import limits_of
     from .fmu_parameters.planned_inputs import plan_inputs
     from .fmu_parameters.system_task import is_system, system_task
 
@@ -156,11 +152,7 @@ def _diagnosis(path: Path) -> dict[str, Any]:
 
 
 def _task(path: Path) -> Task | None:
-    """What a diagnosis was made of; None: the file does not state it.
-
-    Raises:
-        InputError: it is damaged.
-    """
+    """What a diagnosis was made of; None: the file does not state it."""
     content = json_content(path, "a posterior") if path.exists() else {}
     if not isinstance(content, dict):
         raise InputError(f"'{path}' is not a posterior of cybership learn")

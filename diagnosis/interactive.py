@@ -14,7 +14,7 @@ from fmus.ships.naming import DEFAULT as DEFAULT_SHIP
 from . import session
 from .assessment.gathering import gather
 from .design import Plan, Question, plan_next
-from .design.limits import limits_of
+from .design.designing import limits_of
 from .execution.progress import Advance, silent
 from .predictors import (
     Model,
@@ -105,10 +105,6 @@ def _model_of(
     """The initial model: a given one, or the nominal one of a ship, by default that of the runs.
 
     Where these name none, it is the one that a model file is of.
-
-    Raises:
-        InputError: no such ship, model and ship are given, or the runs are of several ships; an FMU
-            whose ship nobody names.
     """
     if model is not None and name is not None:
         raise InputError("model already has a ship: give model or ship, not both")

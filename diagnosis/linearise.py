@@ -90,11 +90,7 @@ def _doubt(share: float) -> list[str]:
 
 
 def _read_state(path: Path, model: "FmuModel") -> dict[str, float]:
-    """Variable -> value, of a JSON file.
-
-    Raises:
-        InputError: it is not that.
-    """
+    """Variable -> value, of a JSON file."""
     content = json_content(path, "a state")
     if not isinstance(content, dict):
         raise InputError(f'\'{path}\' must be an object of numbers, as {{"u_0": 0.1, "tau_X": 0.5}}')

@@ -47,11 +47,7 @@ def trial(options: argparse.Namespace, advance: Advance) -> Done:
 
 
 def _check_log(options: argparse.Namespace) -> None:
-    """Refuse a ship or a kind of trial that is not that of the log of a simulated run.
-
-    Raises:
-        InputError: one is another than the log states.
-    """
+    """Refuse a ship or a kind of trial that is not that of the log of a simulated run."""
     log = read_options(options.run)
     ship = log.ship or (log.outline and log.outline.name)
     stated = {
@@ -71,9 +67,6 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutco
 
     The whole run is prepared, as for all commands; the trial is the part of it between two times of the
     file, whatever its channels show of its clock.
-
-    Raises:
-        InputError: the run cannot be read, or its kind of trial is not stated.
     """
     from .assessment.gathering import motion, usable
     from .assessment.trial_errors import length_of, measured_passage

@@ -9,9 +9,8 @@ from cosim import InputError, SimulationError
 from diagnosis.predictors import Model, black_box
 from diagnosis.predictors.black_box import MOTION, POSE, VELOCITY, BlackBox, laid
 from diagnosis.predictors.fmu import fmu_playback, wrapper
-from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes
+from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes, ShortSteps
 from diagnosis.predictors.fmu.foreign_fmu import Fmu, FmuPredictor
-from diagnosis.predictors.fmu.short_steps import ShortSteps
 from diagnosis.predictors.fmu.variable_map import DISTURBANCES, VariableMap
 from diagnosis.runs import Column
 from diagnosis.runs.run_constants import ORDER

@@ -9,7 +9,7 @@ from support.measured import commands, csv_of, sail, table_of
 
 import diagnosis
 from diagnosis import InputError
-from diagnosis.runs.row_means import row_means
+from diagnosis.runs.files.reading import row_means
 from diagnosis.search.significance import Losses
 from diagnosis.verdict.measured_commands import are_measured, log_odds
 

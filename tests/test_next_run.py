@@ -31,7 +31,7 @@ from diagnosis.design import (
     rehearsal,
     write_run,
 )
-from diagnosis.design.designing import Designer
+from diagnosis.design.designing import Designer, limits_of
 from diagnosis.design.hypotheses import knowledge, rivals
 from diagnosis.design.information import (
     Hypothesis,
@@ -45,7 +45,6 @@ from diagnosis.design.information import (
     inseparable,
     projected,
 )
-from diagnosis.design.limits import limits_of
 from diagnosis.design.manoeuvre_library import LIBRARY, PlanStep, Reach, poses, sequence, usual
 from diagnosis.design.planned_motion import PlannedMotion
 from diagnosis.design.rehearsal import Rehearsal, RehearsedEffect

@@ -31,9 +31,9 @@ from diagnosis.report import (
     page,
     write_report,
 )
-from diagnosis.report.error_change import error_changes
 from diagnosis.report.pictures import tracks
 from diagnosis.report.pictures.chart import Text
+from diagnosis.report.report_data import error_changes
 from diagnosis.report.reported_effect import ReportedCoefficient
 from diagnosis.runs.sensors.sensor_finding import Examined, SensorFinding
 from fmus.ship import ship

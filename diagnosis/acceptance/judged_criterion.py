@@ -186,11 +186,7 @@ def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Ou
 def _counted(
     c: Criterion, predicted: Sequence[Predicted], short: Mapping[str, int]
 ) -> tuple[list[tuple[Predicted, np.ndarray]], WindowCounts]:
-    """The windows that count, of each run that has some, a mask (w,).
-
-    Raises:
-        InputError: ``operating_range`` names what is no signal of a run.
-    """
+    """The windows that count, of each run that has some, a mask (w,)."""
     excluded = {FEW: sum(short.values())}
     left_out, chosen = dict.fromkeys(short, f"no window of {c.horizon:g} s has enough samples"), []
     for p in predicted:

@@ -7,13 +7,12 @@ import numpy as np
 from ..predictors import at_samples
 from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
+from ..runs.columns.unit_check import SI_UNIT
 from ..runs.run_constants import NEGLIGIBLE
 from .criterion import MOTION
 from .predictions import Predictions
 
 QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
-# By the quantity of a command.
-SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
 
 
 def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
@@ -34,7 +33,7 @@ def unit_of(signal: str, evaluation: Evaluation) -> str:
         return MOTION[signal]
     commands = evaluation.model.ship.commands
     quantity = OF_UNIT[commands[signal]] if signal in commands else QUANTITY.get(signal, "command")
-    return SI[quantity]
+    return SI_UNIT[quantity]
 
 
 def window_means(p: Predictions) -> dict[str, np.ndarray]:

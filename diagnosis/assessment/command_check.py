@@ -17,7 +17,7 @@ from .settings import SETTINGS
 def beyond_thrusters(run: Run, model: Model) -> str | None:
     """A clause about commands of a run that a model's thrusters cannot give, where these matter."""
     if run.commands is not None:
-        return _beyond_limits(run, model)
+        return _beyond_limits(run.commands, run.time, model)
     full, size = full_thrust(model), np.abs(run.tau_cmd)
     beyond = size > SETTINGS.most_gain * full
     share = (size * beyond).sum(axis=0) / np.maximum(size.sum(axis=0), np.finfo(float).tiny)
@@ -38,14 +38,12 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     return f"{seen}: leave false cells empty, and log commands after they are clipped"
 
 
-def _beyond_limits(run: Run, model: Model) -> str | None:
-    """A clause about a command that is many times its limit, as which it then counts."""
-    if run.commands is None:
-        return None
-    layout = model.ship.layout_of(run.commands)
-    limits, form = layout.limits(model.drive.params), model.ship.form_of(run.commands)
+def _beyond_limits(commands: np.ndarray, time: np.ndarray, model: Model) -> str | None:
+    """A clause about a command (n, k) that is many times its limit, as which it then counts."""
+    layout = model.ship.layout_of(commands)
+    limits, form = layout.limits(model.drive.params), model.ship.form_of(commands)
     for k, ((name, unit), limit) in enumerate(zip(form.items(), limits, strict=True)):
-        most, size = float(np.abs(limit).max()), np.abs(run.commands[:, k])
+        most, size = float(np.abs(limit).max()), np.abs(commands[:, k])
         beyond = size > SETTINGS.most_gain * most
         if (layout.round and layout.round[k]) or beyond.mean() <= SETTINGS.negligible:
             continue
@@ -54,7 +52,7 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
         rows = f"{int(beyond.sum())} of {len(size)} rows"
         return (
             f"{name} reaches {size.max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times "
-            f"its limit, {most:.4g} {unit}, in {rows}, from {run.time[first]:.4g} s on; probably {why}"
+            f"its limit, {most:.4g} {unit}, in {rows}, from {time[first]:.4g} s on; probably {why}"
         )
     return None
 

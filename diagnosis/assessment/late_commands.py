@@ -28,7 +28,7 @@ from ..runs import Run
 from ..runs.cleaning import BRIEF
 from ..runs.columns.columns import TAU
 from ..runs.run_constants import CHANCE, PARTS
-from ..runs.smoothing.delay import LONGEST, least_squares, surely_positive
+from ..runs.smoothing.command_response import LONGEST, least_squares, surely_positive
 from .gains import other_forces
 from .readings import inertial
 from .settings import SETTINGS

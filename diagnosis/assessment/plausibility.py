@@ -21,7 +21,7 @@ from ..predictors import Model, WeakWindows, omega
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
-from ..runs.smoothing.delay import least_squares
+from ..runs.smoothing.command_response import least_squares
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import constant_forces, gains
 from .late_commands import late_commands

@@ -247,12 +247,7 @@ def command_of(name: str) -> str:
 
 
 def _take_ship_of_logs(options: argparse.Namespace) -> None:
-    """Take the ship that the logs among the runs are of, unless ``--ship`` names one.
-
-    Raises:
-        InputError: they are of several ships, or of another than the thesis', which is all that a
-            command without ``--ship`` analyses.
-    """
+    """Take the ship that the logs among the runs are of, unless ``--ship`` names one."""
     if getattr(options, "ship", None) is not None:
         return
     from ..runs import ship_of_logs  # only now: it takes a second to import

@@ -16,6 +16,7 @@ from ..runs.run_constants import DIGITS
 from ..search.candidates import SMALL, CandidateShape, candidate, model_error
 from ..search.nonlinear.multistart import FAR
 from ..search.prior import NominalPrior
+from ..search.refinement import bounded
 from ..search.shortlist import LENGTH
 from .information import Hypothesis, Knowledge
 
@@ -120,15 +121,7 @@ class Space:
                 changes[n] = changes.get(n, 0.0) + block.given[n]
             for n, x, step in zip(block.names, own[1:], block.steps, strict=True):
                 changes[n] = changes.get(n, 0.0) + float(x) * step
-        return self.start.plus({n: _within(self.start, n, x) for n, x in changes.items()})
-
-
-def _within(start: Model, name: str, addition: float) -> float:
-    """An addition with which a parameter stays within its declared range."""
-    span, present = start.declared(name).range, start.value(name)
-    low = -np.inf if span.min is None else span.min
-    high = np.inf if span.max is None else span.max
-    return float(np.clip(present + addition, low, high) - present)
+        return self.start.plus({n: bounded(self.start, n, x) for n, x in changes.items()})
 
 
 def rivals(content: Mapping[str, Any]) -> list[Rival]:

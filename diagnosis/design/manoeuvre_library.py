@@ -7,7 +7,8 @@ two where the next one begins with another heading.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -40,16 +41,20 @@ RISE = 2.0  # s, times the time scale; shortest change of speed, as of the guida
 SOFT = 5.0  # s, times the time scale; longest of them: three time constants of the surge motion (chosen)
 LIBRARY: dict[str, Course] = {}
 TEXTS: dict[str, str] = {}
+AnyCourse = TypeVar("AnyCourse", bound=Callable[..., np.ndarray])
 
 
-def manoeuvre(name: str) -> Callable[[Course], Course]:
-    """Register a manoeuvre under a name; the first line of its docstring describes it."""
+def registered(library: dict[str, AnyCourse], name: str) -> Callable[[AnyCourse], AnyCourse]:
+    """Register a course under a name; the first line of its docstring describes it."""
 
-    def register(course: Course) -> Course:
-        LIBRARY[name], TEXTS[name] = course, (course.__doc__ or "").partition("\n")[0].rstrip(".")
+    def register(course: AnyCourse) -> AnyCourse:
+        library[name], TEXTS[name] = course, (course.__doc__ or "").partition("\n")[0].rstrip(".")
         return course
 
     return register
+
+
+manoeuvre = partial(registered, LIBRARY)
 
 
 def moved(t: Any, distance: float, seconds: float, rise: float) -> Any:

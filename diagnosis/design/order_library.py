@@ -7,6 +7,7 @@ rudders has the moment of its propellers in place of it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,7 @@ from fmus.ship import Ship
 from ..predictors import Model, WeakWindows
 from ..predictors.black_box import TAU
 from ..predictors.thrust import FORGOTTEN
-from .manoeuvre_library import SOFT, TEXTS, PlanStep, between
+from .manoeuvre_library import SOFT, PlanStep, between, registered
 from .planned_motion import Basin, PlannedMotion, usable_thrust
 from .spread import driven
 
@@ -26,16 +27,7 @@ OrderCourse = Callable[[np.ndarray, float, Sequence[float], float], np.ndarray]
 ORDERS: dict[str, OrderCourse] = {}
 HARD_OVER = np.radians(35.0)  # rad, largest rudder angle of usual trials (IMO MSC/Circ.1053)
 LEAST = 0.3  # 1, share of thrust under way: less hardly steers (chosen)
-
-
-def order(name: str) -> Callable[[OrderCourse], OrderCourse]:
-    """Register a course under a name; the first line of its docstring describes it."""
-
-    def register(course: OrderCourse) -> OrderCourse:
-        ORDERS[name], TEXTS[name] = course, (course.__doc__ or "").partition("\n")[0].rstrip(".")
-        return course
-
-    return register
+order = partial(registered, ORDERS)
 
 
 def _shares(t: np.ndarray, thrust: ArrayLike, rudder: ArrayLike) -> np.ndarray:

@@ -16,9 +16,8 @@ from .designing import Designer, ScoredPlan
 from .hypotheses import Space
 from .information import CRITERIA, Knowledge, pairs, projected
 from .manoeuvre_library import TEXTS
-from .run_files import commands_file, picture_file, scenario_file, write_run
+from .run_files import commands_file, draw, picture_file, scenario_file, write_run
 from .spread import Spread
-from .track_picture import draw
 
 JSON, PAGE = "next.json", "plan.md"
 MOST_RUNS = 9  # 1, of a plan; chosen

@@ -15,8 +15,7 @@ from cybership.message_text import quoted
 
 from ..predictors import DEFAULT_EXECUTION, Execution
 from ..predictors.black_box import MOTION, TAU
-from ..predictors.fmu.fmu_playback import confined
-from ..predictors.fmu.short_steps import ShortSteps
+from ..predictors.fmu.fmu_playback import ShortSteps, confined
 from ..predictors.fmu.variable_map import VariableMap, propose
 from ..predictors.weak_form import SMALL
 from ..report.formatting import write_json
@@ -127,11 +126,7 @@ def _of_map(given: SystemMap, model: FmuModel) -> list[LinearState]:
 
 
 def _listed(model: FmuModel) -> list[LinearState]:
-    """Those of the model structure.
-
-    Raises:
-        InputError: one cannot be set.
-    """
+    """Those of the model structure."""
     found = []
     for unknown in model.description.derivatives:
         rate = unknown.variable
@@ -208,27 +203,21 @@ def _by_steps(
     seen = [*outputs, *(s.seen for s in states)]
     with closing(ShortSteps(fmu, [*driven], seen, h, False)) as steps:
 
-        def answer(start: Mapping[str, float], driven: Mapping[str, float]) -> np.ndarray:
-            found = steps.run(start, driven)
+        def answer(moved: Mapping[str, float]) -> np.ndarray:
+            parts = ({n: moved.get(n, x) for n, x in part.items()} for part in (start, driven))
+            found = steps.run(*parts)
             rates = []
             for s in states:
                 x = found[s.seen]
                 rates.append(x[0] if s.order == 0 else steps.derivatives(x)[s.order - 1])
             return np.array([*rates, *(found[n][0] for n in outputs)])
 
-        base = answer(start, driven)
-        columns = []
+        base, columns = answer({}), []
         for name in known:
             value = {**start, **driven}[name]
             d = SMALL * max(abs(value), 1.0)  # of one unit where the value is less
-            sides = []
-            for moved in (value - d, value + d):
-                changed = {name: moved}
-                if name in driven:
-                    sides.append(answer(start, {**driven, **changed}))
-                else:
-                    sides.append(answer({**start, **changed}, driven))
-            columns.append((sides[1] - sides[0]) / (2.0 * d))
+            low, high = (answer({name: x}) for x in (value - d, value + d))
+            columns.append((high - low) / (2.0 * d))
     return base, np.column_stack([*columns, np.zeros((base.size, 0))])
 
 

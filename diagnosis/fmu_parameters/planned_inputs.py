@@ -20,6 +20,7 @@ from cosim import InputError
 from ..design.designing import SECONDS
 from ..design.information import Hypothesis, Knowledge, a_optimal, d_optimal
 from ..design.run_files import commands_file
+from ..design.run_plan import JSON, PAGE
 from ..execution.progress import Advance, silent
 from ..execution.result_folder import together
 from ..report.formatting import write_json
@@ -32,7 +33,6 @@ from .system_task import SystemTask
 
 COURSE = ("form", "least value", "largest value", "period")  # of an input, by a number each
 SHORTEST, LONGEST = 0.02, 0.5  # 1, of the length of a run: period of a course; chosen
-PAGE, JSON = "plan.md", "next.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +198,8 @@ def course(task: SystemTask, point: np.ndarray, seconds: float) -> MeasuredRun:
     """The run at a point of the unit cube, COURSE for each input; outputs rest where a run began."""
     first = task.runs["train"][0]
     t = np.arange(0.0, seconds, float(np.median(np.diff(first.time))))
-    columns = {name: np.full(t.size, _first(first.columns[name])) for name in task.map.outputs}
+    outputs = {name: first.columns[name] for name in task.map.outputs}
+    columns = {name: np.full(t.size, x[np.isfinite(x)][0]) for name, x in outputs.items()}
     for name, x in zip(task.map.inputs, point.reshape(-1, len(COURSE)), strict=True):
         every = np.concatenate([r.columns[name] for r in task.runs["train"]])
         low, high = np.nanmin(every), np.nanmax(every)
@@ -210,7 +211,3 @@ def course(task: SystemTask, point: np.ndarray, seconds: float) -> MeasuredRun:
         )
         columns[name] = ends.mean() + 0.5 * np.ptp(ends) * shape
     return MeasuredRun("planned run", t, columns)
-
-
-def _first(values: np.ndarray) -> float:
-    return float(values[np.isfinite(values)][0])

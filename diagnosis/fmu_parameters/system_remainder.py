@@ -87,9 +87,7 @@ def remainder(
 
 
 def _of_output(r: WindowResiduals, white: np.ndarray, k: int) -> list[np.ndarray]:
-    return [
-        white[rows].reshape(w.measured.shape)[:, k] for w, rows in zip(r.windows, r.rows, strict=True)
-    ]
+    return [x.reshape(w.measured.shape)[:, k] for w, x in r.parts(white)]
 
 
 def _spread(r: WindowResiduals, k: int) -> float:

@@ -9,7 +9,7 @@ from .evaluation import PredictionError as PredictionError
 from .evaluation import evaluate_run as evaluate_run
 from .evaluation import evaluate_runs as evaluate_runs
 from .fmu.foreign_fmu import Fmu as Fmu
-from .fmu.ship_of_fmu import ship_of_model as ship_of_model
+from .fmu.lineage import ship_of_model as ship_of_model
 from .fmu.variable_map import write_map as write_map
 from .parameter_set import read_model as read_model
 from .parameter_set import ship_with as ship_with

@@ -82,7 +82,7 @@ class FunctionPredictor(BlackBox):
         with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
             for _ in range(steps):
                 commands: Any = commands_at(smoothed.track.run, state.t + 0.5 * h)
-                state = vessel.integrate(state, commands, self, h, _law)
+                state = vessel.integrate(state, commands, self, h, lambda s, c, by: by.answer(s, c))
                 found.append(np.stack(state[:6]))
         return np.stack(found)
 
@@ -112,10 +112,6 @@ class FunctionPredictor(BlackBox):
         if len(found) != 3:
             raise InputError(f"'{self.name}' must return u_dot, v_dot, r_dot; got {len(found)} values")
         return found
-
-
-def _law(state: vessel.State, commands: Signals, by: FunctionPredictor) -> list[np.ndarray]:
-    return by.answer(state, commands)
 
 
 def open_function(path: Path, ship: Ship | None) -> PythonFunction:

@@ -15,7 +15,7 @@ mass M and the slope F of the force by nu make of an error of the pose at the fr
 
 A density holds where samples are even. In a window in which samples of a channel are missing for longer
 than half a period of w0, they do not determine what the smoothing passes: there the variances of the
-derivatives are those of the splines' covariance (:mod:`..runs.smoothing.spline_covariance`), which are
+derivatives are those of the splines' covariance (:mod:`..runs.smoothing.spline`), which are
 the same in windows without a gap.
 
 Behind a filter of the measurement the noise of a pose is what it changes by from sample to sample: that

@@ -15,13 +15,12 @@ from ..execution.progress import Advance, silent
 from ..predictors.evaluation import Evaluation
 from . import formatting
 from .content import coefficients, versions
-from .error_change import error_changes
 from .glossary import linked
 from .headline import boundedness, cause, finding_sentence, first_sentences, gain_of_search, page_title
 from .pictures import figures, tracks
 from .pictures.chart import data_uri, themed
 from .pictures.shape import curves
-from .report_data import USES, ReportData, trial_rows
+from .report_data import USES, ReportData, error_changes, trial_rows
 from .what_if import what_if
 
 if TYPE_CHECKING:

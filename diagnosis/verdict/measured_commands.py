@@ -21,7 +21,7 @@ from fmus.ship import ship
 from ..predictors import WeakWindows
 from ..runs.cleaning import Track
 from ..runs.columns.columns import TAU, log_of
-from ..runs.row_means import row_means
+from ..runs.files.reading import row_means
 from ..runs.run_constants import NEGLIGIBLE
 from ..search.significance import Losses
 

@@ -8,8 +8,8 @@ import cosim
 from cosim.fmu import FmuModel
 from fmus.build import BuildError
 
-from ...predictors.fmu.fmu_container import ADDED, FOREIGN, write_container
 from ...predictors.fmu.variable_map import write_map
+from ...predictors.fmu.wrapper import ADDED, FOREIGN, write_container
 from ...predictors.predictor import FOUND, MAP
 from ..additional_force import AdditionalForce
 

@@ -16,8 +16,7 @@ from ..sensitivity import sensitivities
 from ..ship_task import ship_task
 from ..system_calibration import calibrate
 from ..system_task import is_system, system_task
-from .system_content import FILES, CalibrationReport
-from .system_plots import plots_of
+from .system_content import FILES, CalibrationReport, plots_of
 
 OTHERS = ("comparison.json", "calibrated.ssv", "calibrated.json", "coefficients.csv", "coefficients.tex")
 
@@ -72,11 +71,7 @@ def learn_fmu(
 
 
 def _only_known(task: CalibrationTask, parts: Mapping[str, WindowResiduals], advance: Advance) -> None:
-    """Leave to be calibrated what the runs can tell, within the range in which the FMU works.
-
-    Raises:
-        InputError: they can tell nothing.
-    """
+    """Leave to be calibrated what the runs can tell, within the range in which the FMU works."""
     found = sensitivities(parts["train"], advance)
     if not any(s.known for s in found.each):
         raise InputError(

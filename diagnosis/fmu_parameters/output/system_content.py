@@ -17,11 +17,14 @@ from ...predictors.prediction import FAR_OFF
 from ...report.document import Document, Plot, ReportSection, numbers, write_document
 from ...report.document import Table as PageTable
 from ...report.formatting import write_json
+from ...report.pictures.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
+from ...report.report_data import USES
 from ...runs.cleaning import Z95
 from ..additional_force import AdditionalForce
 from ..calibration_task import CalibrationTask
 from ..force_search import Accepted
 from ..parameter_file import unit_of
+from ..residuals import WindowResiduals
 from ..system_calibration import CalibratedValue, SystemCalibration
 
 FILES = ("diagnosis.json", "model.ssv", "posterior.json", "report.html")
@@ -282,7 +285,6 @@ ALONE = "To identify one of them alone, leave known ones out of the file of para
 PARAMETERS = ("parameter", "start", "value", "95 % interval", "unit", "")
 FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indistinguishable")
 ERRORS = ("run", "output", "rms before", "rms after", "unit")
-USES = {"train": "training", "validate": "validation", "test": "test"}
 
 
 def advice(f: Accepted) -> str:
@@ -306,3 +308,36 @@ def _table(of: PageTable) -> Table:
     for row in of.rows:
         made.add_row(*map(Text, row))
     return made
+
+
+def plots_of(
+    parts: Mapping[str, WindowResiduals], r: SystemCalibration, names: Sequence[str]
+) -> list[Plot]:
+    """Measured and predicted outputs of each run."""
+    found = []
+    for part in parts.values():
+        before, after = part.raw([part.start, r.fit.setting if r.changed else part.start])
+        for run in dict.fromkeys(w.run for w in part.windows):
+            panels = []
+            for k, name in enumerate(names):
+                panel = Panel(ChartAxis("time [s]", shown=k == len(names) - 1), ChartAxis(name))
+                mine = [
+                    (w, rows) for w, rows in zip(part.windows, part.rows, strict=True) if w.run == run
+                ]
+                time = _joined([w.begin + w.time for w, _ in mine])
+                y = _joined([w.measured[:, k] for w, _ in mine])
+                panel.draw(time, y, INK, "measured", faint=True)
+                changes = ((before, BEFORE, "before"), (after, AFTER, "after"))
+                for off, colour, label in changes if r.changed else changes[:1]:
+                    left = [off[rows].reshape(w.measured.shape)[:, k] for w, rows in mine]
+                    panel.draw(time, y - _joined(left) * part.noise[k], colour, label)
+                panels.append(panel)
+            found.append(
+                Plot(Chart(60.0 + 110.0 * len(panels), panels), f"{run}: measured and predicted.")
+            )
+    return found
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Parts one after the other, with NaN in between, at which a line breaks."""
+    return np.concatenate([x for part in parts for x in (part, [np.nan])])[:-1]

@@ -48,10 +48,8 @@ from ..ship_model import Model
 from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
 from ..windows import FREE_STEP, Windows, step_of
-from .fmu_playback import PlaybackRequest, Processes, confined
-from .lineage import learned_from, parts_of, remember
-from .ship_of_fmu import SYSTEMS
-from .short_steps import ShortSteps
+from .fmu_playback import PlaybackRequest, Processes, ShortSteps, confined
+from .lineage import SYSTEMS, learned_from, parts_of, remember
 from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
 from .wrapper import Wrapped, write_wrapper
 

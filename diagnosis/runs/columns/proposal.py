@@ -218,9 +218,6 @@ def _columns(
 
     Those that are stated are kept. A name of which words alone are known counts where it has a unit of
     the signal, and no other column is as likely.
-
-    Raises:
-        InputError: a unit that is none of the signal.
     """
     columns = dict(kept)
     free = [pair for pair in zip(names, units, strict=False) if pair[0] not in _names_of(kept)]

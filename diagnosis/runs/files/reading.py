@@ -16,6 +16,7 @@ import pandas as pd
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
+from fmus.ops import wrap
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
 from fmus.ships.naming import DEFAULT
@@ -38,11 +39,9 @@ from ..columns.columns import (
     with_units_of_names,
 )
 from ..columns.unit_check import LARGEST, UNITS, largest, remedy
-from ..row_means import row_means
 from ..run_constants import DIGITS
 from .matlab_files import fits_matlab, read_matlab
-from .resolution import resolution
-from .tables import as_table, column_names, date_stamps, is_cell, numbers, table_of_file
+from .tables import as_table, column_names, date_stamps, is_cell, numbers, resolution, table_of_file
 
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
@@ -370,3 +369,28 @@ def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
         raise InputError(f"the runs are of several ships: {each}")
     first = next(iter(told.items()), None)
     return None if first is None or first[1] == DEFAULT else (first[1], first[0])
+
+
+def row_means(
+    values: np.ndarray, time: np.ndarray, angle: bool = False, sampled: np.ndarray | None = None
+) -> np.ndarray:
+    """Samples (n,) at times (n,) [s] as their means from each row to the next; the last one stays.
+
+    Args:
+        values: of which a missing one is NaN, and changes no other. Between two they are on a line.
+        time: in any order.
+        angle: whether they are angles [rad], which take the shorter way.
+        sampled: (n,), whether a row has a sample, and does not repeat one; None: each has.
+    """
+    order = np.argsort(time, kind="stable")
+    own = order if sampled is None else order[sampled[order]]
+    steps = np.diff(values[own], append=np.nan)
+    if angle:
+        steps = wrap(steps)
+    width = np.diff(time[own], append=np.inf)
+    slope = np.where(np.isfinite(steps) & (width > 0.0), steps, 0.0) / np.where(width > 0.0, width, 1.0)
+    at = np.searchsorted(time[own], time[order], side="right") - 1
+    middle = 0.5 * (time[order] + np.append(time[order][1:], time[order][-1]))
+    means = values.copy()
+    means[order] += np.nan_to_num(slope[at] * (middle - time[own][at]))  # a row may have no time
+    return means

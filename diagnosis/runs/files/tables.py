@@ -21,6 +21,7 @@ from ..columns.side_car import (
     refuse_units,
     what_to_do,
 )
+from ..run_constants import CHANCE, DIGITS
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
@@ -190,3 +191,21 @@ def _first(cells: pd.Series, unreadable: Any) -> str | None:
     """The first cell that is not empty and could not be read."""
     wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
     return str(cells.iloc[wrong[0]]) if wrong.size else None
+
+
+def resolution(values: np.ndarray) -> np.ndarray:
+    """The step to which each of some numbers (n,) is rounded; zero where they are not."""
+    counted = np.isfinite(values) & (values != 0.0)
+    size = np.abs(values[counted])
+    if not size.size:
+        return np.zeros_like(values)
+    power = np.floor(np.log10(size * (1.0 + DIGITS)))  # of ten, of the first digit
+    for digits in range(1, np.finfo(float).precision + 1):
+        for first in (np.full_like(power, power.max()), power):  # decimals, significant digits
+            step = 10.0 ** (first - digits + 1.0)
+            off = np.abs(size - step * np.round(size / step))
+            if np.mean(off <= DIGITS * step + np.spacing(size)) >= 1.0 - CHANCE:
+                found = np.full_like(values, step.min())
+                found[counted] = step
+                return found
+    return np.zeros_like(values)

@@ -12,16 +12,141 @@ P the hat matrix of the spline, and r(a) the residuals [sqrt(W) (a - P a), sqrt(
 
     g = argmin |r(z) - r(A) g|^2,    taken = r(z)^T r(A) g / sigma^2.
 
-No model of a ship enters.
+No model of a ship enters. The likeliest delay alone proves nothing: the response of
+:mod:`.command_motion` knows neither damping nor any other force, and where commands are slow, a delay
+makes up for what is missing. Therefore each delay is compared with none *beside* what a ship with
+damping would make of commands that act at once: motions by the commands behind some lags. A
+slow command cannot tell those from a delay, a jump can.
+
+The likelihood ratio of two delays is a sum over blocks of time. A delay is sure if it is above zero by
+Student's test over the blocks, which needs no assumption on how residuals are correlated within one.
 """
 
-import numpy as np
+from functools import cache
+from typing import Any
 
-from .command_motion import CommandResponse, Commands
-from .delay import Regression, likeliest_delay
+import numpy as np
+from scipy.linalg import LinAlgError, orth
+from scipy.special import stdtrit
+
+from ..cleaning import BRIEF, WIDTH, between
+from ..run_constants import CHANCE, DIGITS
+from .command_motion import FORGETTING, CommandResponse, Commands
 from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
+from .spline import middles
+
+# s, times the scale of the ship; CyberShip Enterprise 1 has 0.4 s (docs/studies/measured_ship)
+LONGEST = 1.0
+
+
+class Regression:
+    """Generalised least squares of a run's pose on its commands, beside a spline.
+
+    Args:
+        problem: the pose.
+        fit: a smoothing spline of it.
+        commands: commands and headings.
+        time: (n,), of the pose, since the run's start [s].
+    """
+
+    def __init__(self, problem: Problem, fit: Fit, commands: Commands, time: np.ndarray) -> None:
+        self.problem, self.fit, self.commands, self.time = problem, fit, commands, time
+        self.time_scale = commands.track.scale.time
+        pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
+        self.pose = np.vstack(pose[:2]), pose[2]
+
+    def gains(self, delay: float) -> np.ndarray:
+        """Body-fixed acceleration by a unit of each command, (3, 3), for a delay [s]."""
+        motions = self.motions(self.commands.delayed(delay))
+        flat, turn = (least_squares(a, z[:, 0]) for a, z in zip(motions, self.pose, strict=True))
+        return np.vstack([flat.reshape(2, 3), turn])
+
+    def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
+        commands, time = self.commands, self.time + self.commands.track.run.time[0]
+        ahead = between(time, commands.even, commands.motion(commands.rotation[:, None] * tau)[0])
+        yaw = between(time, commands.even, commands.motion(tau)[0])
+        # A force to starboard moves the ship as one ahead does, a right angle further.
+        north, east = np.real(ahead), np.imag(ahead)
+        plane = {0: np.hstack([north, -east]), 1: np.hstack([east, north])}
+        found = np.vstack([self._residual(c, x) for c, x in plane.items()]), self._residual(2, yaw)
+        if not all(np.isfinite(part).all() for part in found):  # LAPACK may not end
+            raise LinAlgError("the response to its commands is not finite")
+        return found
+
+    def _residual(self, channel: int, x: np.ndarray) -> np.ndarray:
+        """r(x) of signals (n, k) in a channel, in units of the noise."""
+        system, y = self.fit.systems[channel], self.problem.data(channel, x)
+        return system.residual(y, system.solve(y))
+
+    @property
+    def block(self) -> np.ndarray:
+        """Number of the block of time of each row of r(x).
+
+        Residuals of a spline are correlated over less than its time constant, a second.
+        """
+        rows = np.concatenate([self.time, middles(self.problem.spline.grid)])
+        return np.unique(rows // (WIDTH * self.time_scale), return_inverse=True)[1]
+
+
+def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """x of least |z - a x|; columns that do not differ share their effect evenly."""
+    size = np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
+    scaled = a / size
+    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=DIGITS)[0] / size
+
+
+def likeliest_delay(regression: Regression) -> tuple[float, bool]:
+    """From a command to its effect [s], and whether the blocks of the run agree that there is a delay.
+
+    The search is over whole sampling periods: coarse at first, then downhill with halved steps. A delay
+    that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
+    logarithm of their number) is zero.
+    """
+    commands, block, time_scale = regression.commands, regression.block, regression.time_scale
+    period, longest, noticed = commands.track.period, LONGEST * time_scale, BRIEF * time_scale
+    # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
+    lags = np.geomspace(LONGEST, FORGETTING, 3) * time_scale
+    prompt = commands.delayed(0.0)
+    lagged = [regression.motions(commands.lagging(prompt, lag)) for lag in lags.tolist()]
+    aside = [orth(np.hstack(part)) for part in zip(*lagged, strict=True)]
+    pose = [z - q @ (q.T @ z) for q, z in zip(aside, regression.pose, strict=True)]
+
+    @cache
+    def blocks(periods: int) -> Any:
+        """(blocks,), what a delay leaves of -2 log L in each block."""
+        total = np.zeros(block.max() + 1)
+        motions = regression.motions(commands.delayed(periods * period))
+        for q, z, a in zip(aside, pose, motions, strict=True):
+            own = a - q @ (q.T @ a)
+            off = z[:, 0] - own @ least_squares(own, z[:, 0])
+            total += np.bincount(np.tile(block, off.size // block.size), off**2)
+        return total
+
+    def left(periods: int) -> float:
+        return float(blocks(periods).sum())
+
+    step = 2.0 * noticed / period  # between the delays that are tried first
+    tried = {round(k * step) for k in range(round(longest / (2.0 * noticed)) + 1)}
+    best = min(sorted(tried), key=left)
+    while step > 1:
+        step = np.ceil(step / 2.0)
+        near = {max(best - int(step), 0), best + int(step)}
+        tried |= near
+        best = min((best, *sorted(near)), key=left)
+    if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
+        return 0.0, False
+    short = min((k for k in tried if k * period < noticed), key=left)
+    sure = best != short and surely_positive(blocks(short) - blocks(best), CHANCE / len(tried))
+    return best * period, sure
+
+
+def surely_positive(values: np.ndarray, chance: float) -> bool:
+    """Whether the mean of independent values (k,) is above zero, by Student's one-sided test."""
+    k = values.size
+    return k > 1 and bool(values.mean() > values.std(ddof=1) / k**0.5 * -stdtrit(k - 1, chance))
 
 
 def with_commands(

@@ -23,9 +23,8 @@ from ...execution.short_text import ShortRepr
 from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise
 from ..columns.columns import POSE
 from ..frozen import repeated
-from ..measured_wind import air_along
 from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
-from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
+from ..sensors.evidence import FEWEST, VELOCITIES, air_along, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
@@ -33,8 +32,7 @@ from .correlated_noise import with_correlated
 from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
-from .spline import DEGREE, Knots, basis, knots
-from .spline_covariance import SplineCovariance
+from .spline import DEGREE, Knots, SplineCovariance, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 

@@ -12,12 +12,12 @@ K the Gram matrix of the third derivatives in units of h.
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, PPoly
-from scipy.linalg import cholesky_banded, hilbert
-from scipy.sparse import csr_array
+from scipy.linalg import cholesky_banded, get_lapack_funcs, hilbert
+from scipy.sparse import csr_array, csr_matrix
 
 from ..run_constants import DIGITS, ORDER
 
@@ -25,6 +25,7 @@ DEGREE = 2 * ORDER - 1  # 1, of the smoothing spline
 # 1, coefficients after which the recursion of the inverse has forgotten its start: its memory falls as
 # exp(-n / (2 s^(1/6))), to 5e-5 at the smoothness s = 1e6, to 1e-2 at the largest one, 1e8.
 MEMORY = 200
+TBTRS: Any = get_lapack_funcs("tbtrs", dtype=float)  # solves by a triangular band
 
 
 @cache
@@ -209,3 +210,40 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
             of, row = (diagonal, i + j) if i + j < DEGREE else (beside, i + j - DEGREE)
             found[i, ..., j] = of[..., row, j].T
     return found.reshape(WIDTH, channels, -1)[..., :size].swapaxes(1, 2)
+
+
+class SplineCovariance(NamedTuple):
+    """What the samples leave uncertain of the splines of the three channels.
+
+    Attributes:
+        grid: their knots, times counted from ``start``.
+        factors: (3, 6, size), lower bands of L.
+        start: time of the run's first row [s].
+    """
+
+    grid: Knots
+    factors: np.ndarray
+    start: float
+
+    def variance(self, weights: csr_matrix, time: np.ndarray, derivative: int) -> np.ndarray:
+        """Variance (K, 3) of sums of a derivative of the pose, of which the commands explain a part.
+
+        A sum is a linear function a of the coefficients, whose covariance is A^-1 = (L L^T)^-1
+        (:mod:`.penalised`): its variance is |L^-1 a|^2. Wherever samples are missing, that is the
+        variance of what the jerk may have done meanwhile.
+
+        Args:
+            weights: (K, n), of the derivative at some times in stretches.
+            time: (n,) [s].
+            derivative: its order.
+        """
+        sums: Any = weights @ basis(self.grid, time - self.start, derivative).matrix
+        found = np.zeros((sums.shape[0], len(self.factors)))
+        for row, (begin, end) in enumerate(zip(sums.indptr[:-1], sums.indptr[1:], strict=True)):
+            columns = sums.indices[begin:end]
+            first = columns.min()
+            band = self.factors[:, :, first : columns.max() + MEMORY]
+            right = np.zeros((band.shape[2], 1))
+            right[columns - first, 0] = sums.data[begin:end]
+            found[row] = [np.sum(TBTRS(factor, right, uplo="L")[0] ** 2) for factor in band]
+        return found
