@@ -544,7 +544,7 @@ def test_a_coefficient_is_no_second_part_of_its_own_change():
 def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sure):
     """By shares of the first error; a method that cannot fit without it says nothing."""
     found, start = told(0.99, 0.99), Model()
-    doubts = Doubts(replaceable=replaceable(found, start, [0.9], [own]))
+    doubts = Doubts(replaceable=replaceable(found, [0.9], [own]))
     (f,) = with_confidence(found, start, doubts).effects
     assert f.confidence == (0.99 if sure else 0.5)
     assert ("as much without it" in f.doubt) != sure
@@ -572,9 +572,16 @@ def test_a_tracking_filter_faster_than_the_smoothing_is_even_odds(noise, faster)
     assert {f.id for f in found.effects} - {*sure} == faster
 
 
-def test_waves_are_in_no_model_and_not_replaceable():
-    waves = Finding("waves", {"wave_peak": 0.6}, {}, 0.95, [], 0.8, 0.8, together=0.95)
-    assert not replaceable(Findings([waves], model=Model()), Model(), [0.8], [0.0])
+@pytest.mark.parametrize("validate", [False, True])
+def test_waves_are_in_no_model_and_have_no_share_of_the_squared_error(validate):
+    """Their share is of the power; to fit all else without them says nothing of them."""
+    start, run = Model(), weak_windows(smoothed(sail(60.0, 0.1, {})[0]))
+    waves = Finding("waves", {"wave_peak": 0.6}, {}, 0.95, [], 0.8, 0.8, together=0.95, model=start)
+    found = Findings([waves], model=start, refit=lambda ids: pytest.fail("nothing to fit"))
+    explained = judging.shares(found, start, [run] if validate else [])
+    unique = judging.unique_shares(found, start, [run], [])
+    assert (explained, unique) == ([0.8], [None])
+    assert not replaceable(found, explained, unique)
 
 
 @pytest.mark.slow

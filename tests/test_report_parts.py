@@ -13,7 +13,7 @@ from diagnosis import Model
 from diagnosis.assessment.covariates import HEADING, SPEED
 from diagnosis.assessment.regions import Profile
 from diagnosis.assessment.settings import SETTINGS
-from diagnosis.report import finding_text, formatting, headline
+from diagnosis.report import finding_text, formatting, headline, terminal
 from diagnosis.report.pictures import chart, figures, shape, tracks
 from diagnosis.report.pictures.shape import Curve
 from diagnosis.report.reported_effect import ReportedCoefficient
@@ -107,6 +107,14 @@ def test_what_is_sure_is_a_fact_and_comes_first():
         headline.headline(both)
         == f"{headline.finding_sentence(sure)} {headline.finding_sentence(unsure)}"
     )
+
+
+@pytest.mark.parametrize(
+    ("by_power", "of"), [(True, "of the power of"), (False, "of the squared error")]
+)
+def test_the_share_of_a_finding_says_what_it_is_of(by_power, of):
+    *_, line = terminal._effect(effect("waves", 0.9, by_power=by_power))
+    assert f"explains 90 % {of}" in line
 
 
 def test_headline_of_each_verdict():

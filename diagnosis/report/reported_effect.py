@@ -18,6 +18,8 @@ from .finding_text import advice, equation, sentence, separation_note, unit
 
 T = TypeVar("T")
 OTHERWISE = 2.0  # 1, ratio of two forces of which one does not stand for the other (chosen)
+OF_ERROR = "of the squared error with the coefficients"
+OF_POWER = "of the power of the model error, on the axis with the most"
 AXES = ("X", "Y", "N", "XY")  # effects on other sets of axes count as XYN
 
 
@@ -39,6 +41,7 @@ class ReportedEffect:
 
     Attributes:
         in_model: whether ``model.ssv`` has it.
+        by_power: whether the share is that of the power of the model error, as of waves.
     """
 
     id: str
@@ -54,6 +57,12 @@ class ReportedEffect:
     share_unique: float | None = None
     doubt: str = ""
     in_model: bool = True
+    by_power: bool = False
+
+    @property
+    def of(self) -> str:
+        """What the share is of."""
+        return OF_POWER if self.by_power else OF_ERROR
 
 
 def reported_effects(d: Diagnosis) -> tuple[list[ReportedEffect], list[ReportedEffect]]:
@@ -94,6 +103,7 @@ def _reported(
         unique,
         f.doubt,
         in_model,
+        effect.search.by == "spectrum",
     )
 
 

@@ -203,7 +203,7 @@ def _effect(e: ReportedEffect) -> Iterator[str]:
     share = _percent(e.share_of_error)
     unique = f", unique contribution {_percent(e.share_unique)} (lost without this effect)"
     alone = "" if e.share_unique is None else unique
-    explained = f"explains {share} of the squared error with the coefficients{alone}"
+    explained = f"explains {share} {e.of}{alone}"
     yield f"confidence {_percent(e.confidence)}, {explained}"
     yield from filter(None, (e.separation, e.advice))
 

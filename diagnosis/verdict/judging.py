@@ -188,7 +188,7 @@ def judge(
     doubts = Doubts(
         residual=unexplained_axes(fit.findings, remainder, start),
         of_data=doubt_of_data(train),
-        replaceable=replaceable(fit.findings, start, explained, alone),
+        replaceable=replaceable(fit.findings, explained, alone),
         on_one_line=on_one_line(fit.findings, start, train),
         smoothed=faster_than_smoothing(fit.findings, start, train),
         without_gain=unshown,
@@ -210,24 +210,17 @@ def _predicting(found: Findings, data: ValidationData, changed: bool) -> Finding
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
     """Axes with a significant residual; where waves are sure, which account for it, with a slow one."""
-    waves = [f for f in found.effects if start.ship.effects[f.id].search.by == "spectrum"]
+    waves = [f for f in found.effects if _is_random(f, start)]
     are_sure = any(confidence_of(f, start).own >= FOUND for f in waves)
     return {axis for axis, r in remainder.axes.items() if r.significant and (r.is_slow or not are_sure)}
 
 
-def replaceable(
-    found: Findings, start: Model, explained: Sequence[float], alone: Sequence[float | None]
-) -> set[str]:
-    """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`.
-
-    Waves are in no model, so that none explains less without them.
-    """
+def replaceable(found: Findings, explained: Sequence[float], alone: Sequence[float | None]) -> set[str]:
+    """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`."""
     return {
         f.id
         for f, share, own in zip(found.effects, explained, alone, strict=True)
-        if own is not None
-        and own <= NEGLIGIBLE * share
-        and start.ship.effects[f.id].search.by != "spectrum"
+        if own is not None and own <= NEGLIGIBLE * share
     }
 
 
@@ -274,8 +267,7 @@ def remainder_of(
     significant = any(axis.significant for axis in axes.values())
     how = recurrence(runs, np.concatenate(left)) if significant else None
     regions = find_regions(runs, left, noise_of(runs, start, model)).regions
-    effects = learned.model.ship.effects
-    waves = any(effects[f.id].search.by == "spectrum" for f in learned.effects)
+    waves = any(_is_random(f, start) for f in learned.effects)
     return Remainder(axes, remainder_sentence(axes, how, regions, waves, runs[0].scale))
 
 
@@ -287,7 +279,7 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
     """Share of the initial sum of squares that each finding explains.
 
     It is that of validation runs; without any, and of times within a run, which no other run has, that
-    of cross-validation.
+    of cross-validation. Of waves it is their share of the power, as no model foretells them.
 
     Args:
         learned, start: the findings and the model with them, and the initial model.
@@ -299,8 +291,13 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
         sums = np.array([_squares(validate, model, learned.sigma) for model in models])
         unseen = (-np.diff(sums) / sums[0]).tolist()
         pairs = zip(learned.effects, unseen, strict=True)
-        found = [f.share if f.of_runs else share for f, share in pairs]
+        found = [f.share if f.of_runs or _is_random(f, start) else share for f, share in pairs]
     return np.clip(found, 0.0, 1.0).tolist()
+
+
+def _is_random(f: Finding, start: Model) -> bool:
+    """Whether a finding is a random process, as waves are."""
+    return start.ship.effects[f.id].search.by == "spectrum"
 
 
 def unique_shares(
@@ -318,7 +315,8 @@ def unique_shares(
         validate: validation runs; where there are any, they count for all else.
 
     Returns:
-        For each finding, in their order, a share [1]; None where the method cannot fit without it.
+        For each finding, in their order, a share [1]; None for waves, and where the method cannot fit
+        without it.
     """
     if learned.refit is None:
         return [None] * len(learned.effects)
@@ -334,6 +332,9 @@ def unique_shares(
 
     found: list[float | None] = []
     for finding in learned.effects:
+        if _is_random(finding, start):
+            found.append(None)
+            continue
         try:
             others = learned.refit([f.id for f in learned.effects if f.id != finding.id])
         except LinAlgError:  # these data do not determine the others alone
