@@ -416,4 +416,4 @@ def test_what_all_runs_share_is_shown_with_calibrated_coefficients(values, said)
     calibrated = SimpleNamespace(learned=found, model=found.model, measured=False, gain=None)
     text = as_text(show_calibration(calibrated, report_data(compared(False), **DERIVED)))
     assert said in text
-    assert ("What all runs share" in text) is bool(values)
+    assert ("Shared by all runs" in text) is bool(values)

@@ -65,7 +65,7 @@ def show_calibration(
     shared = at.values if at is not None else {}
     if shared:
         lines = (f"{n} is {_number(model.value(n), 2)} {model.declared(n).unit}" for n in shared)
-        yield from _lines("What all runs share", lines)
+        yield from _lines("Shared by all runs", lines)
     yield from _errors(r)
     yield from _files(r, out)
 
