@@ -235,6 +235,7 @@ def test_a_gain_in_position_that_costs_heading_says_so(heading, told):
     said = " ".join(gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, 10.0))
     assert said.startswith(SEARCH_GAINED)
     assert ("However, predictions of the heading are worse." in said) is told
+    assert ("the mean square rises by 0.0" in said) is (heading < 0.0)
 
 
 @pytest.mark.parametrize("gained", [True, False])

@@ -91,8 +91,9 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
         ("heading", "°", degrees(1.0), gain.heading),
     ):
         errors = " → ".join(number(x, 3, factor) for x in (change.before, change.after))
-        fall, std = (number(x, 2, factor**2) for x in (change.difference, change.standard_error))
-        parts.append(f"{name} {errors} {unit} (the mean square falls by {fall} ± {std} {unit}²)")
+        way = "falls" if change.difference >= 0.0 else "rises"
+        by, std = (number(abs(x), 2, factor**2) for x in (change.difference, change.standard_error))
+        parts.append(f"{name} {errors} {unit} (the mean square {way} by {by} ± {std} {unit}²)")
         worse += [name] if change.is_worse else []
     where = f"Predictions over {number(over)} s in {gain.windows} windows of {gain.where}"
     but = [f"However, predictions of the {worse[0]} are worse."] if gain.gained and worse else []
