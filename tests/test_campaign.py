@@ -203,6 +203,25 @@ def test_finished_runs_are_not_made_again(base, monkeypatch):
     assert third.equals(second)
 
 
+def test_an_interrupt_of_the_first_table_is_told_in_the_summary(base, monkeypatch):
+    """To import what writes it takes a second, in which nothing has run."""
+    original, called = cosim.campaign.conduct.write_table, []
+
+    def write(folder, made):
+        called.append(folder)
+        if len(called) == 1:
+            raise KeyboardInterrupt
+        original(folder, made)
+
+    monkeypatch.setattr("cosim.campaign.conduct.write_table", write)
+    path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0]}})
+    with pytest.raises(KeyboardInterrupt):
+        main([str(path), "--workers", "0", "--out", str(base / "out")])
+    assert pandas.read_parquet(base / "out" / "runs.parquet").empty
+    told = json.loads((base / "out" / "campaign.json").read_text())
+    assert (told["status"], told["done"]) == ("interrupted", 0)
+
+
 def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
     original, made = cosim.dispatch.workplace.Workplace.run, []
 

@@ -212,6 +212,9 @@ class _Work:
             self._keep("running")
         except OSError as error:
             raise InputError(not_written(self.folder, error)) from None
+        except KeyboardInterrupt:
+            self._end("interrupted")
+            raise
         STATE.write(CAMPAIGN, str(self.folder / SUMMARY))
         status, message = "failed", ""
         with ExitStack() as stack:
@@ -233,11 +236,14 @@ class _Work:
             except OSError as error:
                 message = not_written(self.folder, error)
                 raise SimulationError(f"{message}; {self.ended} finished runs are kept") from None
-            finally:
-                # Before the place closes, which may take seconds.
-                with Held():
-                    made = self._keep(status, message)
-                    STATE.write(CAMPAIGN, "")
+            finally:  # before the place closes, which may take seconds
+                made = self._end(status, message)
+        return made
+
+    def _end(self, status: str, message: str = "") -> pandas.DataFrame:
+        with Held():
+            made = self._keep(status, message)
+            STATE.write(CAMPAIGN, "")
         return made
 
     def _take(self, rows: Iterator[tuple[Job, RunRow]], progress: Progress) -> None:
