@@ -17,15 +17,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ...predictors import Model, WeakWindows
+from ...predictors import Model, WeakWindows, omega
 from ...predictors.shooting import Shooting
-from ...predictors.uncertainty import measurement_std
 from ..candidates import SMALL, model_error
 from ..findings import Findings
 from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
-from .disturbance import ForceDisturbance
 from .disturbance_summary import unrecorded
 from .fit import (
     Information,
@@ -70,7 +68,8 @@ class Calibration(PredictionFit):
         whole, pushes = push_of(self.runs, model_error(self.runs, model), self.std)
         steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
         columns = [*self._columns, *([*steps].index(n) for n in CONSTANTS)]
-        unit = np.concatenate([self.unit, usual(pushes)])
+        usual = np.median([p.size for p in pushes], axis=0)
+        unit = np.concatenate([self.unit, usual[1:]])
         folds = len(self.folds)
         H, G, g = np.zeros((folds, q, q)), np.zeros((q, q)), np.zeros((folds, q))
         by_constants, missed, expected = np.zeros((q, q)), 0.0, 0.0
@@ -148,13 +147,13 @@ class Calibrator:
         """The same with an axis of the heading and constants that all runs share.
 
         The constants of each run stand for them otherwise, and another run is predicted without. The fit
-        begins with the mean of the model error, which is part of the disturbance otherwise.
+        begins with the mean of the model error, which is part of the disturbance otherwise. Its prior
+        deviation is the mean size of the runs' own means.
         """
         at = RefinedModel.at(self.start, self.prior)
-        error = model_error(self.train, self.start)
-        std = np.concatenate([measurement_std(w, self.start) for w in self.train])
-        _, pushes = push_of(self.train, error, std)
-        found = zip(CONSTANTS, usual(pushes).tolist(), error.mean(axis=0)[1:].tolist(), strict=True)
+        means = np.array([omega(w, self.start).mean(axis=0)[1:] for w in self.train])
+        sizes = np.sqrt(np.mean(means**2, axis=0))
+        found = zip(CONSTANTS, sizes.tolist(), means.mean(axis=0).tolist(), strict=True)
         shared = {name: (size, mean) for name, size, mean in found if size > 0.0}
         if "heading_offset" in self.start.ship.effects:
             shared = {**shared, "heading_offset": (AXIS, 0.0)}
@@ -172,11 +171,6 @@ class Calibrator:
         learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)
         posterior = JointPosterior.of(fitted, self.prior)
         return RefitOutcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
-
-
-def usual(pushes: Sequence[ForceDisturbance]) -> np.ndarray:
-    """Prior standard deviations (2,) of CONSTANTS: the sizes of the usual disturbance [N, N m]."""
-    return np.median([p.size for p in pushes], axis=0)[1:]
 
 
 def begin(
