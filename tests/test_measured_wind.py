@@ -19,7 +19,7 @@ from diagnosis import Model
 from diagnosis.predictors import weak_windows
 from diagnosis.predictors.weak_form import omega
 from diagnosis.runs import prepare, read_frame
-from diagnosis.runs.sensors.evidence import air_along
+from diagnosis.runs.measured_wind import air_along
 from diagnosis.search.findings import Findings
 from diagnosis.search.prediction_fit.coefficient_calibration import Calibrator
 from diagnosis.search.prior import NominalPrior

@@ -23,7 +23,7 @@ from fmus.effects import Memory
 from fmus.vessel.vessel import PreparedVessel, State, water_velocity
 
 from ..runs.files.reading import Run
-from ..runs.smoothing.command_motion import filtered
+from ..runs.linear_filter import filtered
 from .ship_model import Model
 
 # s, times the scale of the ship; longest step of thrusters and vessel, where the error of the

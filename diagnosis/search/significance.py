@@ -150,17 +150,13 @@ def predicts_worse(its: Losses, others: Losses) -> bool:
     return True
 
 
-def gain(its: Losses, others: Losses) -> float:
-    """Fall of the losses from a model to another: logarithms of their ratios, summed over the three."""
-    return _fall(its, others)
+def gain(its: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> float:
+    """Fall of the losses from a model to another: logarithms of their ratios, summed over all."""
+    pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))
 
 
 def gain_of_predictions(its: Losses, others: Losses) -> float:
     """The same of the predictions alone."""
-    return _fall(its[1:], others[1:])
-
-
-def _fall(its: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> float:
-    pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))
+    return gain(its[1:], others[1:])

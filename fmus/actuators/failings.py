@@ -21,7 +21,7 @@ from ..effects.misplaced import elsewhere, turned
 from ..effects.own_curves import ALONG, command_curve, force_curve, speed_curve, thrust_curve
 from ..effects.power import crossed_forces, power_exponent
 from ..effects.text import number
-from .actuator import Actuator
+from .actuator import Actuator, both, twins
 
 
 def failings(a: Actuator) -> list[Effect]:
@@ -52,6 +52,11 @@ def failings(a: Actuator) -> list[Effect]:
         outage(d, f"{d.name}_failure"),
         *([lagging] if a.leads else []),
     ]
+
+
+def failings_of_twins(every: Sequence[Actuator]) -> list[Effect]:
+    """What may go wrong with two twins alike, as where both were set up by one mistake."""
+    return [turned(both(*pair)) for pair in twins(every)]
 
 
 def by_axis(d: Devices) -> Effect:

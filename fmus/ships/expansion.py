@@ -3,13 +3,11 @@
 from functools import cache
 
 from ..actuators.actuation import actuators
-from ..actuators.actuator import both, twins
-from ..actuators.failings import failings, named_effects
+from ..actuators.failings import failings, failings_of_twins, named_effects
 from ..actuators.law_changes import changes
 from ..declare import variables
 from ..effects import STANDARD, EffectSet
 from ..effects.force import change
-from ..effects.misplaced import turned
 from ..hull import Damping, term_variable
 from ..ship_description import Description
 from .hull_errors import hull_errors
@@ -39,8 +37,7 @@ def effects_of_ship(ship: Description, effects: EffectSet = STANDARD) -> EffectS
     if ship.effects:
         acting = named_effects(every, ship.effects, others)
     else:
-        acting = [e for a in every for e in failings(a)]
-        acting += [turned(both(*pair)) for pair in twins(every)]
+        acting = [e for a in every for e in failings(a)] + failings_of_twins(every)
     return EffectSet(
         [
             *acting,

@@ -5,10 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
-from fmus.frames import air_velocity, rotate_to_earth
+from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE
 
-from ..cleaning import between, long_gap, lost, median_std, noise
+from ..cleaning import long_gap, lost, median_std, noise
 from ..files.reading import Run
 from ..files.telegrams import filled
 from ..frozen import repeated
@@ -23,8 +23,6 @@ LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chos
 STRAIGHT = 0.25
 # Channels that give the velocity over ground, best first: with the heading, or without it.
 VELOCITIES = (("u", "v"), ("x_dot", "y_dot"), ("speed", "course"))
-TRUE = ("wind_speed", "wind_direction")
-RELATIVE = ("wind_speed_relative", "wind_direction_relative")
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,28 +194,3 @@ def blocked_fit(
     parts = np.array([solved(block != k) for k in range(FEWEST)])
     std = np.sqrt((FEWEST - 1) / FEWEST * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
     return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
-
-
-def air_along(run: Run, psi: np.ndarray, nu: np.ndarray) -> np.ndarray | None:
-    """Velocity (n, 2) of the air to north and east [m/s]; None: no wind was measured.
-
-    Between samples it is on a line between them, before the first and after the last as there.
-
-    Args:
-        run: with the true wind, or one relative to the ship, of which the ship's velocity is taken off.
-        psi: (n,), smoothed heading [rad].
-        nu: (n, 3), smoothed velocity [m/s, m/s, rad/s].
-    """
-    if all(name in run.measured for name in TRUE):
-        speed, direction = (run.measured[name] for name in TRUE)
-        air = np.column_stack(air_velocity(speed, direction))
-    elif all(name in run.measured for name in RELATIVE):
-        speed, direction = (run.measured[name] for name in RELATIVE)
-        u, v = air_velocity(speed, direction)
-        air = np.column_stack(rotate_to_earth(psi, u + nu[:, 0], v + nu[:, 1]))
-    else:
-        return None
-    known = np.isfinite(air).all(axis=1) & np.isfinite(run.time)
-    if not known.any():
-        return None
-    return between(run.time, run.time[known], air[known])

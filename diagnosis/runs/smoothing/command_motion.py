@@ -5,17 +5,16 @@
 on evenly spaced times, of commands that are held from row to row.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
 
 from fmus.scale import Scale
 
 from ..cleaning import Track, between, impulse
+from ..linear_filter import filtered
 from .spline import Knots
 
 # Of CyberShip Enterprise 1, times the scale of the ship.
@@ -138,23 +137,3 @@ class Commands:
         sampled = (between(self.track.run.time, self.even, each).T for each in (x, x_dot, x_ddot))
         eta = [np.column_stack([plane.real, plane.imag, yaw.real]) for plane, yaw in sampled]
         return CommandResponse(eta[0], eta[1], eta[2], delay)
-
-
-def filtered(numerator: Sequence[float], denominator: Sequence[float], x: np.ndarray) -> np.ndarray:
-    """A signal behind a linear filter at rest before, as a triangular system with few diagonals.
-
-    ``scipy.signal.lfilter`` gives the same, but takes more time to import than a run takes to smooth.
-
-    Args:
-        numerator, denominator: polynomials in 1/z; the latter begins with one.
-        x: (n, k), the signal.
-    """
-    y = np.zeros_like(x)
-    for late, gain in enumerate(numerator[: len(x)]):
-        if gain:
-            y[late:] += gain * x[: len(x) - late]
-    if len(denominator) == 1:
-        return y
-    diagonals = np.asarray(denominator, x.dtype)[:, None].repeat(len(x), axis=1)
-    (solved,) = get_lapack_funcs(("tbtrs",), (y,))
-    return solved(diagonals, y, uplo="L", diag="U")[0]

@@ -105,7 +105,7 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
     stretch = np.searchsorted(p.spline.grid.first, b.first, side="right") - 1
     for _ in range(REWEIGHTINGS):
         fit = solve(p, smoothness, weights)
-        # Where the noise is far below what rounding leaves of a variance that may be below zero.
+        # Rounding may leave a variance below zero, and a noise that is far smaller makes that large.
         spread = np.maximum(p.share * b.variance(fit.covariance), 0.0) / p.sigma**2
         off = _deviations(p, fit)
         leverage = np.minimum(weights * spread, 0.999)

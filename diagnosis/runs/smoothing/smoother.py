@@ -23,8 +23,9 @@ from ...execution.short_text import ShortRepr
 from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise
 from ..columns.columns import POSE
 from ..frozen import repeated
+from ..measured_wind import air_along
 from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
-from ..sensors.evidence import FEWEST, VELOCITIES, air_along, velocity_over_ground
+from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
