@@ -1,0 +1,35 @@
+"""Numbers of pages about benchmarks are those of the results that lie beside them."""
+
+import json
+import re
+
+import pytest
+from support.project import ROOT
+
+from benchmarks.logs.aims import aims
+from benchmarks.logs.recorded import Recorded
+
+BENCHMARKS = ROOT / "docs" / "benchmarks"
+PAGE = (ROOT / "benchmarks" / "measured_data.md").read_text("utf-8")
+# The columns of the table of logs: file of the results, effects that there are (None: not known).
+LOGS = {"simulated": ["X_u"], "cse1": None, "gunnerus": None}
+
+
+def column(number):
+    """Row -> cell of a column of the table of slow, held and filtered logs."""
+    part = PAGE.split("## Slow, held and filtered logs")[1].split("\n## ")[0]
+    lines = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")]
+    return {cells[0]: cells[number + 1] for cells in lines[1:]}
+
+
+@pytest.mark.parametrize(("number", "name"), [*enumerate(LOGS)])
+def test_aims_of_logs_are_those_of_the_results(number, name):
+    ways = json.loads((BENCHMARKS / "logs" / f"{name}_learned.json").read_text("utf-8"))["ways"]
+    found = dict(aims([Recorded.of(way) for way in ways], LOGS[name]))
+    told = [re.findall(r"\d+ (?:channels )?of \d+|\d+\.\d\d|\d+ are", text) for text in found.values()]
+    refused, known, bounds, doubted, others, kept, leading, sure, errors = (
+        [n.replace(" channels", "").removesuffix(" are") for n in row] for row in told
+    )
+    cells = [refused, known[:1], [*bounds, known[1]], doubted, others, kept, leading, sure, errors]
+    for (row, cell), numbers in zip(column(number).items(), cells, strict=True):
+        assert re.findall(r"\d+ of \d+|\d+\.\d\d|\d+$", re.sub(r" \(\d+ %\)", "", cell)) == numbers, row
