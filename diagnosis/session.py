@@ -40,7 +40,6 @@ from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .search.significance import Losses
-from .verdict.coefficients import Calibrations, calibrations
 from .verdict.judging import DecidedFindings, judge
 from .verdict.measured_commands import are_measured, with_measured_commands
 from .verdict.prediction_gain import PredictionGain, prediction_gain
@@ -262,13 +261,8 @@ class Session(ShortRepr):
         """First answer: the errors of the initial model."""
         return self._compared(None)
 
-    @property
-    def calibration(self) -> RefitOutcome | None:
-        """The better one of :attr:`calibrations`; None: runs do not determine coefficients."""
-        return self.calibrations and self.calibrations.best
-
     @cached_property
-    def calibrations(self) -> Calibrations | None:
+    def calibration(self) -> RefitOutcome | None:
         """The coefficients fitted to predictions; None: runs do not determine any."""
         if not (self.predictor.parametric and any(self.known.std.values())):
             return None
@@ -276,7 +270,7 @@ class Session(ShortRepr):
         calibrator = Calibrator(nothing, self.train, self.start, self.known)
         self.advance("calibration of the coefficients")
         with suppress(LinAlgError):  # the runs do not determine them
-            return calibrations(calibrator, self.data(nothing.sigma)) if calibrator.windows else None
+            return calibrator.coefficients() if calibrator.windows else None
         return None
 
     @well_posed()
@@ -322,7 +316,7 @@ class Session(ShortRepr):
         nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
         region = OperatingRegion.of(nu, self.start.ship.scale)
         calibrates = self.predictor.parametric
-        calibration = self.calibrations if calibrates else None
+        calibration = self.calibration if calibrates else None
         verdict, gain = judge(
             found, data, self.known, self.harms, region, calibrates, calibration, self.advance
         )

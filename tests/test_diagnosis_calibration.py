@@ -1,4 +1,4 @@
-"""A calibrated model: all coefficients at once, by predictions, each run with constants of its own."""
+"""A calibrated model: all coefficients at once, by predictions."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,41 +9,32 @@ from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model, weak_windows
 from diagnosis.predictors.windows import Windows
+from diagnosis.search.candidates import model_error
 from diagnosis.search.findings import Findings
 from diagnosis.search.prediction_fit.coefficient_calibration import (
-    AXIS,
-    CONSTANTS,
     LEFT_OUT,
     Calibration,
-    Calibrator,
     begin,
 )
-from diagnosis.search.prediction_fit.fit import fit_to, shootings
+from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, push_of, shootings
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
-from diagnosis.verdict.coefficients import calibrated, calibrations
+from diagnosis.verdict.coefficients import calibrated
 from diagnosis.verdict.validation_data import ValidationData
 
 DRAG = -2.0  # N s/m, hidden
 MOMENTS = (0.02, -0.02, 0.01, -0.01)  # N m, of each run, that nobody recorded
 STREAM_EAST = 0.04  # m/s
-SHARED = 0.03  # N m, of all runs
 PRIOR = NominalPrior.of(Model())
 
 
 @cache
-def runs(drag=DRAG, east=0.0, axis=0.0, moment=0.0):
+def runs(drag=DRAG, east=0.0):
     """Runs of a ship that may have more drag than the model, each turned by a constant of its own.
 
-    The water goes east [m/s]; the heading is measured about an axis that is off by an angle [rad].
-    One more moment [N m] turns all.
+    The water goes east [m/s].
     """
-    ships = [
-        {"delta_X_u": drag, "body_bias_N": moment + (own if drag else 0.0), "V_e": east}
-        for own in MOMENTS
-    ]
-    if axis:
-        ships = [ship | {"heading_offset": axis} for ship in ships]
+    ships = [{"delta_X_u": drag, "body_bias_N": own if drag else 0.0, "V_e": east} for own in MOMENTS]
     tracks = [smoothed(sail(seed=k, ship=ship)[0]) for k, ship in enumerate(ships)]
     named = [
         replace(s, track=replace(s.track, run=replace(s.track.run, name=f"run {k}")))
@@ -72,7 +63,7 @@ def test_what_a_model_leaves_out_is_zero_give_or_take_its_size():
 
 
 @pytest.mark.slow
-def test_the_drag_is_found_beside_constants_of_each_run():
+def test_the_drag_is_found_though_a_moment_that_nobody_recorded_turns_each_run():
     _, fitted = fit()
     model = fitted.estimate.model(PRIOR)
     still = {"delta_X_u": DRAG}
@@ -81,49 +72,21 @@ def test_the_drag_is_found_beside_constants_of_each_run():
         predicted.errors(m).over_all()[0] for m in (Model(), model, Model().plus(still))
     )
     assert after - true < 0.3 * (before - true)
-    assert [model.value(n) for n in CONSTANTS] == [0.0, 0.0]
     assert len(fitted.fold_models) == 4
 
 
-def tried(found):
-    """Calibrations of some runs, judged by each run without it."""
-    data = ValidationData(found, [], Model(), np.ones(3))
-    return calibrations(Calibrator(nothing_found(), found, Model(), PRIOR), data)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "value", "ship"),
-    [("heading_offset", AXIS, {"axis": AXIS}), ("body_bias_N", SHARED, {"moment": SHARED})],
-)
-def test_what_several_runs_share_is_calibrated(name, value, ship):
-    """Constants of all runs would stand for it, and a run that is not known has none."""
-    found = runs(0.0, **ship)
-    fits = tried(found[:3])
-    values = [c.findings.model.value(name) for c in fits]
-    assert values == pytest.approx([0.0, value], abs=0.1 * abs(value))
-    unseen = Windows([found[3].smoothed])
-    alone, best = (np.ravel(unseen.errors(c.findings.model).over_all())[0] for c in fits)
-    assert best < 0.5 * alone
-    few = tried(found[:2])
-    assert few.best is few.alone
-
-
-@pytest.mark.slow
-def test_what_runs_do_not_share_is_not_calibrated():
-    """Each run has a moment of its own, and their mean predicts a run without it no better."""
-    found = tried(runs()[:3])
-    assert found.best is found.alone
-
-
-@pytest.mark.slow
-def test_a_constant_of_a_run_costs_less_than_what_it_does():
+def test_the_disturbance_is_scaled_to_what_the_windows_miss():
+    """Its share of the information is the mean square of whitened residuals over the expected one."""
     problem, fitted = fit()
-    known = problem.information(fitted.estimate)
-    model = fitted.estimate.model(PRIOR).plus({"body_bias_N": 0.01})
-    with_constants = problem.squares(0, known.weights[0], model)
-    without = super(Calibration, problem).squares(0, known.weights[0], model)
-    assert with_constants < 0.9 * without
+    at, (windows,) = fitted.estimate, problem.windows
+    plain = PredictionFit(runs(), problem.windows, at, PRIOR).information(at)
+    share = np.trace(problem.information(at).G) / np.trace(plain.G)
+    model = at.model(PRIOR)
+    (W,), around = plain.weights, problem.around(windows, model)
+    _, pushes = push_of(runs(), model_error(runs(), model), problem.std)
+    expected = np.einsum("wii->", problem.scatter(windows, around, W, pushes))
+    assert share == pytest.approx(problem.squares(0, W, model) / expected, rel=2e-3)
 
 
 @pytest.mark.slow

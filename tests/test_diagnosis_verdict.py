@@ -610,7 +610,7 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(monk
     runs = diagnosis.gather([sail(64.0, 0.1, {"delta_X_u": -2.0})[0]])
     session = begin(runs)
     found = session.method.fit(runs, session.start, session.prior, silent, 0)
-    data, calibration = session.data(found.sigma), session.calibrations
+    data, calibration = session.data(found.sigma), session.calibration
     for name, value in (("any_sure", False), ("needless", True), ("predicts_worse", False)):
         monkeypatch.setattr(judging, name, lambda *_, value=value: value)
 
@@ -624,7 +624,7 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(monk
         assert decided.learned.ranking == found.ranking != []
         return decided
 
-    coefficients, nothing = seen(calibration.best), seen(None)
+    coefficients, nothing = seen(calibration), seen(None)
     assert (coefficients.refitted, nothing.refitted) == (True, False)
     assert (coefficients.changed, nothing.changed) == (True, False)
     assert nothing.learned.model == session.start

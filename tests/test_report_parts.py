@@ -141,8 +141,8 @@ def test_headline_of_each_verdict():
     assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])
     assert "a (mass), b, c, d and 2 others; no" in said("coefficients", suspects=suspects)
     assert said("coefficients").endswith("explain these data; no effect is needed.")
-    shared = said("coefficients", shared={"heading_offset": 0.1, "body_bias_N": 2.0})
-    assert "what all runs share (body_bias_N and heading_offset); no other effect" in shared
+    beside = said("coefficients", shared={"heading_offset": 0.1, "body_bias_N": 2.0})
+    assert "explain these data together with body_bias_N and heading_offset; no other" in beside
 
 
 def test_names_in_a_row():

@@ -28,7 +28,6 @@ from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.measured_channels import UNUSED
 from diagnosis.runs.sensors.sensor_finding import SensorFinding
 from diagnosis.search.findings import Findings
-from diagnosis.search.refinement import RefinedModel
 from diagnosis.verdict.prediction_gain import PairedChange, PredictionGain
 
 
@@ -400,21 +399,10 @@ def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
     assert text.count("<svg") == 2
 
 
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        (
-            {"heading_offset": 0.03, "body_bias_N": -2.0},
-            "heading_offset is 0.03 rad\n  body_bias_N is -2 N.m",
-        ),
-        ({}, ""),
-    ],
-)
-def test_what_all_runs_share_is_shown_with_calibrated_coefficients(values, said):
+def test_coefficients_that_moved_most_are_shown_with_a_calibration():
     start = Model()
-    at = RefinedModel(start, np.zeros(1), values, np.eye(len(values)))
-    found = Findings([], model=start.plus(values), moved={"X_u": 1.0}, estimate=at)
-    calibrated = SimpleNamespace(learned=found, model=found.model, measured=False, gain=None)
+    found = Findings([], model=start, moved={"X_u": -1.5, "m": 0.1})
+    calibrated = SimpleNamespace(learned=found, model=start, measured=False, gain=None)
     text = as_text(show_calibration(calibrated, report_data(compared(False), **DERIVED)))
-    assert said in text
-    assert ("Shared by all runs" in text) is bool(values)
+    assert text.index("X_u is") < text.index("m is")
+    assert "(-1.5)" in text

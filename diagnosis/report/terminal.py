@@ -61,11 +61,6 @@ def show_calibration(
     by = (f"{n} is {_number(calibrated.model.value(n))} ({_number(moved[n], 2)})" for n in furthest)
     title = "Coefficients with the largest changes (the change in standard deviations of the prior)"
     yield from _lines(title, by)
-    at, model = calibrated.learned.estimate, calibrated.model
-    shared = at.values if at is not None else {}
-    if shared:
-        lines = (f"{n} is {_number(model.value(n), 2)} {model.declared(n).unit}" for n in shared)
-        yield from _lines("Shared by all runs", lines)
     yield from _errors(r)
     yield from _files(r, out)
 

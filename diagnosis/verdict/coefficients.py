@@ -15,33 +15,10 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import gain, gain_of_predictions, harm, predicts_worse
+from ..search.significance import gain, harm, predicts_worse
 from .confidence import FOUND, Doubts, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
-
-
-class Calibrations(NamedTuple):
-    """The coefficients fitted to predictions, without an effect.
-
-    Attributes:
-        alone: nothing else in the model.
-        best: the same, or with what all runs share, see :meth:`.Calibrator.with_shared`, where the data
-            that decide are predicted better so.
-    """
-
-    alone: RefitOutcome
-    best: RefitOutcome
-
-
-def calibrations(calibrator: Calibrator, data: ValidationData) -> Calibrations:
-    """Both; of fewer than three runs what they share and what acts in one are indistinguishable."""
-    alone = calibrator.coefficients()
-    if len(calibrator.train) < WHOLE_RUNS:
-        return Calibrations(alone, alone)
-    shared = calibrator.with_shared()
-    better = gain_of_predictions(*data.losses(alone.findings, shared.findings)) > 0.0
-    return Calibrations(alone, shared if better else alone)
 
 
 class Conclusion(NamedTuple):

@@ -23,11 +23,10 @@ from ..runs.run_constants import NEGLIGIBLE
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
-from ..search.prediction_fit.refit import prediction_bands, to_predictions
+from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
 from ..search.prior import NominalPrior
 from ..search.significance import predicts_worse
 from .coefficients import (
-    Calibrations,
     any_finding,
     any_sure,
     better_calibration,
@@ -119,7 +118,7 @@ def judge(
     criterion: Harm,
     region: OperatingRegion,
     calibrates: bool,
-    calibration: Calibrations | None,
+    calibration: RefitOutcome | None,
     advance: Advance,
 ) -> tuple[DecidedFindings, PredictionGain | None]:
     """Judge what a search found: prune, conclude, fit to predictions, calibrate, say how sure it is.
@@ -156,17 +155,15 @@ def judge(
     gain, unshown = None, set[str]()
     if calibrates:
         advance("gain of the search over calibration")
-        alone, best = (c.findings for c in calibration) if calibration else (None, None)
+        coefficients = calibration and calibration.findings
         now = _predicting(fit.findings, data, changed)
-        gain = gain_of_search(data, start, best, fit.findings, now)
-        # What runs share is an effect: only coefficients make others superfluous.
-        by_alone = gain if alone is best else gain_of_search(data, start, alone, fit.findings, now)
-        unshown = without_gain(by_alone, fit.findings, start, train, [*prior.std])
+        gain = gain_of_search(data, start, coefficients, fit.findings, now)
+        unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
         other = None
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
         if other is None and not any_sure(fit.findings, start, unshown):
-            other = better_calibration(calibration and calibration.best, now, data, drives, unshown)
+            other = better_calibration(calibration, now, data, drives, unshown)
         nothing = (
             other is None
             and needless(fit.findings, unshown)
@@ -178,7 +175,7 @@ def judge(
             fit = other or to_predictions(learned, train, prior, False)
             fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
-            gain = gain_of_search(data, start, best, fit.findings, now)
+            gain = gain_of_search(data, start, coefficients, fit.findings, now)
     advance("residual")
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs

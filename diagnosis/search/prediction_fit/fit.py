@@ -247,6 +247,14 @@ class PredictionFit:
         total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
         return total if np.isfinite(total) else np.inf
 
+    def share(self, missed: float, expected: float) -> float:
+        """Of the sum of squares that disturbance and noise are expected to give, what counts.
+
+        Args:
+            missed, expected: sums of squares of the whitened residuals.
+        """
+        return 1.0
+
     def information(self, at: RefinedModel) -> Information:
         """What the windows say, by the slopes at an estimate and the push that it leaves in each run."""
         push, pushes = push_of(self.runs, model_error(self.runs, at.model(self.prior)), self.std)
@@ -261,7 +269,9 @@ class PredictionFit:
             parts = [(A[of == k].reshape(-1, q), r[of == k].ravel()) for k in range(folds)]
             H = np.array([J.T @ J for J, _ in parts])
             g = np.array([J.T @ left for J, left in parts])
-            return H, information_of(A, self.scatter(s, around, W, pushes)), g, W
+            V = self.scatter(s, around, W, pushes)
+            share = self.share(float(np.sum(r**2)), float(np.einsum("wii->", V)))
+            return H, share * information_of(A, V), g, W
 
         groups = [*zip(self.windows, self.fold_of_window, strict=True)]
         Hs, Gs, gs, weights = zip(*for_each(of_windows, groups), strict=True)
