@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 from support.project import ROOT
 
@@ -33,3 +34,29 @@ def test_aims_of_logs_are_those_of_the_results(number, name):
     cells = [refused, known[:1], [*bounds, known[1]], doubted, others, kept, leading, sure, errors]
     for (row, cell), numbers in zip(column(number).items(), cells, strict=True):
         assert re.findall(r"\d+ of \d+|\d+\.\d\d|\d+$", re.sub(r" \(\d+ %\)", "", cell)) == numbers, row
+
+
+SHIPS = {
+    "CyberShip Enterprise 1": "cse1, 8 s",
+    "KVLCC2": "kvlcc2, 20 s",
+    "R/V Gunnerus": "gunnerus, 60 s",
+    "Esso Osaka": "esso_osaka, 60 s",
+    "seven training tests of Esso Osaka": "esso_osaka_tzrb, 60 s",
+}
+METHODS = {"`learn --quick`": "calibrated", "`learn`": "learned", "ridge": "ridge", "initial": "nominal"}
+
+
+def test_methods_on_measured_ships_are_those_of_the_results():
+    means = json.loads((BENCHMARKS / "ships" / "results.json").read_text("utf-8"))["means"]
+    page = (ROOT / "docs" / "trust.md").read_text("utf-8")
+    (row,) = (line for line in page.splitlines() if line.startswith("| It is better than established"))
+    told = {}
+    for ship, errors in re.findall(r"(?:On|on|;) ([\w /]+): ([^;|]*?)(?=;|\. |\.?\|)", row):
+        found = re.findall(r"(\S.*?) ([\d.]+) m, ([\d.]+)°(?:, |$)", errors)
+        told[ship] = {method: (place, heading) for method, place, heading in found}
+    assert set(told) == set(SHIPS)
+    for ship, methods in told.items():
+        assert {"`learn --quick`", "ridge", "initial"} <= set(methods)
+        for method, (place, heading) in methods.items():
+            m = means[SHIPS[ship]][METHODS[method]]
+            assert (place, heading) == (f"{m['position']:.3g}", f"{np.degrees(m['heading']):.3g}")
