@@ -57,16 +57,15 @@ class Judge:
         copy: folder of the unchanged copy.
         lines: which tests execute a line.
         seconds: wall time of a mutant.
-        wanted: expression that a test's id has to contain.
     """
 
-    def __init__(self, copy: Path, lines: LineMap, seconds: float, wanted: str) -> None:
-        self.copy, self.lines, self.seconds, self.wanted = copy, lines, seconds, wanted
+    def __init__(self, copy: Path, lines: LineMap, seconds: float) -> None:
+        self.copy, self.lines, self.seconds = copy, lines, seconds
         self._sound: dict[str, bool] = {}
 
     def fate(self, m: Mutant) -> tuple[str, str]:
         """What becomes of a mutant, and by which test or how many."""
-        tests = [test for test in self.lines.tests(m.module, m.line) if re.search(self.wanted, test)]
+        tests = self.lines.tests(m.module, m.line)
         count = len(tests)
         with tempfile.TemporaryDirectory() as folder:
             changed = shutil.copytree(self.copy, Path(folder) / "copy")
@@ -151,7 +150,7 @@ def main() -> None:
         lines = options.out.resolve() / f"map_{head.strip()}_{'slow' if options.slow else 'quick'}"
         if not lines.exists():
             measure(copy, lines, "slow" if options.slow else "not slow")
-        judge = Judge(copy, LineMap(lines), options.seconds, options.tests)
+        judge = Judge(copy, LineMap(lines), options.seconds)
         compileall.compile_dir(copy, quiet=2)  # once for all mutants
         with ThreadPoolExecutor(WORKERS) as pool:
             for m, (fate, by) in zip(mutants, pool.map(judge.fate, mutants), strict=True):
