@@ -84,8 +84,9 @@ def _made_anew(_session_cache, tmp_path_factory):
 
 def pytest_sessionfinish() -> None:
     """Processes of pytest-xdist do not end in order."""
-    coverage.Coverage.current().stop()
-    coverage.Coverage.current().save()
+    measured = coverage.Coverage.current()
+    measured.stop()
+    measured.save()
 
 
 class LineMap:
