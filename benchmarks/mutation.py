@@ -133,9 +133,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     log = options.out.resolve() / f"seed_{options.seed}.jsonl"
     done = _read(log)
-    if options.map:
-        mutants = []
-    elif options.again:
+    if options.again:
         alive = [key for key, row in done.items() if row["fate"] != KILLED]
         mutants = [m for key in alive if (m := again(*key))]
     else:
@@ -150,6 +148,8 @@ def main() -> None:
         lines = options.out.resolve() / f"map_{head.strip()}_{'slow' if options.slow else 'quick'}"
         if not lines.exists():
             measure(copy, lines, "slow" if options.slow else "not slow")
+        if options.map:
+            return
         judge = Judge(copy, LineMap(lines), options.seconds)
         compileall.compile_dir(copy, quiet=2)  # once for all mutants
         with ThreadPoolExecutor(WORKERS) as pool:
@@ -177,7 +177,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seconds", type=float, default=90.0, help="wall time of a mutant (90)")
     parser.add_argument("--slow", action="store_true", help="slow tests, in place of the quick ones")
     parser.add_argument("--map", action="store_true", help="only the map of lines and tests")
-    parser.add_argument("--tests", default="", metavar="REGEX", help="only tests with this in their id")
     parser.add_argument(
         "--again", action="store_true", help="the survivors of the log, on the present code"
     )
