@@ -252,14 +252,13 @@ def test_fleet_sails_as_single_ships_do_in_cosimulation(short, monkeypatch):
         assert together.measured.tau_cmd == pytest.approx(alone.measured.tau_cmd, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "values",
     [
-        pytest.param(values, id=next(iter(values)), marks=() if "delay" in values else pytest.mark.slow)
-        for values in (
-            {"delta_X_u": -1.0}, {"mass": 4.0}, {"loss_yaw": 0.3}, {"lag": 0.3}, {"delay": 0.3}, {"V_n": 0.03},
-        )
+        {"delta_X_u": -1.0}, {"mass": 4.0}, {"loss_yaw": 0.3}, {"lag": 0.3}, {"delay": 0.3}, {"V_n": 0.03},
     ],
+    ids=lambda values: next(iter(values)),
 )  # fmt: skip
 def test_force_is_that_of_the_simulation(short, values):
     """Two ways to the same: the log of the simulation, and the effect on the true motion."""
