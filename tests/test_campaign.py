@@ -311,6 +311,20 @@ def test_equal_runs_are_made_once_and_labels_are_shown(base):
     assert len((base / "out" / JOURNAL).read_bytes().splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    "axis", [{"set": "seed", "values": [0, 0]}, {"set": "vessel.m", "values": [14.0, 14.0]}]
+)
+@pytest.mark.parametrize("faulty", [True, False])
+def test_seeds_without_effect_are_noted(base, ellipse, axis, faulty):
+    if not faulty:
+        (base / "base.json").write_text(json.dumps(ellipse | {"faults": []}))
+    notes = []
+    cosim.run_campaign(campaign(base, {"a": axis}), base / "out", workers=0, show=notes.append)
+    assert any("no faults, so the seed" in note for note in notes) == (
+        axis["set"] == "seed" and not faulty
+    )
+
+
 def test_differences_and_the_best_are_tables(base, monkeypatch):
     axes = {
         "m": {"set": "vessel.m", "values": [14.0, 15.0]},

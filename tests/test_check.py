@@ -22,7 +22,7 @@ from support.plain import GAIN
 from support.project import COMPONENTS, ROOT
 
 from fmucheck import checking, report, source, trial
-from fmucheck.api import Library
+from fmucheck.api import InstanceOnTrial, Library
 from fmucheck.checking import main
 from fmucheck.description import FmuDescription
 from fmucheck.examine import examine
@@ -359,6 +359,27 @@ def in_this_process(path, folder, *names):
 @pytest.mark.parametrize("name", LIGHT)
 def test_ours_run_well(name, fmus, tmp_path):
     assert in_this_process(fmus[name], tmp_path, *RUNNING) == {}
+
+
+def test_each_step_begins_where_the_last_one_ended(fmus, tmp_path, monkeypatch):
+    """And the first one of an instance, or after a reset, at the start time, which is zero."""
+    steps, step, reset = [], InstanceOnTrial.step, InstanceOnTrial.reset
+
+    def stepped(one, time, size):
+        steps.append((time, getattr(one, "now", 0.0)))
+        step(one, time, size)
+        one.now = time + size
+
+    def begun_anew(one):
+        reset(one)
+        one.now = 0.0
+
+    monkeypatch.setattr(InstanceOnTrial, "step", stepped)
+    monkeypatch.setattr(InstanceOnTrial, "reset", begun_anew)
+    names = [name for name in RUNNING if "state" not in name]  # a state has a time
+    in_this_process(fmus["guidance_setpoint"], tmp_path, *names)
+    assert len(steps) > 100
+    assert [times for times in steps if times[0] != pytest.approx(times[1], abs=1e-9)] == []
 
 
 @pytest.mark.slow

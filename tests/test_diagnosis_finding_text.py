@@ -2,6 +2,7 @@
 
 import re
 from itertools import combinations
+from types import SimpleNamespace
 
 import pytest
 from support.cse1 import EFFECTS
@@ -15,7 +16,7 @@ from diagnosis.report.finding_text import (
     separation_note,
     unit,
 )
-from diagnosis.report.reported_effect import of_whole_hull
+from diagnosis.report.reported_effect import _sentence, of_whole_hull
 from diagnosis.search.findings import Finding
 from fmus.effects import Effect
 from fmus.effects.families import UNKNOWN
@@ -26,6 +27,23 @@ def values(effect, x):
     """Every parameter x; the ends of an interval after its start."""
     ends = {end: 2.0 * x for _, end in effect.search.intervals}
     return dict.fromkeys(effect.coefficients, x) | ends
+
+
+@pytest.mark.parametrize("runs", [["a"], ["a", "b"]])
+def test_what_holds_in_single_runs_is_said_of_each_where_there_are_several(runs):
+    start, name = Model(), "bow_failure_time"
+    times = {f"{name}@{run}": 20.0 + 5.0 * k for k, run in enumerate(runs)}
+    f = Finding("bow_failure", times, {}, 0.9, (), 0.5, 0.5)
+    d = SimpleNamespace(
+        start=start, speeds=(0.1, 0.0, 0.0), comparison=SimpleNamespace(evaluations=runs),
+        learned=SimpleNamespace(model=start),
+    )  # fmt: skip
+    each = {
+        run: sentence(Found(EFFECTS[f.id], {name: times[f"{name}@{run}"]}, d.speeds)) for run in runs
+    }
+    said = " ".join(f"Run {run}: {text}" for run, text in each.items()) if len(runs) > 1 else each["a"]
+    assert f.of_runs == runs
+    assert _sentence(d, f, times) == said
 
 
 @pytest.mark.parametrize("name", EFFECTS)

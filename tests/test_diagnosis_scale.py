@@ -168,6 +168,7 @@ def test_the_least_region_is_that_of_the_size():
     assert slow.edges == pytest.approx(0.1 * OperatingRegion().edges * SIZES[0].speeds)
 
 
+@pytest.mark.slow
 def test_profiles_over_time_have_bins_of_the_size():
     from diagnosis.assessment.covariates import covariates_by_axis
 

@@ -143,21 +143,17 @@ def test_same_ship_elsewhere_and_later_gives_the_same_velocity():
     pose = np.column_stack([40.0 + c * x - d * y, d * x + c * y - 7.0, psi + turn])
     s = smooth(clean(replace(base(), pose=pose, time=base().time + 1e5)))
     assert np.abs(s.nu - smooth_base().nu)[INNER].max() < 5e-4  # noise of x and y is weighted anew
-    moved = smooth(clean(replace(base(), pose=base().pose + np.array([40.0, -7.0, 0.0]))))
-    np.testing.assert_allclose(moved.nu, smooth_base().nu, atol=2e-5)
 
 
-@pytest.mark.parametrize("shift", [(10.0, 10.0), (40.0, -7.0), (1e4, -1e4)])
-def test_origin_does_not_matter(shift):
-    moved = smooth(clean(replace(base(), pose=base().pose + np.array([*shift, 0.0]))))
+def test_origin_does_not_matter():
+    moved = smooth(clean(replace(base(), pose=base().pose + np.array([1e4, -1e4, 0.0]))))
     np.testing.assert_allclose(moved.nu, smooth_base().nu, atol=1e-9)
     np.testing.assert_allclose(moved.nu_std, smooth_base().nu_std, rtol=1e-8)
     np.testing.assert_allclose(moved.jerk, smooth_base().jerk, rtol=1e-8)
 
 
-@pytest.mark.parametrize("later", [1e5, 1e6])
-def test_start_of_time_does_not_matter(later):
-    s = smooth(clean(replace(base(), time=base().time + later)))
+def test_start_of_time_does_not_matter():
+    s = smooth(clean(replace(base(), time=base().time + 1e6)))
     np.testing.assert_allclose(s.nu, smooth_base().nu, atol=1e-8)
     np.testing.assert_allclose(s.jerk, smooth_base().jerk, rtol=1e-6)  # time stamps of 1e-10 s
 

@@ -80,6 +80,7 @@ def test_commands_are_no_waves(quick, noise, seed):
     assert find_waves([run], Model(), np.random.default_rng(seed)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 11])
 def test_a_drawing_of_noise_makes_no_waves_of_what_is_missing(seed):
     """Drag and lost force are in the model error; of these drawings lines of the floor are low by chance."""

@@ -13,8 +13,9 @@ from support.cse1 import ASIDE, FIVE, THRUSTERS
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, read
-from diagnosis.predictors import DescribedShip
-from diagnosis.predictors.ship_model import parameters
+from diagnosis.predictors import DescribedShip, omega, weak_windows
+from diagnosis.predictors.ship_model import SampledForce, parameters
+from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.predictors.weak_form import HORIZON
 from diagnosis.predictors.windows import free_runs
 
@@ -137,6 +138,22 @@ def test_values_of_one_run_hold_in_it_alone():
     np.testing.assert_allclose(learned, np.concatenate(expected), atol=1e-12)
     differs = ~np.isclose(nominal, learned, atol=1e-9).all(axis=1)
     assert {*Windows(runs).run[Windows(runs).sample_window[differs]]} == {1}
+
+
+def test_what_windows_keep_of_a_model_serves_no_other_one():
+    """As windows do that have seen none, whatever two models differ in."""
+    smooth = smooth_base()
+    still, name = np.zeros((smooth.time.size, 3)), smooth.track.run.name
+    pulls = [SampledForce(still, np.full((len(still), 3, 6), x)) for x in (-4.0, 4.0)]
+    parts = [{"vessel": ship, "thrusters": thrusters} for ship, thrusters in HIDDEN]
+    parts += [{"runs": {name: {"plant_F_vsp": x}}} for x in (0.5, 0.8)]
+    parts += [{"given": {name: pull}} for pull in pulls] + [{"measurement": {"clock_offset": 0.1}}, {}]
+    models, seen = [Model(**part) for part in parts], weak_windows(smooth)
+    fresh = [(omega(w, m), omega_std(w, m)) for m in models for w in [weak_windows(smooth)]]
+    for m, (error, std) in [*zip(models, fresh, strict=True)] * 2:
+        np.testing.assert_array_equal(omega(seen, m), error)
+        np.testing.assert_array_equal(omega_std(seen, m), std)
+    assert len({error.tobytes() + std.tobytes() for error, std in fresh}) == len(models)
 
 
 def test_no_sample_is_further_than_a_window_from_its_start():

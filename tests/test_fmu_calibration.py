@@ -1,6 +1,6 @@
 """The fit of an FMU's parameters, its intervals, search and verdict: on predictions in closed form, without an FMU."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from diagnosis.execution.progress import silent
 from diagnosis.fmu_parameters import parameter_fit as fits
 from diagnosis.fmu_parameters import sensitivity
 from diagnosis.fmu_parameters.additional_force import AdditionalForce, EarthDirection
-from diagnosis.fmu_parameters.force_search import Accepted, candidates
+from diagnosis.fmu_parameters.force_search import Accepted, candidates, search
 from diagnosis.fmu_parameters.measured_system import Window
 from diagnosis.fmu_parameters.parameter_file import CalibratedParameter, Prior
 from diagnosis.fmu_parameters.residuals import Setting, WindowResiduals, rms_of
@@ -33,7 +33,7 @@ class Linear:
     """A system whose output is a sum of curves, each times a value.
 
     Attributes:
-        curves: value -> curve (T,); of the key "f" that of a constant force.
+        curves: value -> curve (T,); of an input that of a constant force on it.
         failing: of which values it fails.
     """
 
@@ -48,7 +48,7 @@ class Linear:
 
     def _one(self, r):
         y = sum(x * self.curves[n] for n, x in r.start.items())
-        y = y + sum(t.coefficient * self.curves["f"] for t in r.terms)
+        y = y + sum(t.coefficient * self.curves[self.inputs[t.input]] for t in r.terms)
         if self.failing and self.failing(r.start):
             return PlayedBack(np.full((len(y), 1), np.nan), "it fails")
         return PlayedBack(y[:, None])
@@ -168,6 +168,46 @@ def test_a_constant_force_is_fitted_in_any_unit_of_its_coefficient(seed, size):
         e -= 0.7 * r.processes.curves["y0"] / 0.3
         best = np.linalg.solve(np.diag([1.0, 1.0, 0.0]) + X.T @ X, X.T @ e)
         assert [*f.setting.z, *f.coefficients] == pytest.approx(best, abs=1e-4)
+
+
+@settings(max_examples=12)
+@given(seeds, st.floats(-0.6, 0.6), st.floats(1.0, 4.0))
+def test_a_force_is_accepted_by_the_odds_of_all_candidates_and_none(seed, size, temper):
+    """By what each gains with the parameters free: e of the covariance I + S S', and each force without prior."""
+    r, S, _, e = problem(seed)
+    w, curves = r.windows[0], r.processes.curves
+    rng = np.random.default_rng([seed, 1])
+    curves |= {n: 0.5 * curves["f"] + s * rng.standard_normal(60) for n, s in (("g", 0.3), ("h", 2.0))}
+    curves["twin"], r.processes.inputs = -3.0 * curves["f"], ("f", "g", "h", "twin")
+    r.windows = [replace(w, measured=w.measured + size * curves["f"][:, None])]
+    r.whiten_about(START)
+    possible = [AdditionalForce(n) for n in ("f", "g", "h", "twin")]
+    scales = dict.fromkeys(curves, 1.0)
+    at = fits.fit(r, START)
+    found = search(r, at, [], possible, scales, lambda _: temper, silent)
+    W = np.linalg.inv(np.eye(60) + S @ S.T)
+    e = e + size * curves["f"] / 0.3
+    gain = {n: (curves[n] @ W @ e) ** 2 / (curves[n] @ W @ curves[n]) for n in "fgh"}
+    charge = np.log(60) + 2.0 * np.log(4.0)
+    score = {n: x / temper - charge for n, x in gain.items() if x > charge / 4.0}
+    if max(score.values(), default=0.0) <= 0.0:
+        assert found is None
+        return
+    f, accepted = found
+    odds = {n: np.exp(0.5 * x) for n, x in score.items()}
+    own = {n: x / (1.0 + sum(odds.values())) for n, x in odds.items()}
+    best = max(own, key=own.get)
+    first, *alike = (
+        name.partition(":")[0].replace("twin", "f") for name in (accepted.force.id, *accepted.alike)
+    )
+    assert first == best
+    assert accepted.probability == pytest.approx(own[best], rel=1e-3)
+    assert accepted.gain == pytest.approx(gain[best], rel=1e-3)
+    assert accepted.together == pytest.approx(sum(x for x in own.values() if x > 0.05), rel=1e-3)
+    like = {n for n, x in own.items() if x > 0.05 and n != best}
+    assert {*alike} == like | ({"f"} if best == "f" else set()), "whichever of the twins stands for both"
+    assert f.setting.forces == (accepted.force,)
+    assert search(r, f, [], [accepted.force], scales, lambda _: temper, silent) is None, "it is there"
 
 
 @settings(max_examples=12)

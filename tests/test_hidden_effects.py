@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.cases import in_part
 from support.closed_form import Allocation, thrust
 from support.cosimulated import build, sail
 from support.cse1 import EFFECTS
@@ -84,7 +85,12 @@ def ships(shared):
     return once(shared / "hidden_effects", build)
 
 
-@pytest.mark.parametrize("effect", [e for e in (*SINGLE, *UNKNOWN) if e not in OF_NO_SIZE])
+SIZED = [e for e in (*SINGLE, *UNKNOWN) if e not in OF_NO_SIZE]
+
+
+@pytest.mark.parametrize(
+    "effect", in_part(SIZED, keep=[e for e in SIZED if e[1:2] != "_" or e in ("X_|u|r", "N_uv")])
+)
 def test_size_is_what_was_drawn(effect):
     d = draw(effect, np.random.default_rng(3), RUNS)
     assert d.size == share(RUNS, effect, d.values)
@@ -246,14 +252,13 @@ def test_fleet_sails_as_single_ships_do_in_cosimulation(short, monkeypatch):
         assert together.measured.tau_cmd == pytest.approx(alone.measured.tau_cmd, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "values",
     [
-        pytest.param(values, id=next(iter(values)), marks=() if "delay" in values else pytest.mark.slow)
-        for values in (
-            {"delta_X_u": -1.0}, {"mass": 4.0}, {"loss_yaw": 0.3}, {"lag": 0.3}, {"delay": 0.3}, {"V_n": 0.03},
-        )
+        {"delta_X_u": -1.0}, {"mass": 4.0}, {"loss_yaw": 0.3}, {"lag": 0.3}, {"delay": 0.3}, {"V_n": 0.03},
     ],
+    ids=lambda values: next(iter(values)),
 )  # fmt: skip
 def test_force_is_that_of_the_simulation(short, values):
     """Two ways to the same: the log of the simulation, and the effect on the true motion."""

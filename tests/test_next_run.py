@@ -51,6 +51,7 @@ from diagnosis.design.rehearsal import Rehearsal, RehearsedEffect
 from diagnosis.design.spread import drawn, followed
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest
+from diagnosis.predictors.thrust import LONGEST_STEP
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.runs.cleaning import BRIEF
 from diagnosis.search.candidates import model_error
@@ -663,6 +664,48 @@ def test_steps_of_the_thrust_discriminate_what_one_speed_does_not(steering):
     around = d.usual(k, "circle")
     assert steps.excess == around.excess == 0.0
     assert steps.score > around.score
+
+
+@pytest.mark.parametrize("names", [None, ["rudder_delta", "propeller_n"]])
+def test_a_planned_run_is_a_scenario_that_plays_its_table(names, tmp_path):
+    """Set points and the force that they need, or orders, each to the input of its name."""
+    rng, ship, h = np.random.default_rng(0), "kvlcc2" if names else None, 2.0 * LONGEST_STEP
+    time = h * np.arange(51)
+    eta, eta_dot, eta_ddot, tau = rng.standard_normal((4, time.size, 3))
+    orders = rng.standard_normal((time.size, 2)) if names else None
+    motions = {
+        ("steps", 0.5, h): SimpleNamespace(
+            time=time,
+            eta=eta,
+            eta_dot=eta_dot,
+            eta_ddot=eta_ddot,
+            orders=orders,
+            thrust=lambda m: m * tau,
+        )
+    }
+    noise = np.array([0.01, 0.02, 0.003])
+    d = SimpleNamespace(
+        scale=2.0, model=3.0, motion=lambda *plan: motions[plan], limits=SimpleNamespace(seconds=2.0),
+        orders=SimpleNamespace(names=names) if names else None,
+        data=[SimpleNamespace(smoothed=SimpleNamespace(noise=noise))],
+    )  # fmt: skip
+    write_run(d, SimpleNamespace(steps="steps", size=0.5), 7, tmp_path, ship)
+    table = pd.read_csv(tmp_path / "commands_7.csv")
+    moves = [f"{n}_t{order}" for order in ("", "_dot", "_ddot") for n in ("x", "y", "psi")]
+    shown = ["x", "y", "psi", *names] if names else [*moves, "tau_X", "tau_Y", "tau_N"]
+    parts = [eta, orders] if names else [eta, eta_dot, eta_ddot, 3.0 * tau]
+    assert [*table] == ["time", *shown]
+    np.testing.assert_allclose(table, np.column_stack([time, *parts]), rtol=1e-6)
+    scenario = cosim.load_scenario(tmp_path / "scenario_7.json")
+    assert (scenario.name, scenario.step, scenario.stop) == ("next_7", h, 2.0)
+    assert [*scenario.fmus["vessel"].parameters.values()] == [*eta[0]]
+    (played,) = scenario.recordings
+    given = "thrusters" if names else "controller"
+    assert played.path == "commands_7.csv"
+    assert played.inputs == {f"{given}.{name}": name for name in names or moves}
+    (fault,) = scenario.faults
+    assert fault.std == [*noise]
+    assert "guidance" not in scenario.fmus
 
 
 @pytest.mark.slow

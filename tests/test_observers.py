@@ -114,7 +114,7 @@ def calm(observer, h):
     return rows, state, replayed(COMPONENTS[observer], rows[half - 1 :], h, state)[1]
 
 
-@pytest.mark.parametrize("upset", UPSETS)
+@pytest.mark.parametrize("upset", in_part(UPSETS, keep=["1 km", "NaN", "infinite force"]))
 @pytest.mark.parametrize("h", [0.01, 0.1])
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_no_upset_is_for_good(observer, h, upset):

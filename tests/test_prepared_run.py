@@ -1,6 +1,7 @@
 """One file gives one set of samples, whichever command reads it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -23,7 +24,7 @@ from diagnosis import (
     sysid,
     watch,
 )
-from diagnosis.runs import Examined, SensorFinding, prepare, prepared_run, read_each, thinning
+from diagnosis.runs import Examined, Run, SensorFinding, prepare, prepared_run, read_each, thinning
 from thesis.open_loop import loop_of
 from thesis.open_loop.playback import fed
 
@@ -184,6 +185,14 @@ def test_other_columns_keep_to_their_rows(spoilt, tmp_path):
     assert track.run.time.size == len(table)
     assert np.array_equal(track.run.measured["x_t"], track.run.pose[:, 0] + 1.0)
     assert "y_t" not in track.run.measured
+
+
+def test_only_the_later_run_of_a_name_gets_another_one():
+    time, zero = np.arange(4.0), np.zeros((4, 3))
+    runs = [Run(name, time, zero + k, zero) for k, name in enumerate("aba")]
+    assert [run.name for run in read_each(runs)] == ["a", "b", Path("a").absolute().as_posix()]
+    with pytest.raises(InputError, match="'b' holds the same measurement as 'a'"):
+        read_each([runs[0], replace(runs[0], name="b")])
 
 
 def test_runs_of_one_name_get_more_of_their_path(spoilt, tmp_path):

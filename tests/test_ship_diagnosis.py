@@ -225,6 +225,7 @@ def test_analyses_without_a_model_of_their_own_take_any_ship(
     assert "the ship is cybership2" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "more"), [("sysid", []), ("watch", []), ("replay", ["--controller", "abs"])]
 )

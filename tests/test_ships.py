@@ -242,6 +242,16 @@ def test_reach_is_what_commands_within_their_limits_give(name, a, b):
                 assert low - 1e-9 <= given[axis] <= high + 1e-9
 
 
+@given(st.floats(0.1, 1.5), st.floats(-0.5, 0.5), st.sampled_from([1.0, -0.6]))
+def test_a_rudder_reaches_the_extremes_over_its_angles(delta_max, bias, u):
+    """Beyond 45 degrees its force falls again."""
+    law = Law.known["rudder"]
+    p, flow = law.Parameters(delta_max=delta_max, bias=bias), Flow(u, 0.0, u)
+    _, Y = law.force((np.linspace(-delta_max, delta_max, 4001),), flow, p)
+    (span,) = law.reach(flow, p)
+    assert span == pytest.approx((Y.min(), Y.max()), rel=1e-5, abs=1e-9)
+
+
 @every_law
 @few
 @given(share, share)

@@ -1,6 +1,7 @@
 """The studies of KVLCC2 and R/V Gunnerus: their files, the nominal models on them, folds and tables."""
 
 import json
+import re
 import sys
 from types import SimpleNamespace
 
@@ -14,7 +15,8 @@ from cosim import InputError
 from diagnosis import Model
 from diagnosis.predictors import ship_with, weak_windows
 from diagnosis.predictors.windows import free_runs, usable_windows
-from diagnosis.runs import Run, examine
+from diagnosis.runs import UNITS, Run, examine
+from diagnosis.runs.columns.columns import QUANTITY
 from diagnosis.search import DEFAULT
 from fmus.ship import ship
 from studies import low_speed_tanker, research_vessel, ship_folds, tanker
@@ -65,6 +67,16 @@ def test_the_sea_trial_is_repaired_and_cut_into_its_manoeuvres():
     speed, rate = steady(time, pose)
     assert speed == pytest.approx(3.74, rel=0.16)
     assert np.degrees(rate) == pytest.approx(3.47, rel=0.16)
+
+
+@pytest.mark.parametrize("study", [tanker, low_speed_tanker])
+def test_columns_have_the_factor_of_the_unit_in_their_name(study):
+    named = {c: re.search(r"\[(.+)\]|_(deg)$", c) for c in study.COLUMNS}
+    assert sum(map(bool, named.values())) > 1
+    for column, (signal, factor) in study.COLUMNS.items():
+        if unit := named[column]:
+            quantity = {"propeller.n": "shaft speed", "rudder.delta": "angle"} | QUANTITY
+            assert abs(factor) == pytest.approx(UNITS[quantity[signal]][unit[1] or unit[2]]), column
 
 
 def test_a_file_with_other_columns_is_refused(tmp_path):

@@ -61,6 +61,7 @@ def test_other_tools_give_the_same_answer(answers, case):
     assert relative <= same_answer.TOLERANCE
 
 
+@pytest.mark.slow
 def test_the_comparison_sees_a_difference(answers):
     """The order of stepping, which all of them would miss if they looked at nothing."""
     _, relative = same_answer.difference(answers("gauss_seidel"), answers("jacobi"))

@@ -127,6 +127,19 @@ def test_the_code_speaks_in_the_words_of_the_field(part):
     assert [f for s in code_sentences(part) for f in broken(s[0], s[1], "paragraph_open", s[2])] == []
 
 
+@pytest.mark.quick
+def test_help_states_the_default_that_an_option_has():
+    stated = [
+        (m[1], str(action.default), f"{module} {action.dest}: {shown}")
+        for module, parser in texts.parsers().items()
+        for action, shown in texts.help_of_arguments(parser)
+        if (m := re.search(r"\(default: ([^);,]+)", shown)) and action.default not in (None, [], ())
+    ]
+    assert len(stated) > 30
+    wrong = [where for said, of, where in stated if of not in (said, f"{said}.0")]
+    assert [where for where in wrong if "(default: processors)" not in where] == []
+
+
 def test_a_page_is_not_two():
     lines = {page: path.read_text("utf-8").count("\n") for page, path in PAGES.items()}
     assert {page: n for page, n in lines.items() if n > LINES} == {}

@@ -96,10 +96,15 @@ def _parser(module: str) -> argparse.ArgumentParser:
 def help_texts(parser: argparse.ArgumentParser) -> Iterator[str]:
     """The description of a command, and the help of its options, as they are shown."""
     yield parser.description or ""
+    yield from (shown for _, shown in help_of_arguments(parser))
+
+
+def help_of_arguments(parser: argparse.ArgumentParser) -> Iterator[tuple[argparse.Action, str]]:
+    """Arguments of a command, with their help as it is shown."""
     shown = parser._get_formatter()  # which fills in the defaults
     for action in parser._actions:
         if action.help and action.help is not argparse.SUPPRESS:
-            yield shown._expand_help(action)
+            yield action, shown._expand_help(action)
 
 
 def public_docstrings() -> Iterator[tuple[str, str]]:
