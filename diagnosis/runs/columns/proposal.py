@@ -1,7 +1,8 @@
 """The content of the file beside a measurement, proposed by a look at the measurement itself."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
+from ..files.message_fields import message_fields
 from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
@@ -104,14 +106,19 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         read(path, of=of)  # refuses it
     text = text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
     names = column_names(path, text)
+    fields = message_fields(names)
     log = log_of(of.commands)
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
-    units = _units_line(path, text) if text.units_line else [""] * len(names)
+    units = [*(_units_line(path, text) if text.units_line else []), *[""] * len(names)][: len(names)]
+    parts = {name for field in fields.values() for name in field.columns}
+    whole = [k for k, name in enumerate(names) if name not in parts]
+    names, units = [names[k] for k in whole], [units[k] for k in whole]
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
     columns = _columns(path, names, units, quantity, kept)
+    columns |= _of_message(columns, fields, kept)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
@@ -275,6 +282,22 @@ def _by_words(
     if len(turning) == len(shafts) == 1:  # one shaft, and one speed of a shaft
         found[turning[0]] = shafts
     return {s: each[0] for s, each in found.items() if len(each) == 1 and s not in columns}
+
+
+def _of_message(
+    columns: Mapping[str, Column], fields: Collection[str], kept: Collection[str]
+) -> dict[str, Column]:
+    """Heading and position by the axes of ROS messages (REP 103): x to east, y to north, z up.
+
+    Only a heading by a quaternion is known to be of such a message.
+    """
+    psi = columns.get("psi")
+    if psi is None or psi.name not in fields or "psi" in kept:
+        return {}
+    turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
+    if {"x", "y"} <= columns.keys() - kept and columns["x"].name.casefold().endswith("x"):
+        turned |= {"x": columns["y"], "y": columns["x"]}
+    return turned
 
 
 def _geographic(
