@@ -17,6 +17,7 @@ from ..columns.columns import Layout
 from ..columns.side_car import (
     refuse_encoding,
     refuse_layout,
+    refuse_long_rows,
     refuse_sentences,
     refuse_units,
     what_to_do,
@@ -80,7 +81,8 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
     """The columns of some names.
 
     Raises:
-        InputError: the text is in another encoding, or has a line of units that was not stated.
+        InputError: the text is in another encoding, has a line of units that was not stated, or a row
+            with more cells than names.
         OSError, ValueError: it cannot be read.
         KeyboardInterrupt: the user has asked for the end.
     """
@@ -94,6 +96,7 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
     else:
         table = csv_table(path, layout, own)
         refuse_units(path, layout, table)
+        refuse_long_rows(path, layout, len(names))
     return with_fields(table, fields, wanted)
 
 

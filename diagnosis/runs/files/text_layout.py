@@ -28,7 +28,8 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
 
 def table_cells(line: str, separator: str) -> list[str]:
     """The cells of a line, without blanks around them."""
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    cells = csv.reader([line], delimiter=separator, skipinitialspace=True)
+    return [cell.strip() for cell in next(cells, [])]
 
 
 def bare_unit(text: str) -> str:
