@@ -21,8 +21,8 @@ from fmus.declare import DeclarationError, parameters_of, variables
 from fmus.effects.text import Found
 from fmus.hull_functions import FUNCTIONS
 from fmus.ship import ship
-from fmus.ships.__main__ import main as schema_main
 from fmus.ships import ship_file
+from fmus.ships.__main__ import main as schema_main
 from fmus.ships.ship_file import Term, find_ship, read_ship, shipped_ships
 from fmus.ships.ship_warning import ShipWarning
 
