@@ -64,16 +64,17 @@ IN_ONE_RUN = (
     "something that differed in that run, such as its place, load, water or weather",
 )
 LASTS = (
-    "shows no dependence on position, motion, command or time, and lasts for about {0:.0f} s at a time",
-    "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
+    "shows no dependence on position, motion, command or time alone, and lasts for about {0:.0f} s at a time",
+    "an intermittent disturbance, such as gusts, a changing current or a towed cable, or a force that "
+    "depends on several of these together",
 )
 THROUGHOUT = (
-    "shows no dependence on position, motion, command or time, and lasts through whole runs",
+    "shows no dependence on position, motion, command or time alone, and lasts through whole runs",
     "a force that differs from run to run, such as that of wind or current, or one that is commanded "
     "otherwise than recorded",
 )
 BRIEF = (
-    "shows no dependence on position, motion, command or time, and is short",
+    "shows no dependence on position, motion, command or time alone, and is short",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 
