@@ -27,6 +27,7 @@ from diagnosis.assessment.plausibility import (
     pushed_aside,
     refuse_implausible,
     same_columns,
+    scale_is_confirmed,
 )
 from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
 from diagnosis.assessment.readings import (
@@ -34,13 +35,14 @@ from diagnosis.assessment.readings import (
     Reading,
     of_commands,
     of_pose,
+    other_factors,
     readings,
     reread,
     swapped,
 )
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
-from diagnosis.runs.columns.columns import POSE, Named
+from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
 from fmus.signals import Force
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -371,6 +373,32 @@ def test_tanker_with_a_rudder_is_a_unit_alone():
         w = weak_windows(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
         found = likeliest_mistake(w, Model())
         assert found is None or of_units(found)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.3048])
+def test_a_velocity_that_agrees_confirms_the_unit_of_the_position(unit):
+    """A ship that seems 3.3 times too quick moves by its own speed so; a velocity in another unit says nothing."""
+    run = edited(pose=lambda p: p / [0.3048, 0.3048, 1.0])
+    (alone,) = diagnosis.gather([run], anyway=True)
+    found = likeliest_mistake(alone, Model())
+    assert found is not None
+    assert "its position is in ft" in found.clause
+    nu = alone.smoothed.nu * [unit, unit, 1.0]
+    measured = dict(zip("uvr", np.nan_to_num(nu).T, strict=True))
+    (w,) = diagnosis.gather([replace(run, measured=measured)], anyway=True)
+    assert set("uv") <= set(w.smoothed.sensors.agreeing)
+    assert scale_is_confirmed(w.smoothed.sensors) == (unit == 1.0)
+    found = likeliest_mistake(w, Model())
+    assert (found is not None and "its position is in ft" in found.clause) == (unit != 1.0)
+
+
+def test_degrees_of_latitude_are_in_no_unit_of_length():
+    columns = {"x": Column(name="Lat", factor=111e3), "y": Column(name="Lon", factor=68e3)}
+    for layout, expected in ((Layout(columns=columns), False), (Layout(), True)):
+        run = replace(base(), layout=layout)
+        found = [*readings(run, Model()), *other_factors(run, 2.0)]
+        assert any("position is in" in r.mistake for r in found) == expected
+        assert any(r.mistake == "y points west (east is positive here)" for r in found)
 
 
 class SomeOdds:

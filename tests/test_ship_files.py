@@ -333,11 +333,11 @@ def test_a_product_has_one_name_however_it_is_written(product: str, name: str) -
 
 def test_a_ship_that_is_not_there_is_refused_with_those_that_are(monkeypatch) -> None:
     with pytest.raises(
-        DeclarationError, match="no ship 'xyz'; there are cse1, .*, or give a .toml file"
+        DeclarationError, match=r"no ship 'xyz'; there are cse1, .*, or give a .toml file"
     ):
         find_ship("xyz")
     monkeypatch.setattr(ship_file, "shipped_ships", list)
-    with pytest.raises(DeclarationError, match="no ship 'xyz'; give a .toml file"):
+    with pytest.raises(DeclarationError, match=r"no ship 'xyz'; give a .toml file"):
         find_ship("xyz")
 
 

@@ -13,6 +13,7 @@ from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OF_MOTION, needed_force
 from ..runs import Run
 from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
+from ..runs.columns.geographic import is_geographic
 from ..runs.columns.unit_check import SI_UNIT, UNITS
 
 
@@ -101,7 +102,7 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
         back = Named(name="psi", offset=float(-np.radians(degrees) % (2.0 * np.pi)))
         yield Reading(f"its heading is off by {degrees} deg", {"psi": back})
     for unit, m in UNITS["length"].items():
-        if m == 1.0:
+        if m == 1.0 or not _has_unit(run):
             continue
         for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
             yield of_pose(f"{name} is in {unit}", factors)
@@ -155,11 +156,17 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
 
 def other_factors(run: Run, k: float) -> Iterator[Reading]:
     """Readings in a unit without a name, or of another clock: the ship accelerates k times too much."""
-    yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
+    if _has_unit(run):
+        yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
     clock = {"time": Named(name="time", factor=k**0.5)}
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock)
+
+
+def _has_unit(run: Run) -> bool:
+    """Whether the position is in a unit of length, and not in degrees of latitude and longitude."""
+    return not any(is_geographic(signal, run.layout.column(signal)) for signal in ("x", "y"))
 
 
 def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:

@@ -64,7 +64,8 @@ IN_ONE_RUN = (
     "something that differed in that run, such as its place, load, water or weather",
 )
 LASTS = (
-    "shows no dependence on position, motion, command or time alone, and lasts for about {0:.0f} s at a time",
+    "shows no dependence on position, motion, command or time alone, and lasts for about {0:.0f} s at "
+    "a time",
     "an intermittent disturbance, such as gusts, a changing current or a towed cable, or a force that "
     "depends on several of these together",
 )

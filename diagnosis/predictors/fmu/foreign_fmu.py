@@ -173,8 +173,8 @@ class Fmu:
         longest = WIDTH * runs[0].scale.time
         if self.fixed_step and self.fixed_step > longest:
             raise cosim.InputError(
-                f"'{self.name}' has a step of {self.fixed_step:g} s; allowed is at most {longest:.3g} s, the "
-                "time over which its error is averaged; --step sets another step"
+                f"'{self.name}' has a step of {self.fixed_step:g} s; at most {longest:.3g} s are allowed, "
+                "the time over which its error is averaged; --step sets another step"
             )
         measured = [w.run for w in runs]
         maps = self.given(measured), self.variables(measured)  # before a process is started
