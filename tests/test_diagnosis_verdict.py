@@ -416,6 +416,16 @@ def test_verdict_follows_the_confidence(found, refitted, remains, said):
     assert verdict_name(found, refitted, left_on(X=remains)) == said
 
 
+@pytest.mark.parametrize(("slow", "said"), [(0.1, "found"), (1.0, "unexplained")])
+def test_waves_alone_explain_no_slow_residual(slow, said):
+    """A cause that is found besides is the verdict; waves stay a finding."""
+    waves = Finding("waves", {"wave_peak": 1.0}, {}, 0.9, [], 0.9, 0.9, together=0.9)
+    axes = {a: AxisRemainder(1.0, 0.1, 0.5, slow, 0.5, 0.1, True) for a in "XYN"}
+    assert verdict_name(Findings([waves]), False, Remainder(axes, "")) == said
+    both = Findings([waves, *told(0.9, 0.9).effects])
+    assert verdict_name(both, False, Remainder(axes, "")) == "found"
+
+
 def test_verdict_goes_on_without_what_is_not_believed():
     unlikely, sure = told(0.1, 0.2, ["N_r"]), told(0.9, 0.9)
     both = replace(sure, effects=[*unlikely.effects, *sure.effects])
