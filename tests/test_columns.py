@@ -518,6 +518,19 @@ def test_axes_that_are_stated_stay_beside_a_quaternion(tmp_path: Path) -> None:
     assert propose(written(tmp_path / "b.csv", without), OTTER).unused == ["z", "w"]
 
 
+@pytest.mark.parametrize(
+    ("others", "name"), [({}, "Zeitstempel"), ({"sent": "2026-01-01T00:00:00"}, "")]
+)
+def test_the_only_date_stamps_are_the_time_whatever_their_name(
+    tmp_path: Path, others: dict[str, str], name: str
+) -> None:
+    stamps = pd.Timestamp("2026-03-29T01:59:30Z") + pd.to_timedelta(boat()["time"], unit="s")
+    table = boat().drop(columns="time").assign(Zeitstempel=stamps.astype(str), note="none", **others)
+    found = propose(written(tmp_path / "a.csv", table), OTTER)
+    assert found.layout.column("time").name == name
+    assert (found.run is not None) == bool(name)
+
+
 def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: Path) -> None:
     """Position, heading and commands come at times of their own, as a bag of messages has them."""
     table, parts = boat(), []

@@ -171,10 +171,10 @@ class Fmu:
             InputError: as :meth:`variables`; its step is too long; there is no process for it.
         """
         longest = WIDTH * runs[0].scale.time
-        if self.fixed_step and self.fixed_step > longest:
+        if (step := self.fixed_step) and step > longest:
             raise cosim.InputError(
-                f"'{self.name}' has a step of {self.fixed_step:g} s; at most {longest:.3g} s are allowed, "
-                "the time over which its error is averaged; --step sets another step"
+                f"'{self.name}' has a step of {step:g} s; allowed is at most {longest:.3g} s, the time "
+                "over which its error is averaged; --step sets another step"
             )
         measured = [w.run for w in runs]
         maps = self.given(measured), self.variables(measured)  # before a process is started

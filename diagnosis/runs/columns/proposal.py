@@ -119,6 +119,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
     columns = _columns(path, names, units, quantity, kept)
     columns |= _of_message(columns, fields, kept)
+    columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
@@ -298,6 +299,15 @@ def _of_message(
     if {"x", "y"} <= columns.keys() - kept and columns["x"].name.casefold().endswith("x"):
         turned |= {"x": columns["y"], "y": columns["x"]}
     return turned
+
+
+def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
+    """The only column of date stamps as the time, whatever its name, if no other column is known."""
+    if "time" in layout.columns:
+        return {}
+    table = table_of_file(path, layout, {*names} - _names_of(layout.columns))
+    stamped = [str(name) for name, cells in table.items() if date_stamps(cells) is not None]
+    return {"time": Column(name=stamped[0])} if len(stamped) == 1 else {}
 
 
 def _geographic(
