@@ -27,7 +27,7 @@ from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
 from ..predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
 from .covariates import AXES
-from .recurrence import Recurrence
+from .recurrence import TOGETHER, Recurrence
 from .regions import NAMES, UNITS, Region, numbered
 from .settings import SETTINGS
 
@@ -49,6 +49,10 @@ REPEATS = {
     "command": (
         "depends on the commands",
         "a thruster force that differs from the thruster model in a shape that no effect has",
+    ),
+    TOGETHER: (
+        "depends on position and motion together",
+        "a force on the hull that differs from place to place, as in shallow water or near a bank",
     ),
     "time": (
         "depends on the time since the start of a run",
