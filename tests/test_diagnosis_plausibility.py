@@ -398,7 +398,17 @@ def test_degrees_of_latitude_are_in_no_unit_of_length():
         run = replace(base(), layout=layout)
         found = [*readings(run, Model()), *other_factors(run, 2.0)]
         assert any("position is in" in r.mistake for r in found) == expected
+        assert any("as in axes east and north" in r.mistake for r in found) == expected
         assert any(r.mistake == "y points west (east is positive here)" for r in found)
+
+
+@pytest.mark.parametrize(("name", "angles"), [("cybership2", 2), ("otter", 0)])
+def test_all_angles_may_have_the_wrong_sign(name, angles):
+    ship = ship_with((), name)
+    run = replace(base(), ship=ship.description, signals=tuple(ship.commands))
+    run = replace(run, commands=np.ones((run.time.size, len(run.signals))))
+    found = [r for r in readings(run, Model(ship=ship)) if r.mistake == "its angles have the wrong sign"]
+    assert [len(r.changes) for r in found] == [angles] * bool(angles)
 
 
 class SomeOdds:

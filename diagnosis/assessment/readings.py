@@ -93,9 +93,10 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
     yield of_pose("its heading is mirrored (clockwise is positive here)", (1.0, 1.0, -1.0))
     yield of_pose("y points west (east is positive here)", (1.0, -1.0, 1.0))
     yield of_pose("x points south (north is positive here)", (-1.0, 1.0, 1.0))
-    yield of_pose(
-        "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
-    )
+    if _has_unit(run):  # latitude and longitude are to north and east
+        yield of_pose(
+            "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
+        )
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
     for degrees in (180, 90, -90):
@@ -132,10 +133,9 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
     names, form = run.signals, model.ship.form_of(commands)
     ones, unit = np.ones(len(names)), np.array([form[s] for s in names])
     turned = {s: -np.where(np.arange(len(names)) == k, 1.0, -1.0) for k, s in enumerate(names)}
-    thrusts = np.where(
-        unit == "rad", 1.0, -1.0
-    )  # a force turns round with its thrust, at the same angle
-    groups = {"its commands have": -ones, "its thrusts have": thrusts}
+    # A force turns round with its thrust, at the same angle.
+    thrusts = np.where(unit == "rad", 1.0, -1.0)
+    groups = {"its commands have": -ones, "its thrusts have": thrusts, "its angles have": -thrusts}
     signs = {f"{s} has": f for s, f in turned.items()} | groups
     for who, factors in {tuple(f.tolist()): (who, f) for who, f in reversed(signs.items())}.values():
         if (factors < 0.0).any():

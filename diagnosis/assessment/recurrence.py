@@ -18,7 +18,6 @@ from ..predictors.weak_form import BLOCK, EVERY
 from .regions import numbered
 from .settings import SETTINGS
 
-
 TOGETHER = "place and motion"  # the space of both, where an error repeats in none alone
 
 
