@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 from support.command import command
 
 from cosim import InputError
@@ -482,7 +483,7 @@ def message(table: pd.DataFrame) -> pd.DataFrame:
             "header.stamp.nanosec": np.round(1e9 * (time % 1.0)),
             "imu.linear_acceleration.x": 0.1,
             "pose.pose.position.x": table["y"],
-            "pose.pose.position.y": table["x"],
+            "vehicle_local_position.y": table["x"],
             **{f"pose.pose.orientation.{axis}": 0.0 for axis in "xy"},
             "pose.pose.orientation.z": 2.0 * np.sin(0.5 * yaw),  # of any length
             "pose.pose.orientation.w": 2.0 * np.cos(0.5 * yaw),
@@ -510,7 +511,7 @@ def test_messages_have_their_heading_as_a_quaternion(tmp_path: Path, suffix: str
 def test_axes_that_are_stated_stay_beside_a_quaternion(tmp_path: Path) -> None:
     """North and east are named. A width beside x, y and z is no quaternion."""
     table = message(boat()).rename(
-        columns={"pose.pose.position.x": "East", "pose.pose.position.y": "North"}
+        columns={"pose.pose.position.x": "East", "vehicle_local_position.y": "North"}
     )
     found = propose(written(tmp_path / "a.csv", table), OTTER)
     assert [found.layout.column(s).name for s in ("x", "y")] == ["North", "East"]
@@ -529,6 +530,41 @@ def test_the_only_date_stamps_are_the_time_whatever_their_name(
     found = propose(written(tmp_path / "a.csv", table), OTTER)
     assert found.layout.column("time").name == name
     assert (found.run is not None) == bool(name)
+
+
+def test_a_struct_of_matlab_is_a_table(tmp_path: Path) -> None:
+    """Of vectors of one length; a constant and a text are none of it."""
+    path, table = tmp_path / "a.mat", boat()
+    log = {
+        "t": table["time"].to_numpy(),
+        "eta": table[["x", "y", "psi"]].to_numpy(),
+        "port": {"n": table["port.n"].to_numpy()},
+        "starboard_n": table["starboard.n"].to_numpy(),
+        "ship": "otter",
+        "gains": np.ones(5),
+    }
+    savemat(path, {"log": log})
+    found = propose(path, OTTER)
+    assert found.run is None
+    assert found.unused == ["log.eta.1", "log.eta.2", "log.eta.3"]
+    pose = {s: f"log.eta.{k}" for k, s in enumerate(("x", "y", "psi"), 1)}
+    columns = found.needed["columns"] | pose
+    path.with_name("a.mat.json").write_text(json.dumps({"columns": columns}), encoding="utf-8")
+    run = read(path, of=OTTER)
+    np.testing.assert_array_equal(run.pose, table[["x", "y", "psi"]])
+    np.testing.assert_array_equal(run.commands, table[["port.n", "starboard.n"]])
+    path.write_bytes(b"MATLAB 7.3 MAT-file" + bytes(200))
+    with pytest.raises(InputError, match=r"save it by save\(..., '-v7'\), or as CSV"):
+        read(path, of=OTTER)
+
+
+def test_cells_may_be_separated_by_blanks(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(boat().round(6).to_string(index=False), encoding="utf-8")
+    found = propose(path, OTTER)
+    assert found.layout.separator == " "
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.pose, boat()[["x", "y", "psi"]], atol=1e-6)
 
 
 def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: Path) -> None:

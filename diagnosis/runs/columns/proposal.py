@@ -14,6 +14,7 @@ from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
+from ..files.matlab_files import fits_matlab
 from ..files.message_fields import message_fields
 from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
@@ -83,7 +84,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     """Look at a file: its text, its names and units, and at the numbers where units are not told.
 
     Args:
-        path: a CSV or Parquet file; what is stated beside it stands.
+        path: a CSV, Parquet or MATLAB file; what is stated beside it stands.
         of: the ship that was measured; None: the default ship.
 
     Raises:
@@ -92,10 +93,10 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     """
     of = of or ship()
     quantity = quantities(of)
-    if path.suffix == ".mat" or path.is_dir():
-        raise InputError(f"'{path}' is not a CSV or Parquet file with named columns")
+    if path.is_dir() or (path.suffix == ".mat" and fits_matlab(of)):
+        raise InputError(f"'{path}' is not a CSV, Parquet or MATLAB file with named columns")
     stated, text = stated_layout(path) or Layout(), Layout()
-    if path.is_file() and path.suffix != ".parquet":
+    if path.is_file() and path.suffix not in (".parquet", ".mat"):
         refuse_sentences(path)
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)

@@ -43,7 +43,8 @@ def line_beside(
     Returns:
         The end of a sentence; empty where there is no such file, as beside a log.
     """
-    if path is None or path.is_dir() or path.suffix == ".mat" or not changes:
+    published = path is not None and path.suffix == ".mat" and read_as == Layout()  # those of NTNU
+    if path is None or path.is_dir() or published or not changes:
         return ""
     # What that file does not state yet has to be there, too: with it names tell no units.
     told = stated_layout(path) == read_as

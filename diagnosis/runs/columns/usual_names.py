@@ -65,14 +65,15 @@ def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
     """Which of some signals a name means, and whether its axis points the other way.
 
     Of a name with a path, as ``/gnss/pose/position/x`` or ``pose.position.x``, the last two parts or the
-    last one count; after a dot a letter alone is a part of any vector, and means nothing.
+    last one count; after a dot a letter alone, but t, is a part of any vector, and means nothing.
 
     Returns:
         An empty name where it means none of them.
     """
     known = MEANT | {_folded(signal): (signal, False) for signal in signals}
     parts = re.split("[/.]", name)
-    last = parts[-1] if len(parts[-1]) > 1 or "." not in name else ""
+    parts[-2:-1] = [part.rpartition("_")[2] for part in parts[-2:-1]]  # vehicle_local_position.x
+    last = parts[-1] if len(parts[-1]) > 1 or parts[-1] == "t" or "." not in name else ""
     for part in (name, "".join(parts[-2:]), last):
         found = known.get(_folded(part), ("", False))
         if found[0] in signals:

@@ -23,6 +23,7 @@ from ..columns.side_car import (
     what_to_do,
 )
 from ..run_constants import CHANCE, DIGITS
+from .matlab_files import matlab_table
 from .message_fields import message_fields, with_fields
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
@@ -70,6 +71,8 @@ def _names(path: Path, layout: Layout) -> list[str]:
         from pyarrow import parquet
 
         return list(parquet.read_schema(path).names)
+    if path.suffix == ".mat":
+        return list(matlab_table(path))
     refuse_sentences(path)
     first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
     names = [name.strip() for name in first.iloc[0]]
@@ -93,6 +96,8 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
         table = pd.read_parquet(path, columns=list(own))
         index = [name for name in table.index.names if name in own]
         table = table.reset_index(index) if index else table
+    elif path.suffix == ".mat":
+        table = matlab_table(path)[[*own]]
     else:
         table = csv_table(path, layout, own)
         refuse_units(path, layout, table)

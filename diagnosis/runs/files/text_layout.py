@@ -10,7 +10,7 @@ from pathlib import Path
 from ..columns.columns import PREAMBLE, UNITS, Layout
 from ..columns.unit_check import spelt
 
-SEPARATORS = (",", ";", "\t", "|")  # that a table may have between its cells
+SEPARATORS = (",", ";", "\t", "|", " ")  # that a table may have between its cells
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
