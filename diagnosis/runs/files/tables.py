@@ -97,7 +97,7 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
         index = [name for name in table.index.names if name in own]
         table = table.reset_index(index) if index else table
     elif path.suffix == ".mat":
-        table = matlab_table(path)[[*own]]
+        table = matlab_table(path).filter(items=[*own])
     else:
         table = csv_table(path, layout, own)
         refuse_units(path, layout, table)
