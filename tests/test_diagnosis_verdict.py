@@ -701,6 +701,26 @@ def test_pose_younger_than_its_stamp_is_not_told_from_lags_that_are_too_long(nam
     assert ("the same effect" in seen.doubt) != sure
 
 
+@pytest.mark.parametrize(
+    ("doubts", "own", "of_set"),
+    [
+        (Doubts(), 0.94, 0.96),
+        (Doubts(residual="X"), 0.5, 0.5),
+        (Doubts(residual="N"), 0.94, 0.96),
+        (Doubts(replaceable={"X_u"}, without_gain={"X_u"}), 0.5, 0.5),  # the same alternative
+        (Doubts(residual="X", without_gain={"X_u"}), 1.0 / 3.0, 1.0 / 3.0),
+        (Doubts(residual="X", without_gain={"X_u"}, rivals={"X_u"}, of_parts="X"), 0.25, 0.25),
+        (Doubts(of_data="samples", without_gain={"X_u"}), 1.0 / 3.0, 0.5),
+    ],
+)
+def test_alternatives_that_are_as_likely_add_up(doubts, own, of_set):
+    f = Finding("X_u", {"delta_X_u": -2.0}, {}, 0.94, [], 0.9, 0.9, together=0.96)
+    seen = confidence_of(f, Model(), doubts)
+    assert (seen.own, seen.of_set) == pytest.approx((own, of_set))
+    assert seen.is_finding == (of_set >= 0.5)
+    assert bool(seen.doubt) == (own < 0.94)
+
+
 @pytest.mark.quick
 def test_axis_that_is_never_commanded_has_the_force_of_the_ships_inertia():
     (w, *_) = voyages(**SHORT)
