@@ -710,7 +710,7 @@ def test_pose_younger_than_its_stamp_is_not_told_from_lags_that_are_too_long(nam
         (Doubts(replaceable={"X_u"}, without_gain={"X_u"}), 0.5, 0.5),  # the same alternative
         (Doubts(residual="X", without_gain={"X_u"}), 1.0 / 3.0, 1.0 / 3.0),
         (Doubts(residual="X", without_gain={"X_u"}, rivals={"X_u"}, of_parts="X"), 0.25, 0.25),
-        (Doubts(of_data="samples", without_gain={"X_u"}), 1.0 / 3.0, 0.5),
+        (Doubts(of_data="samples", without_gain={"X_u"}), 1.0 / 3.0, 1.0 / 3.0),
     ],
 )
 def test_alternatives_that_are_as_likely_add_up(doubts, own, of_set):

@@ -7,7 +7,7 @@ the same axes, laws that make up another one, effects and coefficients that expl
 smoothing that is slower than a filter.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from scipy.special import expit
@@ -112,13 +112,11 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         return Confidence(0.0, 0.0, " and ".join(map(str, limits)))
     effect = start.ship.effects[f.id]
     axes = set(effect.axis)
-    # Of each unknown alternative the doubts that show it, of the effect alone or of its set as well.
-    alone = {
+    # Doubt -> the alternative that it shows, of the effect and of its set, and whether it holds.
+    all_doubts = {
         MAY_BE_NONE: (COEFFICIENTS, may_be_none(f)),
         MAY_BE_LAGS: (LAGS, _may_be_lags(f, start)),
         doubts.of_data: (DATA, bool(doubts.of_data)),
-    }
-    of_all = {
         # Waves are a residual themselves.
         RESIDUAL: (UNKNOWN, effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual)),
         RIVAL: (OTHERS, f.id in doubts.rivals),
@@ -128,14 +126,9 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         SMOOTHED: (SMOOTHING, f.id in doubts.smoothed),
         NO_GAIN: (COEFFICIENTS, f.id in doubts.without_gain),
     }
-    most, most_of_set = _at_most(alone | of_all), _at_most(of_all)
-    doubt = next((text for text, (_, holds) in (alone | of_all).items() if holds), "")
-    return Confidence(min(own, most), min(of_set, most_of_set), doubt if own > most else "")
-
-
-def _at_most(doubts: Mapping[str, tuple[str, bool]]) -> float:
-    """Confidence at the most, if each alternative that doubts show is as likely as the effect."""
-    return 1.0 / (1.0 + len({alternative for alternative, holds in doubts.values() if holds}))
+    holding = {text: alternative for text, (alternative, holds) in all_doubts.items() if holds}
+    most = 1.0 / (1.0 + len({*holding.values()}))  # each alternative is as likely as the effect
+    return Confidence(min(own, most), min(of_set, most), next(iter(holding), "") if own > most else "")
 
 
 def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
