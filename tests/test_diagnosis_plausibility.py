@@ -19,7 +19,7 @@ from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model, Run, omega, propose_columns, weak_windows
 from diagnosis.assessment import plausibility
-from diagnosis.assessment.command_check import without_force
+from diagnosis.assessment.command_check import contradicted_commands, without_force
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import (
     Mistake,
@@ -409,6 +409,24 @@ def test_all_angles_may_have_the_wrong_sign(name, angles):
     run = replace(run, commands=np.ones((run.time.size, len(run.signals))))
     found = [r for r in readings(run, Model(ship=ship)) if r.mistake == "its angles have the wrong sign"]
     assert [len(r.changes) for r in found] == [angles] * bool(angles)
+
+
+@pytest.mark.parametrize("rudder", [0.3, 0.0])
+def test_a_rudder_that_goes_to_and_fro_at_one_shaft_speed_varies(rudder):
+    """At rest it gives no force: a zig-zag has constant commands of force."""
+    ship = ship_with((), "cybership2")
+    t = np.arange(0.0, 100.0, 0.1)
+    way = np.where(np.sin(0.3 * t) > 0.0, rudder, -rudder)
+    given = {"port.n": 10.0 + 0.0 * t, "starboard.n": 10.0 + 0.0 * t, "bow.u": 0.0 * t}
+    given |= {"port_rudder.delta": way, "starboard_rudder.delta": way}
+    commands = np.column_stack([given[name] for name in ship.commands])
+    psi = 0.2 * np.sin(0.3 * t - 1.0)
+    pose = np.column_stack([0.03 * np.cumsum(np.cos(psi)), 0.03 * np.cumsum(np.sin(psi)), psi])
+    pose += np.random.default_rng(2).normal(0.0, 1e-3, pose.shape)
+    tau = ship.commanded_force(commands, None)
+    run = Run("z", t, pose, tau, commands, signals=tuple(ship.commands), ship=ship.description)
+    said = contradicted_commands(weak_windows(smoothed(run)), Model(ship=ship))
+    assert (said is not None and "commands are constant" in said) == (rudder == 0.0)
 
 
 class SomeOdds:
