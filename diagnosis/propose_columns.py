@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .runs import Column, Layout, LikelyColumn, Proposal, Run
     from .runs.smoothing.smoother import Smoothed
 
-TABLES = (".csv", ".parquet")
+TABLES = (".csv", ".parquet", ".mat")
 HEADS = ("samples", "frozen", "dropped", "spikes", "used")  # what becomes of the samples
 
 

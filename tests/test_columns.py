@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 from support.command import command
 
 from cosim import InputError
@@ -473,6 +474,99 @@ def test_paths_of_messages_are_known_by_their_last_parts(tmp_path: Path) -> None
     np.testing.assert_allclose(found.run.commands, boat()[["port.n", "starboard.n"]])
 
 
+def message(table: pd.DataFrame) -> pd.DataFrame:
+    """The Otter's log as fields of ROS messages: axes east, north and up, a quaternion, a split stamp."""
+    yaw, time = 0.5 * np.pi - table["psi"], 1.7e9 + table["time"]
+    return pd.DataFrame(
+        {
+            "header.stamp.sec": np.floor(time),
+            "header.stamp.nanosec": np.round(1e9 * (time % 1.0)),
+            "imu.linear_acceleration.x": 0.1,
+            "pose.pose.position.x": table["y"],
+            "vehicle_local_position.y": table["x"],
+            **{f"pose.pose.orientation.{axis}": 0.0 for axis in "xy"},
+            "pose.pose.orientation.z": 2.0 * np.sin(0.5 * yaw),  # of any length
+            "pose.pose.orientation.w": 2.0 * np.cos(0.5 * yaw),
+            "cmd.port.n": table["port.n"],
+            "cmd.starboard.n": table["starboard.n"],
+        }
+    )
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_messages_have_their_heading_as_a_quaternion(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".csv":
+        message(boat()).to_csv(path, index=False)
+    else:
+        message(boat()).to_parquet(path)
+    found = propose(path, OTTER)
+    assert found.unused == ["imu.linear_acceleration.x"]
+    run = read(path, found.layout, OTTER)
+    np.testing.assert_allclose(run.time - run.time[0], boat()["time"], atol=1e-6)
+    np.testing.assert_allclose(run.pose[:, :2], boat()[["x", "y"]])
+    np.testing.assert_allclose(np.sin(run.pose[:, 2] - boat()["psi"]), 0.0, atol=1e-9)
+
+
+def test_axes_that_are_stated_stay_beside_a_quaternion(tmp_path: Path) -> None:
+    """North and east are named. A width beside x, y and z is no quaternion."""
+    table = message(boat()).rename(
+        columns={"pose.pose.position.x": "East", "vehicle_local_position.y": "North"}
+    )
+    found = propose(written(tmp_path / "a.csv", table), OTTER)
+    assert [found.layout.column(s).name for s in ("x", "y")] == ["North", "East"]
+    without = boat().assign(z=0.1, w=0.2)
+    assert propose(written(tmp_path / "b.csv", without), OTTER).unused == ["z", "w"]
+
+
+@pytest.mark.parametrize(
+    ("others", "name"), [({}, "Zeitstempel"), ({"sent": "2026-01-01T00:00:00"}, "")]
+)
+def test_the_only_date_stamps_are_the_time_whatever_their_name(
+    tmp_path: Path, others: dict[str, str], name: str
+) -> None:
+    stamps = pd.Timestamp("2026-03-29T01:59:30Z") + pd.to_timedelta(boat()["time"], unit="s")
+    table = boat().drop(columns="time").assign(Zeitstempel=stamps.astype(str), note="none", **others)
+    found = propose(written(tmp_path / "a.csv", table), OTTER)
+    assert found.layout.column("time").name == name
+    assert (found.run is not None) == bool(name)
+
+
+def test_a_struct_of_matlab_is_a_table(tmp_path: Path) -> None:
+    """Of vectors of one length; a constant and a text are none of it."""
+    path, table = tmp_path / "a.mat", boat()
+    log = {
+        "t": table["time"].to_numpy(),
+        "eta": table[["x", "y", "psi"]].to_numpy(),
+        "port": {"n": table["port.n"].to_numpy()},
+        "starboard_n": table["starboard.n"].to_numpy(),
+        "ship": "otter",
+        "gains": np.ones(5),
+    }
+    savemat(path, {"log": log})
+    found = propose(path, OTTER)
+    assert found.run is None
+    assert found.unused == ["log.eta.1", "log.eta.2", "log.eta.3"]
+    pose = {s: f"log.eta.{k}" for k, s in enumerate(("x", "y", "psi"), 1)}
+    columns = found.needed["columns"] | pose
+    path.with_name("a.mat.json").write_text(json.dumps({"columns": columns}), encoding="utf-8")
+    run = read(path, of=OTTER)
+    np.testing.assert_array_equal(run.pose, table[["x", "y", "psi"]])
+    np.testing.assert_array_equal(run.commands, table[["port.n", "starboard.n"]])
+    path.write_bytes(b"MATLAB 7.3 MAT-file" + bytes(200))
+    with pytest.raises(InputError, match=r"save it by save\(..., '-v7'\), or as CSV"):
+        read(path, of=OTTER)
+
+
+def test_cells_may_be_separated_by_blanks(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(boat().round(6).to_string(index=False), encoding="utf-8")
+    found = propose(path, OTTER)
+    assert found.layout.separator == " "
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.pose, boat()[["x", "y", "psi"]], atol=1e-6)
+
+
 def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: Path) -> None:
     """Position, heading and commands come at times of their own, as a bag of messages has them."""
     table, parts = boat(), []
@@ -542,6 +636,11 @@ def test_commands_in_percent_are_proposed_so(tmp_path: Path) -> None:
     table = boat().rename(columns={"port.n": "u_vsp_x", "starboard.n": "u_vsp_y"})
     table = table.assign(u_vsp_x=table["u_vsp_x"] / 6.0, u_vsp_y=0.4, u_bow=0.1)
     percent = table.assign(**{n: 100.0 * table[n] for n in ("u_vsp_x", "u_vsp_y", "u_bow")})
+    named = {n: f"{n}_pct" for n in ("u_vsp_x", "u_vsp_y", "u_bow")}
+    found = propose(written(tmp_path / "c.csv", percent.rename(columns=named)))
+    assert {c["name"]: c["unit"] for c in found.needed["columns"].values()} == dict.fromkeys(
+        named.values(), "%"
+    )
     found = propose(written(tmp_path / "a.csv", percent))
     assert {c["unit"] for c in found.needed["columns"].values()} == {"%"}
     assert found.run is not None

@@ -303,7 +303,13 @@ def test_without_a_speed_a_scale_of_the_rate_may_be_the_clock():
     ("kind", "channel", "unit", "value", "sentence"),
     [
         ("delay", "u", "s", 0.5, "u and v are 0.5 s later than the pose"),
-        ("delay", "r", "s", -0.25, "r is 0.25 s earlier than the pose"),
+        (
+            "delay",
+            "r",
+            "s",
+            -0.25,
+            "r is 0.25 s earlier than the heading, so that the heading is probably late",
+        ),
         ("place", "x", "m", 2.0, "the position is measured 2 m ahead of the place of the velocity"),
         ("place", "x", "m", -2.0, "the position is measured 2 m aft of the place of the velocity"),
         ("place", "y", "m", 1.5, "the position is measured 1.5 m to starboard of the place of"),

@@ -88,6 +88,37 @@ def test_speeds_that_are_reached_once_say_nothing_of_what_repeats():
     assert recurrences._share(error, near, np.zeros(0, int)) > 0.3
 
 
+@pytest.mark.parametrize(
+    ("error", "best"),
+    [
+        (lambda x, u: np.where(x > 0.0, u, 0.0), recurrences.TOGETHER),  # a drag at some places
+        (lambda x, u: u, "motion"),
+        (lambda x, u: np.random.default_rng(3).standard_normal(x.size), None),
+    ],
+)
+def test_a_damping_that_differs_from_place_to_place_repeats_with_both_together(error, best):
+    """The ship comes by each place in both directions at several speeds."""
+    n, rng = 900, np.random.default_rng(1)
+    slow = np.cumsum(rng.standard_normal((n, 2)), axis=0)
+    x, u = np.sin(0.3 * slow[:, 0]), np.sin(0.3 * slow[:, 1])
+    zero = np.zeros(n)
+    w = SimpleNamespace(
+        middle=0.5 * np.arange(n),
+        every=0.5,
+        scale=REFERENCE,
+        known=np.ones(n, bool),
+        smoothed=SimpleNamespace(
+            eta=np.column_stack([x, zero, zero]), nu=np.column_stack([u, zero, zero])
+        ),
+        smooth=np.eye(n),
+        held=np.eye(n),
+        run=SimpleNamespace(tau_cmd=np.ones((n, 3)), name="one"),
+    )
+    left = np.zeros((n, 3))
+    left[:, 0] = error(x, u)
+    assert recurrences.recurrence([w], left)[0].best == best
+
+
 def test_an_error_of_short_runs_is_compared_with_itself_at_many_shifts(monkeypatch):
     """By one shift alone half of all errors would repeat."""
     offsets = []

@@ -390,6 +390,22 @@ def test_columns_of_a_large_file_take_less_memory_than_the_file(tmp_path):
     assert most < 0.5 * path.stat().st_size
 
 
+def test_a_row_with_more_cells_than_names_is_refused(tmp_path):
+    """A decimal comma in one row shifts its cells; separators at the ends of rows shift none."""
+    path = tmp_path / "a.csv"
+    with_tau().to_csv(path, index=False)
+    names, *rows = path.read_text().splitlines()
+    good = diagnosis.read(path)
+    for end in (",", ",,", ', " "'):
+        path.write_text("\n".join([names, *(row + end for row in rows)]))
+        np.testing.assert_array_equal(diagnosis.read(path).pose, good.pose)
+    path.write_text("\n".join([names, *rows[:4], rows[4].replace(".", ",", 1), *rows[5:]]))
+    with pytest.raises(cosim.InputError, match="line 6 has more cells than the 7 names"):
+        diagnosis.read(path)
+    path.write_text("\n".join([f"{names},note", *(f'{row},"to port, then back"' for row in rows)]))
+    np.testing.assert_array_equal(diagnosis.read(path).pose, good.pose)
+
+
 def test_roles_of_a_log_are_its_names(tmp_path):
     """A system with instances of other names: the pose and the force are those that its roles state."""
     roles = {"pose": ["boat.n", "boat.e", "boat.h"], "force": ["jets.a", "jets.b", "jets.c"]}

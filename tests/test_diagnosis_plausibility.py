@@ -19,7 +19,7 @@ from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model, Run, omega, propose_columns, weak_windows
 from diagnosis.assessment import plausibility
-from diagnosis.assessment.command_check import without_force
+from diagnosis.assessment.command_check import contradicted_commands, without_force
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import (
     Mistake,
@@ -27,6 +27,7 @@ from diagnosis.assessment.plausibility import (
     pushed_aside,
     refuse_implausible,
     same_columns,
+    scale_is_confirmed,
 )
 from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
 from diagnosis.assessment.readings import (
@@ -34,13 +35,14 @@ from diagnosis.assessment.readings import (
     Reading,
     of_commands,
     of_pose,
+    other_factors,
     readings,
     reread,
     swapped,
 )
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
-from diagnosis.runs.columns.columns import POSE, Named
+from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
 from fmus.signals import Force
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -371,6 +373,60 @@ def test_tanker_with_a_rudder_is_a_unit_alone():
         w = weak_windows(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
         found = likeliest_mistake(w, Model())
         assert found is None or of_units(found)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.3048])
+def test_a_velocity_that_agrees_confirms_the_unit_of_the_position(unit):
+    """A ship that seems 3.3 times too quick moves by its own speed so; a velocity in another unit says nothing."""
+    run = edited(pose=lambda p: p / [0.3048, 0.3048, 1.0])
+    (alone,) = diagnosis.gather([run], anyway=True)
+    found = likeliest_mistake(alone, Model())
+    assert found is not None
+    assert "its position is in ft" in found.clause
+    nu = alone.smoothed.nu * [unit, unit, 1.0]
+    measured = dict(zip("uvr", np.nan_to_num(nu).T, strict=True))
+    (w,) = diagnosis.gather([replace(run, measured=measured)], anyway=True)
+    assert set("uv") <= set(w.smoothed.sensors.agreeing)
+    assert scale_is_confirmed(w.smoothed.sensors) == (unit == 1.0)
+    found = likeliest_mistake(w, Model())
+    assert (found is not None and "its position is in ft" in found.clause) == (unit != 1.0)
+
+
+def test_degrees_of_latitude_are_in_no_unit_of_length():
+    columns = {"x": Column(name="Lat", factor=111e3), "y": Column(name="Lon", factor=68e3)}
+    for layout, expected in ((Layout(columns=columns), False), (Layout(), True)):
+        run = replace(base(), layout=layout)
+        found = [*readings(run, Model()), *other_factors(run, 2.0)]
+        assert any("position is in" in r.mistake for r in found) == expected
+        assert any("as in axes east and north" in r.mistake for r in found) == expected
+        assert any(r.mistake == "y points west (east is positive here)" for r in found)
+
+
+@pytest.mark.parametrize(("name", "angles"), [("cybership2", 2), ("otter", 0)])
+def test_all_angles_may_have_the_wrong_sign(name, angles):
+    ship = ship_with((), name)
+    run = replace(base(), ship=ship.description, signals=tuple(ship.commands))
+    run = replace(run, commands=np.ones((run.time.size, len(run.signals))))
+    found = [r for r in readings(run, Model(ship=ship)) if r.mistake == "its angles have the wrong sign"]
+    assert [len(r.changes) for r in found] == [angles] * bool(angles)
+
+
+@pytest.mark.parametrize("rudder", [0.3, 0.0])
+def test_a_rudder_that_goes_to_and_fro_at_one_shaft_speed_varies(rudder):
+    """At rest it gives no force: a zig-zag has constant commands of force."""
+    ship = ship_with((), "cybership2")
+    t = np.arange(0.0, 100.0, 0.1)
+    way = np.where(np.sin(0.3 * t) > 0.0, rudder, -rudder)
+    given = {"port.n": 10.0 + 0.0 * t, "starboard.n": 10.0 + 0.0 * t, "bow.u": 0.0 * t}
+    given |= {"port_rudder.delta": way, "starboard_rudder.delta": way}
+    commands = np.column_stack([given[name] for name in ship.commands])
+    psi = 0.2 * np.sin(0.3 * t - 1.0)
+    pose = np.column_stack([0.03 * np.cumsum(np.cos(psi)), 0.03 * np.cumsum(np.sin(psi)), psi])
+    pose += np.random.default_rng(2).normal(0.0, 1e-3, pose.shape)
+    tau = ship.commanded_force(commands, None)
+    run = Run("z", t, pose, tau, commands, signals=tuple(ship.commands), ship=ship.description)
+    said = contradicted_commands(weak_windows(smoothed(run)), Model(ship=ship))
+    assert (said is not None and "commands are constant" in said) == (rudder == 0.0)
 
 
 class SomeOdds:

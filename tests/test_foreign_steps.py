@@ -187,6 +187,13 @@ def steps_of(fmu, tmp_path, **options):
         patch.undo()
 
 
+def test_a_step_over_which_no_error_is_known_is_refused(made):
+    runs = loaded(turned(0.1, 60.0))
+    with pytest.raises(InputError, match=r"'turning.fmu' has a step of 3.5 s; allowed is at most 3 s"):
+        Fmu(made, execution=Execution(step=3.5)).begun_on(runs)
+    assert Fmu(made, execution=Execution(step=3.0)).begun_on(runs)
+
+
 @pytest.mark.slow
 def test_an_fmu_of_fixed_step_takes_no_other(made, tmp_path):
     fixed = described(made, tmp_path / "fixed.fmu", *FIXED_STEP)

@@ -118,10 +118,11 @@ def test_a_delay_that_is_found_in_steps_is_stated_as_it_is_repaired(delay, way):
     run = made()
     u, v, r = (np.interp(run.time - delay, run.time, run.measured[name]) for name in "uvr")
     found = told(beside(run, u=u, v=v, r=r))
-    for channel, name in (("u", "u and v are"), ("r", "r is")):
+    for channel, name, of in (("u", "u and v are", "pose"), ("r", "r is", "heading")):
         value = abs(found[channel, "delay"].value)
         assert value == pytest.approx(0.5, abs=0.05)
-        assert found[channel, "delay"].sentence == f"{name} {value:.3g} s {way} than the pose"
+        late = f", so that the {of} is probably late" if way == "earlier" else ""
+        assert found[channel, "delay"].sentence == f"{name} {value:.3g} s {way} than the {of}{late}"
 
 
 def test_a_scale_is_stated_in_percent():

@@ -21,6 +21,7 @@ from fmus.declare import DeclarationError, parameters_of, variables
 from fmus.effects.text import Found
 from fmus.hull_functions import FUNCTIONS
 from fmus.ship import ship
+from fmus.ships import ship_file
 from fmus.ships.__main__ import main as schema_main
 from fmus.ships.ship_file import Term, find_ship, read_ship, shipped_ships
 from fmus.ships.ship_warning import ShipWarning
@@ -328,6 +329,16 @@ def test_a_file_that_is_cut_or_garbled_is_read_or_refused(tmp_path: Path, data: 
 )
 def test_a_product_has_one_name_however_it_is_written(product: str, name: str) -> None:
     assert Term(axis="X", product=product, value=1.0).name == name
+
+
+def test_a_ship_that_is_not_there_is_refused_with_those_that_are(monkeypatch) -> None:
+    with pytest.raises(
+        DeclarationError, match=r"no ship 'xyz'; there are cse1, .*, or give a .toml file"
+    ):
+        find_ship("xyz")
+    monkeypatch.setattr(ship_file, "shipped_ships", list)
+    with pytest.raises(DeclarationError, match=r"no ship 'xyz'; give a .toml file"):
+        find_ship("xyz")
 
 
 @pytest.mark.parametrize("name", shipped_ships())

@@ -80,7 +80,8 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
     varies = np.ptp(tau, axis=0) > DIGITS * largest
-    if not varies.any():
+    # A rudder gives no force in ``tau``, which is that of a ship at rest.
+    if not (np.ptp(run.given, axis=0) > DIGITS * np.abs(run.given).max(axis=0)).any():
         return (
             "all its commands are constant, so the response of the ship to commands cannot be estimated"
         )

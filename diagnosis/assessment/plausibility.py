@@ -21,6 +21,8 @@ from ..predictors import Model, WeakWindows, omega
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
+from ..runs.sensors.evidence import ALIKE, VELOCITIES
+from ..runs.sensors.sensor_finding import Examined
 from ..runs.smoothing.command_response import least_squares
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import constant_forces, gains
@@ -169,6 +171,18 @@ def odds_of(logarithm: float) -> str:
     return f"10^{ten:.0f} : 1" if ten < MOST else f"more than 10^{MOST} : 1"
 
 
+def scale_is_confirmed(sensors: Examined | None) -> bool:
+    """Whether a measured velocity agrees, in its stated unit, with the units of pose and time."""
+    if sensors is None:
+        return False
+    other = {
+        f.channel for f in sensors.findings if f.kind == "scale" and abs(1.0 / f.value - 1.0) >= ALIKE
+    }
+    return any(
+        names[0] in sensors.agreeing and other.isdisjoint((*POSE, *names)) for names in VELOCITIES
+    )
+
+
 def likeliest_mistake(
     w: WeakWindows, model: Model, doubted: bool = False, factor: float | None = None
 ) -> Mistake | None:
@@ -181,8 +195,11 @@ def likeliest_mistake(
         factor: by which a column without a unit may be off; None: by none.
     """
     odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
+    others = [] if factor is None else [*other_factors(w.run, factor)]
+    if scale_is_confirmed(w.smoothed.sensors):
+        possible, others = ([r for r in some if r.density == 0.0] for some in (possible, others))
     named = len(possible)
-    possible += [] if factor is None else other_factors(w.run, factor)
+    possible += others
     if beyond_thrusters(w.run, model):
         sound = [not beyond_thrusters(reread(w, r, model).run, model) for r in possible]
         named, possible = sum(sound[:named]), [*compress(possible, sound)]

@@ -13,6 +13,7 @@ from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OF_MOTION, needed_force
 from ..runs import Run
 from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
+from ..runs.columns.geographic import is_geographic
 from ..runs.columns.unit_check import SI_UNIT, UNITS
 
 
@@ -92,16 +93,17 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
     yield of_pose("its heading is mirrored (clockwise is positive here)", (1.0, 1.0, -1.0))
     yield of_pose("y points west (east is positive here)", (1.0, -1.0, 1.0))
     yield of_pose("x points south (north is positive here)", (-1.0, 1.0, 1.0))
-    yield of_pose(
-        "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
-    )
+    if _has_unit(run):  # latitude and longitude are to north and east
+        yield of_pose(
+            "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
+        )
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
     for degrees in (180, 90, -90):
         back = Named(name="psi", offset=float(-np.radians(degrees) % (2.0 * np.pi)))
         yield Reading(f"its heading is off by {degrees} deg", {"psi": back})
     for unit, m in UNITS["length"].items():
-        if m == 1.0:
+        if m == 1.0 or not _has_unit(run):
             continue
         for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
             yield of_pose(f"{name} is in {unit}", factors)
@@ -131,10 +133,9 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
     names, form = run.signals, model.ship.form_of(commands)
     ones, unit = np.ones(len(names)), np.array([form[s] for s in names])
     turned = {s: -np.where(np.arange(len(names)) == k, 1.0, -1.0) for k, s in enumerate(names)}
-    thrusts = np.where(
-        unit == "rad", 1.0, -1.0
-    )  # a force turns round with its thrust, at the same angle
-    groups = {"its commands have": -ones, "its thrusts have": thrusts}
+    # A force turns round with its thrust, at the same angle.
+    thrusts = np.where(unit == "rad", 1.0, -1.0)
+    groups = {"its commands have": -ones, "its thrusts have": thrusts, "its angles have": -thrusts}
     signs = {f"{s} has": f for s, f in turned.items()} | groups
     for who, factors in {tuple(f.tolist()): (who, f) for who, f in reversed(signs.items())}.values():
         if (factors < 0.0).any():
@@ -155,11 +156,17 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
 
 def other_factors(run: Run, k: float) -> Iterator[Reading]:
     """Readings in a unit without a name, or of another clock: the ship accelerates k times too much."""
-    yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
+    if _has_unit(run):
+        yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
     clock = {"time": Named(name="time", factor=k**0.5)}
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock)
+
+
+def _has_unit(run: Run) -> bool:
+    """Whether the position is in a unit of length, and not in degrees of latitude and longitude."""
+    return not any(is_geographic(signal, run.layout.column(signal)) for signal in ("x", "y"))
 
 
 def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:

@@ -18,6 +18,8 @@ from ..predictors.weak_form import BLOCK, EVERY
 from .regions import numbered
 from .settings import SETTINGS
 
+TOGETHER = "place and motion"  # the space of both, where an error repeats in none alone
+
 
 class Recurrence(NamedTuple):
     """How an axis' model error comes again.
@@ -57,6 +59,8 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
+    at_a_place = np.hstack([_scaled(place), spaces["motion"]])
+    together = _neighbours(at_a_place, run, time, apart, count)
     rng = np.random.default_rng(0)
     shifts = round(1.0 / SETTINGS.chance) - 1
     offsets = rng.integers(least, max(len(left) - least, least + 1), shifts)
@@ -68,6 +72,8 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     for k in range(3):
         error = left[:, k]
         shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
+        if not any(shares.values()):  # as of a damping that is larger at some places
+            shares[TOGETHER] = _share(error, together, offsets)
         others = (np.ones_like(error), motion[:, k])
         in_part = _in_part(error, command[:, k], others, stretch, shares["command"])
         size = np.bincount(run, error**2) / np.bincount(run)

@@ -27,7 +27,7 @@ from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
 from ..predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
 from .covariates import AXES
-from .recurrence import Recurrence
+from .recurrence import TOGETHER, Recurrence
 from .regions import NAMES, UNITS, Region, numbered
 from .settings import SETTINGS
 
@@ -50,6 +50,10 @@ REPEATS = {
         "depends on the commands",
         "a thruster force that differs from the thruster model in a shape that no effect has",
     ),
+    TOGETHER: (
+        "depends on position and motion together",
+        "a force on the hull that differs from place to place, as in shallow water or near a bank",
+    ),
     "time": (
         "depends on the time since the start of a run",
         "an event at the same time of each run, or a drift",
@@ -64,16 +68,18 @@ IN_ONE_RUN = (
     "something that differed in that run, such as its place, load, water or weather",
 )
 LASTS = (
-    "shows no dependence on position, motion, command or time, and lasts for about {0:.0f} s at a time",
-    "an intermittent disturbance, such as gusts, a changing current, or a towed cable",
+    "shows no dependence on position, motion, command or time alone, and lasts for about {0:.0f} s at "
+    "a time",
+    "an intermittent disturbance, such as gusts, a changing current or a towed cable, or a force that "
+    "depends on several of these together",
 )
 THROUGHOUT = (
-    "shows no dependence on position, motion, command or time, and lasts through whole runs",
+    "shows no dependence on position, motion, command or time alone, and lasts through whole runs",
     "a force that differs from run to run, such as that of wind or current, or one that is commanded "
     "otherwise than recorded",
 )
 BRIEF = (
-    "shows no dependence on position, motion, command or time, and is short",
+    "shows no dependence on position, motion, command or time alone, and is short",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 

@@ -39,6 +39,10 @@ RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
 NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
+# Alternatives that doubts show; several doubts may show the same one.
+COEFFICIENTS, LAGS, DATA, UNKNOWN, OTHERS, SMOOTHING = (
+    *("coefficients", "lags", "data", "unknown physics", "other effects", "smoothing"),
+)
 
 
 class Doubts(NamedTuple):
@@ -106,27 +110,25 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         own, of_set = probability(f.evidence), probability(f.set_evidence)
     if limits := at_limit(start, f.id, f.values):
         return Confidence(0.0, 0.0, " and ".join(map(str, limits)))
-    doubt = ""
-    if own > EVEN_ODDS and may_be_none(f):
-        own, doubt = EVEN_ODDS, MAY_BE_NONE
-    elif _may_be_lags(f, start):
-        own, doubt = min(own, EVEN_ODDS), MAY_BE_LAGS
-    elif own > EVEN_ODDS and doubts.of_data:
-        own, doubt = EVEN_ODDS, doubts.of_data
     effect = start.ship.effects[f.id]
-    capped = {
+    axes = set(effect.axis)
+    # Doubt -> the alternative that it shows, of the effect and of its set, and whether it holds.
+    all_doubts = {
+        MAY_BE_NONE: (COEFFICIENTS, may_be_none(f)),
+        MAY_BE_LAGS: (LAGS, _may_be_lags(f, start)),
+        doubts.of_data: (DATA, bool(doubts.of_data)),
         # Waves are a residual themselves.
-        RESIDUAL: effect.search.by != "spectrum" and set(doubts.residual) & set(effect.axis),
-        RIVAL: f.id in doubts.rivals,
-        IN_PARTS: effect.kind == "force" and set(doubts.of_parts) & set(effect.axis),
-        ON_ONE_LINE: f.id in doubts.on_one_line,
-        REPLACEABLE: f.id in doubts.replaceable,
-        SMOOTHED: f.id in doubts.smoothed,
-        NO_GAIN: f.id in doubts.without_gain,
+        RESIDUAL: (UNKNOWN, effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual)),
+        RIVAL: (OTHERS, f.id in doubts.rivals),
+        IN_PARTS: (OTHERS, effect.kind == "force" and not axes.isdisjoint(doubts.of_parts)),
+        ON_ONE_LINE: (OTHERS, f.id in doubts.on_one_line),
+        REPLACEABLE: (COEFFICIENTS, f.id in doubts.replaceable),
+        SMOOTHED: (SMOOTHING, f.id in doubts.smoothed),
+        NO_GAIN: (COEFFICIENTS, f.id in doubts.without_gain),
     }
-    if own > EVEN_ODDS and any(capped.values()):
-        return Confidence(EVEN_ODDS, EVEN_ODDS, next(text for text, holds in capped.items() if holds))
-    return Confidence(own, of_set, doubt)
+    holding = {text: alternative for text, (alternative, holds) in all_doubts.items() if holds}
+    most = 1.0 / (1.0 + len({*holding.values()}))  # each alternative is as likely as the effect
+    return Confidence(min(own, most), min(of_set, most), next(iter(holding), "") if own > most else "")
 
 
 def doubt_of_data(runs: Sequence[WeakWindows]) -> str:

@@ -146,7 +146,8 @@ def find_ship(name: str | Path) -> Path:
     if (found := installed.ship_file(str(name))) is not None:
         return found
     known = shipped_ships()
-    hint = nearest(str(name), known) or f"; there are {', '.join(known)}, or give a .toml file"
+    there = f"there are {', '.join(known)}, or " if known else ""
+    hint = nearest(str(name), known) or f"; {there}give a .toml file"
     raise DeclarationError(f"no ship '{name}'{hint}")
 
 

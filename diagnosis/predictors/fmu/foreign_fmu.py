@@ -23,6 +23,7 @@ from fmus.ship import Ship, ship
 from ...execution.progress import Advance, silent
 from ...execution.result_folder import sha256
 from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
+from ...runs.run_constants import WIDTH
 from ..black_box import (
     MOTION,
     POSE,
@@ -167,8 +168,14 @@ class Fmu:
         """The predictor of some runs, of which nothing is computed yet.
 
         Raises:
-            InputError: as :meth:`variables`; there is no process for it.
+            InputError: as :meth:`variables`; its step is too long; there is no process for it.
         """
+        longest = WIDTH * runs[0].scale.time
+        if (step := self.fixed_step) and step > longest:
+            raise cosim.InputError(
+                f"'{self.name}' has a step of {step:g} s; allowed is at most {longest:.3g} s, the time "
+                "over which its error is averaged; --step sets another step"
+            )
         measured = [w.run for w in runs]
         maps = self.given(measured), self.variables(measured)  # before a process is started
         process = confined(self.model, self.execution)

@@ -69,6 +69,11 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     return columns
 
 
+def is_geographic(signal: str, column: Column) -> bool:
+    """Whether the column of x or y is a latitude or longitude, of degrees and nothing else."""
+    return column.factor != 1.0 and bool(WORDS[signal] & {*words_of(column.name)})
+
+
 def refuse_minutes(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> None:
     """Refuse positions in degrees and minutes (ddmm.mmmm), or with a letter, as NMEA 0183 has them.
 
@@ -102,7 +107,7 @@ def one_origin(files: Sequence[Mapping[str, Column]]) -> dict[str, Column]:
         that the length of a degree of longitude differs by more than 0.25 %.
     """
     pairs = [{s: file.get(s, Column(name="")) for s in WORDS} for file in files]
-    for signal, words in WORDS.items():
+    for signal in WORDS:
         columns = [pair[signal] for pair in pairs]
         largest, least = (of(abs(c.factor) for c in columns) for of in (max, min))
         if (
@@ -110,6 +115,6 @@ def one_origin(files: Sequence[Mapping[str, Column]]) -> dict[str, Column]:
             or largest > (1.0 + NEGLIGIBLE**2) * least
         ):
             return {}
-        if not (words & {*words_of(columns[0].name)} and all(c.factor != 1.0 for c in columns)):
+        if not all(is_geographic(signal, column) for column in columns):
             return {}
     return pairs[0]

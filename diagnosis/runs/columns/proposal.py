@@ -1,7 +1,8 @@
 """The content of the file beside a measurement, proposed by a look at the measurement itself."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +14,8 @@ from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
+from ..files.matlab_files import fits_matlab
+from ..files.message_fields import message_fields
 from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
@@ -81,7 +84,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     """Look at a file: its text, its names and units, and at the numbers where units are not told.
 
     Args:
-        path: a CSV or Parquet file; what is stated beside it stands.
+        path: a CSV, Parquet or MATLAB file; what is stated beside it stands.
         of: the ship that was measured; None: the default ship.
 
     Raises:
@@ -90,10 +93,10 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     """
     of = of or ship()
     quantity = quantities(of)
-    if path.suffix == ".mat" or path.is_dir():
-        raise InputError(f"'{path}' is not a CSV or Parquet file with named columns")
+    if path.is_dir() or (path.suffix == ".mat" and fits_matlab(of)):
+        raise InputError(f"'{path}' is not a CSV, Parquet or MATLAB file with named columns")
     stated, text = stated_layout(path) or Layout(), Layout()
-    if path.is_file() and path.suffix != ".parquet":
+    if path.is_file() and path.suffix not in (".parquet", ".mat"):
         refuse_sentences(path)
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)
@@ -104,14 +107,20 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         read(path, of=of)  # refuses it
     text = text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
     names = column_names(path, text)
+    fields = message_fields(names)
     log = log_of(of.commands)
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
-    units = _units_line(path, text) if text.units_line else [""] * len(names)
+    units = [*(_units_line(path, text) if text.units_line else []), *[""] * len(names)][: len(names)]
+    parts = {name for field in fields.values() for name in field.columns}
+    whole = [k for k, name in enumerate(names) if name not in parts]
+    names, units = [names[k] for k in whole], [units[k] for k in whole]
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
     columns = _columns(path, names, units, quantity, kept)
+    columns |= _of_message(columns, fields, kept)
+    columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
@@ -275,6 +284,31 @@ def _by_words(
     if len(turning) == len(shafts) == 1:  # one shaft, and one speed of a shaft
         found[turning[0]] = shafts
     return {s: each[0] for s, each in found.items() if len(each) == 1 and s not in columns}
+
+
+def _of_message(
+    columns: Mapping[str, Column], fields: Collection[str], kept: Collection[str]
+) -> dict[str, Column]:
+    """Heading and position by the axes of ROS messages (REP 103): x to east, y to north, z up.
+
+    Only a heading by a quaternion is known to be of such a message.
+    """
+    psi = columns.get("psi")
+    if psi is None or psi.name not in fields or "psi" in kept:
+        return {}
+    turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
+    if {"x", "y"} <= columns.keys() - kept and columns["x"].name.casefold().endswith("x"):
+        turned |= {"x": columns["y"], "y": columns["x"]}
+    return turned
+
+
+def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
+    """The only column of date stamps as the time, whatever its name, if no other column is known."""
+    if "time" in layout.columns:
+        return {}
+    table = table_of_file(path, layout, {*names} - _names_of(layout.columns))
+    stamped = [str(name) for name, cells in table.items() if date_stamps(cells) is not None]
+    return {"time": Column(name=stamped[0])} if len(stamped) == 1 else {}
 
 
 def _geographic(

@@ -12,7 +12,7 @@ import pandas as pd
 from cosim import InputError
 from cybership.message_text import quoted
 
-from ..files.text_layout import text_layout
+from ..files.text_layout import table_cells, text_layout
 from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, Named, stated_layout
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
@@ -43,7 +43,8 @@ def line_beside(
     Returns:
         The end of a sentence; empty where there is no such file, as beside a log.
     """
-    if path is None or path.is_dir() or path.suffix == ".mat" or not changes:
+    published = path is not None and path.suffix == ".mat" and read_as == Layout()  # those of NTNU
+    if path is None or path.is_dir() or published or not changes:
         return ""
     # What that file does not state yet has to be there, too: with it names tell no units.
     told = stated_layout(path) == read_as
@@ -140,6 +141,19 @@ def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
             f"{_changed(path, layout, units_line=True)}, with the units of "
             'columns that are not in SI, as in "columns": {"x": {"name": "x", "unit": "mm"}}'
         )
+
+
+def refuse_long_rows(path: Path, layout: Layout, count: int) -> None:
+    """Refuse a CSV file with a row of more cells than names: some of them are in a wrong column."""
+    with path.open(encoding=layout.encoding, newline="") as file:
+        for number, line in enumerate(file, 1):
+            if number <= layout.skip + 1 or line.count(layout.separator) < count:
+                continue
+            if any(table_cells(line, layout.separator)[count:]):
+                raise InputError(
+                    f"'{path}', line {number} has more cells than the {count} names; name each column, "
+                    f"and quote a cell that contains the separator {layout.separator!r}"
+                )
 
 
 def refuse_thousands(path: Path, layout: Layout, table: pd.DataFrame) -> None:

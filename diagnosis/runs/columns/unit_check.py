@@ -34,12 +34,16 @@ SPELT = {
     **dict.fromkeys(("kt", "kts", "knot", "knots"), "kn"),
     **dict.fromkeys(("degree", "degrees"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
+    **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
     **dict.fromkeys(("1/min", "r/min", "rev/min", "min-1", "min^-1"), "rpm"),
     **dict.fromkeys(("°/min",), "deg/min"),
     **{f"{unit}/sec": f"{unit}/s" for unit in ("m", "rad", "deg")},
 }
-WORDS = ("rpm", "rps", "deg", "degree", "degrees", "kts", "knot", "knots", "sec", "seconds")
+WORDS = (
+    *("rpm", "rps", "deg", "degree", "degrees", "kts", "knot", "knots", "sec", "seconds"),
+    *("pct", "percent"),
+)
 SI_UNIT = {quantity: next(iter(units)) for quantity, units in UNITS.items()}
 NAMED_SO: Mapping[str, str] = {}  # columns have the names of their signals
 GO_ON = "--anyway continues nevertheless"

@@ -9,7 +9,7 @@ from .columns import QUANTITY
 CALLED: dict[str, tuple[str, ...]] = {
     "time": (
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
-        *("timestamputc", "gpstime", "elapsedtime", "seconds"),
+        *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp"),
     ),
     "x": (
         *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
@@ -21,7 +21,7 @@ CALLED: dict[str, tuple[str, ...]] = {
     ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
-        *("hdm", "compass", "gyro", "gyrocompass"),
+        *("hdm", "compass", "gyro", "gyrocompass", "orientation", "quaternion", "quat", "q"),
     ),
     "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
     "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
@@ -64,14 +64,17 @@ MEANT = (
 def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
     """Which of some signals a name means, and whether its axis points the other way.
 
-    Of a name with a path, as ``/gnss/pose/position/x``, the last two parts or the last one count.
+    Of a name with a path, as ``/gnss/pose/position/x`` or ``pose.position.x``, the last two parts or the
+    last one count; after a dot a letter alone, but t, is a part of any vector, and means nothing.
 
     Returns:
         An empty name where it means none of them.
     """
     known = MEANT | {_folded(signal): (signal, False) for signal in signals}
-    parts = name.split("/")
-    for part in (name, "".join(parts[-2:]), parts[-1]):
+    parts = re.split("[/.]", name)
+    parts[-2:-1] = [part.rpartition("_")[2] for part in parts[-2:-1]]  # vehicle_local_position.x
+    last = parts[-1] if len(parts[-1]) > 1 or parts[-1] == "t" or "." not in name else ""
+    for part in (name, "".join(parts[-2:]), last):
         found = known.get(_folded(part), ("", False))
         if found[0] in signals:
             return found

@@ -1,8 +1,12 @@
-"""The MATLAB files that NTNU publishes of CyberShip Enterprise 1; docs/measurements.md."""
+"""MATLAB files as tables, and those of NTNU of CyberShip Enterprise 1; docs/measurements.md."""
 
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from cosim import InputError
 from fmus.ship import Ship
@@ -66,3 +70,36 @@ def _power(data: np.ndarray) -> np.ndarray:
     steered = (np.bincount(stretch, alike) > 0.5 * np.bincount(stretch))[stretch]
     aft, fore = np.where(steered, (fore, aft), (aft, fore))
     return np.array([(np.maximum(aft, 0.0) / FULL[0]) ** 2, np.maximum(fore, 0.0) / FULL[1]])
+
+
+def matlab_table(path: Path) -> pd.DataFrame:
+    """The variables of a file, of the length that most of them have, as columns.
+
+    Those of a struct have its name before a dot, as ``log.time``; rows of a matrix, or its columns where
+    there are fewer of these, have their number, as ``eta.1``.
+
+    Raises:
+        InputError: not a MATLAB file of version 4 to 7.
+    """
+    from scipy.io import loadmat  # most runs are no MATLAB files
+
+    try:
+        content = loadmat(path, simplify_cells=True)
+    except Exception as error:  # a broken file makes the reader stumble in many ways
+        text = " ".join(str(error).split())
+        raise InputError(f"'{path}': {text}; save it by save(..., '-v7'), or as CSV") from None
+    columns = {n: x for name, value in content.items() for n, x in _vectors(name, value)}
+    (length, _), *_ = Counter(x.size for x in columns.values()).most_common(1) or [(0, 0)]
+    return pd.DataFrame({n: x for n, x in columns.items() if x.size == length})
+
+
+def _vectors(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """The vectors of numbers in a variable, by name."""
+    if isinstance(value, dict):
+        for part, inner in value.items():
+            yield from _vectors(f"{name}.{part}", inner)
+    elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "biuf":
+        yield name, value
+    elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf":
+        rows = value if value.shape[0] < value.shape[1] else value.T
+        yield from ((f"{name}.{k}", row) for k, row in enumerate(rows, 1))

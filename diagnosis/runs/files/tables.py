@@ -17,11 +17,14 @@ from ..columns.columns import Layout
 from ..columns.side_car import (
     refuse_encoding,
     refuse_layout,
+    refuse_long_rows,
     refuse_sentences,
     refuse_units,
     what_to_do,
 )
 from ..run_constants import CHANCE, DIGITS
+from .matlab_files import matlab_table
+from .message_fields import message_fields, with_fields
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
@@ -52,16 +55,24 @@ def as_table(path: Path) -> Iterator[None]:
 
 
 def column_names(path: Path, layout: Layout) -> list[str]:
-    """The names of the columns as they stand there, one that is there twice included.
+    """The names of the columns, and of the fields of messages that some of them make up.
 
     Raises:
         InputError: the text is in another encoding, or begins with other lines.
         OSError, ValueError: it cannot be read.
     """
+    names = _names(path, layout)
+    return [*names, *(field for field in message_fields(names) if field not in names)]
+
+
+def _names(path: Path, layout: Layout) -> list[str]:
+    """The names of the columns as they stand there, one that is there twice included."""
     if path.suffix == ".parquet":
         from pyarrow import parquet
 
         return list(parquet.read_schema(path).names)
+    if path.suffix == ".mat":
+        return list(matlab_table(path))
     refuse_sentences(path)
     first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
     names = [name.strip() for name in first.iloc[0]]
@@ -73,17 +84,25 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
     """The columns of some names.
 
     Raises:
-        InputError: the text is in another encoding, or has a line of units that was not stated.
+        InputError: the text is in another encoding, has a line of units that was not stated, or a row
+            with more cells than names.
         OSError, ValueError: it cannot be read.
         KeyboardInterrupt: the user has asked for the end.
     """
+    names = _names(path, layout)
+    fields = {name: field for name, field in message_fields(names).items() if name not in names}
+    own = {c for name in wanted for c in (fields[name].columns if name in fields else (name,))}
     if path.suffix == ".parquet":
-        table = pd.read_parquet(path, columns=list(wanted))
-        index = [name for name in table.index.names if name in wanted]
-        return table.reset_index(index) if index else table
-    table = csv_table(path, layout, wanted)
-    refuse_units(path, layout, table)
-    return table
+        table = pd.read_parquet(path, columns=list(own))
+        index = [name for name in table.index.names if name in own]
+        table = table.reset_index(index) if index else table
+    elif path.suffix == ".mat":
+        table = matlab_table(path).filter(items=[*own])
+    else:
+        table = csv_table(path, layout, own)
+        refuse_units(path, layout, table)
+        refuse_long_rows(path, layout, len(names))
+    return with_fields(table, fields, wanted)
 
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..columns.columns import PREAMBLE, UNITS, Layout
 from ..columns.unit_check import spelt
 
-SEPARATORS = (",", ";", "\t", "|")  # that a table may have between its cells
+SEPARATORS = (",", ";", "\t", "|", " ")  # that a table may have between its cells
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
@@ -28,7 +28,8 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
 
 def table_cells(line: str, separator: str) -> list[str]:
     """The cells of a line, without blanks around them."""
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    cells = csv.reader([line], delimiter=separator, skipinitialspace=True)
+    return [cell.strip() for cell in next(cells, [])]
 
 
 def bare_unit(text: str) -> str:

@@ -247,9 +247,10 @@ def _channels(channel: str, e: Evidence) -> tuple[str, str]:
 
 
 def _late(channel: str, value: float, e: Evidence) -> str:
-    """A delay [s] in words."""
-    way = "earlier" if value < 0.0 else "later"
-    return f"{' '.join(_channels(channel, e))} {abs(value):.3g} s {way} than the pose"
+    """A delay [s] in words: of the yaw rate against the heading, as the position tells nothing of it."""
+    way, of = "earlier" if value < 0.0 else "later", "heading" if channel == "r" else "pose"
+    late = f", so that the {of} is probably late" if value < 0.0 else ""  # nothing is measured too early
+    return f"{' '.join(_channels(channel, e))} {abs(value):.3g} s {way} than the {of}{late}"
 
 
 def _told(c: FaultColumn, value: float, e: Evidence) -> str:

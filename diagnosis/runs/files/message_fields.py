@@ -1,0 +1,63 @@
+"""Fields of ROS messages that a table has in several columns: the heading of a quaternion, a time stamp.
+
+Such a field has the name that its columns begin with: ``pose.orientation`` of ``pose.orientation.x``.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.constants import nano
+
+MARKS = "./_"  # between the name of a field and that of its part, where there is one
+
+
+class MessageField(NamedTuple):
+    """A field of a message: the columns that hold its parts, and its value by them."""
+
+    columns: Sequence[str]
+    value: Callable[..., np.ndarray]
+
+
+def heading(x: np.ndarray, y: np.ndarray, z: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """The rotation [rad] about the third axis by a quaternion of any length; NaN where that is zero."""
+    about = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    return np.where(x * x + y * y + z * z + w * w > 0.0, about, np.nan)
+
+
+def stamp(whole: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """A time [s] by its whole seconds and the nanoseconds after them."""
+    return whole + nano * rest
+
+
+PARTS: Mapping[tuple[str, ...], Callable[..., np.ndarray]] = {
+    ("x", "y", "z", "w"): heading,
+    ("sec", "nanosec"): stamp,
+    ("secs", "nsecs"): stamp,
+}
+
+
+def message_fields(names: Collection[str]) -> dict[str, MessageField]:
+    """Name of a field -> its columns, of all fields that a table with columns of some names has."""
+    found: dict[str, MessageField] = {}
+    for parts, value in PARTS.items():
+        for name in names:
+            begin = name.removesuffix(parts[-1])
+            columns = [begin + part for part in parts]
+            if (field := begin.rstrip(MARKS)) and begin != name and set(columns) <= set(names):
+                found[field] = MessageField(columns, value)
+    return found
+
+
+def with_fields(
+    table: pd.DataFrame, fields: Mapping[str, MessageField], wanted: Iterable[str]
+) -> pd.DataFrame:
+    """A table with the values of those of its fields that are wanted."""
+    values = {name: fields[name] for name in wanted if name in fields}
+    return table.assign(
+        **{
+            name: field.value(*(pd.to_numeric(table[c], errors="coerce") for c in field.columns))
+            for name, field in values.items()
+        }
+    )
