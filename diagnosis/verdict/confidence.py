@@ -39,10 +39,6 @@ RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
 NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
-# Alternatives that doubts show; several doubts may show the same one.
-COEFFICIENTS, LAGS, DATA, UNKNOWN, OTHERS, SMOOTHING = (
-    *("coefficients", "lags", "data", "unknown physics", "other effects", "smoothing"),
-)
 
 
 class Doubts(NamedTuple):
@@ -112,23 +108,23 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         return Confidence(0.0, 0.0, " and ".join(map(str, limits)))
     effect = start.ship.effects[f.id]
     axes = set(effect.axis)
-    # Doubt -> the alternative that it shows, of the effect and of its set, and whether it holds.
+    # Each shows an alternative that is as likely as the effect or its set.
     all_doubts = {
-        MAY_BE_NONE: (COEFFICIENTS, may_be_none(f)),
-        MAY_BE_LAGS: (LAGS, _may_be_lags(f, start)),
-        doubts.of_data: (DATA, bool(doubts.of_data)),
+        MAY_BE_NONE: may_be_none(f),
+        MAY_BE_LAGS: _may_be_lags(f, start),
+        doubts.of_data: bool(doubts.of_data),
         # Waves are a residual themselves.
-        RESIDUAL: (UNKNOWN, effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual)),
-        RIVAL: (OTHERS, f.id in doubts.rivals),
-        IN_PARTS: (OTHERS, effect.kind == "force" and not axes.isdisjoint(doubts.of_parts)),
-        ON_ONE_LINE: (OTHERS, f.id in doubts.on_one_line),
-        REPLACEABLE: (COEFFICIENTS, f.id in doubts.replaceable),
-        SMOOTHED: (SMOOTHING, f.id in doubts.smoothed),
-        NO_GAIN: (COEFFICIENTS, f.id in doubts.without_gain),
+        RESIDUAL: effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual),
+        RIVAL: f.id in doubts.rivals,
+        IN_PARTS: effect.kind == "force" and not axes.isdisjoint(doubts.of_parts),
+        ON_ONE_LINE: f.id in doubts.on_one_line,
+        REPLACEABLE: f.id in doubts.replaceable,
+        SMOOTHED: f.id in doubts.smoothed,
+        NO_GAIN: f.id in doubts.without_gain,
     }
-    holding = {text: alternative for text, (alternative, holds) in all_doubts.items() if holds}
-    most = 1.0 / (1.0 + len({*holding.values()}))  # each alternative is as likely as the effect
-    return Confidence(min(own, most), min(of_set, most), next(iter(holding), "") if own > most else "")
+    holding = [text for text, holds in all_doubts.items() if holds]
+    most = EVEN_ODDS if holding else 1.0
+    return Confidence(min(own, most), min(of_set, most), holding[0] if own > most else "")
 
 
 def doubt_of_data(runs: Sequence[WeakWindows]) -> str:

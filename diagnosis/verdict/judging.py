@@ -102,15 +102,10 @@ def is_finding(f: Finding) -> bool:
 
 
 def verdict_name(learned: Findings, refitted: bool, remainder: Remainder) -> VerdictName:
-    """The verdict in a word, by the one rule that JSON, terminal and page follow.
-
-    Waves that were found explain no residual that lasts longer than a wave.
-    """
-    believed = [f for f in learned.effects if is_finding(f)]
-    if any(r.significant and r.is_slow for r in remainder.axes.values()):
-        believed = [f for f in believed if not _is_random(f, learned.model)]
-    if believed:
-        return "found" if believed[0].confidence >= FOUND else "ambiguous"
+    """The verdict in a word, by the one rule that JSON, terminal and page follow."""
+    first = next(filter(is_finding, learned.effects), None)
+    if first is not None:
+        return "found" if first.confidence >= FOUND else "ambiguous"
     if refitted and learned.plausible and not remainder.significant:
         return "coefficients"
     return "unexplained" if remainder.significant or learned.effects or refitted else "none"
