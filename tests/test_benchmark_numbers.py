@@ -60,3 +60,29 @@ def test_methods_on_measured_ships_are_those_of_the_results():
         for method, (place, heading) in methods.items():
             m = means[SHIPS[ship]][METHODS[method]]
             assert (place, heading) == (f"{m['position']:.3g}", f"{np.degrees(m['heading']):.3g}")
+
+
+def test_calibrated_ships_are_those_of_their_studies():
+    """Position in mm and medians of windows as the table of the ships has them."""
+    page = (ROOT / "docs" / "ships.md").read_text("utf-8")
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    cells = {row[0]: row[1:3] for row in lines}
+
+    def results(study):
+        return json.loads((ROOT / "docs" / "studies" / study / "results.json").read_text("utf-8"))
+
+    (place, _, X, Y, N, thrust) = results("tanker_calibrated")["overall"]["root mean square"]
+    in_mm = [f"{1e3 * x:.0f}" for x in place]
+    assert cells["tanker, position over 20 s, root mean square [mm]"] == in_mm
+    errors = {"model error in surge [N]": X, "in sway [N]": Y, "in yaw [N m]": N}
+    errors |= {"thrust compared with the dynamometer [N]": thrust}
+    for name, pair in errors.items():
+        assert cells[f"tanker, {name}"] == [f"{x:.1f}" for x in pair]
+    vessel = results("research_vessel")
+    for k, (name, pair) in enumerate({"position": "[m]", "heading": "[°]"}.items()):
+        told = cells[f"research vessel, {name} over 60 s, median of windows {pair}"]
+        assert told == [f"{when[k]:.1f}" for when in vessel["medians of windows"]]
+    circles = np.array(vessel["circles"])  # measured, before, after
+    off = 100.0 * np.median(np.abs(circles[:, 1:] / circles[:, :1] - 1.0), axis=0)
+    for k, name in enumerate(("speed", "yaw rate")):
+        assert cells[f"research vessel, {name} of circles [%]"] == [f"{x:.1f}" for x in off[:, k]]
