@@ -86,3 +86,12 @@ def test_calibrated_ships_are_those_of_their_studies():
     off = 100.0 * np.median(np.abs(circles[:, 1:] / circles[:, :1] - 1.0), axis=0)
     for k, name in enumerate(("speed", "yaw rate")):
         assert cells[f"research vessel, {name} of circles [%]"] == [f"{x:.1f}" for x in off[:, k]]
+
+
+def test_kinds_of_tests_of_the_low_speed_tanker_are_those_of_the_study():
+    page = (ROOT / "docs" / "ships.md").read_text("utf-8")
+    text = (ROOT / "docs" / "studies" / "low_speed_tanker" / "results.json").read_text("utf-8")
+    before, _, after, *_ = (table["rows"] for table in json.loads(text)["tables"])
+    for first, last in zip(before, after, strict=True):
+        pairs = [f"{x} → {y}" for x, y in zip(first[2:6], last[2:6], strict=True)]
+        assert f"| {first[1]} | {' | '.join(pairs)} | {last[6]}, {last[7]} |" in page
