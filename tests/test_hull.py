@@ -100,6 +100,14 @@ def test_hull_as_printed_is_indefinite_in_sway_and_yaw():
     assert eigenvalues == pytest.approx([-2.0, 5.3], abs=0.05)
 
 
+def test_integrator_keeps_energy_without_damping():
+    s = State(u=0.3, v=-0.2, r=0.5)
+    before = kinetic_energy(s)
+    for _ in range(1000):
+        s = integrate(s, Force(), VESSEL.prepare(UNDAMPED).hull, 0.01)
+    assert kinetic_energy(s) == pytest.approx(before, rel=1e-8)
+
+
 def test_energy_balance_with_force_and_damping():
     """Change of kinetic energy equals the work of force and damping, by Simpson's rule over steps."""
     b, tau, h = HULL, Force(0.5, -0.3, 0.1), 0.01

@@ -2,12 +2,13 @@
 
 import math
 import random
+from itertools import pairwise
 
 import pytest
 from support.project import with_values
 
 from fmus.declare import variables
-from fmus.observer.mdf import COMPONENT
+from fmus.observer.mdf import COMPONENT, State
 from fmus.observer.screen import Inputs
 from fmus.signals import Force, Measurement
 
@@ -65,6 +66,16 @@ def test_velocity_and_acceleration_of_steady_motion():
     assert last.v_hat == pytest.approx(0.0, abs=2e-3)
     assert last.frozen == 0.0
     assert abs(last.r_dot_hat) < 1e-6
+
+
+def test_heading_is_continuous_over_many_turns():
+    estimates = run([circle(k, rate=0.5) for k in range(30000)])
+    steps = [b.psi_hat - a.psi_hat for a, b in pairwise(estimates)]
+    assert max(steps) < 0.01
+    assert min(steps) >= 0.0
+    # 150 rad, less the lag of the position filter.
+    lag = 0.5 * -H / math.log(1 - 0.08)
+    assert estimates[-1].psi_hat == pytest.approx(0.5 * 29999 * H - lag, abs=0.01)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -151,6 +162,19 @@ def test_another_step_size_gives_the_same_filter():
     fine = run([circle(k) for k in range(4001)])[-1]
     coarse = run([circle(k, h=0.02) for k in range(2001)], params(measurement_period=0.02), 0.02)[-1]
     assert coarse[:6] == pytest.approx(fine[:6], abs=2e-3)
+
+
+def test_state_is_all_there_is():
+    """Two observers in the same state go on identically."""
+    poses = [circle(k) for k in range(200)]
+    state = State()
+    for m in poses[:100]:
+        state, _ = COMPONENT.step(state, Inputs(Measurement(*m), Force()), params(), H)
+    copy = State._make(state)
+    for m in poses[100:]:
+        state, a = COMPONENT.step(state, Inputs(Measurement(*m), Force()), params(), H)
+        copy, b = COMPONENT.step(copy, Inputs(Measurement(*m), Force()), params(), H)
+        assert a == b
 
 
 def test_weights_of_the_filters_are_shares():
