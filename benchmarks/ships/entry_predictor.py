@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -28,14 +29,14 @@ class Training:
     model: Model
     horizon: float
 
-    @property
+    @cached_property
     def smoothed(self) -> list[Smoothed]:
         """The smoothed runs."""
         return [w.smoothed for w in self.runs]
 
-    @property
+    @cached_property
     def nominal(self) -> Nominal:
-        """The description as functions of velocity and commands."""
+        """The description as functions of velocity and commands; one, by which entries may cache."""
         return Nominal(self.model, self.runs[0].run.commands)
 
 
