@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from functools import cache
+from itertools import repeat
 
 import numpy as np
 import pandas as pd
@@ -256,6 +257,19 @@ def test_hidden_cause_of_a_described_ship_is_no_mistake(cause):
     ship = ship_with((), "otter")
     table = sail_of(ship, causes(ship)[cause], np.random.default_rng(1), 1, seconds=120.0)
     assert len(diagnosis.load(table, ship="otter")) == 1
+
+
+@pytest.mark.parametrize("cause", ["none", "wind", "lag"])
+def test_a_steady_turn_may_have_constant_commands(cause):
+    """With every coefficient 10 % wrong; commands that were others are found by their varying force."""
+    ship = ship_with((), "otter")
+    rng = np.random.default_rng(1)
+    turn = sail_of(ship, causes(ship)[cause], rng, 1, repeat((7.0, 10.0)), seconds=120.0)
+    (w,) = diagnosis.load(turn, ship="otter")
+    assert np.ptp(w.run.commands, axis=0).max() == 0.0
+    assert "all its commands are constant, and the motion needs a force that varies by" in doubt(
+        otter().assign(**dict.fromkeys(ship.commands, 10.0))
+    )
 
 
 def test_a_force_where_no_actuator_pushes_is_a_question():

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..predictors import Model, WeakWindows, weak_windows
+from ..predictors import Model, WeakWindows, omega, weak_windows
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import BLOCK, needed_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU, Named
 from ..runs.run_constants import DIGITS
+from .gains import varying
 from .readings import inertial
 from .settings import SETTINGS
 
@@ -75,18 +76,22 @@ def without_force(run: Run, model: Model) -> str:
     return clause + line_beside(run.file, run.layout, flipped)
 
 
+def constant_commands(run: Run) -> bool:
+    """Whether no command of a run varies; a rudder's has no force in ``tau``, that of a ship at rest."""
+    return not (np.ptp(run.given, axis=0) > DIGITS * np.abs(run.given).max(axis=0)).any()
+
+
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
     varies = np.ptp(tau, axis=0) > DIGITS * largest
-    # A rudder gives no force in ``tau``, which is that of a ship at rest.
-    if not (np.ptp(run.given, axis=0) > DIGITS * np.abs(run.given).max(axis=0)).any():
-        return (
-            "all its commands are constant, so the response of the ship to commands cannot be estimated"
-        )
-    z = needed_force(w, model)
+    z, inertia = needed_force(w, model), inertial(w, model)
     size = np.sqrt((z**2).mean(axis=0))
+    # Both inertia and hull may be inexact.
+    uncertain = 2.0 * SETTINGS.inexact * np.sqrt((inertia**2 + (z - inertia) ** 2).mean(axis=0))
+    if constant_commands(run):
+        return _varying(w, model, uncertain)
     for k in np.flatnonzero(~varies):
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
         follows = (z[:, k] * given > 0.0).mean() >= SETTINGS.negligible
@@ -97,15 +102,29 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
                 f"{z[:, k].mean():.3g} {unit} on average: it is another column, or it was not "
                 "logged"
             )
-        inertia = inertial(w, model)[:, k]
-        parts = inertia**2 + (z[:, k] - inertia) ** 2
-        # Both inertia and hull may be inexact.
-        if name in run.absent and size[k] > 2.0 * SETTINGS.inexact * np.sqrt(parts.mean()):
+        if name in run.absent and size[k] > uncertain[k]:
             return (
                 f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
                 "if nothing was commanded there, give it a column of zeros"
             )
     return None
+
+
+def _varying(w: WeakWindows, model: Model, uncertain: np.ndarray) -> str | None:
+    """A clause about constant commands while the motion needs a force that varies, as in no steady turn.
+
+    Args:
+        w, model: windows of the run, and its ship.
+        uncertain: (3,), what inertia and hull may be off by [N, N, N m].
+    """
+    varies = varying(w, omega(w, model))
+    if not (varies > uncertain).any():
+        return None
+    k = int(np.argmax(varies / np.maximum(uncertain, np.finfo(float).tiny)))
+    return (
+        f"all its commands are constant, and the motion needs a force that varies by {varies[k]:.3g} "
+        f"{'N.m' if k == 2 else 'N'} on {TAU[k]}: they are other columns, or were not logged"
+    )
 
 
 def lasting(force: np.ndarray, block: np.ndarray) -> np.ndarray:

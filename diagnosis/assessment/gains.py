@@ -22,6 +22,7 @@ from ..predictors.prediction import FAR_OFF
 from ..predictors.uncertainty import correlated_windows
 from ..predictors.weak_form import OVERLAP, commanded_force, needed_force
 from ..runs.run_constants import DIGITS
+from ..runs.smoothing.command_response import least_squares
 from .readings import inertial
 from .settings import SETTINGS
 
@@ -112,6 +113,12 @@ def constant_forces(w: WeakWindows) -> list[np.ndarray]:
     north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
     earth = ([north, east], [-east, north], [])
     return [np.column_stack([one, *(w.smooth @ s for s in each)]) for each in earth]
+
+
+def varying(w: WeakWindows, force: np.ndarray) -> np.ndarray:
+    """RMS (3,) of a force (K, 3) beside one that is constant in the axes of ship or earth."""
+    left = [f - x @ least_squares(x, f) for x, f in zip(constant_forces(w), force.T, strict=True)]
+    return np.sqrt(np.mean(np.square(left), axis=1))
 
 
 def _own(command: np.ndarray, others: Sequence[np.ndarray]) -> float:

@@ -23,9 +23,8 @@ from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
 from ..runs.sensors.evidence import ALIKE, VELOCITIES
 from ..runs.sensors.sensor_finding import Examined
-from ..runs.smoothing.command_response import least_squares
-from .command_check import beyond_thrusters, contradicted_commands
-from .gains import constant_forces, gains
+from .command_check import beyond_thrusters, constant_commands, contradicted_commands
+from .gains import gains, varying
 from .late_commands import late_commands
 from .reading_odds import ReadingOdds, most_thrust
 from .readings import AS_READ, Reading, other_factors, readings, reread
@@ -112,9 +111,7 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
 
     What a current or a wind may give does not count, a constant force in the ship's or the earth's axes.
     """
-    e, T = omega(w, model), w.held @ w.run.tau_cmd
-    left = [each - x @ least_squares(x, each) for x, each in zip(constant_forces(w), e.T, strict=True)]
-    lacking, full = np.sqrt(np.mean(np.square(left), axis=1)), most_thrust(w, model)
+    T, lacking, full = w.held @ w.run.tau_cmd, varying(w, omega(w, model)), most_thrust(w, model)
     idle = ~T.any(axis=0) & (lacking > SETTINGS.much * full)
     if not idle.any():
         return None
@@ -196,7 +193,8 @@ def likeliest_mistake(
     """
     odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
     others = [] if factor is None else [*other_factors(w.run, factor)]
-    if scale_is_confirmed(w.smoothed.sensors):
+    # Without a response to commands, another scale is as well a thrust that is lost.
+    if scale_is_confirmed(w.smoothed.sensors) or constant_commands(w.run):
         possible, others = ([r for r in some if r.density == 0.0] for some in (possible, others))
     named = len(possible)
     possible += others
