@@ -97,7 +97,7 @@ def law(
         delay: of the commands [s].
         terms: of the model.
         process: as of :func:`smoothed_velocity`.
-        passes: of smoothing and regression.
+        passes: of smoothing and regression, at the most.
     """
     tables = [table(r, STEP, delay) for r in runs]
 
@@ -108,9 +108,10 @@ def law(
         left, right = [], []
         for t, nu in zip(tables, velocities, strict=True):
             nu_dot = np.gradient(nu, STEP, axis=0)
-            for p in t.parts:
+            for known in t.parts:
+                p = slice(known.start + 1, known.stop)
                 # The mean command of a step acts in its middle: so do these differences of two.
-                given = 0.5 * (t.given[p] + np.roll(t.given, 1, axis=0)[p])
+                given = 0.5 * (t.given[p] + t.given[known][:-1])
                 left.append(regressors(terms, nu[p], nominal.inputs(inputs, nu[p], given)))
                 right.append(nu_dot[p])
         factors = np.linalg.lstsq(np.vstack(left), np.vstack(right), rcond=None)[0]
@@ -118,7 +119,10 @@ def law(
 
     found = fitted([by_nominal(r, nominal, process) for r in runs])
     for _ in range(passes - 1):
-        found = fitted([smoothed_velocity(found, t, process) for t in tables])
+        try:
+            found = fitted([smoothed_velocity(found, t, process) for t in tables])
+        except np.linalg.LinAlgError:  # a fitted model may run away, as the nominal one does not
+            break
     return found
 
 
