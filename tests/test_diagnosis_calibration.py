@@ -14,9 +14,12 @@ from diagnosis.search.findings import Findings
 from diagnosis.search.prediction_fit.coefficient_calibration import (
     LEFT_OUT,
     Calibration,
+    as_missed,
     begin,
 )
 from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, push_of, shootings
+from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
+from diagnosis.search.prediction_fit.refit import prediction_bands
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
 from diagnosis.verdict.coefficients import calibrated
@@ -87,6 +90,24 @@ def test_the_disturbance_is_scaled_to_what_the_windows_miss():
     _, pushes = push_of(runs(), model_error(runs(), model), problem.std)
     expected = np.einsum("wii->", problem.scatter(windows, around, W, pushes))
     assert share == pytest.approx(problem.squares(0, W, model) / expected, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_bands_are_as_wide_as_predictions_of_runs_left_out_are_off():
+    """However large a disturbance the residual force shows."""
+    problem, fitted = fit()
+    model, posterior = fitted.estimate.model(PRIOR), JointPosterior.of(fitted, PRIOR)
+    found = as_missed(problem, fitted, model, posterior)
+    for times in (0.2, 5.0):
+        other = replace(fitted, push=replace(fitted.push, size=times * fitted.push.size))
+        assert as_missed(problem, other, model, posterior).size == pytest.approx(found.size, rel=1e-6)
+    squares = []
+    for w, left_out in zip(runs(), fitted.fold_models, strict=True):
+        windows = Windows([w.smoothed])
+        bands = prediction_bands(w.smoothed, windows, model, posterior, found)
+        V = np.einsum("nii->ni", bands.at_samples)
+        squares.append(windows.residuals(left_out) ** 2 / V)
+    assert np.concatenate(squares).mean() == pytest.approx(1.0, rel=0.2)
 
 
 @pytest.mark.slow

@@ -9,21 +9,23 @@ part of that error does not add up over a window.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ...predictors import Model, WeakWindows
-from ...predictors.shooting import Shooting
+from ...predictors.shooting import UNKNOWN, Shooting
 from ..findings import Findings
 from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
+from .disturbance import ForceDisturbance
 from .disturbance_summary import unrecorded
-from .fit import PredictionFit, fit_to, shootings
+from .fit import Fitted, PredictionFit, fit_to, shootings
 from .joint_posterior import JointPosterior
-from .refit import RefitOutcome
+from .refit import RefitOutcome, Spread
 
 # 1; effects whose coefficients models of few terms leave out, and their prior deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
@@ -36,6 +38,9 @@ AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; 
 # 1, prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
 # for a ship of 34 m; chosen.
 STREAM = 0.05
+
+
+LEAST = 1e-4  # 1, factor of the variance of the unrecorded force, or one over it; beyond, it is none
 
 
 class Calibration(PredictionFit):
@@ -93,7 +98,38 @@ class Calibrator:
         f = self.found
         learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)
         posterior = JointPosterior.of(fitted, self.prior)
-        return RefitOutcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
+        push = as_missed(problem, fitted, model, posterior)
+        return RefitOutcome(learned, posterior, unrecorded(self.train, model, push, {}))
+
+
+def as_missed(
+    problem: Calibration, fitted: Fitted, model: Model, posterior: JointPosterior
+) -> ForceDisturbance:
+    """The unrecorded force, so large that windows left out of the fit are missed as bands expect.
+
+    Then the mean square of what is missed there is one, in standard deviations of the bands.
+    """
+    names = [n for n, std in posterior.std.items() if std > 0.0]
+    squares, still, pushed = [], [], []
+    for shots, fold in zip(problem.windows, problem.fold_of_window, strict=True):
+        about, missed = Spread.of(shots, model, posterior, fitted.push), np.zeros(shots.measured.shape)
+        for k, other in enumerate(fitted.fold_models):
+            step = [other.value(n) - model.value(n) for n in names]
+            missed[fold == k] = about.residuals[fold == k] - about.slopes[fold == k] @ step
+        noise = shots.noise + np.einsum("wtii->wti", about.still)
+        seen = np.isfinite(missed.sum(axis=2)) & (shots.noise[..., 2] < UNKNOWN)
+        squares.append(missed[seen] ** 2)
+        still.append(noise[seen])
+        pushed.append(np.einsum("wtii->wti", about.pushed)[seen])
+    s, v, p = (np.concatenate(x) for x in (squares, still, pushed))
+
+    def off(log_factor: float) -> float:
+        return float(np.log(np.mean(s / (v + np.exp(log_factor) * p))))
+
+    low, high = np.log(LEAST), -np.log(LEAST)
+    ends = np.clip([off(low), off(high)], [0.0, -np.inf], [np.inf, 0.0])
+    factor = np.exp(brentq(off, low, high)) if ends.all() else LEAST if ends[1] else 1.0 / LEAST
+    return replace(fitted.push, size=fitted.push.size * np.sqrt(factor))
 
 
 def begin(

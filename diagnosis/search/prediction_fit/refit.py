@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -134,19 +135,48 @@ def prediction_bands(
     if windows is None:
         return None
     shots = Shooting([smoothed], windows.length)
-    std = posterior.std
-    around = shots.around(model, {n: SMALL * s for n, s in std.items() if s > 0.0})
-    kept = [k for k, s in enumerate(std.values()) if s > 0.0]
-    C = posterior.covariance[np.ix_(kept, kept)]
-    first = smoothed.eta[shots.starts.runs[0][1]]
-    predicted = np.concatenate([first[:, None], shots.measured - around.residuals], axis=1)
-    moved = np.diff(predicted[..., :2], axis=1) / shots.every
-    speed = np.nan_to_num(np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=1)), nan=0.0, posinf=0.0)
-    later = covariance(around.motion, shots.at_start, push.at(speed))
-    instants = np.arange(shots.since.size)
-    found = np.zeros((len(later), shots.since.size + 1, 3, 3))
-    found[:, 1:] = later[:, instants, :, instants].swapaxes(0, 1)
-    found[:, 1:] += around.slopes @ C @ np.swapaxes(around.slopes, -1, -2)
+    about = Spread.of(shots, model, posterior, push)
+    found = np.concatenate([np.zeros_like(about.still[:, :1]), about.still + about.pushed], axis=1)
     found[:, 0, range(3), range(3)] = shots.at_start[:, :3]
     found[..., range(3), range(3)] += smoothed.noise**2
-    return Bands(windows, np.concatenate([[0.0], shots.since]), predicted, found)
+    return Bands(windows, np.concatenate([[0.0], shots.since]), about.predicted, found)
+
+
+class Spread(NamedTuple):
+    """How uncertain predicted poses are at the instants of windows.
+
+    Attributes:
+        predicted: (w, T + 1, 3), pose at the start and at the instants [m, m, rad].
+        residuals: (w, T, 3), measured minus predicted pose.
+        slopes: (w, T, 3, q), change of the predicted pose by each fitted value.
+        still: (w, T, 3, 3), covariance by the initial state and the fitted values.
+        pushed: (w, T, 3, 3), covariance by the unrecorded force.
+    """
+
+    predicted: np.ndarray
+    residuals: np.ndarray
+    slopes: np.ndarray
+    still: np.ndarray
+    pushed: np.ndarray
+
+    @classmethod
+    def of(
+        cls, shots: Shooting, model: Model, posterior: JointPosterior, push: ForceDisturbance
+    ) -> "Spread":
+        """About a model's predictions, see :func:`prediction_bands`."""
+        std = posterior.std
+        around = shots.around(model, {n: SMALL * s for n, s in std.items() if s > 0.0})
+        kept = [k for k, s in enumerate(std.values()) if s > 0.0]
+        C = posterior.covariance[np.ix_(kept, kept)]
+        first = shots.starts.first(lambda s: s.eta).T
+        predicted = np.concatenate([first[:, None], shots.measured - around.residuals], axis=1)
+        moved = np.diff(predicted[..., :2], axis=1) / shots.every
+        speed = np.nan_to_num(np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=1)), nan=0.0, posinf=0.0)
+        parts = (
+            covariance(around.motion, shots.at_start, replace(push, size=np.zeros(3))),
+            covariance(around.motion, np.zeros_like(shots.at_start), push.at(speed)),
+        )
+        instants = np.arange(shots.since.size)
+        still, pushed = (V[:, instants, :, instants].swapaxes(0, 1) for V in parts)
+        still = still + around.slopes @ C @ np.swapaxes(around.slopes, -1, -2)
+        return cls(predicted, around.residuals, around.slopes, still, pushed)
