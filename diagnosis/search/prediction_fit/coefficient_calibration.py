@@ -126,9 +126,9 @@ def as_missed(
     def off(log_factor: float) -> float:
         return float(np.log(np.mean(s / (v + np.exp(log_factor) * p))))
 
-    low, high = np.log(LEAST), -np.log(LEAST)
-    ends = np.clip([off(low), off(high)], [0.0, -np.inf], [np.inf, 0.0])
-    factor = np.exp(brentq(off, low, high)) if ends.all() else LEAST if ends[1] else 1.0 / LEAST
+    factor = LEAST if off(np.log(LEAST)) < 0.0 else 1.0 / LEAST
+    if off(-np.log(LEAST)) < 0.0 < off(np.log(LEAST)):
+        factor = np.exp(float(brentq(off, np.log(LEAST), -np.log(LEAST))))  # pyright: ignore
     return replace(fitted.push, size=fitted.push.size * np.sqrt(factor))
 
 
