@@ -8,6 +8,7 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model, weak_windows
+from diagnosis.predictors.shooting import Shooting
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
 from diagnosis.search.findings import Findings
@@ -90,6 +91,16 @@ def test_the_disturbance_is_scaled_to_what_the_windows_miss():
     _, pushes = push_of(runs(), model_error(runs(), model), problem.std)
     expected = np.einsum("wii->", problem.scatter(windows, around, W, pushes))
     assert share == pytest.approx(problem.squares(0, W, model) / expected, rel=2e-3)
+
+
+def test_early_errors_count_as_much_as_late_ones():
+    """Errors that grow with time and differ between runs leave whitened residuals of one size."""
+    windows = Shooting([w.smoothed for w in runs()[:2]], 8.0)
+    problem = Calibration(runs()[:2], [windows], begin(Model(), PRIOR), PRIOR)
+    size = np.array([1.0, 3.0])[windows.run][:, None, None] * windows.since[:, None]
+    squares = (size * [1.0, 1.0, 0.2]) ** 2
+    found = problem.missed(windows, squares, np.ones(squares.shape[:2], bool))
+    assert squares / found == pytest.approx(np.ones(squares.shape))
 
 
 @pytest.mark.slow

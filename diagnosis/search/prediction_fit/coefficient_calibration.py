@@ -2,10 +2,11 @@
 
 In addition to the nominal coefficients, each with the prior of where its value is from, those that
 simple models leave out are fitted (lift of the hull by sway and yaw, drag in turns, resistance that is
-not quadratic), and the axis of the heading. The windows are weighed as in :mod:`.fit`, by what the model
-misses in the run of each: errors of slow runs count as much as those of quick ones. Where the
-information is counted, the disturbance that the model error shows is scaled to what the windows miss: a
-part of that error does not add up over a window.
+not quadratic), and the axis of the heading. The windows are weighed by what the model misses in the run
+of each, as in :mod:`.fit`, and at each time since their start: errors of slow runs count as much as
+those of quick ones, early errors as much as late ones. Where the information is counted, the disturbance
+that the model error shows is scaled to what the windows miss: a part of that error does not add up over
+a window.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,12 +45,19 @@ LEAST = 1e-4  # 1, factor of the variance of the unrecorded force, or one over i
 
 
 class Calibration(PredictionFit):
-    """The fit: the disturbance is scaled to what the windows miss."""
+    """The fit: the disturbance is scaled to what the windows miss, at each time since their start."""
 
     @cached_property
     def folds(self) -> list[tuple[int, np.ndarray]]:
         """The folds of the runs, see :func:`.gram.run_folds`."""
         return run_folds(self.runs)
+
+    def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """(w, T, 3): the mean square of each run, as it grows with the time since a window's start."""
+        growth = squares.sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0)[:, None]
+        growth[:, :2] = growth[:, :2].mean(axis=1, keepdims=True)
+        growth /= np.maximum(growth.mean(axis=0), np.finfo(float).tiny)
+        return super().missed(s, squares, seen) * growth
 
     def share(self, missed: float, expected: float) -> float:
         return missed / expected if expected > 0.0 else 1.0

@@ -202,7 +202,7 @@ class PredictionFit:
         V = covariance(around.motion[fine], s.at_start[fine], none)
         missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
         found = np.zeros((len(r), r[0].size, r[0].size))
-        whole = _square(V, s.noise[fine] + missed[fine, None])
+        whole = _square(V, s.noise[fine] + missed[fine])
         # Of a ship that turns far within a window rounding alone would make it indefinite.
         diagonal = np.einsum("wii->wi", whole)
         diagonal += DIGITS * diagonal.max(axis=1, keepdims=True)
@@ -226,7 +226,7 @@ class PredictionFit:
         return found
 
     def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """(w, 3): mean square of what the model misses in the run of each window, both places alike.
+        """(w, 1, 3): mean square of what the model misses in the run of each window, both places alike.
 
         ``squares`` (w, T, 3) are those of the residuals, 0 where the instants (w, T) are not seen.
         """
@@ -234,7 +234,7 @@ class PredictionFit:
         np.add.at(missed, s.run, squares.sum(axis=1))
         missed /= np.maximum(np.bincount(s.run, seen.sum(axis=1), len(s.runs)), 1.0)[:, None]
         missed[:, :2] = missed[:, :2].mean(axis=1, keepdims=True)
-        return missed[s.run]
+        return missed[s.run][:, None]
 
     def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
         """Sum of squares of the whitened residuals of a model in the windows of one length."""
