@@ -14,6 +14,7 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 from ...errors import InputError, SimulationError
 from ...process.spawned import end_with_parent
@@ -51,7 +52,7 @@ class Worker:
             "get_value": self._get_value,
             "free": self._free,
             "reset": self._reset,
-            "whole_run": self._whole_run,
+            "whole_runs": self._whole_runs,
         }
 
     def serve(self) -> None:
@@ -110,8 +111,17 @@ class Worker:
             self._access.get()
         return bytes(self._outputs)
 
+    def _whole_runs(self, runs: list[tuple[Any, ...]], h: float) -> list[str]:
+        """One after the other, with a reset between two."""
+        told = []
+        for k, run in enumerate(runs):
+            if k:
+                self._reset()
+            told.append(self._whole_run(*run, h))
+        return told
+
     def _whole_run(
-        self, start: dict[str, Value], inputs: str, terms: list[FeedbackTerm], steps: int, h: float
+        self, start: dict[str, Value], inputs: str, steps: int, terms: list[FeedbackTerm], h: float
     ) -> str:
         """The outputs at the start of a run and after each step, up to one that has diverged."""
         self._instance.set_up(steps * h)
