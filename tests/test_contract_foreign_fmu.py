@@ -210,7 +210,9 @@ def test_derivatives_are_those_of_a_polynomial():
         np.testing.assert_allclose(found, y_0 + t[:, None] * u)
         np.testing.assert_allclose(steps.derivatives(found), [u, 0.0 * u], atol=1e-9)
         assert fmu.requests == [1, 1, 1, 2]
-    with pytest.raises(InputError, match="cannot be set to a measured state: y is not finite at t = 0.2 s"):
+    with pytest.raises(
+        InputError, match=r"cannot be set to a measured state: y is not finite at t = 0\.2 s"
+    ):
         ShortSteps(fmu_of(most=0.5), ["b"], ["y"], 0.1, False).run({}, {"b": np.array([1.0, 3.0])})
 
 

@@ -202,11 +202,23 @@ def test_a_whole_run_has_the_outputs_at_its_start_and_after_each_step(served):
 
 
 def test_whole_runs_are_apart_by_a_reset(served):
-    runs = [[{"y": y}, np.array([[a, 0.0]]).tobytes().hex(), 1, []] for y, a in ((3.0, 1.0), (-1.0, 2.0))]
+    runs = [
+        [{"y": y}, np.array([[a, 0.0]]).tobytes().hex(), 1, []] for y, a in ((3.0, 1.0), (-1.0, 2.0))
+    ]
     answers, made = served(*BEGIN, call("whole_runs", runs, 0.5))
     told = [np.frombuffer(bytes.fromhex(x)).tolist() for x in json.loads(answers[-1][1])]
     assert told == [[3.0, 3.5], [-1.0, 0.0]]
-    one = ["set up", "enter_initialization", "put", "exit_initialization", "get", "put", "step", "get", "terminate"]
+    one = [
+        "set up",
+        "enter_initialization",
+        "put",
+        "exit_initialization",
+        "get",
+        "put",
+        "step",
+        "get",
+        "terminate",
+    ]
     asked = [a[0] if isinstance(a, tuple) else a for a in made._instance.asked]
     assert asked == [*one, "reset", *one]
 

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import lsq_linear
 from support.cases import in_part
 from support.ccode import stepped
 from support.command import command
@@ -29,7 +30,7 @@ from diagnosis.assessment.plausibility import (
     same_columns,
     scale_is_confirmed,
 )
-from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
+from diagnosis.assessment.reading_odds import Explanation, ReadingOdds, bounded
 from diagnosis.assessment.readings import (
     AS_READ,
     Reading,
@@ -92,6 +93,28 @@ def test_a_density_is_that_of_a_normal_prior_and_normal_noise():
     noise = np.sqrt(((e - b * s * x) ** 2).mean(axis=0) + least**2)
     expected = -windows * np.log(noise).sum() - 0.5 * (b**2 + np.log(information))
     assert explained((x, s)).density(e, least, windows) == pytest.approx(expected, abs=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_factors_between_limits_are_the_same_from_wherever_they_are_looked_for(seed):
+    """The one minimum of a convex problem, by scipy's algorithm for it and from limits that hold elsewhere."""
+    rng = np.random.default_rng(seed)
+    design, y = np.vstack([rng.normal(size=(9, 6)), np.eye(6)]), rng.normal(0.0, 3.0, 15)
+    low, high = (
+        np.array([-np.inf, -1.0, 0.0, 0.0, -0.3, -np.inf]),
+        np.array([np.inf, np.inf, np.inf, 0.5, 0.3, 0.2]),
+    )
+    expected = lsq_linear(design, y, (low, high)).x
+    held = (expected - low < 1e-6) | (high - expected < 1e-6)
+    assert 0 < held.sum() < 6
+    for near in (
+        np.zeros(6),
+        np.fmax(low, -9.0),
+        np.fmin(high, 9.0),
+        expected,
+        rng.uniform(-1.0, 1.0, 6),
+    ):
+        np.testing.assert_allclose(bounded(design, y, low, high, near), expected, atol=1e-6)
 
 
 def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit():
