@@ -176,11 +176,13 @@ def test_many_predictions_are_one_request_where_a_reset_is_enough(more, requests
     assert fmu.requests == [1, 1, 1, *requests]
 
 
-def test_predictions_in_two_processes_keep_their_order():
+@pytest.mark.parametrize(("fresh", "requests"), [(True, [1] * 7), (False, [1, 1, 1, 1, 1, 1, 2, 3])])
+def test_predictions_in_two_processes_keep_their_order(fresh, requests):
     fmu = fmu_of()
-    processes = Processes(fmu, ["b"], ["y"], fresh=True)
+    processes = Processes(fmu, ["b"], ["y"], fresh=fresh)
     found = processes.run([request(y_0=float(k)) for k in range(7)])
     assert [p.outputs[0, 0] for p in found] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert sorted(fmu.requests) == requests
     processes.close()
     assert fmu.closed == 1
     assert all(i.gone for i in fmu.made)

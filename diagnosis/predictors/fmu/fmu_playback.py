@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from queue import SimpleQueue
 from threading import Lock
 from typing import NamedTuple
 
@@ -116,18 +115,19 @@ class Playback:
             return PlayedBack(self._nothing(prediction), self._fmu.told(error))
 
     def run_each(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
-        """Predictions in steps of one length; many at once where nothing but a reset is between them."""
-        found = [self.run(prediction) for prediction in predictions[:1]]
-        for k in range(1, len(predictions), AT_ONCE):
+        """Some predictions; many at once where nothing but a reset is between them."""
+        alone = 0 if self._resets else 1  # which tells whether it is
+        found = [self.run(prediction) for prediction in predictions[:alone]]
+        for k in range(alone, len(predictions), AT_ONCE):
             part = predictions[k : k + AT_ONCE]
             found += self._at_once(part) or map(self.run, part)
         return found
 
     def _at_once(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
-        """Nothing where one of them fails."""
-        if not self._resets:
-            return []
+        """Nothing where one of them fails, or they are in steps of several lengths."""
         h = predictions[0].h
+        if not self._resets or any(p.h != h for p in predictions):
+            return []
         try:
             told = self._ready(h).whole_runs([self._asked(p) for p in predictions], h)
         except SimulationError:
@@ -202,26 +202,22 @@ class Processes:
     ) -> None:
         self._fmu, self.name, self.inputs, self.outputs = fmu, fmu.model.path.name, inputs, outputs
         self._playbacks = [Playback(fmu, inputs, outputs, fresh) for _ in range(2)]
-        self._free = SimpleQueue[Playback]()
-        for playback in self._playbacks:
-            self._free.put(playback)
 
     def run(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
         """Some predictions, in their order."""
-        with ThreadPoolExecutor(len(self._playbacks), "playback") as threads:
+        count = len(self._playbacks)
+        found = [PlayedBack(np.zeros((0, 0)))] * len(predictions)
+        with ThreadPoolExecutor(count, "playback") as threads:
             try:
-                return [*threads.map(self._one, predictions)]
+                parts = [predictions[k::count] for k in range(count)]
+                told = threads.map(Playback.run_each, self._playbacks, parts)
+                for k, part in enumerate(told):
+                    found[k::count] = part
+                return found
             except BaseException:  # such as Ctrl-C: predictions that are under way end with the FMU
                 threads.shutdown(wait=False, cancel_futures=True)
                 self._fmu.close()
                 raise
-
-    def _one(self, prediction: PlaybackRequest) -> PlayedBack:
-        playback = self._free.get()
-        try:
-            return playback.run(prediction)
-        finally:
-            self._free.put(playback)
 
     def close(self) -> None:
         """End the processes."""
