@@ -192,7 +192,7 @@ def test_predictions_in_two_processes_keep_their_order(fresh, requests):
         raise KeyboardInterrupt
 
     for playback in processes._playbacks:
-        playback.run = interrupted
+        playback.run = playback._at_once = interrupted
     with pytest.raises(KeyboardInterrupt):
         processes.run([request()])
     assert fmu.closed == 2

@@ -111,13 +111,13 @@ class Worker:
             self._access.get()
         return bytes(self._outputs)
 
-    def _whole_runs(self, runs: list[tuple[Any, ...]], h: float) -> list[str]:
+    def _whole_runs(self, runs: list[Any], h: float) -> list[str]:
         """One after the other, with a reset between two."""
         told = []
-        for k, run in enumerate(runs):
+        for k, (start, inputs, steps, terms) in enumerate(runs):
             if k:
                 self._reset()
-            told.append(self._whole_run(*run, h))
+            told.append(self._whole_run(start, inputs, steps, terms, h))
         return told
 
     def _whole_run(
