@@ -224,14 +224,14 @@ def test_an_instance_tells_another_one_nothing_but_by_files(tmp_path, by, means)
 @pytest.mark.parametrize(
     ("habit", "message", "means"),
     [
-        ("sleep(60);", r"the step from t = 0.0 s took longer than 2 s; its process was ended", MEANS[0]),
+        ("sleep(60);", r"the step from t = 0.0 s took longer than 1 s; its process was ended", MEANS[0]),
         ("*(volatile int *)0 = 1;", r"\(signal 11, SIGSEGV\)", ()),
         ("abort();", r"\(signal 6, SIGABRT\)", MEANS[0]),
         ("if (!fork()) for (;;) pause(); exit(7);", "died|took", MEANS[0]),
     ],
 )
 def test_a_crash_or_a_hang_is_one_message_and_leaves_no_process(tmp_path, habit, message, means):
-    confined = opened(build_lag(tmp_path, habit=habit), timeout=2.0, means=means)
+    confined = opened(build_lag(tmp_path, habit=habit), timeout=1.0, means=means)
     try:
         with pytest.raises(SimulationError) as error:
             stepped(confined)
