@@ -41,6 +41,7 @@ from diagnosis.assessment.readings import (
     reread,
     swapped,
 )
+from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
@@ -115,6 +116,30 @@ def test_factors_between_limits_are_the_same_from_wherever_they_are_looked_for(s
         rng.uniform(-1.0, 1.0, 6),
     ):
         np.testing.assert_allclose(bounded(design, y, low, high, near), expected, atol=1e-6)
+
+
+def test_the_unit_of_a_column_does_not_matter():
+    """A column in a unit k times as large has factors, deviation and limits that are k times smaller."""
+    rng = np.random.default_rng(2)
+    x, y, least = rng.normal(size=(40, 3)), rng.normal(size=(40, 3)), np.full(3, 0.1)
+    e = 1.5 * x - 2.0 * y + 0.3 * rng.normal(size=(40, 3))
+
+    def density(k):
+        columns = (k * x, 0.7 / k, -np.inf, 1.2 / k), (k * y, 0.4 / k, -1.1 / k, np.inf)
+        return explained(*columns).density(e, least, 15.0)
+
+    assert density(1.0) < explained((x, 0.7), (y, 0.4)).density(e, least, 15.0) - 1.0, "limits act"
+    assert [density(k) for k in (0.2, 7.0)] == pytest.approx([density(1.0)] * 2)
+
+
+@pytest.mark.parametrize("name", ["cse1", "kvlcc2"])
+def test_a_current_that_may_explain_an_error_is_that_of_the_ships_size(name):
+    """A small share of a speed that grows with the root of the length (Froude)."""
+    odds = object.__new__(ReadingOdds)
+    odds.model = Model(ship=ship_with((), name))
+    speed = SETTINGS.inexact * np.sqrt(odds.model.ship.description.length / 1.105)
+    currents = [(m.value("V_n"), m.value("V_e")) for m in odds._streaming]
+    np.testing.assert_allclose(currents, speed * np.eye(2), rtol=1e-3)
 
 
 def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit():
