@@ -134,20 +134,22 @@ class Worker:
         self._instance.exit_initialization()
         self._access.get()
         driven, seen = self._inputs.cast("d"), self._outputs.cast("d")
-        told, before = bytearray(self._outputs), [*seen]
+        told, before, put, step = bytearray(self._outputs), [*seen], self._access.put, self._access.step
         for k in range(steps):
             self._inputs[:] = rows[k * width : (k + 1) * width]
             for slot, place, power, rate, coefficient, turn, phase in terms:
                 y = (seen[place] - before[place]) / h if rate else seen[place] if power else 1.0
                 y = math.cos(turn * y + phase) if turn else y
                 driven[slot] += coefficient * y * abs(y) ** max(0, power - 1)
-            before = [*seen]
-            self._access.put()
-            self._access.step(k * h)
+            before = seen.tolist()
+            put()
+            step(k * h)
             told += self._outputs
-            # Some tools integrate for hours once a state is infinite.
-            if not all(abs(y) < DIVERGED for y in seen):
-                return told.hex()
+            for y in seen.tolist():
+                if (
+                    not -DIVERGED < y < DIVERGED
+                ):  # some tools integrate for hours once a state is infinite
+                    return told.hex()
         self._instance.terminate()
         return told.hex()
 
