@@ -438,3 +438,17 @@ def test_channels_that_agree_have_the_noise_of_a_sampling_period():
         MotionFaults(path, False), replace(e, by=("speed", "course"), rate=None)
     )
     assert by_course == pytest.approx({"speed": 0.03 / 0.5**0.5})
+
+
+@pytest.mark.parametrize("held", [1, 4])
+def test_speeds_up_to_which_channels_are_noise_are_three_of_its_deviations(held):
+    """Of both velocities together, whatever the motion and however often a value repeats; else 0."""
+    rng, n = np.random.default_rng(3), 4000
+    time = 0.02 * np.arange(n)
+    white = rng.normal(size=(n, 3)).repeat(held, axis=0)[:n] * [0.03, 0.04, 0.002]
+    e = seen(0.0 * time, white[:, :2], white[:, 2], time=time)
+    assert e.still == pytest.approx((3.0 * 0.05, 3.0 * 0.002), rel=0.1)
+    assert replace(e, velocity=None).still == (0.0, e.still[1])
+    assert replace(e, rate=None).still == (e.still[0], 0.0)
+    assert replace(e, rate=white[: 19 * held, 2]).still[1] == 0.0, "too few to tell"
+    assert replace(e, rate=white[: 20 * held, 2]).still[1] > 0.0
