@@ -464,7 +464,7 @@ def test_two_clocks_differ_by_more_than_noise_and_half_of_what_a_clock_changes(m
     apart, changes = (x - (weight * x).sum() / weight.sum() for x in (apart, changes))
     needed = 12.0 + 0.5 * (weight * changes**2).sum()
     apart *= np.sqrt(more * needed / (weight * apart**2).sum())
-    means = iter([1.3 + apart, np.full(12, 0.9), 1.1 + changes])
+    means = iter([1.3 + 1.5 * apart, 0.9 + 0.5 * apart, 1.1 + changes])
     stds = iter([way_std, turn_std, way_std])
 
     class Problem:
