@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cosim import InputError, SimulationError
+from cosim.fmu import MOST_STEPS
 from diagnosis.predictors import Model, black_box
 from diagnosis.predictors.black_box import MOTION, POSE, VELOCITY, BlackBox, laid
 from diagnosis.predictors.fmu import fmu_playback, wrapper
 from diagnosis.predictors.fmu.fmu_playback import (
-    AT_ONCE,
     Playback,
     PlaybackRequest,
     Processes,
@@ -23,6 +23,9 @@ from diagnosis.runs.run_constants import ORDER
 from fmus.addition import Line
 
 # Playback
+
+
+MANY = MOST_STEPS // 2  # predictions of two steps in one request
 
 
 class Instance:
@@ -73,7 +76,7 @@ def fmu_of(**more):
     model = SimpleNamespace(variables=variables, path=SimpleNamespace(name="m.fmu"))
     made = SimpleNamespace(
         model=model, made=[], asked=[], requests=[], resets=0, refuses="", most=np.inf, beyond=np.nan, resets_well=True,
-        closed=0, told=str,
+        closed=0, told=str, timeout=None,
     )  # fmt: skip
     made.instance = lambda: Instance(made)
     made.close = lambda: setattr(made, "closed", made.closed + 1)
@@ -158,15 +161,16 @@ def test_an_fmu_that_fails_says_where(beyond, how):
 @pytest.mark.parametrize(
     ("more", "requests"),
     [
-        ({}, [AT_ONCE, 1]),
-        ({"resets_well": False}, [1] * (AT_ONCE + 1)),
-        ({"most": 2.0, "beyond": np.nan}, [AT_ONCE, *[1] * AT_ONCE, 1, 1]),
+        ({}, [MANY, 1]),
+        ({"resets_well": False}, [1] * (MANY + 1)),
+        ({"timeout": 5.0}, [1] * (MANY + 1)),
+        ({"most": 2.0, "beyond": np.nan}, [MANY, *[1] * MANY, 1, 1]),
     ],
-    ids=["a reset is enough", "a reset is not", "half of them fail"],
+    ids=["a reset is enough", "a reset is not", "each has a time", "half of them fail"],
 )
 def test_many_predictions_are_one_request_where_a_reset_is_enough(more, requests):
     """Two tries of the first one tell whether it is."""
-    starts = [k / AT_ONCE for k in range(AT_ONCE + 2)]
+    starts = [k / MANY for k in range(MANY + 2)]
     fmu = fmu_of(**more)
     found = Playback(fmu, ["b"], ["y"]).run_each([request(y_0=y) for y in starts])
     alone = [Playback(fmu_of(**more), ["b"], ["y"]).run(request(y_0=y)) for y in starts]

@@ -46,6 +46,7 @@ WATCH_INTERVAL = 0.5
 # Wall time of a whole run where none is given [s]: RUN_TIMEOUT, or SLOW_STEP for each step where that is
 # more; chosen: no FMU that is of use takes longer.
 RUN_TIMEOUT, SLOW_STEP = 120.0, 0.1
+MOST_STEPS = round(RUN_TIMEOUT / SLOW_STEP)  # 1, of whole runs whose request has no more time than one
 START, RUN = "its instantiation", "a run"
 
 

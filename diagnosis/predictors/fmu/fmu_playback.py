@@ -5,7 +5,7 @@ else, and where it must know nothing of other predictions, each has an instance,
 own. A request that fails says why; the others go on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ import numpy as np
 from cosim import InputError, SimulationError
 from cosim.fmu import (
     MEANS,
+    MOST_STEPS,
     ConfinedFmu,
     DoubleMemory,
     FeedbackTerm,
@@ -41,10 +42,6 @@ def confined(model: FmuModel, execution: Execution) -> ConfinedFmu:
         return ConfinedFmu(model, means, execution.timeout)
     except SimulationError as error:
         raise InputError(str(error)) from None
-
-
-# 1, predictions in one request; chosen: to ask then takes less than they do
-AT_ONCE = 100
 
 
 class PlaybackRequest(NamedTuple):
@@ -118,15 +115,14 @@ class Playback:
         """Some predictions; many at once where nothing but a reset is between them."""
         alone = 0 if self._resets else 1  # which tells whether it is
         found = [self.run(prediction) for prediction in predictions[:alone]]
-        for k in range(alone, len(predictions), AT_ONCE):
-            part = predictions[k : k + AT_ONCE]
+        for part in _requests(predictions[alone:]):
             found += self._at_once(part) or map(self.run, part)
         return found
 
     def _at_once(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
-        """Nothing where one of them fails, or they are in steps of several lengths."""
+        """Nothing where one fails, their steps differ in length, or each has a time that is given."""
         h = predictions[0].h
-        if not self._resets or any(p.h != h for p in predictions):
+        if not self._resets or self._fmu.timeout is not None or any(p.h != h for p in predictions):
             return []
         try:
             told = self._ready(h).whole_runs([self._asked(p) for p in predictions], h)
@@ -192,6 +188,21 @@ class Playback:
         place = int(np.argmax(np.nan_to_num(np.abs(outputs[k]), nan=np.inf)))
         how = "diverges" if np.isfinite(outputs[k, place]) else "is not finite"
         return PlayedBack(outputs, f"{self.outputs[place]} {how} at t = {k * h:.6g} s")
+
+
+def _requests(predictions: Sequence[PlaybackRequest]) -> Iterator[list[PlaybackRequest]]:
+    """Predictions in their order, as many together as make MOST_STEPS, or one that has more."""
+    part: list[PlaybackRequest] = []
+    steps = 0
+    for prediction in predictions:
+        count = len(prediction.inputs)
+        if part and steps + count > MOST_STEPS:
+            yield part
+            part, steps = [], 0
+        part.append(prediction)
+        steps += count
+    if part:
+        yield part
 
 
 class Processes:
