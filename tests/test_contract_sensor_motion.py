@@ -495,3 +495,34 @@ def test_two_clocks_differ_by_more_than_noise_and_half_of_what_a_clock_changes(m
     for part in ("rate", "velocity"):
         alone = SimpleNamespace(problem=SimpleNamespace(evidence=replace(e, **{part: None})), columns=[])
         assert motion._two_clocks(alone) is False, "one alone contradicts nothing"
+
+
+@pytest.mark.parametrize(
+    ("found", "taken"),
+    [
+        ([0.3], [0.3]),
+        ([-0.3], [-0.3]),
+        ([0.4, 0.02], [0.4, 0.02]),
+        ([0.4, -0.1, 0.02], [0.4, -0.05, 0.005]),
+        ([-0.4, 0.1], [-0.4, 0.05]),
+    ],
+)
+def test_of_a_delay_all_is_taken_at_first_and_half_after_each_step_back(monkeypatch, found, taken):
+    """What is found after each step is the rest; it ends when nothing is left."""
+    left, corrections = iter([*found, 0.0]), []
+
+    def constants(_, e):
+        delay = next(left)
+        return [finding("u", "delay", delay, 1e-3)] if delay else []
+
+    nothing = {"evidence": seen, "gaps": [], "columns": [], "_clock": [], "_leeway": [], "_agreeing": {}}
+    for name, value in nothing.items():
+        monkeypatch.setattr(motion, name, lambda *_, v=value: v() if callable(v) else v)
+    monkeypatch.setattr(motion, "_estimated", lambda *_: SimpleNamespace(torn=False))
+    monkeypatch.setattr(motion, "_constants", constants)
+    monkeypatch.setattr(motion, "corrected", lambda e, c: corrections.append(c.values) or "repaired")
+    examined = motion.motion("run", REFERENCE)
+    assert [values["u", "delay"] for values in corrections] == pytest.approx(taken)
+    assert examined.run == "repaired"
+    (whole,) = examined.findings
+    assert whole.value == pytest.approx(sum(taken))
