@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Mapping
 from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ from support.command import command, main_of
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.processes import one_process, two_processes
-from support.project import ROOT
+from support.project import COMPONENTS, ROOT
 from support.shared import keep_in, kept, once, shared_folder
 from support.slow_tests import NODE, PROCESSOR, slow_tests
 
@@ -174,10 +175,29 @@ def _first_library(_session_cache):
         yield
 
 
+class BuiltFmus(Mapping[str, Path]):
+    """Name -> path of every FMU of the project, each built when it is first asked for."""
+
+    def __init__(self):
+        self._paths = {}
+
+    def __getitem__(self, name):
+        if name not in COMPONENTS:
+            raise KeyError(name)
+        if name not in self._paths:
+            (self._paths[name],) = build([name])
+        return self._paths[name]
+
+    def __iter__(self):
+        return iter(COMPONENTS)
+
+    def __len__(self):
+        return len(COMPONENTS)
+
+
 @pytest.fixture(scope="session")
 def fmus(_session_cache):
-    """Name -> path of every FMU of the project."""
-    return {path.stem: path for path in build([])}
+    return BuiltFmus()
 
 
 @pytest.fixture(scope="session")

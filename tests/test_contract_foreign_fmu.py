@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from cosim import InputError, SimulationError
+from cosim.fmu import MOST_STEPS
 from diagnosis.predictors import Model, black_box
 from diagnosis.predictors.black_box import MOTION, POSE, VELOCITY, BlackBox, laid
 from diagnosis.predictors.fmu import fmu_playback, wrapper
-from diagnosis.predictors.fmu.fmu_playback import Playback, PlaybackRequest, Processes, ShortSteps
+from diagnosis.predictors.fmu.fmu_playback import (
+    Playback,
+    PlaybackRequest,
+    Processes,
+    ShortSteps,
+)
 from diagnosis.predictors.fmu.foreign_fmu import Fmu, FmuPredictor
 from diagnosis.predictors.fmu.variable_map import DISTURBANCES, VariableMap
 from diagnosis.runs import Column
@@ -17,6 +23,9 @@ from diagnosis.runs.run_constants import ORDER
 from fmus.addition import Line
 
 # Playback
+
+
+MANY = MOST_STEPS // 2  # predictions of two steps in one request
 
 
 class Instance:
@@ -33,7 +42,15 @@ class Instance:
     def reset(self):
         self.fmu.resets += 1
 
-    def whole_run(self, start, rows, steps, h, terms):
+    def whole_runs(self, runs, h):
+        self.fmu.requests.append(len(runs))
+        told = [self.whole_run(*runs[0], h)]
+        for run in runs[1:]:
+            self.reset()
+            told.append(self.whole_run(*run, h))
+        return told
+
+    def whole_run(self, start, rows, steps, terms, h):
         if self.fmu.refuses == "always" or (self.fmu.refuses == "once" and not self.redoes):
             raise SimulationError("it refuses")
         u = np.frombuffer(rows).reshape(steps, self.count)
@@ -58,8 +75,8 @@ def fmu_of(**more):
     variables = {n: SimpleNamespace(name=n, start=x) for n, x in (("a", 0.5), ("b", None), ("y", 0.0))}
     model = SimpleNamespace(variables=variables, path=SimpleNamespace(name="m.fmu"))
     made = SimpleNamespace(
-        model=model, made=[], asked=[], resets=0, refuses="", most=np.inf, beyond=np.nan, resets_well=True,
-        closed=0, told=str,
+        model=model, made=[], asked=[], requests=[], resets=0, refuses="", most=np.inf, beyond=np.nan, resets_well=True,
+        closed=0, told=str, timeout=None,
     )  # fmt: skip
     made.instance = lambda: Instance(made)
     made.close = lambda: setattr(made, "closed", made.closed + 1)
@@ -141,11 +158,35 @@ def test_an_fmu_that_fails_says_where(beyond, how):
     assert all(i.gone for i in fmu.made)
 
 
-def test_predictions_in_two_processes_keep_their_order():
+@pytest.mark.parametrize(
+    ("more", "requests"),
+    [
+        ({}, [MANY, 1]),
+        ({"resets_well": False}, [1] * (MANY + 1)),
+        ({"timeout": 5.0}, [1] * (MANY + 1)),
+        ({"most": 2.0, "beyond": np.nan}, [MANY, *[1] * MANY, 1, 1]),
+    ],
+    ids=["a reset is enough", "a reset is not", "each has a time", "half of them fail"],
+)
+def test_many_predictions_are_one_request_where_a_reset_is_enough(more, requests):
+    """Two tries of the first one tell whether it is."""
+    starts = [k / MANY for k in range(MANY + 2)]
+    fmu = fmu_of(**more)
+    found = Playback(fmu, ["b"], ["y"]).run_each([request(y_0=y) for y in starts])
+    alone = [Playback(fmu_of(**more), ["b"], ["y"]).run(request(y_0=y)) for y in starts]
+    assert [each.fault for each in found] == [each.fault for each in alone]
+    for one, other in zip(found, alone, strict=True):
+        np.testing.assert_array_equal(one.outputs, other.outputs)
+    assert fmu.requests == [1, 1, 1, *requests]
+
+
+@pytest.mark.parametrize(("fresh", "requests"), [(True, [1] * 7), (False, [1, 1, 1, 1, 1, 1, 2, 3])])
+def test_predictions_in_two_processes_keep_their_order(fresh, requests):
     fmu = fmu_of()
-    processes = Processes(fmu, ["b"], ["y"], fresh=True)
+    processes = Processes(fmu, ["b"], ["y"], fresh=fresh)
     found = processes.run([request(y_0=float(k)) for k in range(7)])
     assert [p.outputs[0, 0] for p in found] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert sorted(fmu.requests) == requests
     processes.close()
     assert fmu.closed == 1
     assert all(i.gone for i in fmu.made)
@@ -155,7 +196,7 @@ def test_predictions_in_two_processes_keep_their_order():
         raise KeyboardInterrupt
 
     for playback in processes._playbacks:
-        playback.run = interrupted
+        playback.run = playback._at_once = interrupted
     with pytest.raises(KeyboardInterrupt):
         processes.run([request()])
     assert fmu.closed == 2
@@ -164,11 +205,21 @@ def test_predictions_in_two_processes_keep_their_order():
 def test_derivatives_are_those_of_a_polynomial():
     """Of the order of the differences; late ones begin after the first step."""
     for late in (False, True):
-        steps = ShortSteps(fmu_of(), ["b"], ["y"], 0.1, late)
+        fmu = fmu_of()
+        steps = ShortSteps(fmu, ["b"], ["y"], 0.1, late)
         n = ORDER
         t = 0.1 * (np.arange(n + 1) + late)
         x = 2.0 - 3.0 * t + 4.0 * t**2 + 0.5 * t**3
         assert steps.derivatives(x) == pytest.approx((-3.0, 8.0))
+        y_0, u = np.array([1.0, -2.0, 0.5]), np.array([2.0, 4.0, -6.0])
+        found = steps.run({"y_0": y_0}, {"b": u})["y"]
+        np.testing.assert_allclose(found, y_0 + t[:, None] * u)
+        np.testing.assert_allclose(steps.derivatives(found), [u, 0.0 * u], atol=1e-9)
+        assert fmu.requests == [1, 1, 1, 2]
+    with pytest.raises(
+        InputError, match=r"cannot be set to a measured state: y is not finite at t = 0\.2 s"
+    ):
+        ShortSteps(fmu_of(most=0.5), ["b"], ["y"], 0.1, False).run({}, {"b": np.array([1.0, 3.0])})
 
 
 # Signals
@@ -326,18 +377,24 @@ def test_an_acceleration_is_that_of_velocities_or_of_poses_in_the_body():
     poses = {"x_out": (ways[0] - 1.0) / 2.0, "y_out": ways[1], "psi_out": -psi}
     made = predictor()
     steps_of = ShortSteps(fmu_of(), ["b"], ["y"], h, False)
-    made._steps = SimpleNamespace(run=lambda start, inputs: poses, derivatives=steps_of.derivatives)
-    found = made._accelerated({}, {})
-    assert found == pytest.approx([0.3, 0.0, 0.0], abs=2e-2)
+    asked = []
+
+    def given(values):
+        """The same from each of two states."""
+        found = {name: np.column_stack([x, x]) for name, x in values.items()}
+        run = lambda *state: asked.append(state) or found  # noqa: E731
+        return SimpleNamespace(run=run, derivatives=steps_of.derivatives)
+
+    made._steps = given(poses)
+    found = made.accelerations({})
+    np.testing.assert_allclose(found, [[0.3, 0.0, 0.0]] * 2, atol=2e-2)
     both = predictor(outputs=VELOCITY)
     values = {"u_out": (u + 0.3 * t) / 0.5, "v_out": -0.2 * t, "r_out": r + 0.7 * t}
-    both._steps = SimpleNamespace(run=lambda start, inputs: values, derivatives=steps_of.derivatives)
-    assert both._accelerated({}, {}) == pytest.approx([0.3, -0.2, 0.7])
-    asked = []
-    both._accelerated = lambda start, inputs: asked.append((start, inputs)) or np.array([1.0, 2.0, 3.0])
+    both._steps = given(values)
     many = both.accelerations({"tau_X": np.array([2.0, 6.0]), "u": np.array([1.0, 11.0])})
-    assert many.tolist() == [[1.0, 2.0, 3.0]] * 2
-    assert asked == [({"u_0": 0.0}, {"force": 0.0}), ({"u_0": 1.0}, {"force": 1.0})]
+    np.testing.assert_allclose(many, [[0.3, -0.2, 0.7]] * 2, atol=1e-6)
+    start, inputs = asked[-1]
+    assert (start["u_0"].tolist(), inputs["force"].tolist()) == ([0.0, 1.0], [0.0, 1.0])
 
 
 def test_what_can_be_set_and_seen_decides_how_it_predicts():

@@ -184,11 +184,12 @@ def test_values_are_exchanged_in_the_order_put_step_get(served):
 
 def whole_run(served, inputs, terms=(), start=None, h=0.5):
     rows = np.array(inputs, float)
-    asked = call("whole_run", start or {}, rows.tobytes().hex(), [list(t) for t in terms], len(rows), h)
+    run = [start or {}, rows.tobytes().hex(), len(rows), [list(t) for t in terms]]
+    asked = call("whole_runs", [run], h)
     answers, made = served(*BEGIN, asked)
     kind, body = answers[-1]
     assert kind == DONE
-    return np.frombuffer(bytes.fromhex(json.loads(body))), made._instance
+    return np.frombuffer(bytes.fromhex(*json.loads(body))), made._instance
 
 
 def test_a_whole_run_has_the_outputs_at_its_start_and_after_each_step(served):
@@ -198,6 +199,28 @@ def test_a_whole_run_has_the_outputs_at_its_start_and_after_each_step(served):
         ("set up", 1.5), "enter_initialization", "put", "exit_initialization", "get",
         "put", ("step", 0.0), "get", "put", ("step", 0.5), "get", "put", ("step", 1.0), "get", "terminate",
     ]  # fmt: skip
+
+
+def test_whole_runs_are_apart_by_a_reset(served):
+    runs = [
+        [{"y": y}, np.array([[a, 0.0]]).tobytes().hex(), 1, []] for y, a in ((3.0, 1.0), (-1.0, 2.0))
+    ]
+    answers, made = served(*BEGIN, call("whole_runs", runs, 0.5))
+    told = [np.frombuffer(bytes.fromhex(x)).tolist() for x in json.loads(answers[-1][1])]
+    assert told == [[3.0, 3.5], [-1.0, 0.0]]
+    one = [
+        "set up",
+        "enter_initialization",
+        "put",
+        "exit_initialization",
+        "get",
+        "put",
+        "step",
+        "get",
+        "terminate",
+    ]
+    asked = [a[0] if isinstance(a, tuple) else a for a in made._instance.asked]
+    assert asked == [*one, "reset", *one]
 
 
 @pytest.mark.parametrize("power", [0, 1, 2, 3])

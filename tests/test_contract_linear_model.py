@@ -30,11 +30,11 @@ class Steps:
 
     def run(self, start, driven):
         assert [*driven] == self.inputs
-        x, u = np.array([start["p"], start["v"]]), np.array([driven["f"]])
+        x, u = np.concatenate([start["p"], start["v"]]), driven["f"]
         rate = A @ x + B @ u + self.fmu.bend * np.array([0.0, x[0] ** 2])
         y = C @ x + D @ u
         values = {"der(p)": rate[0], "der(v)": rate[1], "p_seen": y[0], "w": y[1]}
-        found = {n: np.array([values[n], np.nan]) for n in self.outputs}
+        found = {n: np.array([[values[n]], [np.nan]]) for n in self.outputs}
         self.rate = rate
         return found
 

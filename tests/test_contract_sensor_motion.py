@@ -438,3 +438,91 @@ def test_channels_that_agree_have_the_noise_of_a_sampling_period():
         MotionFaults(path, False), replace(e, by=("speed", "course"), rate=None)
     )
     assert by_course == pytest.approx({"speed": 0.03 / 0.5**0.5})
+
+
+@pytest.mark.parametrize("held", [1, 4])
+def test_speeds_up_to_which_channels_are_noise_are_three_of_its_deviations(held):
+    """Of both velocities together, whatever the motion and however often a value repeats; else 0."""
+    rng, n = np.random.default_rng(3), 4000
+    time = 0.02 * np.arange(n)
+    white = rng.normal(size=(n, 3)).repeat(held, axis=0)[:n] * [0.03, 0.04, 0.002]
+    e = seen(0.0 * time, white[:, :2], white[:, 2], time=time)
+    assert e.still == pytest.approx((3.0 * 0.05, 3.0 * 0.002), rel=0.1)
+    assert replace(e, velocity=None).still == (0.0, e.still[1])
+    assert replace(e, rate=None).still == (e.still[0], 0.0)
+    assert replace(e, rate=white[: 19 * held, 2]).still[1] == 0.0, "too few to tell"
+    assert replace(e, rate=white[: 20 * held, 2]).still[1] > 0.0
+
+
+@pytest.mark.parametrize(("more", "torn"), [(0.99, False), (1.01, True)])
+def test_two_clocks_differ_by_more_than_noise_and_half_of_what_a_clock_changes(monkeypatch, more, torn):
+    """Each is that of channels with faults of their own; a scale of the speed is the mean of the way's clock."""
+    rng, asked = np.random.default_rng(11), []
+    way_std, turn_std = rng.uniform(0.01, 0.03, (2, 12))
+    weight = 1.0 / (way_std**2 + turn_std**2)
+    apart, changes = rng.normal(0.0, 0.1, (2, 12))
+    apart, changes = (x - (weight * x).sum() / weight.sum() for x in (apart, changes))
+    needed = 12.0 + 0.5 * (weight * changes**2).sum()
+    apart *= np.sqrt(more * needed / (weight * apart**2).sum())
+    means = iter([1.3 + 1.5 * apart, 0.9 + 0.5 * apart, 1.1 + changes])
+    stds = iter([way_std, turn_std, way_std])
+
+    class Problem:
+        def __init__(self, e, *rest):
+            self.e, self.rest = e, rest
+
+        def solve(self, own):
+            asked.append((self.e, self.rest, own))
+
+    monkeypatch.setattr(motion, "PathProblem", Problem)
+    monkeypatch.setattr(
+        motion, "_blocks", lambda path: SimpleNamespace(mean=next(means), std=next(stds))
+    )
+    e = seen()
+    problem = SimpleNamespace(evidence=e, noise=(0.1, 0.2), gaps=[(3.0, 4.0)], without=frozenset({7}))
+    path = SimpleNamespace(problem=problem, columns=[*columns(e, REFERENCE), *deviations(e)])
+    assert motion._two_clocks(path) is torn
+    (way, *given), (turn, *other) = asked
+    assert (way.rate, turn.velocity, turn.by) == (None, None, None)
+    assert way.velocity is e.velocity
+    assert turn.rate is e.rate
+    assert given[0] == other[0] == ((0.1, 0.2), [(3.0, 4.0)], frozenset({7}))
+    of_way, of_turn = ({(c.needs, c.kind) for c in own} for own in (given[1], other[1]))
+    assert {needs for needs, _ in of_way} == {"velocity"}
+    assert "scale" not in {kind for _, kind in of_way}
+    assert {needs for needs, _ in of_turn} == {"rate"}
+    assert "scale" in {kind for _, kind in of_turn}
+    for part in ("rate", "velocity"):
+        alone = SimpleNamespace(problem=SimpleNamespace(evidence=replace(e, **{part: None})), columns=[])
+        assert motion._two_clocks(alone) is False, "one alone contradicts nothing"
+
+
+@pytest.mark.parametrize(
+    ("found", "taken"),
+    [
+        ([0.3], [0.3]),
+        ([-0.3], [-0.3]),
+        ([0.4, 0.02], [0.4, 0.02]),
+        ([0.4, -0.1, 0.02], [0.4, -0.05, 0.005]),
+        ([-0.4, 0.1], [-0.4, 0.05]),
+    ],
+)
+def test_of_a_delay_all_is_taken_at_first_and_half_after_each_step_back(monkeypatch, found, taken):
+    """What is found after each step is the rest; it ends when nothing is left."""
+    left, corrections = iter([*found, 0.0]), []
+
+    def constants(_, e):
+        delay = next(left)
+        return [finding("u", "delay", delay, 1e-3)] if delay else []
+
+    nothing = {"evidence": seen, "gaps": [], "columns": [], "_clock": [], "_leeway": [], "_agreeing": {}}
+    for name, value in nothing.items():
+        monkeypatch.setattr(motion, name, lambda *_, v=value: v() if callable(v) else v)
+    monkeypatch.setattr(motion, "_estimated", lambda *_: SimpleNamespace(torn=False))
+    monkeypatch.setattr(motion, "_constants", constants)
+    monkeypatch.setattr(motion, "corrected", lambda e, c: corrections.append(c.values) or "repaired")
+    examined = motion.motion("run", REFERENCE)
+    assert [values["u", "delay"] for values in corrections] == pytest.approx(taken)
+    assert examined.run == "repaired"
+    (whole,) = examined.findings
+    assert whole.value == pytest.approx(sum(taken))

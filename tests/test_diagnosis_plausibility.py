@@ -9,6 +9,7 @@ from itertools import repeat
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import lsq_linear
 from support.cases import in_part
 from support.ccode import stepped
 from support.command import command
@@ -30,7 +31,7 @@ from diagnosis.assessment.plausibility import (
     same_columns,
     scale_is_confirmed,
 )
-from diagnosis.assessment.reading_odds import Explanation, ReadingOdds
+from diagnosis.assessment.reading_odds import Explanation, ReadingOdds, bounded
 from diagnosis.assessment.readings import (
     AS_READ,
     Reading,
@@ -41,6 +42,7 @@ from diagnosis.assessment.readings import (
     reread,
     swapped,
 )
+from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
@@ -93,6 +95,52 @@ def test_a_density_is_that_of_a_normal_prior_and_normal_noise():
     noise = np.sqrt(((e - b * s * x) ** 2).mean(axis=0) + least**2)
     expected = -windows * np.log(noise).sum() - 0.5 * (b**2 + np.log(information))
     assert explained((x, s)).density(e, least, windows) == pytest.approx(expected, abs=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_factors_between_limits_are_the_same_from_wherever_they_are_looked_for(seed):
+    """The one minimum of a convex problem, by scipy's algorithm for it and from limits that hold elsewhere."""
+    rng = np.random.default_rng(seed)
+    design, y = np.vstack([rng.normal(size=(9, 6)), np.eye(6)]), rng.normal(0.0, 3.0, 15)
+    low, high = (
+        np.array([-np.inf, -1.0, 0.0, 0.0, -0.3, -np.inf]),
+        np.array([np.inf, np.inf, np.inf, 0.5, 0.3, 0.2]),
+    )
+    expected = lsq_linear(design, y, (low, high)).x
+    held = (expected - low < 1e-6) | (high - expected < 1e-6)
+    assert 0 < held.sum() < 6
+    for near in (
+        np.zeros(6),
+        np.fmax(low, -9.0),
+        np.fmin(high, 9.0),
+        expected,
+        rng.uniform(-1.0, 1.0, 6),
+    ):
+        np.testing.assert_allclose(bounded(design, y, low, high, near), expected, atol=1e-6)
+
+
+def test_the_unit_of_a_column_does_not_matter():
+    """A column in a unit k times as large has factors, deviation and limits that are k times smaller."""
+    rng = np.random.default_rng(2)
+    x, y, least = rng.normal(size=(40, 3)), rng.normal(size=(40, 3)), np.full(3, 0.1)
+    e = 1.5 * x - 2.0 * y + 0.3 * rng.normal(size=(40, 3))
+
+    def density(k):
+        columns = (k * x, 0.7 / k, -np.inf, 1.2 / k), (k * y, 0.4 / k, -1.1 / k, np.inf)
+        return explained(*columns).density(e, least, 15.0)
+
+    assert density(1.0) < explained((x, 0.7), (y, 0.4)).density(e, least, 15.0) - 1.0, "limits act"
+    assert [density(k) for k in (0.2, 7.0)] == pytest.approx([density(1.0)] * 2)
+
+
+@pytest.mark.parametrize("name", ["cse1", "kvlcc2"])
+def test_a_current_that_may_explain_an_error_is_that_of_the_ships_size(name):
+    """A small share of a speed that grows with the root of the length (Froude)."""
+    odds = object.__new__(ReadingOdds)
+    odds.model = Model(ship=ship_with((), name))
+    speed = SETTINGS.inexact * np.sqrt(odds.model.ship.description.length / 1.105)
+    currents = [(m.value("V_n"), m.value("V_e")) for m in odds._streaming]
+    np.testing.assert_allclose(currents, speed * np.eye(2), rtol=1e-3)
 
 
 def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit():

@@ -334,12 +334,12 @@ HIDDEN = Cell(("loss_yaw",), "n4", False, 0)
 
 @pytest.fixture(scope="module")
 def simulated(shared):
-    """Folder of a problem, of runs of a minute."""
+    """Folder of a problem, of runs of 40 s."""
 
     def simulate(folder):
         with pytest.MonkeyPatch.context() as patch:
             for module in (simulated_runs, fleet):
-                patch.setattr(module, "STOP", 60.0)
+                patch.setattr(module, "STOP", 40.0)
             assert list(make([HIDDEN], folder)) == [HIDDEN.key]
 
     return once(shared / "hidden_problems", simulate)
@@ -355,7 +355,7 @@ def test_diagnosis_gets_a_measurement_and_nothing_else(simulated):
         given = {"name", "time", "pose", "tau_cmd", "notes", "signals", "hashes", "layout"}
         assert known == given | empty
         assert not any(getattr(run, name) for name in empty)
-        assert run.pose.shape == run.tau_cmd.shape == (3001, 3)
+        assert run.pose.shape == run.tau_cmd.shape == (2001, 3)
     frozen = [(np.diff(run.pose[:, 0]) == 0.0).any() for run in problem.runs]
     assert any(frozen), "there are freezes"
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 from support.measured import sail
 
 from cosim import InputError
@@ -154,6 +155,19 @@ def test_a_noise_is_hardly_known_where_motions_are_quicker_than_samples():
     found = table(replace(run, pose=pose, measured={}).rows(rows))
     assert (found["x"].known, found["x"].noise_at_most) == (False, True)
     assert (found["psi"].known, found["psi"].noise_at_most) == (True, False)
+
+
+@pytest.mark.parametrize("kurtosis", [0.0, 1.5])
+def test_the_chance_of_equal_variances_is_that_of_bartletts_test(kurtosis):
+    """By scipy, whose statistic Box divides by 1 + kurtosis / 2."""
+    rng = np.random.default_rng(7)
+    parts = [s * rng.normal(size=n) for s, n in ((1.0, 5), (1.6, 9), (0.8, 14), (1.2, 4))]
+    squares = np.array([np.sum((x - x.mean()) ** 2) for x in parts])
+    free = np.array([len(x) - 1.0 for x in parts])
+    statistic = stats.bartlett(*parts).statistic / (1.0 + 0.5 * kurtosis)
+    expected = stats.chi2.sf(statistic, len(parts) - 1)
+    assert 0.05 < expected < 0.9
+    assert equal_variances(squares, free, kurtosis) == pytest.approx(expected)
 
 
 def test_parts_of_one_noise_have_one_variance_by_chance():

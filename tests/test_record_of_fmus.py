@@ -59,7 +59,7 @@ MAP = {"inputs": {n: n for n in SHIP.inputs}, "outputs": NAMES, "start": {n: f"{
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    return csv_of(sail(48.0, h=0.1)[0], tmp_path_factory.mktemp("run") / "a.csv")
+    return csv_of(sail(40.0, h=0.1)[0], tmp_path_factory.mktemp("run") / "a.csv")
 
 
 def compared(run, folder, name, habit="", **execution):

@@ -38,11 +38,11 @@ def command(folder, *arguments):
 @pytest.mark.parametrize("entry", [{}, {"isolate": True}])
 def test_a_hang_in_a_run_ends_in_one_line_with_the_log_kept(tmp_path, entry):
     folder = scenario(tmp_path, HANGS, **entry)
-    done = command(folder, "cosim.run", "one.json", "--timeout", "2", "--no-plots", "--quiet")
+    done = command(folder, "cosim.run", "one.json", "--timeout", "1", "--no-plots", "--quiet")
     assert done.returncode == 3
     (line,) = done.stderr.splitlines()
     assert "a: " in line
-    assert "took longer than 2 s; its process was ended" in line
+    assert "took longer than 1 s; its process was ended" in line
     log = json.loads((folder / "results" / "one" / "log.json").read_text())
     assert log["status"] == "failed"
     assert log["rows"] == 6
@@ -52,10 +52,10 @@ def test_a_hang_in_a_run_ends_in_one_line_with_the_log_kept(tmp_path, entry):
 @pytest.mark.parametrize("workers", ["0", "1"])
 def test_a_hang_in_a_campaign_says_which_call_it_was(tmp_path, workers):
     folder = scenario(tmp_path, HANGS)
-    arguments = ["campaign.json", "--timeout", "2", "--quiet", "--out", "out", "--workers", workers]
+    arguments = ["campaign.json", "--timeout", "1", "--quiet", "--out", "out", "--workers", workers]
     done = command(folder, "cosim.campaign", *arguments)
     assert done.returncode == 3
-    assert "a: a step took longer than 2 s; its process was ended" in done.stderr
+    assert "a: a step took longer than 1 s; its process was ended" in done.stderr
     if workers == "1":
         table = pandas.read_parquet(folder / "out" / "runs.parquet")
         assert list(table["status"]) == ["failed"]

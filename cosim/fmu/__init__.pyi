@@ -4,7 +4,9 @@ from .instance import Instance as Instance
 from .isolation.channel import FeedbackTerm as FeedbackTerm
 from .isolation.confined import ConfinedFmu as ConfinedFmu
 from .isolation.confinement import MEANS as MEANS
+from .isolation.isolated import MOST_STEPS as MOST_STEPS
 from .isolation.isolated import IsolatedInstance as IsolatedInstance
+from .isolation.isolated import WholeRun as WholeRun
 from .local import LocalInstance as LocalInstance
 from .memory import DoubleMemory as DoubleMemory
 from .memory import Port as Port

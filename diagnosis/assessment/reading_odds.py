@@ -62,10 +62,31 @@ class Explanation:
             weight = np.sqrt(windows / len(e)) / _noise(axes, b, len(e), least)
             R = np.linalg.qr((axes * weight[:, None, None]).reshape(-1, s.size + 1)).R
             design, y = np.vstack([R[:, :-1], unit]), np.concatenate([R[:, -1], np.zeros(s.size)])
-            b = lsq_linear(design, y, (low / s, high / s), method="bvls").x
+            b = bounded(design, y, low / s, high / s, b)
         noise = _noise(axes, b, len(e), least)
         known = np.linalg.slogdet(design.T @ design)[1]
         return float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
+
+
+def bounded(
+    design: np.ndarray, y: np.ndarray, low: np.ndarray, high: np.ndarray, near: np.ndarray
+) -> np.ndarray:
+    """b of least |y - design b| between limits, by those that hold for one nearby if they hold again.
+
+    Where design has full rank there is one b whose free factors are within the limits, and whose others
+    would only go beyond them (Karush, Kuhn and Tucker).
+    """
+    at_low, at_high = near <= low, near >= high
+    free = ~(at_low | at_high)
+    b = np.where(at_low, low, np.where(at_high, high, 0.0))
+    held = y - design[:, ~free] @ b[~free]
+    part = design[:, free]
+    b[free] = np.linalg.solve(part.T @ part, part.T @ held)
+    slope = (design @ b - y) @ design
+    within = (b[free] >= low[free]).all() and (b[free] <= high[free]).all()
+    if within and (slope[at_low] >= 0.0).all() and (slope[at_high] <= 0.0).all():
+        return b
+    return lsq_linear(design, y, (low, high), method="bvls").x
 
 
 def _noise(axes: np.ndarray, b: np.ndarray, windows: int, least: np.ndarray) -> np.ndarray:

@@ -204,8 +204,8 @@ def _by_steps(
     with closing(ShortSteps(fmu, [*driven], seen, h, False)) as steps:
 
         def answer(moved: Mapping[str, float]) -> np.ndarray:
-            parts = ({n: moved.get(n, x) for n, x in part.items()} for part in (start, driven))
-            found = steps.run(*parts)
+            parts = ({n: np.array([moved.get(n, x)]) for n, x in p.items()} for p in (start, driven))
+            found = {name: x[:, 0] for name, x in steps.run(*parts).items()}
             rates = []
             for s in states:
                 x = found[s.seen]

@@ -54,7 +54,7 @@ class ConfinedFmu:
     def __init__(
         self, model: FmuModel, means: Sequence[str] = MEANS, timeout: float | None = None
     ) -> None:
-        self.model, self._timeout = model, timeout
+        self.model, self.timeout = model, timeout
         self.printed: dict[str, None] = {}
         self.outside: dict[str, None] = {}
         self._owner, self._closed = os.getpid(), False
@@ -122,7 +122,7 @@ class ConfinedFmu:
         """
         if self._closed:
             raise SimulationError(f"{NAME}: its process cannot be started: it has been closed")
-        return IsolatedInstance(NAME, self._model, _ignore, self._timeout, self._fork, self._keep)
+        return IsolatedInstance(NAME, self._model, _ignore, self.timeout, self._fork, self._keep)
 
     def _fork(self) -> ForkedProcess | StartedProcess:
         folder = self._folder()

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from ...errors import InputError, SimulationError
 from ...process.call_watch import TIMEOUT, TIMES_USUAL
@@ -46,7 +46,24 @@ WATCH_INTERVAL = 0.5
 # Wall time of a whole run where none is given [s]: RUN_TIMEOUT, or SLOW_STEP for each step where that is
 # more; chosen: no FMU that is of use takes longer.
 RUN_TIMEOUT, SLOW_STEP = 120.0, 0.1
+MOST_STEPS = round(RUN_TIMEOUT / SLOW_STEP)  # 1, of whole runs whose request has no more time than one
 START, RUN = "its instantiation", "a run"
+
+
+class WholeRun(NamedTuple):
+    """A run from its set-up to its termination.
+
+    Attributes:
+        start: start value -> number.
+        inputs: in each step those that are bound, doubles.
+        steps: how many.
+        terms: what is added to the inputs.
+    """
+
+    start: Mapping[str, Value]
+    inputs: bytes
+    steps: int
+    terms: Sequence[FeedbackTerm] = ()
 
 
 class IsolatedInstance:
@@ -91,7 +108,7 @@ class IsolatedInstance:
         self._in_frame = False  # an exception inside a frame makes the channel unusable
         self._waiting_since: float | None = None
         self._is_late = False
-        self._steps = 0  # of the whole run that is under way
+        self._steps = 0  # of the whole runs that are under way
         self._spent, self._answers = 0.0, 0  # on answers but that of the instantiation [s]
         self._closed = threading.Event()
         threading.Thread(target=self._watch, name=f"watch {name}", daemon=True).start()
@@ -260,37 +277,26 @@ class IsolatedInstance:
 
         return Access(put, get, step, begin)
 
-    def whole_run(
-        self,
-        start: Mapping[str, Value],
-        inputs: bytes,
-        steps: int,
-        h: float,
-        terms: Sequence[FeedbackTerm] = (),
-    ) -> bytes:
-        """A run from its set-up to its termination, as one request, for which the timeout counts.
-
-        Args:
-            start: start value -> number.
-            inputs: in each step those that are bound, doubles.
-            steps, h: how many steps, and of what length [s].
-            terms: what is added to the inputs.
+    def whole_runs(self, runs: Sequence[WholeRun], h: float) -> list[bytes]:
+        """Runs in steps of h [s], as one request, for which the timeout counts; between two is a reset.
 
         Returns:
-            The outputs that are bound, at least one, doubles: at the start and after each step, up to
-            one that is not finite.
+            Of each the outputs that are bound, at least one, doubles: at the start and after each step,
+            up to one that is not finite.
 
         Raises:
             SimulationError: the FMU refuses or fails.
         """
-        self._steps = steps
-        told = self._call(RUN, "whole_run", dict(start), inputs.hex(), [*terms], steps, h)
+        self._steps = sum(run.steps for run in runs)
+        asked = [(dict(r.start), r.inputs.hex(), r.steps, [*r.terms]) for r in runs]
+        told = self._call(RUN, "whole_runs", asked, h)
         try:
-            found = bytes.fromhex(told)
+            found = [*map(bytes.fromhex, told)]
+            sizes = [divmod(len(x), self._width) for x in found]
+            whole = [not rest and 0 < n <= r.steps + 1 for r, (n, rest) in zip(runs, sizes, strict=True)]
         except (TypeError, ValueError):
-            found = b""
-        rows, rest = divmod(len(found), self._width)
-        if rest or not 0 < rows <= steps + 1:
+            found, whole = [], [False]
+        if not all(whole):
             self._asked = RUN
             self._give_up(is_garbled=True)
         return found

@@ -5,11 +5,10 @@ else, and where it must know nothing of other predictions, each has an instance,
 own. A request that fails says why; the others go on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from queue import SimpleQueue
 from threading import Lock
 from typing import NamedTuple
 
@@ -18,12 +17,14 @@ import numpy as np
 from cosim import InputError, SimulationError
 from cosim.fmu import (
     MEANS,
+    MOST_STEPS,
     ConfinedFmu,
     DoubleMemory,
     FeedbackTerm,
     FmuModel,
     IsolatedInstance,
     Port,
+    WholeRun,
 )
 
 from ...runs.run_constants import ORDER
@@ -110,6 +111,31 @@ class Playback:
                 return self.run(prediction)
             return PlayedBack(self._nothing(prediction), self._fmu.told(error))
 
+    def run_each(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
+        """Some predictions; many at once where nothing but a reset is between them."""
+        alone = 0 if self._resets else 1  # which tells whether it is
+        found = [self.run(prediction) for prediction in predictions[:alone]]
+        for part in _requests(predictions[alone:]):
+            found += self._at_once(part) or map(self.run, part)
+        return found
+
+    def _at_once(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
+        """Nothing where one fails, their steps differ in length, or each has a time that is given."""
+        h = predictions[0].h
+        if not self._resets or self._fmu.timeout is not None or any(p.h != h for p in predictions):
+            return []
+        try:
+            told = self._ready(h).whole_runs([self._asked(p) for p in predictions], h)
+        except SimulationError:
+            self.close()
+            return []
+        outputs = [np.frombuffer(x).reshape(-1, len(self.outputs)) for x in told]
+        pairs = zip(predictions, outputs, strict=True)
+        if all(len(y) == len(p.inputs) + 1 and np.isfinite(y).all() for p, y in pairs):
+            return [*map(PlayedBack, outputs)]
+        self.close()  # a reset may not cure what has failed
+        return []
+
     def _nothing(self, prediction: PlaybackRequest) -> np.ndarray:
         return np.full((len(prediction.inputs) + 1, len(self.outputs)), np.nan)
 
@@ -139,15 +165,19 @@ class Playback:
         if instance is not None:
             instance.free()
 
-    def _run(self, prediction: PlaybackRequest) -> PlayedBack:
-        h, start, (steps, driven) = prediction.h, dict(prediction.start), prediction.inputs.shape
+    def _asked(self, prediction: PlaybackRequest) -> WholeRun:
+        """An input that is not driven keeps its start value."""
+        start, (steps, driven) = dict(prediction.start), prediction.inputs.shape
         rows = np.tile(self._starts, (steps, 1))
         rows[:, :driven] = prediction.inputs
         for k, name in enumerate(self.inputs):
             rows[:, k] = start.pop(name, rows[:, k])
-        outputs, instance = self._nothing(prediction), self._ready(h)
-        told = np.frombuffer(instance.whole_run(start, rows.tobytes(), steps, h, prediction.terms))
-        known = told.reshape(-1, len(self.outputs))
+        return WholeRun(start, rows.tobytes(), steps, prediction.terms)
+
+    def _run(self, prediction: PlaybackRequest) -> PlayedBack:
+        h, outputs = prediction.h, self._nothing(prediction)
+        (told,) = self._ready(h).whole_runs([self._asked(prediction)], h)
+        known = np.frombuffer(told).reshape(-1, len(self.outputs))
         outputs[: len(known)] = known
         fine = bool(np.isfinite(outputs).all())
         if self._resets is False or not fine:  # a reset may not cure what has failed
@@ -160,6 +190,21 @@ class Playback:
         return PlayedBack(outputs, f"{self.outputs[place]} {how} at t = {k * h:.6g} s")
 
 
+def _requests(predictions: Sequence[PlaybackRequest]) -> Iterator[list[PlaybackRequest]]:
+    """Predictions in their order, as many together as make MOST_STEPS, or one that has more."""
+    part: list[PlaybackRequest] = []
+    steps = 0
+    for prediction in predictions:
+        count = len(prediction.inputs)
+        if part and steps + count > MOST_STEPS:
+            yield part
+            part, steps = [], 0
+        part.append(prediction)
+        steps += count
+    if part:
+        yield part
+
+
 class Processes:
     """An FMU in processes of its own, in which it may fail; arguments as of :class:`Playback`."""
 
@@ -168,26 +213,22 @@ class Processes:
     ) -> None:
         self._fmu, self.name, self.inputs, self.outputs = fmu, fmu.model.path.name, inputs, outputs
         self._playbacks = [Playback(fmu, inputs, outputs, fresh) for _ in range(2)]
-        self._free = SimpleQueue[Playback]()
-        for playback in self._playbacks:
-            self._free.put(playback)
 
     def run(self, predictions: Sequence[PlaybackRequest]) -> list[PlayedBack]:
         """Some predictions, in their order."""
-        with ThreadPoolExecutor(len(self._playbacks), "playback") as threads:
+        count = len(self._playbacks)
+        found = [PlayedBack(np.zeros((0, 0)))] * len(predictions)
+        with ThreadPoolExecutor(count, "playback") as threads:
             try:
-                return [*threads.map(self._one, predictions)]
+                parts = [predictions[k::count] for k in range(count)]
+                told = threads.map(Playback.run_each, self._playbacks, parts)
+                for k, part in enumerate(told):
+                    found[k::count] = part
+                return found
             except BaseException:  # such as Ctrl-C: predictions that are under way end with the FMU
                 threads.shutdown(wait=False, cancel_futures=True)
                 self._fmu.close()
                 raise
-
-    def _one(self, prediction: PlaybackRequest) -> PlayedBack:
-        playback = self._free.get()
-        try:
-            return playback.run(prediction)
-        finally:
-            self._free.put(playback)
 
     def close(self) -> None:
         """End the processes."""
@@ -214,23 +255,32 @@ class ShortSteps:
         self._name, self.h, self._late = fmu.model.path.name, h, late
         self._playback = Playback(fmu, tuple(inputs), tuple(dict.fromkeys(outputs)))
 
-    def run(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> dict[str, np.ndarray]:
-        """Each output (ORDER + 1,) from a start on; from the first step on where outputs are late.
+    def run(
+        self, start: Mapping[str, np.ndarray], inputs: Mapping[str, np.ndarray]
+    ) -> dict[str, np.ndarray]:
+        """Each output (ORDER + 1, n) from starts (n,) on; from the first step on where outputs are late.
 
         Raises:
-            InputError: the FMU refuses it, or fails.
+            InputError: the FMU refuses one, or fails.
         """
-        playback = self._playback
-        held = np.tile([inputs[name] for name in playback.inputs], (ORDER + self._late, 1))
-        found = playback.run(PlaybackRequest(self.h, start, held))
-        if found.fault:
-            raise InputError(f"'{self._name}' cannot be set to a measured state: {found.fault}")
-        return dict(zip(playback.outputs, found.outputs[int(self._late) :].T, strict=True))
+        playback, steps = self._playback, ORDER + self._late
+        driven = np.column_stack([inputs[name] for name in playback.inputs])
+        starts = np.column_stack([*start.values(), np.zeros((len(driven), 0))]).tolist()
+        found = playback.run_each(
+            [
+                PlaybackRequest(self.h, dict(zip(start, begin, strict=True)), np.tile(row, (steps, 1)))
+                for begin, row in zip(starts, driven, strict=True)
+            ]
+        )
+        if fault := next((each.fault for each in found if each.fault), ""):
+            raise InputError(f"'{self._name}' cannot be set to a measured state: {fault}")
+        outputs = np.array([each.outputs[int(self._late) :] for each in found])
+        return dict(zip(playback.outputs, outputs.transpose(2, 1, 0), strict=True))
 
-    def derivatives(self, x: np.ndarray) -> tuple[float, float]:
-        """First and second derivative at the start of an output (ORDER + 1,), of a polynomial."""
+    def derivatives(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First and second derivative (n,) at the start of outputs (ORDER + 1, n), of a polynomial."""
         powers = np.vander(self.h * (np.arange(len(x)) + self._late), increasing=True)
-        _, first, half, *_ = np.linalg.solve(powers, x).tolist()
+        _, first, half, *_ = np.linalg.solve(powers, x)
         return first, 2.0 * half
 
     def close(self) -> None:

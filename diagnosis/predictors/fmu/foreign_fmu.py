@@ -292,20 +292,15 @@ class FmuPredictor(BlackBox):
 
     def accelerations(self, signals: Signals) -> np.ndarray:
         start, inputs = (self.of_variables(group, signals) for group in ("start", "inputs"))
-        size = next(iter(signals.values())).size
-        return np.array([self._accelerated(_row(start, k), _row(inputs, k)) for k in range(size)])
-
-    def _accelerated(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> np.ndarray:
-        """nu_dot (3,) from a start on, by differences of a few short steps."""
         motion = self._outputs(self._steps.run(start, inputs))
-        slopes = self._steps.derivatives
+        slopes = self._steps.derivatives  # by differences of a few short steps
         if set(VELOCITY) <= motion.keys():
-            return np.array([slopes(motion[s])[0] for s in VELOCITY])
+            return np.column_stack([slopes(motion[s])[0] for s in VELOCITY])
         x, y, psi = (motion[s] for s in POSE)
-        rate, change = np.transpose([slopes(p) for p in (x, y, np.unwrap(psi))])
-        u, v = rotate_to_body(psi[0], rate[0], rate[1])
-        u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
-        return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])
+        (x_dot, x_ddot), (y_dot, y_ddot), (r, r_dot) = map(slopes, (x, y, np.unwrap(psi, axis=0)))
+        u, v = rotate_to_body(psi[0], x_dot, y_dot)
+        u_dot, v_dot = rotate_to_body(psi[0], x_ddot, y_ddot)
+        return np.column_stack([u_dot + r * v, v_dot - r * u, r_dot])
 
     @property
     def _started_by(self) -> str:

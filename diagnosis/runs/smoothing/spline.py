@@ -188,27 +188,30 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
     padded = np.zeros((channels, WIDTH, parts * MEMORY))
     padded[:, 0] = 1.0
     padded[..., :size] = factors
-    blocks = padded.reshape(channels, WIDTH, parts, -1, DEGREE)  # of five coefficients
-    corner = np.zeros((blocks.shape[3], parts, channels, DEGREE, DEGREE))  # of L, in a block
-    below = np.zeros_like(corner)  # of L, under it
+    # Blocks of five coefficients, of all channels and parts (last) side by side.
+    blocks = padded.reshape(channels, WIDTH, parts, -1, DEGREE).transpose(3, 4, 1, 0, 2)
+    corner = np.zeros((len(blocks), DEGREE, DEGREE, channels, parts))  # of L, in a block
+    below, back = np.zeros_like(corner), np.zeros_like(corner)  # of L, under it; the corner's inverse
     for j in range(DEGREE):
-        for i in range(WIDTH):
-            to, row = (corner, i + j) if i + j < DEGREE else (below, i + j - DEGREE)
-            to[..., row, j] = blocks[:, i, ..., j].T
-    back = np.linalg.inv(corner)
-    own, turn = back.swapaxes(-1, -2) @ back, -below @ back
+        corner[:, j:, j] = blocks[:, j, : DEGREE - j]
+        below[:, : j + 1, j] = blocks[:, j, DEGREE - j :]
+    for i in range(DEGREE):
+        back[:, i, i] = 1.0 / corner[:, i, i]
+        for j in range(i):
+            back[:, i, j] = -back[:, i, i] * (corner[:, i, j:i] * back[:, j:i, j]).sum(axis=1)
+    own, turn = (np.einsum("nki...,nkj...->nij...", x, back) for x in (back, -below.swapaxes(1, 2)))
     diagonal, beside = np.zeros_like(own), np.zeros_like(own)
     later = np.zeros_like(own[0])
     for _ in range(2):  # once to forget the start
-        later = np.concatenate([later[1:], 0.0 * later[:1]])
+        later = np.concatenate([later[..., 1:], 0.0 * later[..., :1]], axis=-1)
         for k in range(len(own) - 1, -1, -1):
-            beside[k] = later @ turn[k]
-            diagonal[k] = later = own[k] + turn[k].swapaxes(-1, -2) @ beside[k]
+            np.einsum("ik...,kj...->ij...", later, turn[k], out=beside[k])
+            diagonal[k] = later = own[k] + np.einsum("ki...,kj...->ij...", turn[k], beside[k])
     found = np.empty((WIDTH, channels, parts, len(own), DEGREE))
     for j in range(DEGREE):
         for i in range(WIDTH):
             of, row = (diagonal, i + j) if i + j < DEGREE else (beside, i + j - DEGREE)
-            found[i, ..., j] = of[..., row, j].T
+            found[i, ..., j] = np.moveaxis(of[:, row, j], 0, -1)
     return found.reshape(WIDTH, channels, -1)[..., :size].swapaxes(1, 2)
 
 
