@@ -7,8 +7,9 @@ import pytest
 from support.measured import DATA, NOISE, base, needs_data, smoothed, true_nu
 
 from diagnosis import Run, clean, read, smooth
+from diagnosis.predictors import ship_with
 from diagnosis.runs import without_commands
-from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands
+from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, lagged
 from diagnosis.runs.smoothing.spline import knots
 
 N = 3000
@@ -117,3 +118,65 @@ def test_parts_far_apart_are_smoothed_each_by_itself():
     assert np.isfinite(apart).all()
     inner = np.r_[100 : half - 100, half + 100 : N - 100]
     assert (rms((apart - true_nu())[inner]) < 1.2 * rms((whole - true_nu())[inner])).all()
+
+
+def on_a_line(name, commands, force, gains):
+    """A run of a ship whose accelerations are gains (3,) times a force (n, 3), and its velocity."""
+    of = ship_with((), name)
+    a = 0.1 * force * gains
+    nu = np.cumsum(a, axis=0) - a + [0.5, 0.0, 0.0]
+    way = 0.1 * (nu + 0.5 * a)
+    psi = np.cumsum(way[:, 2]) - way[:, 2]
+    steps = np.column_stack([way[:, 0] * np.cos(psi), way[:, 0] * np.sin(psi), way[:, 2]])
+    pose = np.cumsum(steps, axis=0) - steps
+    noise = 5e-3 * np.random.default_rng(6).standard_normal((N, 3))
+    run = Run(
+        "line",
+        0.1 * np.arange(N),
+        pose + noise,
+        of.commanded_force(commands),
+        commands,
+        ship=of.description,
+    )
+    return run, nu
+
+
+def times_better(run, nu, axis):
+    """By how much the response to the commands betters the velocity on an axis."""
+    knowing = smooth(clean(run))
+    wrong = (rms((found.nu - nu)[INNER])[axis] for found in (without_commands(knowing), knowing))
+    return np.divide(*wrong)
+
+
+def test_a_rudder_acts_by_the_speed_of_the_ship():
+    """At rest it has no force, and commands of it would explain nothing."""
+    helm = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, N // 60), 60)
+    commands = np.column_stack([*[np.full(N, 5.0)] * 2, 0.0 * helm, helm, helm])
+    force = ship_with((), "cybership2").commanded_force(commands, None, 0.5) * [0.0, 0.0, 1.0]
+    run, nu = on_a_line("cybership2", commands, force - force.mean(axis=0), [0.0, 0.0, 0.05])
+    assert not run.tau_cmd[:, 2].any()
+    assert times_better(run, nu, 2) > 1.4
+
+
+def test_a_force_comes_as_late_as_the_described_lag_of_its_actuator():
+    """Taken for one that jumps with the command, it would shift the motion to the front."""
+    n = np.repeat(np.random.default_rng(2).uniform(2.0, 14.0, (N // 60, 2)), 60, axis=0)
+    late = np.column_stack([lagged(c, np.full(N, 0.1), 1.0) for c in n.T])
+    force = ship_with((), "otter").commanded_force(late) * [1.0, 0.0, 1.0]
+    run, nu = on_a_line("otter", n, force - force.mean(axis=0), [2e-3, 0.0, 2e-3])
+    of = ship_with((), "otter").description
+    parts = [p._replace(values=tuple(v for v in p.values if v.name != "lag")) for p in of.actuators]
+    prompt = replace(run, ship=of._replace(actuators=tuple(parts)))
+    assert times_better(run, nu, 2) > 2.0 * times_better(prompt, nu, 2)
+
+
+def test_means_behind_a_lag_are_those_of_its_differential_equation():
+    steps, x = np.array([0.2, 1.0, 0.1, 3.0]), np.array([1.0, 3.0, -1.0, 0.5])
+    fine = 1e-5
+    y, means = x[0], []
+    for value, step in zip(x, steps, strict=True):
+        path = value + (y - value) * np.exp(-np.arange(0.5 * fine, step, fine) / 0.7)
+        means.append(path.mean())
+        y = value + (y - value) * np.exp(-step / 0.7)
+    np.testing.assert_allclose(lagged(x, steps, 0.7), means, rtol=1e-6)
+    assert lagged(x, steps, 0.0) is x

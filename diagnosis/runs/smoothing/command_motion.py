@@ -5,13 +5,15 @@
 on evenly spaced times, of commands that are held from row to row.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from fmus.scale import Scale
+from fmus.ship import ship
 
 from ..cleaning import Track, between, impulse
 from ..linear_filter import filtered
@@ -27,6 +29,42 @@ FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth mo
 def idle(scale: Scale) -> np.ndarray:
     """(3,), speeds [m/s, m/s, rad/s] below which a ship of a size hardly moves."""
     return np.multiply(IDLE, scale.speeds)
+
+
+def acting(track: Track, surge: np.ndarray) -> Track:
+    """A run whose commanded force is that behind the described lags, and at its speed.
+
+    A rudder in a free flow has no force at rest, and a force that comes later than its command is none
+    that jumps: a smoother that takes it for one shifts the motion to the front.
+
+    Args:
+        track: the run.
+        surge: (n,), its speed ahead [m/s].
+    """
+    run = track.run
+    if run.commands is None:
+        return track
+    of = ship(description=run.ship)
+    layout = of.layout_of(run.commands)
+    steps = np.diff(run.time, append=run.time[-1] + track.period)
+    each = zip(run.commands.T, layout.lags, layout.round, strict=True)
+    commands = [lagged(np.unwrap(c) if angle else c, steps, lag) for c, lag, angle in each]
+    tau = of.commanded_force(np.column_stack(commands), run.power, surge)
+    return replace(track, run=replace(run, tau_cmd=tau))
+
+
+def lagged(x: np.ndarray, steps: np.ndarray, lag: float) -> np.ndarray:
+    """Means over steps [s] of a signal behind a lag of first order [s], x (n,) being held over each.
+
+    The signal before is the first.
+    """
+    if lag == 0.0:
+        return x
+    kept = np.exp(-steps / lag)
+    rises = zip(kept.tolist(), ((1.0 - kept) * x).tolist(), strict=True)
+    found = accumulate(rises, lambda y, step: step[0] * y + step[1], initial=float(x[0]))
+    begin = np.array([*found])[:-1]
+    return x + (begin - x) * (1.0 - kept) * lag / steps
 
 
 class CommandResponse(NamedTuple):

@@ -6,13 +6,14 @@ noise or noise for a jump. The pose is therefore modelled as
     eta(t) = f(t) + x(t),    (d/dt + 1/T)^2 x = R(psi) G tau(t - delay),
 
 f a smoothing spline (:mod:`.penalised`), G constant gains from the commanded force to a body-fixed
-acceleration, one 2 x 3 block for the plane and one row for yaw. Gains and delay have the largest
+acceleration, one 2 x 3 block for the plane and one row for yaw. tau is that of the described actuators
+at the ship's speed, behind their lags (:func:`.command_motion.acting`). Gains and delay have the largest
 likelihood with f integrated out, which is generalised least squares: with A the motions for unit gains,
 P the hat matrix of the spline, and r(a) the residuals [sqrt(W) (a - P a), sqrt(s) roughness of P a],
 
     g = argmin |r(z) - r(A) g|^2,    taken = r(z)^T r(A) g / sigma^2.
 
-No model of a ship enters. The likeliest delay alone proves nothing: the response of
+No model of a hull enters. The likeliest delay alone proves nothing: the response of
 :mod:`.command_motion` knows neither damping nor any other force, and where commands are slow, a delay
 makes up for what is missing. Therefore each delay is compared with none *beside* what a ship with
 damping would make of commands that act at once: motions by the commands behind some lags. A

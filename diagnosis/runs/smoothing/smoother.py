@@ -27,7 +27,7 @@ from ..measured_wind import air_along
 from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
-from .command_motion import Commands, idle
+from .command_motion import Commands, acting, idle
 from .command_response import with_commands
 from .correlated_noise import with_correlated
 from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
@@ -285,7 +285,10 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
     still = idle(scale)
     slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
-    commands = Commands(track, psi, grid, bool(slow))
+    north, east, _ = bases[1](fit.coefficients).T
+    ahead, _ = rotate_to_body(psi[inside], north, east)
+    surge = np.interp(time, time[inside], ahead)
+    commands = Commands(acting(track, surge), psi, grid, bool(slow))
     p, smoothness, response = with_commands(even, alone, fit, commands)
     rates = measured_rates(track, dense, psi, agreeing, grid)
     if rates is not None:
