@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from ..declare import Fields
 from ..effects import EffectSet, Memory, Running, Thrust
-from ..effects.all_thrusters import way
 from ..effects.group import Group, Member, group
+from ..effects.steering_gear import rate_limited
 from ..hull import Triple
 from ..ops import Condition, Number, Series, clip, fmax, when
 from ..ship_description import Description
@@ -270,12 +270,6 @@ def remember(
         otherwise = idle, signals
         found[k], signals = member.apply(b.slow[k], b.params.dynamics, otherwise, found[k], signals, h)
     return tuple(found), signals
-
-
-def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle: bool) -> Number:
-    """A command that moves from ``before`` towards the wanted one at no more than ``rate`` a second."""
-    most = rate * h
-    return before + clip(way(before, wanted, angle), -most, most)
 
 
 def command_response(
