@@ -12,8 +12,8 @@ from .effect import Effect, Memory, Search
 from .text import Found
 
 # rad/s, times the scale of the ship. Chosen about the 65 degrees in 28 s that SOLAS asks of a ship of
-# 100 m, 0.4 rad/s at the size of the reference ship: half a turn takes 3 to 60 s.
-RATES = (0.05, 0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9)
+# 100 m, 0.4 rad/s at the size of the reference ship: half a turn takes 2 to 40 s.
+RATES = (0.08, 0.13, 0.2, 0.32, 0.5, 0.8, 1.3)
 PLAYS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.32)  # rad, from end to end; chosen
 # s, times the scale of the ship; after that an angle was moved by more than its play. Chosen.
 USED = 20.0
