@@ -9,7 +9,7 @@ from support.measured import DATA, NOISE, base, needs_data, smoothed, true_nu
 from diagnosis import Run, clean, read, smooth
 from diagnosis.predictors import ship_with
 from diagnosis.runs import without_commands
-from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, lagged
+from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, lagged
 from diagnosis.runs.smoothing.spline import knots
 
 N = 3000
@@ -28,7 +28,7 @@ def rms(x):
 def test_constant_force_moves_a_critically_damped_mass():
     run = replace(base(), tau_cmd=np.tile([1.0, -2.0, 0.5], (N, 1)))
     t, T = base().time, FORGETTING
-    pushed = commands(clean(run), np.zeros(N)).response(np.eye(3), 0.0)
+    pushed = commands(clean(run), np.zeros(N)).response(Gains(np.eye(3)), 0.0)
     expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
     np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
 
@@ -37,7 +37,7 @@ def test_pose_velocity_and_acceleration_belong_together():
     time = 100.0 + np.arange(N) * 0.02
     force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
     run = replace(base(), time=time, tau_cmd=force)
-    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(np.eye(3), 0.0)
+    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(Gains(np.eye(3)), 0.0)
     for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
         between = np.diff(value, axis=0) / 0.02
         np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
@@ -47,7 +47,7 @@ def test_pose_velocity_and_acceleration_belong_together():
 def test_heading_turns_the_response():
     track = clean(replace(base(), tau_cmd=np.random.default_rng(0).standard_normal((N, 3))))
     ahead, aside = (
-        commands(track, np.full(N, psi)).response(np.eye(3), 0.0) for psi in (0.0, 0.5 * np.pi)
+        commands(track, np.full(N, psi)).response(Gains(np.eye(3)), 0.0) for psi in (0.0, 0.5 * np.pi)
     )
     for a, b in zip(ahead[:3], aside[:3], strict=True):
         np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
@@ -55,7 +55,7 @@ def test_heading_turns_the_response():
 
 def test_delayed_commands_have_a_delayed_response():
     track = clean(base())
-    now, late = (commands(track, np.zeros(N)).response(np.eye(3), by) for by in (0.0, 0.5))
+    now, late = (commands(track, np.zeros(N)).response(Gains(np.eye(3)), by) for by in (0.0, 0.5))
     np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
 
 
@@ -180,3 +180,31 @@ def test_means_behind_a_lag_are_those_of_its_differential_equation():
         y = value + (y - value) * np.exp(-step / 0.7)
     np.testing.assert_allclose(lagged(x, steps, 0.7), means, rtol=1e-6)
     assert lagged(x, steps, 0.0) is x
+
+
+def test_a_turn_that_a_rudder_begins_is_no_force_to_the_other_side():
+    """The rudder pushes the stern aside, and u r soon moves the ship the other way."""
+    helm = np.repeat(np.random.default_rng(3).uniform(-0.5, 0.5, N // 60), 60)
+    commands = np.column_stack([*[np.full(N, 5.0)] * 2, 0.0 * helm, helm, helm])
+    of, h, u = ship_with((), "cybership2"), 0.1, 0.5
+    force = of.commanded_force(commands, None, u)
+    nu, pose, states = np.array([u, 0.0, 0.0]), np.zeros(3), []
+    for _, Y, turning in force:
+        states.append([*pose, *nu])
+        rate = [0.0, 0.02 * Y - 0.05 * nu[1], 0.03 * turning - 0.3 * nu[2]]
+        after = nu + h * np.array(rate)
+        middle, psi = 0.5 * (nu + after), pose[2] + 0.5 * h * nu[2]
+        way = (middle[0] + 1j * middle[1]) * np.exp(1j * psi)
+        pose = pose + h * np.array([way.real, way.imag, middle[2]])
+        nu = after
+    states = np.array(states)
+    noise = [5e-2, 5e-2, 2e-3] * np.random.default_rng(8).standard_normal((N, 3))
+    run = Run(
+        "turn",
+        h * np.arange(N),
+        states[:, :3] + noise,
+        of.commanded_force(commands),
+        commands,
+        ship=of.description,
+    )
+    assert times_better(run, states[:, 3:], 1) > 1.65

@@ -5,7 +5,7 @@
 on evenly spaced times, of commands that are held from row to row.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import NamedTuple
@@ -67,6 +67,18 @@ def lagged(x: np.ndarray, steps: np.ndarray, lag: float) -> np.ndarray:
     return x + (begin - x) * (1.0 - kept) * lag / steps
 
 
+class Gains(NamedTuple):
+    """Accelerations in the body frame.
+
+    Attributes:
+        force: (3, 3), by a unit of each command.
+        bend: share of :attr:`Commands.bend` that acts.
+    """
+
+    force: np.ndarray
+    bend: float = 0.0
+
+
 class CommandResponse(NamedTuple):
     """The motion that follows from the commands, but for a smooth one.
 
@@ -92,12 +104,14 @@ class Commands:
         psi: (n,), its heading [rad], NaN where it is not known.
         grid: knots of the stretches, independent of each other, times counted from the first sample.
         at_rest: whether the ship hardly moves at first: then nothing was commanded before the run.
+        swing: (n,), u r [m/s2], by which the way bends where the heading turns; empty: none counts.
     """
 
     track: Track
     psi: np.ndarray
     grid: Knots
     at_rest: bool = False
+    swing: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def forgetting(self) -> float:
@@ -130,6 +144,14 @@ class Commands:
         """
         given = self.even - delay
         return (self._impulse(given + self.track.period) - self._impulse(given)) / self.track.period
+
+    @cached_property
+    def bend(self) -> np.ndarray:
+        """(m,), u r over each even step, an acceleration to starboard in the complex plane."""
+        known = np.isfinite(self.swing)
+        middle = self.even + 0.5 * self.track.period
+        swing = np.interp(middle, self.track.run.time[known], self.swing[known])
+        return 1j * self.rotation * swing
 
     def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
         """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
@@ -166,10 +188,13 @@ class Commands:
         parts = np.split(x, np.cumsum([part.size for part in self.parts])[:-1])
         return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
-    def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
-        """The motion by gains (3, 3), body-fixed acceleration by a unit of each, and a delay [s]."""
-        surge, sway, yaw = (self.delayed(delay) @ gains.T).T
-        a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
+    def response(self, gains: Gains, delay: float) -> CommandResponse:
+        """The motion by the commands, a delay [s] late, and by the bend of the way."""
+        surge, sway, yaw = (self.delayed(delay) @ gains.force.T).T
+        plane = self.rotation * (surge + 1j * sway)
+        if gains.bend:
+            plane = plane + gains.bend * self.bend
+        a = np.column_stack([plane, yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
         sampled = (between(self.track.run.time, self.even, each).T for each in (x, x_dot, x_ddot))

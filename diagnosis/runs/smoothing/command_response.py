@@ -32,7 +32,7 @@ from scipy.special import stdtrit
 
 from ..cleaning import BRIEF, WIDTH, between
 from ..run_constants import CHANCE, DIGITS
-from .command_motion import FORGETTING, CommandResponse, Commands
+from .command_motion import FORGETTING, CommandResponse, Commands, Gains
 from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
@@ -58,17 +58,22 @@ class Regression:
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
 
-    def gains(self, delay: float) -> np.ndarray:
-        """Body-fixed acceleration by a unit of each command, (3, 3), for a delay [s]."""
-        motions = self.motions(self.commands.delayed(delay))
+    def gains(self, delay: float, bent: bool = False) -> Gains:
+        """What the commands accelerate, and the bend of the way if that counts, for a delay [s]."""
+        plane, yaw = self.motions(self.commands.delayed(delay))
+        motions = np.hstack([plane, *([self.bend] if bent else [])]), yaw
         flat, turn = (least_squares(a, z[:, 0]) for a, z in zip(motions, self.pose, strict=True))
-        return np.vstack([flat.reshape(2, 3), turn])
+        return Gains(np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum()))
+
+    @property
+    def bend(self) -> np.ndarray:
+        """r(A) of the plane for the bend of the way, in one column."""
+        x = self._sampled(self.commands.bend[:, None])
+        return np.vstack([self._residual(0, np.real(x)), self._residual(1, np.imag(x))])
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
-        commands, time = self.commands, self.time + self.commands.track.run.time[0]
-        ahead = between(time, commands.even, commands.motion(commands.rotation[:, None] * tau)[0])
-        yaw = between(time, commands.even, commands.motion(tau)[0])
+        ahead, yaw = self._sampled(self.commands.rotation[:, None] * tau), self._sampled(tau)
         # A force to starboard moves the ship as one ahead does, a right angle further.
         north, east = np.real(ahead), np.imag(ahead)
         plane = {0: np.hstack([north, -east]), 1: np.hstack([east, north])}
@@ -76,6 +81,11 @@ class Regression:
         if not all(np.isfinite(part).all() for part in found):  # LAPACK may not end
             raise LinAlgError("the response to its commands is not finite")
         return found
+
+    def _sampled(self, a: np.ndarray) -> np.ndarray:
+        """Positions (n, k) in the rows of the pose, by accelerations (m, k) of even steps."""
+        time = self.time + self.commands.track.run.time[0]
+        return between(time, self.commands.even, self.commands.motion(a)[0])
 
     def _residual(self, channel: int, x: np.ndarray) -> np.ndarray:
         """r(x) of signals (n, k) in a channel, in units of the noise."""
@@ -165,7 +175,7 @@ def with_commands(
     delay, sure = likeliest_delay(regression)
     gains = regression.gains(delay)
     # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
-    least = deviance(p, weights, near) - 2.0 * (gains.size + 1)
+    least = deviance(p, weights, near) - 2.0 * (gains.force.size + 1)
     found: tuple[Problem, np.ndarray, CommandResponse] | None = None
     for _ in range(ROUNDS):
         response = commands.response(gains, delay)
@@ -181,3 +191,16 @@ def with_commands(
         return alone.problem, alone.smoothness, CommandResponse(still, still, still)
     rest, near, response = found
     return *adapt(rest, near, weights), response
+
+
+def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandResponse) -> CommandResponse:
+    """The response to the commands and the bend of the way, beside a spline as smooth as that of a fit.
+
+    A force to the side that turns the ship as well, as a rudder's, is soon followed by the larger force
+    of the turn, m u r, the other way. Gains alone would be those of the sum of both.
+    """
+    if np.isnan(response.delay):
+        return response
+    time = commands.track.run.time[p.rows] - commands.track.run.time[0]
+    gains = Regression(p, fit, commands, time).gains(response.delay, bent=True)
+    return commands.response(gains, response.delay)._replace(sure=response.sure)
