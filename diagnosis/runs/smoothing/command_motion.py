@@ -31,7 +31,7 @@ def idle(scale: Scale) -> np.ndarray:
     return np.multiply(IDLE, scale.speeds)
 
 
-def acting(track: Track, surge: np.ndarray) -> Track:
+def acting(track: Track, surge: np.ndarray) -> tuple[Track, bool]:
     """A run whose commanded force is that behind the described lags, and at its speed.
 
     A rudder in a free flow has no force at rest, and a force that comes later than its command is none
@@ -40,17 +40,21 @@ def acting(track: Track, surge: np.ndarray) -> Track:
     Args:
         track: the run.
         surge: (n,), its speed ahead [m/s].
+
+    Returns:
+        The run, and whether its yaw moment depends on the speed, as that of a rudder.
     """
     run = track.run
     if run.commands is None:
-        return track
+        return track, False
     of = ship(description=run.ship)
     layout = of.layout_of(run.commands)
     steps = np.diff(run.time, append=run.time[-1] + track.period)
     each = zip(run.commands.T, layout.lags, layout.round, strict=True)
     commands = [lagged(np.unwrap(c) if angle else c, steps, lag) for c, lag, angle in each]
-    tau = of.commanded_force(np.column_stack(commands), run.power, surge)
-    return replace(track, run=replace(run, tau_cmd=tau))
+    at_rest, tau = (of.commanded_force(np.column_stack(commands), run.power, u) for u in (0.0, surge))
+    steered = bool((tau[:, 2] != at_rest[:, 2]).any())
+    return replace(track, run=replace(run, tau_cmd=tau)), steered
 
 
 def lagged(x: np.ndarray, steps: np.ndarray, lag: float) -> np.ndarray:

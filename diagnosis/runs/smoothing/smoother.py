@@ -288,7 +288,8 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     north, east, turn = bases[1](fit.coefficients).T
     ahead, _ = rotate_to_body(psi[inside], north, east)
     surge, swing = (np.interp(time, time[inside], x) for x in (ahead, ahead * turn))
-    commands = Commands(acting(track, surge), psi, grid, bool(slow), swing)
+    late, steered = acting(track, surge)
+    commands = Commands(late, psi, grid, bool(slow), swing if steered else swing[:0])
     p, smoothness, by_commands = with_commands(even, alone, fit, commands)
     response = with_bend(even, solve(p, smoothness, weights), commands, by_commands)
     rates = measured_rates(track, dense, psi, agreeing, grid)
