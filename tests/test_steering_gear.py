@@ -5,6 +5,9 @@ from math import pi
 import numpy as np
 import pytest
 
+from diagnosis import Model, Run
+from diagnosis.predictors import ship_with
+from diagnosis.predictors.thrust import Response
 from fmus.effects.steering_gear import dragged, rate_limited
 from fmus.ship import ship
 from fmus.ships.ship_file import read_ship
@@ -64,3 +67,22 @@ def test_actuators_without_an_angle_have_no_steering_gear():
     effects = ship(description=read_ship("otter")).effects
     assert not [name for name in effects if name.startswith(("rate_", "play_"))]
     assert "rate_azimuth" in ship(description=read_ship("gunnerus")).effects
+
+
+def test_the_diagnosis_steps_a_play_as_the_thrusters_do():
+    """In parts side by side, each from a time before it, with the same result as row by row."""
+    of = ship_with((), "cybership2")
+    helm = np.repeat(np.random.default_rng(9).uniform(-0.5, 0.5, 200), 20)
+    commands = np.zeros((4000, 5))
+    commands[:, 3] = commands[:, 4] = helm
+    time = 0.1 * np.arange(4000)
+    pose = np.column_stack([0.5 * time, 0.0 * time, 0.0 * time])
+    run = Run("play", time, pose, of.commanded_force(commands), commands, ship=of.description)
+    arriving = Response(run, Model(ship=of).plus({"play_port_rudder": 0.2})).between_samples[-1]
+    np.testing.assert_allclose(arriving[4], helm, atol=1e-9)
+    angle, expected = 0.0, []
+    for x in helm.tolist():
+        angle = dragged(angle, x, 0.2, 0.1, False)
+        expected.append(angle)
+    assert np.abs(arriving[3] - helm).max() > 0.09
+    np.testing.assert_allclose(arriving[3], expected, atol=1e-9)
