@@ -9,8 +9,9 @@ from support.measured import DATA, NOISE, base, needs_data, smoothed, true_nu
 from diagnosis import Run, clean, read, smooth
 from diagnosis.predictors import ship_with
 from diagnosis.runs import without_commands
-from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, lagged
+from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, acting, lagged
 from diagnosis.runs.smoothing.spline import knots
+from fmus.ops import wrap
 
 N = 3000
 INNER = slice(100, -100)
@@ -208,3 +209,14 @@ def test_a_turn_that_a_rudder_begins_is_no_force_to_the_other_side():
         ship=of.description,
     )
     assert times_better(run, states[:, 3:], 1) > 1.65
+
+
+def test_a_lagging_angle_that_goes_round_takes_the_shorter_way():
+    """An azimuth that turns at 0.1 rad/s with a lag of 1 s is 0.1 rad behind, turn after turn."""
+    of, time = ship_with((), "gunnerus"), 0.1 * np.arange(N)
+    commands, behind = (np.column_stack([wrap(0.1 * t), np.full(N, 2.0)]) for t in (time, time - 1.0))
+    run = Run("round", time, base().pose, np.zeros((N, 3)), commands, ship=of.description)
+    late, steered = acting(clean(run), np.zeros(N))
+    expected = of.commanded_force(behind)
+    np.testing.assert_allclose(late.run.tau_cmd[100:], expected[100:], atol=0.02 * expected.max())
+    assert not steered
