@@ -45,12 +45,15 @@ def acting(track: Track, surge: np.ndarray) -> tuple[Track, bool]:
         The run, and whether its yaw moment depends on the speed, as that of a rudder.
     """
     run = track.run
-    if run.commands is None:
-        return track, False
     of = ship(description=run.ship)
-    layout = of.layout_of(run.commands)
+    layout, given = of.layout_of(run.commands), run.commands
+    if given is None:
+        if not any(layout.lags):
+            return track, False
+        shares = layout.allocate(tuple(run.tau_cmd.T), of.nominal_drive.params)
+        given = np.column_stack(np.broadcast_arrays(*shares))
     steps = np.diff(run.time, append=run.time[-1] + track.period)
-    each = zip(run.commands.T, layout.lags, layout.round, strict=True)
+    each = zip(given.T, layout.lags, layout.round, strict=True)
     commands = [lagged(np.unwrap(c) if angle else c, steps, lag) for c, lag, angle in each]
     at_rest, tau = (of.commanded_force(np.column_stack(commands), run.power, u) for u in (0.0, surge))
     steered = bool((tau[:, 2] != at_rest[:, 2]).any())
