@@ -126,13 +126,17 @@ class Ship:
         return self.description.allocates and len(axes(self.description)) == 3
 
     def commanded_force(
-        self, commands: "np.ndarray", settings: "np.ndarray | None" = None
+        self,
+        commands: "np.ndarray",
+        settings: "np.ndarray | None" = None,
+        surge: "np.ndarray | float" = 0.0,
     ) -> "np.ndarray":
-        """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands at rest.
+        """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands.
 
         Args:
             commands: (n, k), in one of the layouts.
             settings: (n, m), of the thrusters' power; None: full.
+            surge: (n,), speed ahead [m/s]; by default the ship is at rest.
         """
         import numpy as np
 
@@ -140,7 +144,7 @@ class Ship:
         drive = (
             self.nominal_drive if settings is None else layout.powered(self.nominal_drive, settings.T)
         )
-        force = layout.nominal_force(tuple(commands.T), drive.params)
+        force = layout.nominal_force(tuple(commands.T), drive.params, (surge, 0.0, 0.0))
         return np.column_stack(np.broadcast_arrays(*force, commands[:, 0]))[:, :3]
 
     @cached_property

@@ -519,6 +519,15 @@ def test_axes_that_are_stated_stay_beside_a_quaternion(tmp_path: Path) -> None:
     assert propose(written(tmp_path / "b.csv", without), OTTER).unused == ["z", "w"]
 
 
+@pytest.mark.parametrize("name", ["Time (UTC)", "time [hh:mm:ss]", "Timestamp (UTC+1)"])
+def test_brackets_behind_the_name_of_stamps_are_no_unit(tmp_path: Path, name: str) -> None:
+    stamps = pd.Timestamp("2026-05-05 23:59:30") + pd.to_timedelta(boat()["time"], unit="s")
+    table = boat().assign(time=stamps.dt.strftime("%H:%M:%S.%f")).rename(columns={"time": name})
+    run = propose(written(tmp_path / "a.csv", table), OTTER).run
+    assert run is not None
+    np.testing.assert_allclose(run.time - run.time[0], boat()["time"] - boat()["time"][0], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("others", "name"), [({}, "Zeitstempel"), ({"sent": "2026-01-01T00:00:00"}, "")]
 )

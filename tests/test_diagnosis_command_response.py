@@ -7,9 +7,11 @@ import pytest
 from support.measured import DATA, NOISE, base, needs_data, smoothed, true_nu
 
 from diagnosis import Run, clean, read, smooth
+from diagnosis.predictors import ship_with
 from diagnosis.runs import without_commands
-from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands
+from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, acting, lagged
 from diagnosis.runs.smoothing.spline import knots
+from fmus.ops import wrap
 
 N = 3000
 INNER = slice(100, -100)
@@ -27,7 +29,7 @@ def rms(x):
 def test_constant_force_moves_a_critically_damped_mass():
     run = replace(base(), tau_cmd=np.tile([1.0, -2.0, 0.5], (N, 1)))
     t, T = base().time, FORGETTING
-    pushed = commands(clean(run), np.zeros(N)).response(np.eye(3), 0.0)
+    pushed = commands(clean(run), np.zeros(N)).response(Gains(np.eye(3)), 0.0)
     expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
     np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
 
@@ -36,7 +38,7 @@ def test_pose_velocity_and_acceleration_belong_together():
     time = 100.0 + np.arange(N) * 0.02
     force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
     run = replace(base(), time=time, tau_cmd=force)
-    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(np.eye(3), 0.0)
+    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(Gains(np.eye(3)), 0.0)
     for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
         between = np.diff(value, axis=0) / 0.02
         np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
@@ -46,7 +48,7 @@ def test_pose_velocity_and_acceleration_belong_together():
 def test_heading_turns_the_response():
     track = clean(replace(base(), tau_cmd=np.random.default_rng(0).standard_normal((N, 3))))
     ahead, aside = (
-        commands(track, np.full(N, psi)).response(np.eye(3), 0.0) for psi in (0.0, 0.5 * np.pi)
+        commands(track, np.full(N, psi)).response(Gains(np.eye(3)), 0.0) for psi in (0.0, 0.5 * np.pi)
     )
     for a, b in zip(ahead[:3], aside[:3], strict=True):
         np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
@@ -54,7 +56,7 @@ def test_heading_turns_the_response():
 
 def test_delayed_commands_have_a_delayed_response():
     track = clean(base())
-    now, late = (commands(track, np.zeros(N)).response(np.eye(3), by) for by in (0.0, 0.5))
+    now, late = (commands(track, np.zeros(N)).response(Gains(np.eye(3)), by) for by in (0.0, 0.5))
     np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
 
 
@@ -117,3 +119,104 @@ def test_parts_far_apart_are_smoothed_each_by_itself():
     assert np.isfinite(apart).all()
     inner = np.r_[100 : half - 100, half + 100 : N - 100]
     assert (rms((apart - true_nu())[inner]) < 1.2 * rms((whole - true_nu())[inner])).all()
+
+
+def on_a_line(name, commands, force, gains):
+    """A run of a ship whose accelerations are gains (3,) times a force (n, 3), and its velocity."""
+    of = ship_with((), name)
+    a = 0.1 * force * gains
+    nu = np.cumsum(a, axis=0) - a + [0.5, 0.0, 0.0]
+    way = 0.1 * (nu + 0.5 * a)
+    psi = np.cumsum(way[:, 2]) - way[:, 2]
+    steps = np.column_stack([way[:, 0] * np.cos(psi), way[:, 0] * np.sin(psi), way[:, 2]])
+    pose = np.cumsum(steps, axis=0) - steps
+    noise = 5e-3 * np.random.default_rng(6).standard_normal((N, 3))
+    run = Run(
+        "line",
+        0.1 * np.arange(N),
+        pose + noise,
+        of.commanded_force(commands),
+        commands,
+        ship=of.description,
+    )
+    return run, nu
+
+
+def times_better(run, nu, axis):
+    """By how much the response to the commands betters the velocity on an axis."""
+    knowing = smooth(clean(run))
+    wrong = (rms((found.nu - nu)[INNER])[axis] for found in (without_commands(knowing), knowing))
+    return np.divide(*wrong)
+
+
+def test_a_rudder_acts_by_the_speed_of_the_ship():
+    """At rest it has no force, and commands of it would explain nothing."""
+    helm = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, N // 60), 60)
+    commands = np.column_stack([*[np.full(N, 5.0)] * 2, 0.0 * helm, helm, helm])
+    force = ship_with((), "cybership2").commanded_force(commands, None, 0.5) * [0.0, 0.0, 1.0]
+    run, nu = on_a_line("cybership2", commands, force - force.mean(axis=0), [0.0, 0.0, 0.05])
+    assert not run.tau_cmd[:, 2].any()
+    assert times_better(run, nu, 2) > 1.4
+
+
+def test_a_force_comes_as_late_as_the_described_lag_of_its_actuator():
+    """Taken for one that jumps with the command, it would shift the motion to the front."""
+    n = np.repeat(np.random.default_rng(2).uniform(2.0, 14.0, (N // 60, 2)), 60, axis=0)
+    late = np.column_stack([lagged(c, np.full(N, 0.1), 1.0) for c in n.T])
+    force = ship_with((), "otter").commanded_force(late) * [1.0, 0.0, 1.0]
+    run, nu = on_a_line("otter", n, force - force.mean(axis=0), [2e-3, 0.0, 2e-3])
+    of = ship_with((), "otter").description
+    parts = [p._replace(values=tuple(v for v in p.values if v.name != "lag")) for p in of.actuators]
+    prompt = replace(run, ship=of._replace(actuators=tuple(parts)))
+    assert times_better(run, nu, 2) > 2.0 * times_better(prompt, nu, 2)
+
+
+def test_means_behind_a_lag_are_those_of_its_differential_equation():
+    steps, x = np.array([0.2, 1.0, 0.1, 3.0]), np.array([1.0, 3.0, -1.0, 0.5])
+    fine = 1e-5
+    y, means = x[0], []
+    for value, step in zip(x, steps, strict=True):
+        path = value + (y - value) * np.exp(-np.arange(0.5 * fine, step, fine) / 0.7)
+        means.append(path.mean())
+        y = value + (y - value) * np.exp(-step / 0.7)
+    np.testing.assert_allclose(lagged(x, steps, 0.7), means, rtol=1e-6)
+    assert lagged(x, steps, 0.0) is x
+
+
+def test_a_turn_that_a_rudder_begins_is_no_force_to_the_other_side():
+    """The rudder pushes the stern aside, and u r soon moves the ship the other way."""
+    helm = np.repeat(np.random.default_rng(3).uniform(-0.5, 0.5, N // 60), 60)
+    commands = np.column_stack([*[np.full(N, 5.0)] * 2, 0.0 * helm, helm, helm])
+    of, h, u = ship_with((), "cybership2"), 0.1, 0.5
+    force = of.commanded_force(commands, None, u)
+    nu, pose, states = np.array([u, 0.0, 0.0]), np.zeros(3), []
+    for _, Y, turning in force:
+        states.append([*pose, *nu])
+        rate = [0.0, 0.02 * Y - 0.05 * nu[1], 0.03 * turning - 0.3 * nu[2]]
+        after = nu + h * np.array(rate)
+        middle, psi = 0.5 * (nu + after), pose[2] + 0.5 * h * nu[2]
+        way = (middle[0] + 1j * middle[1]) * np.exp(1j * psi)
+        pose = pose + h * np.array([way.real, way.imag, middle[2]])
+        nu = after
+    states = np.array(states)
+    noise = [5e-2, 5e-2, 2e-3] * np.random.default_rng(8).standard_normal((N, 3))
+    run = Run(
+        "turn",
+        h * np.arange(N),
+        states[:, :3] + noise,
+        of.commanded_force(commands),
+        commands,
+        ship=of.description,
+    )
+    assert times_better(run, states[:, 3:], 1) > 1.65
+
+
+def test_a_lagging_angle_that_goes_round_takes_the_shorter_way():
+    """An azimuth that turns at 0.1 rad/s with a lag of 1 s is 0.1 rad behind, turn after turn."""
+    of, time = ship_with((), "gunnerus"), 0.1 * np.arange(N)
+    commands, behind = (np.column_stack([wrap(0.1 * t), np.full(N, 2.0)]) for t in (time, time - 1.0))
+    run = Run("round", time, base().pose, np.zeros((N, 3)), commands, ship=of.description)
+    late, steered = acting(clean(run), np.zeros(N))
+    expected = of.commanded_force(behind)
+    np.testing.assert_allclose(late.run.tau_cmd[100:], expected[100:], atol=0.02 * expected.max())
+    assert not steered

@@ -25,7 +25,9 @@ NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
 )
 CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
-CALIBRATION_GAINED_NOTHING = "Calibration does not improve the predictions of the initial model."
+CALIBRATION_GAINED_NOTHING = (
+    "Calibration does not improve the predictions of the initial model by more than chance."
+)
 MEASURED_COMMANDS = (
     "The commands are read as measured values of the actuators, of which the mean over a row acts, and "
     "not as orders, because the initial and the calibrated model then predict better. State "

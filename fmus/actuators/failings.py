@@ -20,6 +20,7 @@ from ..effects.lost_force import (
 from ..effects.misplaced import elsewhere, turned
 from ..effects.own_curves import ALONG, command_curve, force_curve, speed_curve, thrust_curve
 from ..effects.power import crossed_forces, power_exponent
+from ..effects.steering_gear import gears
 from ..effects.text import number
 from .actuator import Actuator, both, twins
 
@@ -50,13 +51,26 @@ def failings(a: Actuator) -> list[Effect]:
         turned(d),
         elsewhere(d),
         outage(d, f"{d.name}_failure"),
-        *([lagging] if a.leads else []),
+        *([lagging, *steered(d._replace(name=a.order), a)] if a.leads else []),
     ]
+
+
+def steered(d: Devices, *alike: Actuator) -> list[Effect]:
+    """Effects of the steering gears of some actuators, where these are commanded an angle."""
+    angles = [
+        (a.first + k, a.round[k])
+        for a in alike
+        for k, command in enumerate(a.law.commands)
+        if command.unit == "rad"
+    ]
+    places, turns = zip(*angles, strict=True) if angles else ((), ())
+    return gears(d, places, turns) if angles else []
 
 
 def failings_of_twins(every: Sequence[Actuator]) -> list[Effect]:
     """What may go wrong with two twins alike, as where both were set up by one mistake."""
-    return [turned(both(*pair)) for pair in twins(every)]
+    pairs = [(both(*pair), pair) for pair in twins(every)]
+    return [e for d, pair in pairs for e in (turned(d), *steered(d, *pair))]
 
 
 def by_axis(d: Devices) -> Effect:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 from ..declare import Fields
 from ..effects import EffectSet, Memory, Running, Thrust
-from ..effects.all_thrusters import way
 from ..effects.group import Group, Member, group
+from ..effects.steering_gear import rate_limited
 from ..hull import Triple
 from ..ops import Condition, Number, Series, clip, fmax, when
 from ..ship_description import Description
@@ -80,6 +80,11 @@ class CommandLayout:
         """For each command whether it is an angle that goes round."""
         return tuple([angle for a, _ in self._sets() for angle in a.round])
 
+    @cached_property
+    def lags(self) -> tuple[float, ...]:
+        """For each command the lag of its actuator [s], as it is described."""
+        return tuple([a.part.number("lag") for a, _ in self._sets() for _ in a.law.commands])
+
     def _sets(self) -> list[tuple[Actuator, float]]:
         """Each actuator with commands of its own, as often as it has them."""
         return [(a, side) for a in ordered(self.ship) for side in (a.sides if self.apart else (0.0,))]
@@ -117,12 +122,12 @@ class CommandLayout:
         """tau [N, N, N m], effects included, of :meth:`thrust`."""
         return total(self.thrust(acting, now, b))
 
-    def nominal_force(self, commands: Sequence[Number], p: Fields) -> Triple:
-        """tau [N, N, N m] that the allocation expects of commands at rest."""
+    def nominal_force(
+        self, commands: Sequence[Number], p: Fields, nu: tuple[Series, Series, Series] = AT_REST
+    ) -> Triple:
+        """tau [N, N, N m] that the allocation expects of commands at a velocity, by default at rest."""
         settings = p.power if self.apart else ()  # of a run are given with the commands of each unit
-        return total(
-            forces(allocating(self.ship), commands, AT_REST, p.allocation, settings, self.apart)
-        )
+        return total(forces(allocating(self.ship), commands, nu, p.allocation, settings, self.apart))
 
     def allocate(self, tau: Triple, p: Fields) -> tuple[Number, ...]:
         """The commands that give a force, as nearly as they can."""
@@ -265,12 +270,6 @@ def remember(
         otherwise = idle, signals
         found[k], signals = member.apply(b.slow[k], b.params.dynamics, otherwise, found[k], signals, h)
     return tuple(found), signals
-
-
-def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle: bool) -> Number:
-    """A command that moves from ``before`` towards the wanted one at no more than ``rate`` a second."""
-    most = rate * h
-    return before + clip(way(before, wanted, angle), -most, most)
 
 
 def command_response(

@@ -118,7 +118,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
-    columns = _columns(path, names, units, quantity, kept)
+    columns = _columns(path, text, names, units, quantity, kept)
     columns |= _of_message(columns, fields, kept)
     columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
@@ -218,6 +218,7 @@ def _units_line(path: Path, text: Layout) -> list[str]:
 
 def _columns(
     path: Path,
+    text: Layout,
     names: Sequence[str],
     units: Sequence[str],
     quantity: Mapping[str, str],
@@ -241,6 +242,8 @@ def _columns(
         if signal in columns:
             continue
         known = UNITS[quantity[signal]]
+        if signal == "time" and unit not in known and _is_stamped(path, text, name):
+            unit = ""  # a time zone, or the form of the stamps
         if unit not in NO_UNIT and unit not in known:
             line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
             raise InputError(
@@ -300,6 +303,11 @@ def _of_message(
     if {"x", "y"} <= columns.keys() - kept and columns["x"].name.casefold().endswith("x"):
         turned |= {"x": columns["y"], "y": columns["x"]}
     return turned
+
+
+def _is_stamped(path: Path, text: Layout, name: str) -> bool:
+    """Whether a column has date stamps or times of day."""
+    return date_stamps(table_of_file(path, text, {name})[name]) is not None
 
 
 def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Column]:

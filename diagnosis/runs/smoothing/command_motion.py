@@ -5,13 +5,15 @@
 on evenly spaced times, of commands that are held from row to row.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
 
 from fmus.scale import Scale
+from fmus.ship import ship
 
 from ..cleaning import Track, between, impulse
 from ..linear_filter import filtered
@@ -27,6 +29,61 @@ FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth mo
 def idle(scale: Scale) -> np.ndarray:
     """(3,), speeds [m/s, m/s, rad/s] below which a ship of a size hardly moves."""
     return np.multiply(IDLE, scale.speeds)
+
+
+def acting(track: Track, surge: np.ndarray) -> tuple[Track, bool]:
+    """A run whose commanded force is that behind the described lags, and at its speed.
+
+    A rudder in a free flow has no force at rest, and a force that comes later than its command is none
+    that jumps: a smoother that takes it for one shifts the motion to the front.
+
+    Args:
+        track: the run.
+        surge: (n,), its speed ahead [m/s].
+
+    Returns:
+        The run, and whether its yaw moment depends on the speed, as that of a rudder.
+    """
+    run = track.run
+    of = ship(description=run.ship)
+    layout, given = of.layout_of(run.commands), run.commands
+    if given is None:
+        if not any(layout.lags):
+            return track, False
+        shares = layout.allocate(tuple(run.tau_cmd.T), of.nominal_drive.params)
+        given = np.column_stack(np.broadcast_arrays(*shares))
+    steps = np.diff(run.time, append=run.time[-1] + track.period)
+    each = zip(given.T, layout.lags, layout.round, strict=True)
+    commands = [lagged(np.unwrap(c) if angle else c, steps, lag) for c, lag, angle in each]
+    at_rest, tau = (of.commanded_force(np.column_stack(commands), run.power, u) for u in (0.0, surge))
+    steered = bool((tau[:, 2] != at_rest[:, 2]).any())
+    return replace(track, run=replace(run, tau_cmd=tau)), steered
+
+
+def lagged(x: np.ndarray, steps: np.ndarray, lag: float) -> np.ndarray:
+    """Means over steps [s] of a signal behind a lag of first order [s], x (n,) being held over each.
+
+    The signal before is the first.
+    """
+    if lag == 0.0:
+        return x
+    kept = np.exp(-steps / lag)
+    rises = zip(kept.tolist(), ((1.0 - kept) * x).tolist(), strict=True)
+    found = accumulate(rises, lambda y, step: step[0] * y + step[1], initial=float(x[0]))
+    begin = np.array([*found])[:-1]
+    return x + (begin - x) * (1.0 - kept) * lag / steps
+
+
+class Gains(NamedTuple):
+    """Accelerations in the body frame.
+
+    Attributes:
+        force: (3, 3), by a unit of each command.
+        bend: share of :attr:`Commands.bend` that acts.
+    """
+
+    force: np.ndarray
+    bend: float = 0.0
 
 
 class CommandResponse(NamedTuple):
@@ -54,12 +111,14 @@ class Commands:
         psi: (n,), its heading [rad], NaN where it is not known.
         grid: knots of the stretches, independent of each other, times counted from the first sample.
         at_rest: whether the ship hardly moves at first: then nothing was commanded before the run.
+        swing: (n,), u r [m/s2], by which the way bends where the heading turns; empty: none counts.
     """
 
     track: Track
     psi: np.ndarray
     grid: Knots
     at_rest: bool = False
+    swing: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def forgetting(self) -> float:
@@ -92,6 +151,14 @@ class Commands:
         """
         given = self.even - delay
         return (self._impulse(given + self.track.period) - self._impulse(given)) / self.track.period
+
+    @cached_property
+    def bend(self) -> np.ndarray:
+        """(m,), u r over each even step, an acceleration to starboard in the complex plane."""
+        known = np.isfinite(self.swing)
+        middle = self.even + 0.5 * self.track.period
+        swing = np.interp(middle, self.track.run.time[known], self.swing[known])
+        return 1j * self.rotation * swing
 
     def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
         """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
@@ -128,10 +195,13 @@ class Commands:
         parts = np.split(x, np.cumsum([part.size for part in self.parts])[:-1])
         return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
-    def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
-        """The motion by gains (3, 3), body-fixed acceleration by a unit of each, and a delay [s]."""
-        surge, sway, yaw = (self.delayed(delay) @ gains.T).T
-        a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
+    def response(self, gains: Gains, delay: float) -> CommandResponse:
+        """The motion by the commands, a delay [s] late, and by the bend of the way."""
+        surge, sway, yaw = (self.delayed(delay) @ gains.force.T).T
+        plane = self.rotation * (surge + 1j * sway)
+        if gains.bend:
+            plane = plane + gains.bend * self.bend
+        a = np.column_stack([plane, yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
         sampled = (between(self.track.run.time, self.even, each).T for each in (x, x_dot, x_ddot))

@@ -6,13 +6,14 @@ noise or noise for a jump. The pose is therefore modelled as
     eta(t) = f(t) + x(t),    (d/dt + 1/T)^2 x = R(psi) G tau(t - delay),
 
 f a smoothing spline (:mod:`.penalised`), G constant gains from the commanded force to a body-fixed
-acceleration, one 2 x 3 block for the plane and one row for yaw. Gains and delay have the largest
+acceleration, one 2 x 3 block for the plane and one row for yaw. tau is that of the described actuators
+at the ship's speed, behind their lags (:func:`.command_motion.acting`). Gains and delay have the largest
 likelihood with f integrated out, which is generalised least squares: with A the motions for unit gains,
 P the hat matrix of the spline, and r(a) the residuals [sqrt(W) (a - P a), sqrt(s) roughness of P a],
 
     g = argmin |r(z) - r(A) g|^2,    taken = r(z)^T r(A) g / sigma^2.
 
-No model of a ship enters. The likeliest delay alone proves nothing: the response of
+No model of a hull enters. The likeliest delay alone proves nothing: the response of
 :mod:`.command_motion` knows neither damping nor any other force, and where commands are slow, a delay
 makes up for what is missing. Therefore each delay is compared with none *beside* what a ship with
 damping would make of commands that act at once: motions by the commands behind some lags. A
@@ -31,7 +32,7 @@ from scipy.special import stdtrit
 
 from ..cleaning import BRIEF, WIDTH, between
 from ..run_constants import CHANCE, DIGITS
-from .command_motion import FORGETTING, CommandResponse, Commands
+from .command_motion import FORGETTING, CommandResponse, Commands, Gains
 from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
@@ -57,17 +58,22 @@ class Regression:
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
 
-    def gains(self, delay: float) -> np.ndarray:
-        """Body-fixed acceleration by a unit of each command, (3, 3), for a delay [s]."""
-        motions = self.motions(self.commands.delayed(delay))
+    def gains(self, delay: float, bent: bool = False) -> Gains:
+        """What the commands accelerate, and the bend of the way if that counts, for a delay [s]."""
+        plane, yaw = self.motions(self.commands.delayed(delay))
+        motions = np.hstack([plane, *([self.bend] if bent else [])]), yaw
         flat, turn = (least_squares(a, z[:, 0]) for a, z in zip(motions, self.pose, strict=True))
-        return np.vstack([flat.reshape(2, 3), turn])
+        return Gains(np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum()))
+
+    @property
+    def bend(self) -> np.ndarray:
+        """r(A) of the plane for the bend of the way, in one column."""
+        x = self._sampled(self.commands.bend[:, None])
+        return np.vstack([self._residual(0, np.real(x)), self._residual(1, np.imag(x))])
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
-        commands, time = self.commands, self.time + self.commands.track.run.time[0]
-        ahead = between(time, commands.even, commands.motion(commands.rotation[:, None] * tau)[0])
-        yaw = between(time, commands.even, commands.motion(tau)[0])
+        ahead, yaw = self._sampled(self.commands.rotation[:, None] * tau), self._sampled(tau)
         # A force to starboard moves the ship as one ahead does, a right angle further.
         north, east = np.real(ahead), np.imag(ahead)
         plane = {0: np.hstack([north, -east]), 1: np.hstack([east, north])}
@@ -75,6 +81,11 @@ class Regression:
         if not all(np.isfinite(part).all() for part in found):  # LAPACK may not end
             raise LinAlgError("the response to its commands is not finite")
         return found
+
+    def _sampled(self, a: np.ndarray) -> np.ndarray:
+        """Positions (n, k) in the rows of the pose, by accelerations (m, k) of even steps."""
+        time = self.time + self.commands.track.run.time[0]
+        return between(time, self.commands.even, self.commands.motion(a)[0])
 
     def _residual(self, channel: int, x: np.ndarray) -> np.ndarray:
         """r(x) of signals (n, k) in a channel, in units of the noise."""
@@ -164,7 +175,7 @@ def with_commands(
     delay, sure = likeliest_delay(regression)
     gains = regression.gains(delay)
     # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
-    least = deviance(p, weights, near) - 2.0 * (gains.size + 1)
+    least = deviance(p, weights, near) - 2.0 * (gains.force.size + 1)
     found: tuple[Problem, np.ndarray, CommandResponse] | None = None
     for _ in range(ROUNDS):
         response = commands.response(gains, delay)
@@ -180,3 +191,16 @@ def with_commands(
         return alone.problem, alone.smoothness, CommandResponse(still, still, still)
     rest, near, response = found
     return *adapt(rest, near, weights), response
+
+
+def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandResponse) -> CommandResponse:
+    """The response to the commands and the bend of the way, beside a spline as smooth as that of a fit.
+
+    A force to the side that turns the ship as well, as a rudder's, is soon followed by the larger force
+    of the turn, m u r, the other way. Gains alone would be those of the sum of both.
+    """
+    if np.isnan(response.delay) or not commands.swing.size:
+        return response
+    time = commands.track.run.time[p.rows] - commands.track.run.time[0]
+    gains = Regression(p, fit, commands, time).gains(response.delay, bent=True)
+    return commands.response(gains, response.delay)._replace(sure=response.sure)

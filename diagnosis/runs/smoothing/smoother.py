@@ -27,8 +27,8 @@ from ..measured_wind import air_along
 from ..run_constants import CHANCE, EVERY, HORIZON, LONG, ORDER
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
-from .command_motion import Commands, idle
-from .command_response import with_commands
+from .command_motion import CommandResponse, Commands, acting, idle
+from .command_response import with_bend, with_commands
 from .correlated_noise import with_correlated
 from .likelihood import adapt, criteria, likeliest, noise_uncertainty, with_noise
 from .outliers import Inliers, TooFewError, robust
@@ -285,13 +285,27 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
     still = idle(scale)
     slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
-    commands = Commands(track, psi, grid, bool(slow))
-    p, smoothness, response = with_commands(even, alone, fit, commands)
+    north, east, turn = bases[1](fit.coefficients).T
+    ahead, _ = rotate_to_body(psi[inside], north, east)
+    surge, swing = (np.interp(time, time[inside], x) for x in (ahead, ahead * turn))
+    late, steered = acting(track, surge)
+    commands = Commands(late, psi, grid, bool(slow), swing if steered else swing[:0])
+    p, smoothness, by_commands = with_commands(even, alone, fit, commands)
+    response = with_bend(even, solve(p, smoothness, weights), commands, by_commands)
     rates = measured_rates(track, dense, psi, agreeing, grid)
-    if rates is not None:
+
+    def without(p: Problem, motion: CommandResponse) -> Problem:
+        """The measurements less a motion."""
+        p = p._replace(z=even.z - motion.eta[dense])
+        if rates is None:
+            return p
         at, beside = rates
-        beside = beside._replace(z=np.where(beside.share > 0.0, beside.z - response.eta_dot[at], 0.0))
-        p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
+        z = np.where(beside.share > 0.0, beside.z - motion.eta_dot[at], 0.0)
+        return p.adapted(rates=beside._replace(z=z))
+
+    if rates is not None:
+        p, smoothness = adapt(without(p, by_commands), smoothness, weights)
+    p = without(p, response)
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
     estimated = np.isnan(given_noise(track))
