@@ -31,7 +31,7 @@ from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
 from ..cleaning import BRIEF, WIDTH, between
-from ..run_constants import CHANCE, DIGITS
+from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
 from .command_motion import FORGETTING, CommandResponse, Commands, Gains
 from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
@@ -62,7 +62,11 @@ class Regression:
         """What the commands accelerate, and the bend of the way if that counts, for a delay [s]."""
         plane, yaw = self.motions(self.commands.delayed(delay))
         motions = np.hstack([plane, *([self.bend] if bent else [])]), yaw
-        flat, turn = (least_squares(a, z[:, 0]) for a, z in zip(motions, self.pose, strict=True))
+        # Side force and yaw moment of a rudder go together; where they differ for once, gains of their
+        # difference, by which nothing else is explained, would be anything.
+        flat, turn = (
+            least_squares(a, z[:, 0], NEGLIGIBLE**2) for a, z in zip(motions, self.pose, strict=True)
+        )
         return Gains(np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum()))
 
     @property
@@ -102,11 +106,17 @@ class Regression:
         return np.unique(rows // (WIDTH * self.time_scale), return_inverse=True)[1]
 
 
-def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """x of least |z - a x|; columns that do not differ share their effect evenly."""
+def least_squares(a: np.ndarray, z: np.ndarray, apart: float = DIGITS) -> np.ndarray:
+    """x of least |z - a x|; columns that do not differ share their effect evenly.
+
+    Args:
+        a, z: (n, k) and (n,).
+        apart: share of the largest squared singular value, of columns of length one, below which they
+            do not differ.
+    """
     size = np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
     scaled = a / size
-    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=DIGITS)[0] / size
+    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=apart)[0] / size
 
 
 def likeliest_delay(regression: Regression) -> tuple[float, bool]:
