@@ -9,7 +9,9 @@ from support.measured import DATA, NOISE, base, needs_data, smoothed, true_nu
 from diagnosis import Run, clean, read, smooth
 from diagnosis.predictors import ship_with
 from diagnosis.runs import without_commands
+from diagnosis.runs.run_constants import NEGLIGIBLE
 from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, acting, lagged
+from diagnosis.runs.smoothing.command_response import least_squares
 from diagnosis.runs.smoothing.spline import knots
 from fmus.ops import wrap
 
@@ -104,6 +106,15 @@ def test_commands_that_are_the_same_are_no_trouble():
     found = smooth(clean(same))
     assert np.isfinite(found.nu).all()
     assert rms((found.eta_dot - eta_dot)[INNER])[0] < 2e-3
+
+
+def test_commands_that_differ_for_a_moment_are_not_told_apart():
+    """What happens in that moment would be the work of their difference, however large."""
+    command, moment = np.sin(0.01 * np.arange(N)), np.arange(N) < 5
+    a = np.column_stack([command, command + 0.1 * moment])
+    z = command + 3.0 * moment
+    assert np.abs(least_squares(a, z)).max() > 20.0
+    assert least_squares(a, z, NEGLIGIBLE**2) == pytest.approx([0.5, 0.5], abs=0.02)
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
