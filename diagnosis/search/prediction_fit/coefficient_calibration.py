@@ -26,7 +26,7 @@ from .disturbance import ForceDisturbance
 from .disturbance_summary import unrecorded
 from .fit import Fitted, PredictionFit, fit_to, shootings
 from .joint_posterior import JointPosterior
-from .refit import RefitOutcome, Spread
+from .refit import RefitOutcome, WindowSpread
 
 # 1; effects whose coefficients models of few terms leave out, and their prior deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
@@ -41,7 +41,7 @@ AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; 
 STREAM = 0.05
 
 
-LEAST = 1e-4  # 1, factor of the variance of the unrecorded force, or one over it; beyond, it is none
+LEAST = 1e-4  # 1, factor of the variance of the disturbance, or one over it; beyond, there is none
 
 
 class Calibration(PredictionFit):
@@ -113,14 +113,17 @@ class Calibrator:
 def as_missed(
     problem: Calibration, fitted: Fitted, model: Model, posterior: JointPosterior
 ) -> ForceDisturbance:
-    """The unrecorded force, so large that windows left out of the fit are missed as bands expect.
+    """The disturbance, so large that windows left out of the fit are missed as bands expect.
 
     Then the mean square of what is missed there is one, in standard deviations of the bands.
     """
     names = [n for n, std in posterior.std.items() if std > 0.0]
     squares, still, pushed = [], [], []
     for shots, fold in zip(problem.windows, problem.fold_of_window, strict=True):
-        about, missed = Spread.of(shots, model, posterior, fitted.push), np.zeros(shots.measured.shape)
+        about, missed = (
+            WindowSpread.of(shots, model, posterior, fitted.push),
+            np.zeros(shots.measured.shape),
+        )
         for k, other in enumerate(fitted.fold_models):
             step = [other.value(n) - model.value(n) for n in names]
             missed[fold == k] = about.residuals[fold == k] - about.slopes[fold == k] @ step

@@ -135,14 +135,14 @@ def prediction_bands(
     if windows is None:
         return None
     shots = Shooting([smoothed], windows.length)
-    about = Spread.of(shots, model, posterior, push)
+    about = WindowSpread.of(shots, model, posterior, push)
     found = np.concatenate([np.zeros_like(about.still[:, :1]), about.still + about.pushed], axis=1)
     found[:, 0, range(3), range(3)] = shots.at_start[:, :3]
     found[..., range(3), range(3)] += smoothed.noise**2
     return Bands(windows, np.concatenate([[0.0], shots.since]), about.predicted, found)
 
 
-class Spread(NamedTuple):
+class WindowSpread(NamedTuple):
     """How uncertain predicted poses are at the instants of windows.
 
     Attributes:
@@ -162,7 +162,7 @@ class Spread(NamedTuple):
     @classmethod
     def of(
         cls, shots: Shooting, model: Model, posterior: JointPosterior, push: ForceDisturbance
-    ) -> "Spread":
+    ) -> "WindowSpread":
         """About a model's predictions, see :func:`prediction_bands`."""
         std = posterior.std
         around = shots.around(model, {n: SMALL * s for n, s in std.items() if s > 0.0})
