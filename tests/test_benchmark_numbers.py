@@ -44,6 +44,7 @@ SHIPS = {
     "seven training tests of Esso Osaka": "esso_osaka_tzrb, 60 s",
 }
 METHODS = {"`learn --quick`": "calibrated", "`learn`": "learned", "ridge": "ridge", "initial": "nominal"}
+METHODS |= {"network": "neural"}
 
 
 def test_methods_on_measured_ships_are_those_of_the_results():
