@@ -237,6 +237,21 @@ def test_a_gain_in_position_that_costs_heading_says_so(heading, told):
     assert ("the mean square rises by 0.0" in said) is (heading < 0.0)
 
 
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        ((-2.1, -2.1), " Predictions of the position and the heading are worse."),
+        ((-2.1, 1.0), " Predictions of the position are worse."),
+        ((-1.9, -1.9), ""),
+    ],
+)
+def test_a_model_that_predicts_worse_is_said_to(times, told):
+    changes = [PairedChange(0.01, 0.02, x * 1e-5, 1e-5) for x in times]
+    gain = PredictionGain("validation runs", 54, *changes, False)
+    said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, 10.0)
+    assert " ".join(said).startswith(f"{SEARCH_GAINED_NOTHING}{told} Predictions over 10 s in 54")
+
+
 @pytest.mark.parametrize("gained", [True, False])
 def test_what_the_search_gained_is_the_first_sentence(gained):
     change = PairedChange(0.032, 0.0089, 9.4e-4, 1.1e-4)

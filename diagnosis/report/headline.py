@@ -96,9 +96,10 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
         way = "falls" if change.difference >= 0.0 else "rises"
         by, std = (number(abs(x), 2, factor**2) for x in (change.difference, change.standard_error))
         parts.append(f"{name} {errors} {unit} (the mean square {way} by {by} ± {std} {unit}²)")
-        worse += [name] if change.is_worse else []
+        worse += [f"the {name}"] if change.is_worse else []
     where = f"Predictions over {number(over)} s in {gain.windows} windows of {gain.where}"
-    but = [f"However, predictions of the {worse[0]} are worse."] if gain.gained and worse else []
+    of = "However, predictions of" if gain.gained else "Predictions of"
+    but = [f"{of} {' and '.join(worse)} are worse."] if worse else []
     return [gained if gain.gained else nothing, *but, f"{where}: {', '.join(parts)}."]
 
 
