@@ -54,6 +54,12 @@ def fit():
     return problem, fit_to(problem, at)
 
 
+class Unscaled(Calibration):
+    """The same fit with the disturbance that the model error shows."""
+
+    share = PredictionFit.share
+
+
 def nothing_found(sigma=1.0):
     return Findings(sigma=np.full(3, sigma), estimate=RefinedModel.at(Model(), PRIOR), searched=PRIOR)
 
@@ -84,7 +90,7 @@ def test_the_disturbance_is_scaled_to_what_the_windows_miss():
     """Its share of the information is the mean square of whitened residuals over the expected one."""
     problem, fitted = fit()
     at, (windows,) = fitted.estimate, problem.windows
-    plain = PredictionFit(runs(), problem.windows, at, PRIOR).information(at)
+    plain = Unscaled(runs(), problem.windows, at, PRIOR).information(at)
     share = np.trace(problem.information(at).G) / np.trace(plain.G)
     model = at.model(PRIOR)
     (W,), around = plain.weights, problem.around(windows, model)
