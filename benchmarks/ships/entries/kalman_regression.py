@@ -11,6 +11,7 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from diagnosis import Smoothed
 
@@ -36,6 +37,7 @@ def smoothed_velocity(law: Continuous, t: Table, process: float) -> np.ndarray:
         process: standard deviation of the acceleration that the predictor lacks.
     """
     h, n = t.h, len(t.pose)
+    given = pd.DataFrame(t.given).ffill().bfill().to_numpy()  # in a gap as before it
     Q = np.diag([*[(0.5 * process * h * h) ** 2] * 3, *[(process * h) ** 2] * 3])
     R, H = np.diag(t.noise**2), np.eye(3, 6)
     start = np.flatnonzero(np.isfinite(t.pose[:, 0]))[0]
@@ -45,7 +47,7 @@ def smoothed_velocity(law: Continuous, t: Table, process: float) -> np.ndarray:
     for k in range(n):
         if k:
             points = x + np.vstack([np.zeros(6), SMALL * np.eye(6)])
-            nu = law.step(points[None, :, 3:], np.repeat(t.given[None, [k - 1]], 7, axis=1))
+            nu = law.step(points[None, :, 3:], np.repeat(given[None, [k - 1]], 7, axis=1))
             after = np.hstack([moved(points[:, :3], 0.5 * (points[:, 3:] + nu), h), nu])
             x, F = after[0], (after[1:] - after[0]).T / SMALL
             P = F @ P @ F.T + Q
