@@ -97,15 +97,13 @@ class Shooting:
         like = like or model
         if not like.runs:
             return self._stepped(self.starts, model, like)
-        parts = [
-            self._stepped(one, model.during(name), like.during(name)) for name, one in self._each.items()
-        ]
+        parts = [self._stepped(one, model.during(name), like.during(name)) for name, one in self._each]
         return [_beside(states) for states in zip(*parts, strict=True)]
 
     @cached_property
-    def _each(self) -> dict[str, WindowStarts]:
-        """The windows of each run, by its name."""
-        return {one[0].track.run.name: replace(self.starts, runs=(one,)) for one in self.starts.runs}
+    def _each(self) -> list[tuple[str, WindowStarts]]:
+        """The name of each run, and its windows."""
+        return [(one[0].track.run.name, replace(self.starts, runs=(one,))) for one in self.starts.runs]
 
     def _stepped(self, starts: WindowStarts, model: Model, like: Model) -> list[vessel.State]:
         steps = propagate(starts, model, self._arriving(starts, like))
@@ -165,7 +163,7 @@ class Shooting:
         starts = self.starts
         row = np.minimum(PARTS * np.arange(INSTANTS + 1), starts.steps - 1)
         if model.runs:
-            each = [self._arriving(one, model.during(name)) for name, one in self._each.items()]
+            each = [self._arriving(one, model.during(name)) for name, one in self._each]
             thrust = [np.concatenate(part, axis=-1) for part in zip(*each, strict=True)]
         else:
             thrust = [*self._arriving(starts, model)]

@@ -146,9 +146,8 @@ class Worker:
             step(k * h)
             told += self._outputs
             for y in seen.tolist():
-                if (
-                    not -DIVERGED < y < DIVERGED
-                ):  # some tools integrate for hours once a state is infinite
+                # Some tools integrate for hours once a state is infinite.
+                if not -DIVERGED < y < DIVERGED:
                     return told.hex()
         self._instance.terminate()
         return told.hex()

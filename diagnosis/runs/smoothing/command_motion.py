@@ -111,7 +111,7 @@ class Commands:
         psi: (n,), its heading [rad], NaN where it is not known.
         grid: knots of the stretches, independent of each other, times counted from the first sample.
         at_rest: whether the ship hardly moves at first: then nothing was commanded before the run.
-        swing: (n,), u r [m/s2], by which the way bends where the heading turns; empty: none counts.
+        swing: (n,), u r [m/s2], by which the way bends where the heading turns.
     """
 
     track: Track

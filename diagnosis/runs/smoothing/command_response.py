@@ -209,8 +209,6 @@ def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandRespons
     A force to the side that turns the ship as well, as a rudder's, is soon followed by the larger force
     of the turn, m u r, the other way. Gains alone would be those of the sum of both.
     """
-    if np.isnan(response.delay) or not commands.swing.size:
-        return response
     time = commands.track.run.time[p.rows] - commands.track.run.time[0]
     gains = Regression(p, fit, commands, time).gains(response.delay, bent=True)
     return commands.response(gains, response.delay)._replace(sure=response.sure)

@@ -289,9 +289,11 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     ahead, _ = rotate_to_body(psi[inside], north, east)
     surge, swing = (np.interp(time, time[inside], x) for x in (ahead, ahead * turn))
     late, steered = acting(track, surge)
-    commands = Commands(late, psi, grid, bool(slow), swing if steered else swing[:0])
+    commands = Commands(late, psi, grid, bool(slow), swing)
     p, smoothness, by_commands = with_commands(even, alone, fit, commands)
-    response = with_bend(even, solve(p, smoothness, weights), commands, by_commands)
+    response = by_commands
+    if steered and not np.isnan(by_commands.delay):
+        response = with_bend(even, solve(p, smoothness, weights), commands, by_commands)
     rates = measured_rates(track, dense, psi, agreeing, grid)
 
     def without(p: Problem, motion: CommandResponse) -> Problem:

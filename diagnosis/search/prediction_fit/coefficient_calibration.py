@@ -39,9 +39,7 @@ AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; 
 # 1, prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
 # for a ship of 34 m; chosen.
 STREAM = 0.05
-
-
-LEAST = 1e-4  # 1, factor of the variance of the disturbance, or one over it; beyond, there is none
+LEAST = 1e-4  # 1, factor of the variance of the disturbance, or one over it; chosen
 
 
 class Calibration(PredictionFit):
@@ -120,10 +118,8 @@ def as_missed(
     names = [n for n, std in posterior.std.items() if std > 0.0]
     squares, still, pushed = [], [], []
     for shots, fold in zip(problem.windows, problem.fold_of_window, strict=True):
-        about, missed = (
-            WindowSpread.of(shots, model, posterior, fitted.push),
-            np.zeros(shots.measured.shape),
-        )
+        about = WindowSpread.of(shots, model, posterior, fitted.push)
+        missed = np.zeros(shots.measured.shape)
         for k, other in enumerate(fitted.fold_models):
             step = [other.value(n) - model.value(n) for n in names]
             missed[fold == k] = about.residuals[fold == k] - about.slopes[fold == k] @ step
@@ -137,9 +133,13 @@ def as_missed(
     def off(log_factor: float) -> float:
         return float(np.log(np.mean(s / (v + np.exp(log_factor) * p))))
 
-    factor = LEAST if off(np.log(LEAST)) < 0.0 else 1.0 / LEAST
-    if off(-np.log(LEAST)) < 0.0 < off(np.log(LEAST)):
-        factor = np.exp(float(brentq(off, np.log(LEAST), -np.log(LEAST))))  # pyright: ignore
+    low, high = np.log(LEAST), -np.log(LEAST)
+    if off(low) <= 0.0:
+        factor = LEAST
+    elif off(high) >= 0.0:
+        factor = 1.0 / LEAST
+    else:
+        factor = np.exp(float(brentq(off, low, high)))  # pyright: ignore
     return replace(fitted.push, size=fitted.push.size * np.sqrt(factor))
 
 
