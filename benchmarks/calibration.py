@@ -93,7 +93,7 @@ def fitted(problem: Problem) -> tuple[Fitted, NominalPrior, list]:
     for _ in range(2):  # the second time with what the first leaves as noise
         sigma = np.sqrt(np.mean(model_error(train, at.model(prior)) ** 2, axis=0))
         at, _ = fit_model_error(at, sigma, train, prior)
-    return fit_to(PredictionFit(train, shootings(train), at, prior), at), prior, runs
+    return fit_to(PredictionFit(train, shootings(train, at.model(prior)), at, prior), at), prior, runs
 
 
 def simulated(seeds: Sequence[int], noise: str, folder: Path) -> Found:

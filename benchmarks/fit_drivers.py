@@ -106,7 +106,7 @@ def prediction(runs: Sequence[WeakWindows], driver: str) -> Tally:
     model, count = Model(), Counter[str]()
     prior = NominalPrior.of(model)
     at = RefinedModel(model, np.zeros(prior.size), {EFFECT: 0.0}, np.zeros((1, 1)))
-    problem = PredictionFit(runs, shootings(runs), at, prior)
+    problem = PredictionFit(runs, shootings(runs, model), at, prior)
     L, first, begun = root(problem.precision), problem.theta(at), time.process_time()
     if driver == DRIVERS[0]:
         cost, information = problem.cost, problem.information

@@ -50,7 +50,7 @@ def runs(drag=DRAG, east=0.0):
 @cache
 def fit():
     at = begin(Model(), PRIOR)
-    problem = Calibration(runs(), shootings(runs(), [1.0]), at, PRIOR)
+    problem = Calibration(runs(), shootings(runs(), Model(), [1.0]), at, PRIOR)
     return problem, fit_to(problem, at)
 
 

@@ -17,7 +17,7 @@ from benchmarks.ship_effects import sail as sail_of
 from diagnosis import Smoothed, load
 from diagnosis.predictors import Model, ship_with, shooting, weak_windows
 from diagnosis.predictors.prediction import WindowStarts, at_rest
-from diagnosis.predictors.shooting import Linear, Shooting
+from diagnosis.predictors.shooting import ACCURATE, PARTS, Linear, Shooting
 from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
@@ -144,7 +144,7 @@ def as_modelled():
 def fitted():
     prior = NominalPrior.of(Model(), {"damping": 0.1})
     at = RefinedModel(Model(), np.zeros(prior.size), {"delta_X_u": -0.5}, np.zeros((1, 1)))
-    return fit_to(PredictionFit([hidden()], shootings([hidden()]), at, prior), at), prior
+    return fit_to(PredictionFit([hidden()], shootings([hidden()], Model()), at, prior), at), prior
 
 
 def test_model_without_a_stretch_is_fitted_to_the_others():
@@ -214,13 +214,33 @@ def test_coarse_steps_predict_what_fine_ones_do():
 
 
 @cache
-def zigzag():
-    """A tanker whose rudder goes to and fro."""
+def zigzag(half=750):
+    """A tanker whose rudder goes to and fro every so many samples."""
     ship = ship_with((), "kvlcc2")
-    way = ((10.0, 0.3 if k % 1500 < 750 else -0.3) for k in count())
+    way = ((10.0, 0.3 if k % (2 * half) < half else -0.3) for k in count())
     log = sail_of(ship, causes(ship)["none"], np.random.default_rng(1), None, way, seconds=90.0)
     (w,) = load(log, model=Model(ship=ship))
     return w.smoothed, Model(ship=ship)
+
+
+@pytest.mark.parametrize(("half", "longest"), [(750, True), (23, False)])
+def test_steps_are_short_where_commands_change_within_them(half, longest):
+    """The drag of a rudder that changes sides within a step is not that of its mean angle."""
+    run, model = zigzag(half)
+    found, coarse, fine = Shooting.accurate([run], 20.0, model), *(Shooting([run], 20.0) for _ in "12")
+    fine.parts, fine.starts = (
+        128,
+        replace(fine.starts, h=fine.starts.h / 32, steps=32 * fine.starts.steps),
+    )
+    assert (found.parts == PARTS) == longest
+    exact, off = (
+        fine.residuals(model),
+        [np.abs(s.residuals(model) - fine.residuals(model)) for s in (found, coarse)],
+    )
+    size = np.sqrt(np.mean(exact**2))
+    near, far = (np.sqrt(np.mean(x**2)) / size for x in off)
+    assert near < 2.0 * ACCURATE
+    assert (far < 2.0 * ACCURATE) == longest
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -254,7 +274,7 @@ def test_lasting_push_moves_a_ship_at_rest_by_half_the_acceleration_times_time_s
     slope[:, :, [0, 1, 2], [3, 4, 5]] = 1.0
     motion = Linear(slope, np.diag([0.1, 0.2, 0.5]), 0.25)
     V = covariance(
-        motion, np.zeros((1, 6)), ForceDisturbance(np.array([1.0, 2.0, 3.0]), np.full(3, 1e9))
+        motion, np.zeros((1, 6, 6)), ForceDisturbance(np.array([1.0, 2.0, 3.0]), np.full(3, 1e9))
     )
     moved = 0.5 * np.array([0.1, 0.4, 1.5]) * 2.0**2
     np.testing.assert_allclose(np.sqrt(np.diag(V[0, -1, :, -1])), moved, rtol=1e-5)
@@ -340,7 +360,7 @@ def test_covariance_of_a_windows_mean_is_the_double_integral():
 
 
 def test_initial_state_alone_gives_its_own_covariance():
-    start = np.array([[1.0, 2.0, 0.0, 0.1, 0.0, 0.5]])
+    start = np.diag([1.0, 2.0, 0.0, 0.1, 0.0, 0.5])[None]
     slope = np.zeros((1, 4, 6, 6))
     slope[:, :, [0, 1, 2], [3, 4, 5]] = 1.0
     V = covariance(Linear(slope, np.eye(3), 0.5), start, NO_PUSH)
@@ -437,7 +457,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
     for _ in range(2):  # the second time with what the first leaves as noise
         sigma = np.sqrt(np.mean(model_error(data, at.model(prior)) ** 2, axis=0))
         at, std = fit_model_error(at, sigma, data, prior)
-    fit = fit_to(PredictionFit(data, shootings(data), at, prior), at)
+    fit = fit_to(PredictionFit(data, shootings(data, Model()), at, prior), at)
     true = LIGHTLY_DAMPED - Model().value("N_r")
     assert at.values["delta_N_r"] - true > 3.0 * std["delta_N_r"]
     found, error = fit.estimate.values["delta_N_r"], np.sqrt(fit.covariance[0, 0])

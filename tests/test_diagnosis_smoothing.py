@@ -15,6 +15,7 @@ from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
 from diagnosis.runs.smoothing.penalised import LinearSystem, Problem, Rates, Spline, solve
 from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, middles, roughness, third
+from fmus.frames import rotate_to_body
 
 pytestmark = pytest.mark.numerical
 N = 3000
@@ -119,6 +120,21 @@ def test_velocity_of_a_ship_is_unbiased_and_sharp():
     assert (rms < (5e-4, 5e-4, 1e-3)).all(), "below half a millimetre per second"
     normalised = np.sqrt(np.mean((error / smooth_base().nu_std[INNER]) ** 2, axis=0))
     assert ((normalised > 0.5) & (normalised < 1.6)).all()
+
+
+def test_an_error_of_the_heading_is_one_of_the_body_s_velocity():
+    """Of states whose pose and rate have independent errors, and are seen from the body."""
+    s, row, rng = smooth_base(), 700, np.random.default_rng(4)
+    eta, rate = (
+        x[row] + std[row] * rng.normal(size=(200_000, 3))
+        for x, std in ((s.eta, s.eta_std), (s.eta_dot, s.eta_dot_std))
+    )
+    nu = np.column_stack([*rotate_to_body(eta[:, 2], *rate.T[:2]), rate[:, 2]])
+    (found,) = s.state_covariance(np.array([row]))
+    expected, size = np.cov(np.hstack([eta, nu]).T), np.sqrt(found.diagonal())
+    np.testing.assert_allclose(expected / np.outer(size, size), found / np.outer(size, size), atol=0.02)
+    assert abs(found[2, 3:5]).max() > 0.1 * size[2] * size[3:5].min(), "they go together"
+    np.testing.assert_allclose(size[3:], s.nu_std[row])
 
 
 def test_without_noise_nothing_is_lost():

@@ -51,6 +51,21 @@ def test_numbers(name):
     assert recorded(b, i, single=True)(*s, *i.given, *i.acting, H) == step(s, i, b, H)
 
 
+def test_the_rudder_s_force_follows_the_motion_within_a_step():
+    """So the order is that of the integration, four: half the step, a sixteenth of the error."""
+    model = Model(ship=ship_with((), "kvlcc2"))
+    b, i = Ready(model.hull, model.drive), Inputs((8.0, 0.3), (0.9, 0.5))
+    ends = []
+    for steps in (8, 16, 64):
+        s = vessel.State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        for _ in range(steps):
+            s = step(s, i, b, 8.0 / steps)
+        ends.append(np.array(s[:6]))
+    coarse, fine = (np.linalg.norm(x - ends[-1]) for x in ends[:2])
+    assert 11.0 < coarse / fine < 25.0
+    assert abs(ends[-1][2]) > 0.05, "it turns"
+
+
 def by_step(start, given, acting, b):
     """The states (steps + 1, 7, 3, 5) by the functions that a step is recorded from."""
     s, found = start, []

@@ -237,17 +237,17 @@ def propagate(
         return
     for k, i in enumerate(steps):
         with np.errstate(all="ignore"):
-            tau, hull = thrust_at(s, i, ready, h)
-            s = vessel.integrate(s, tau, hull, h, _with(beside[0][k], beside[1][k]))
+            s = vessel.integrate(s, i, ready, h, _with(beside[0][k], beside[1][k]))
         yield s
 
 
 def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
     """Law of the motion with a force (3, 1, w) beside all else, and its slopes (3, 6, 1, w)."""
 
-    def law(s: vessel.State, tau: Force, b: Any) -> Any:
+    def law(s: vessel.State, i: Inputs, b: Ready) -> Any:
+        tau, hull = thrust_at(s, i, b)
         beside = still + sum(slope[:, k] * x for k, x in enumerate(s[:6]))
-        return vessel.disturbed(s, Force(*(f + g for f, g in zip(tau, beside, strict=True))), b)
+        return vessel.disturbed(s, Force(*(f + g for f, g in zip(tau, beside, strict=True))), hull)
 
     return law
 

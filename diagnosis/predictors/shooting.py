@@ -23,7 +23,10 @@ from .traced.recorded_step import Inputs, Ready, thrust_at
 from .windows import usable_windows
 
 INSTANTS = 16  # 1, of a window at which pose and prediction are compared
-PARTS = 4  # 1, steps between two instants: a tenth of the quickest motion's time in the longest windows
+# 1, steps between two instants: at least a tenth of the quickest motion's time in the longest windows;
+# at most, where a command that changes within a step has other effects than its mean.
+PARTS, MOST_PARTS = 4, 64
+ACCURATE = 0.05  # 1, change of predictions by half the step, as a share of the residuals; chosen
 UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
 
 
@@ -70,15 +73,16 @@ class Shooting:
 
     Attributes:
         runs: as given.
+        parts: steps between two instants.
         run, start: (w,), number of each window's run, and when it starts [s].
         since: (T,), time from a window's start to its instants [s].
         measured: (w, T, 3), pose [m, m, rad], the mean of the samples around each instant.
         noise: (w, T, 3), its variance by the measurement's noise, UNKNOWN without a sample.
-        at_start: (w, 6), variance of x, y, psi, u, v, r where windows begin.
+        at_start: (w, 6, 6), covariance of x, y, psi, u, v, r where windows begin.
     """
 
     def __init__(self, runs: Sequence[Smoothed], length: float) -> None:
-        self.runs = tuple(runs)
+        self.runs, self.parts = tuple(runs), PARTS
         rows = [usable_windows(smoothed, length).first_rows for smoothed in runs]
         self.every = length / INSTANTS
         groups = tuple(zip(runs, rows, strict=True))
@@ -88,9 +92,24 @@ class Shooting:
         self.start = np.concatenate([s.time[r] for s, r in groups])
         seen = [_seen(s, s.time[r][:, None] + self.since, 0.5 * self.every) for s, r in groups]
         self.measured, self.noise = (np.concatenate(part) for part in zip(*seen, strict=True))
-        std = [np.hstack([s.eta_std[r], s.nu_std[r]]) for s, r in groups]
-        self.at_start = np.concatenate(std) ** 2
+        self.at_start = np.concatenate([s.state_covariance(r) for s, r in groups])
         self._thrust: dict[object, tuple[object, tuple[np.ndarray, np.ndarray]]] = {}
+
+    @classmethod
+    def accurate(cls, runs: Sequence[Smoothed], length: float, model: Model) -> "Shooting":
+        """Windows with steps so short that a model's residuals hardly change if they are halved."""
+        found = cls(runs, length)
+        residuals = found.residuals(model)
+        while found.parts < MOST_PARTS:
+            finer = cls(runs, length)
+            finer.parts = 2 * found.parts
+            finer.starts = replace(found.starts, h=0.5 * found.starts.h, steps=2 * found.starts.steps)
+            coarse, residuals = residuals, finer.residuals(model)
+            changes, left = _squares(_off(residuals, coarse)), _squares(residuals)
+            if (changes <= ACCURATE**2 * left).all():
+                break
+            found = finer
+        return found
 
     def _states(self, model: Model, like: Model | None = None) -> list[vessel.State]:
         """States at the start and at the instants; the thrusters respond as those of ``like``."""
@@ -107,7 +126,7 @@ class Shooting:
 
     def _stepped(self, starts: WindowStarts, model: Model, like: Model) -> list[vessel.State]:
         steps = propagate(starts, model, self._arriving(starts, like))
-        return [s for k, s in enumerate(steps) if k % PARTS == 0]
+        return [s for k, s in enumerate(steps) if k % self.parts == 0]
 
     def _arriving(self, starts: WindowStarts, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares that act, kept for models whose thrusters respond alike."""
@@ -150,10 +169,11 @@ class Shooting:
         first = [[np.broadcast_arrays(x, s.u)[0][0] for x in s] for s in states]
         s = vessel.State._make(np.array(first).swapaxes(0, 1))
         least = DIGITS * np.array([1.0, *model.ship.scale.speeds])
-        reach = np.maximum(np.sqrt(3.0 * self.at_start.T[2:]), least[:, None])
+        variance = self.at_start[:, range(2, 6), range(2, 6)].T
+        reach = np.maximum(np.sqrt(3.0 * variance), least[:, None])
         ready = Ready(model.hull, self.starts.drive(model))
         with np.errstate(all="ignore"):
-            rates = _slopes(s, self._inputs(model), ready, self.starts.h, reach)
+            rates = _slopes(s, self._inputs(model), ready, reach)
         i11, i22, i23, i32, i33 = model.hull.hull.inverse
         by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
@@ -161,7 +181,7 @@ class Shooting:
     def _inputs(self, model: Model) -> Inputs:
         """What acts at the start and at the instants, each (T + 1, w)."""
         starts = self.starts
-        row = np.minimum(PARTS * np.arange(INSTANTS + 1), starts.steps - 1)
+        row = np.minimum(self.parts * np.arange(INSTANTS + 1), starts.steps - 1)
         if model.runs:
             each = [self._arriving(one, model.during(name)) for name, one in self._each]
             thrust = [np.concatenate(part, axis=-1) for part in zip(*each, strict=True)]
@@ -203,6 +223,12 @@ def _beside(states: Sequence[vessel.State]) -> vessel.State:
     return vessel.State._make(np.concatenate(x, axis=-1) for x in zip(*whole, strict=True))
 
 
+def _squares(off: np.ndarray) -> np.ndarray:
+    """(2,): sums of squares of position and heading (w, T, 3), but for windows that run away."""
+    x, y, psi = np.square(off[np.isfinite(off).all(axis=(1, 2))]).sum(axis=(0, 1))
+    return np.array([x + y, psi])
+
+
 def _off(pose: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Difference of poses (..., 3), heading wrapped."""
     with np.errstate(invalid="ignore"):
@@ -211,20 +237,19 @@ def _off(pose: np.ndarray, other: np.ndarray) -> np.ndarray:
     return off
 
 
-def _slopes(s: vessel.State, i: Inputs, b: Ready, h: float, reach: np.ndarray) -> np.ndarray:
+def _slopes(s: vessel.State, i: Inputs, b: Ready, reach: np.ndarray) -> np.ndarray:
     """(w, T, 6, 6), derivative of the rate of pose and velocity by themselves, with what acts.
 
     Args:
         s, i: states and inputs, each (T, w).
         b: of the model.
-        h: step [s].
         reach: (4, w), of psi, u, v and r; the slope is the mean between both sides. Over the square root
             of three standard deviations it is right for a normal distribution to the third order
             (M. Nørgaard, N. K. Poulsen, O. Ravn, Automatica 36, 2000), and a small jump does no harm.
     """
 
     def rate(at: vessel.State) -> np.ndarray:
-        tau, hull = thrust_at(at, i, b, h)
+        tau, hull = thrust_at(at, i, b)
         return np.stack(np.broadcast_arrays(*vessel.disturbed(at, tau, hull), at.u)[:3], axis=-1)
 
     c, sn = np.cos(s.psi), np.sin(s.psi)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmus.actuators.response import CommandLayout, PreparedThrusters
+from fmus.hull import Triple
 from fmus.ops import when
 from fmus.signals import Force
 from fmus.vessel import vessel
@@ -43,21 +44,26 @@ class Inputs(NamedTuple):
     air: Sequence[Any] | None = None
 
 
-def thrust_at(s: vessel.State, i: Inputs, b: Ready, h: Any) -> tuple[Force, vessel.PreparedVessel]:
-    """tau [N, N, N m] during a step, and the vessel in the wind there."""
+def thrust_at(s: vessel.State, i: Inputs, b: Ready) -> tuple[Force, vessel.PreparedVessel]:
+    """tau [N, N, N m] in a state, and the vessel in the wind there."""
     drive = b.drive if i.power is None else b.layout.powered(b.drive, i.power)
     hull = b.hull if i.air is None else vessel.blown(b.hull, s, *i.air)
-    now = b.layout.running(s.t + h, *inflow(s, hull), tuple(i.given), drive)
+    now = b.layout.running(s.t, *inflow(s, hull), tuple(i.given), drive)
     return Force(*b.layout.act(tuple(i.acting), now, drive)), hull
 
 
 def step(s: vessel.State, i: Inputs, b: Ready, h: Any) -> vessel.State:
     """The ship a step of h [s] later."""
-    tau, hull = thrust_at(s, i, b, h)
+    return vessel.integrate(s, i, b, h, driven)
+
+
+def driven(s: vessel.State, i: Inputs, b: Ready) -> Triple:
+    """nu_dot of the ship by its thrusters, whose force changes with the motion within a step."""
+    tau, hull = thrust_at(s, i, b)
     return when(
         hull.disturbed,
-        lambda: vessel.integrate(s, tau, hull, h, vessel.disturbed),
-        lambda: vessel.integrate(s, tau, hull.hull, h),
+        lambda: vessel.disturbed(s, tau, hull),
+        lambda: vessel.nominal(s, tau, hull.hull),
     )
 
 

@@ -137,6 +137,10 @@ class Smoothed(ShortRepr):
         of_rows = {n: x[keep] for n, x in arrays.items() if len(x) == keep.size}
         return replace(self, track=self.track.rows(keep), **of_rows)
 
+    def state_covariance(self, rows: np.ndarray) -> np.ndarray:
+        """Covariance (w, 6, 6) of x, y, psi, u, v, r in some rows (w,)."""
+        return _state_covariance(*(x[rows] for x in (self.eta, self.nu, self.eta_std, self.eta_dot_std)))
+
     @cached_property
     def air(self) -> np.ndarray | None:
         """(n, 2), velocity of the air to north and east [m/s]; None: no wind was measured."""
@@ -321,6 +325,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     measured[dense] = (weights > 0.0) & track.fresh[dense]
     track = replace(track, pose=np.where(measured | ~track.valid[:, None], track.pose, motion.eta))
     eta_std, eta_dot_std, eta_ddot_std = (spread(np.sqrt(b.variance(covariance)), inside) for b in bases)
+    covariances = _state_covariance(motion.eta, motion.nu, eta_std, eta_dot_std)
     return Smoothed(
         track,
         spikes,
@@ -329,7 +334,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         eta_std,
         eta_dot_std,
         eta_ddot_std,
-        _body_std(motion, eta_std, eta_dot_std),
+        np.sqrt(covariances[:, range(3, 6), range(3, 6)]),
         sigma,
         sigma**2 / (smoothness * grid.spacing**DEGREE),
         response.delay,
@@ -439,11 +444,16 @@ def spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     return found
 
 
-def _body_std(motion: SmoothMotion, eta_std: np.ndarray, eta_dot_std: np.ndarray) -> np.ndarray:
-    """Standard deviation of nu (n, 3), the heading's included; the channels are independent."""
-    psi, (u, v) = motion.eta[:, 2], motion.nu.T[:2]
-    c2, s2 = np.cos(psi) ** 2, np.sin(psi) ** 2
-    x, y = eta_dot_std[:, 0] ** 2, eta_dot_std[:, 1] ** 2
-    turn = eta_std[:, 2] ** 2
-    ahead, aside = c2 * x + s2 * y + v**2 * turn, s2 * x + c2 * y + u**2 * turn
-    return np.column_stack([np.sqrt(ahead), np.sqrt(aside), eta_dot_std[:, 2]])
+def _state_covariance(
+    eta: np.ndarray, nu: np.ndarray, eta_std: np.ndarray, eta_dot_std: np.ndarray
+) -> np.ndarray:
+    """Covariance (n, 6, 6) of x, y, psi, u, v, r; pose, its rate and the channels are independent.
+
+    A velocity over ground is seen from the body: with the heading's error, u and v have one, too.
+    """
+    (c, s), (u, v) = (np.cos(eta[:, 2]), np.sin(eta[:, 2])), nu.T[:2]
+    J = np.broadcast_to(np.eye(6), (len(eta), 6, 6)).copy()
+    J[:, 3, 2], J[:, 4, 2] = v, -u
+    J[:, 3, 3], J[:, 3, 4], J[:, 4, 3], J[:, 4, 4] = c, s, -s, c
+    variance = np.hstack([eta_std, eta_dot_std])[:, None] ** 2
+    return J * variance @ J.transpose(0, 2, 1)

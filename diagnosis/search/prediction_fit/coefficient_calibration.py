@@ -80,7 +80,7 @@ class Calibrator:
     @cached_property
     def windows(self) -> list[Shooting]:
         """Those in which predictions are shown."""
-        return shootings(self.train, [1.0])
+        return shootings(self.train, self.start, [1.0])
 
     def still(self) -> RefitOutcome:
         """The calibrated model in still water."""

@@ -115,14 +115,14 @@ def covariance(motion: Linear, at_start: np.ndarray, push: ForceDisturbance) -> 
 
     Args:
         motion: about the predictions.
-        at_start: (w, 6), variance of the initial state.
+        at_start: (w, 6, 6), covariance of the initial state.
         push: the unrecorded force, its size (3,) or that of each window (w, 3); at the start as large
             as always.
     """
     windows, instants = motion.slope.shape[:2]
     over, added = _steps(motion, push)
     P = np.zeros((windows, 9, 9))
-    P[:, range(6), range(6)], P[:, range(6, 9), range(6, 9)] = at_start, push.size**2
+    P[:, :6, :6], P[:, range(6, 9), range(6, 9)] = at_start, push.size**2
     found = np.zeros((windows, instants, 3, instants, 3))
     for i in range(instants):
         P = over[:, i] @ P @ over[:, i].transpose(0, 2, 1) + added[:, i]

@@ -61,13 +61,18 @@ class Fitted:
     fold_models: Sequence[Model]
 
 
-def shootings(runs: Sequence[WeakWindows], lengths: Sequence[float] = LENGTHS) -> list[Shooting]:
-    """The windows of some lengths, those of runs with one kind of commands together."""
+def shootings(
+    runs: Sequence[WeakWindows], model: Model, lengths: Sequence[float] = LENGTHS
+) -> list[Shooting]:
+    """The windows of some lengths, those of runs with one kind of commands together.
+
+    Steps are as short as a model needs.
+    """
     found = []
     for signals in sorted({w.run.signals for w in runs}):
         these = [w for w in runs if w.run.signals == signals]
         smoothed = [w.smoothed for w in these]
-        found += [Shooting(smoothed, share * these[0].horizon) for share in lengths]
+        found += [Shooting.accurate(smoothed, share * these[0].horizon, model) for share in lengths]
     return [s for s in found if s.run.size]
 
 

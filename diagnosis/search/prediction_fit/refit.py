@@ -68,7 +68,8 @@ def to_predictions(
         prior: of the nominal coefficients.
         fits: whether anything was learned that can be fitted.
     """
-    begin, searched, windows = found.estimate, found.searched, shootings(runs) if fits else []
+    begin, searched = found.estimate, found.searched
+    windows = shootings(runs, found.model) if fits else []
     known = begin is None or not (begin.fitted or any(prior.std.values()))
     if known or begin is None or searched is None or not windows:
         std = np.concatenate([measurement_std(w, found.model) for w in runs])
@@ -134,10 +135,10 @@ def prediction_bands(
     """
     if windows is None:
         return None
-    shots = Shooting([smoothed], windows.length)
+    shots = Shooting.accurate([smoothed], windows.length, model)
     about = WindowSpread.of(shots, model, posterior, push)
     found = np.concatenate([np.zeros_like(about.still[:, :1]), about.still + about.pushed], axis=1)
-    found[:, 0, range(3), range(3)] = shots.at_start[:, :3]
+    found[:, 0] = shots.at_start[:, :3, :3]
     found[..., range(3), range(3)] += smoothed.noise**2
     return Bands(windows, np.concatenate([[0.0], shots.since]), about.predicted, found)
 
