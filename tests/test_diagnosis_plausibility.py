@@ -4,7 +4,7 @@ import json
 import re
 from dataclasses import replace
 from functools import cache
-from itertools import repeat
+from itertools import count, repeat
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,7 @@ from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model, Run, omega, propose_columns, weak_windows
 from diagnosis.assessment import plausibility
 from diagnosis.assessment.command_check import contradicted_commands, without_force
-from diagnosis.assessment.gains import gains
+from diagnosis.assessment.gains import gains, varying
 from diagnosis.assessment.plausibility import (
     Mistake,
     likeliest_mistake,
@@ -31,7 +31,7 @@ from diagnosis.assessment.plausibility import (
     same_columns,
     scale_is_confirmed,
 )
-from diagnosis.assessment.reading_odds import Explanation, ReadingOdds, bounded
+from diagnosis.assessment.reading_odds import Explanation, ReadingOdds, bounded, most_thrust
 from diagnosis.assessment.readings import (
     AS_READ,
     Reading,
@@ -329,7 +329,18 @@ def test_a_force_where_no_actuator_pushes_is_a_question():
     assert pushed_aside(w, stream) is None
     said = pushed_aside(reread(w, of_pose("", (100.0, 100.0, 1.0)), model), model)
     assert said is not None
-    assert " sideways, where no actuator acts on a ship at rest, and all together give 239 N" in said
+    assert " sideways, where no actuator acts, and all together give 239 N" in said
+
+
+def test_a_rudder_acts_sideways_on_a_ship_under_way():
+    """A hull whose lift is far off lacks more sideways than all of its propeller gives."""
+    ship = ship_with((), "kvlcc2")
+    way = ((10.0, 0.5 if k % 1500 < 750 else -0.5) for k in count())
+    log = sail_of(ship, causes(ship)["none"], np.random.default_rng(1), 1, way, seconds=90.0)
+    (w,), model = diagnosis.load(log, ship="kvlcc2"), Model(ship=ship)
+    wrong = model.plus({"Y_uv": -100.0 * model.unit("Y_uv")})
+    assert varying(w, omega(w, wrong))[1] > SETTINGS.much * most_thrust(w, wrong)[1]
+    assert pushed_aside(w, wrong) is None
 
 
 def test_a_propeller_that_cannot_reverse_gives_no_force():

@@ -18,6 +18,7 @@ import numpy as np
 from cosim import InputError
 
 from ..predictors import Model, WeakWindows, omega
+from ..predictors.weak_form import thrust_along
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
@@ -107,19 +108,20 @@ def _late(w: WeakWindows, model: Model) -> Misreading | None:
 
 
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:
-    """A clause about a force that a ship cannot give, on an axis that no actuator commands.
+    """A clause about a force that a ship cannot give, on an axis on which no actuator acts.
 
-    What a current or a wind may give does not count, a constant force in the ship's or the earth's axes.
+    A rudder acts sideways on a ship under way. What a current or a wind may give does not count, a
+    constant force in the ship's or the earth's axes.
     """
-    T, lacking, full = w.held @ w.run.tau_cmd, varying(w, omega(w, model)), most_thrust(w, model)
-    idle = ~T.any(axis=0) & (lacking > SETTINGS.much * full)
+    thrust, lacking, full = thrust_along(w, model), varying(w, omega(w, model)), most_thrust(w, model)
+    idle = ~np.nan_to_num(thrust).any(axis=0) & (lacking > SETTINGS.much * full)
     if not idle.any():
         return None
     k = int(np.argmax(idle))
     unit = "N.m" if k == 2 else "N"
     return (
         f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no "
-        f"actuator acts on a ship at rest, and all together give {full[k]:.3g} {unit}: check columns, "
+        f"actuator acts, and all together give {full[k]:.3g} {unit}: check columns, "
         "units and axes"
     )
 
