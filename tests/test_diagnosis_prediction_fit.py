@@ -227,18 +227,11 @@ def zigzag(half=750):
 def test_steps_are_short_where_commands_change_within_them(half, longest):
     """The drag of a rudder that changes sides within a step is not that of its mean angle."""
     run, model = zigzag(half)
-    found, coarse, fine = Shooting.accurate([run], 20.0, model), *(Shooting([run], 20.0) for _ in "12")
-    fine.parts, fine.starts = (
-        128,
-        replace(fine.starts, h=fine.starts.h / 32, steps=32 * fine.starts.steps),
-    )
+    found, coarse = Shooting.accurate([run], 20.0, model), Shooting([run], 20.0)
     assert (found.parts == PARTS) == longest
-    exact, off = (
-        fine.residuals(model),
-        [np.abs(s.residuals(model) - fine.residuals(model)) for s in (found, coarse)],
-    )
+    exact = coarse.in_parts(32 * PARTS).residuals(model)
     size = np.sqrt(np.mean(exact**2))
-    near, far = (np.sqrt(np.mean(x**2)) / size for x in off)
+    near, far = (np.sqrt(np.mean((s.residuals(model) - exact) ** 2)) / size for s in (found, coarse))
     assert near < 2.0 * ACCURATE
     assert (far < 2.0 * ACCURATE) == longest
 

@@ -113,16 +113,18 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     A rudder acts sideways on a ship under way. What a current or a wind may give does not count, a
     constant force in the ship's or the earth's axes.
     """
-    thrust, lacking, full = thrust_along(w, model), varying(w, omega(w, model)), most_thrust(w, model)
-    idle = ~np.nan_to_num(thrust).any(axis=0) & (lacking > SETTINGS.much * full)
+    lacking, full = varying(w, omega(w, model)), most_thrust(w, model)
+    idle = lacking > SETTINGS.much * full
+    if not idle.any():
+        return None
+    idle &= ~np.nan_to_num(thrust_along(w, model)).any(axis=0)
     if not idle.any():
         return None
     k = int(np.argmax(idle))
     unit = "N.m" if k == 2 else "N"
     return (
         f"its motion needs {lacking[k]:.3g} {unit} {('ahead', 'sideways', 'in yaw')[k]}, where no "
-        f"actuator acts, and all together give {full[k]:.3g} {unit}: check columns, "
-        "units and axes"
+        f"actuator acts, and all together give {full[k]:.3g} {unit}: check columns, units and axes"
     )
 
 

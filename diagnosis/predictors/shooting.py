@@ -5,8 +5,8 @@ parameters' finite differences as further rows, with the functions of vessel and
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -73,7 +73,6 @@ class Shooting:
 
     Attributes:
         runs: as given.
-        parts: steps between two instants.
         run, start: (w,), number of each window's run, and when it starts [s].
         since: (T,), time from a window's start to its instants [s].
         measured: (w, T, 3), pose [m, m, rad], the mean of the samples around each instant.
@@ -82,7 +81,7 @@ class Shooting:
     """
 
     def __init__(self, runs: Sequence[Smoothed], length: float) -> None:
-        self.runs, self.parts = tuple(runs), PARTS
+        self.runs = tuple(runs)
         rows = [usable_windows(smoothed, length).first_rows for smoothed in runs]
         self.every = length / INSTANTS
         groups = tuple(zip(runs, rows, strict=True))
@@ -101,14 +100,24 @@ class Shooting:
         found = cls(runs, length)
         residuals = found.residuals(model)
         while found.parts < MOST_PARTS:
-            finer = cls(runs, length)
-            finer.parts = 2 * found.parts
-            finer.starts = replace(found.starts, h=0.5 * found.starts.h, steps=2 * found.starts.steps)
+            finer = found.in_parts(2 * found.parts)
             coarse, residuals = residuals, finer.residuals(model)
             changes, left = _squares(_off(residuals, coarse)), _squares(residuals)
             if (changes <= ACCURATE**2 * left).all():
                 break
             found = finer
+        return found
+
+    @property
+    def parts(self) -> int:
+        """Steps between two instants."""
+        return self.starts.steps // INSTANTS
+
+    def in_parts(self, parts: int) -> "Shooting":
+        """The same windows with another number of steps between two instants."""
+        found = copy(self)
+        found.starts = replace(self.starts, h=self.every / parts, steps=INSTANTS * parts)
+        found._thrust = {}
         return found
 
     def _states(self, model: Model, like: Model | None = None) -> list[vessel.State]:
@@ -119,7 +128,7 @@ class Shooting:
         parts = [self._stepped(one, model.during(name), like.during(name)) for name, one in self._each]
         return [_beside(states) for states in zip(*parts, strict=True)]
 
-    @cached_property
+    @property
     def _each(self) -> list[tuple[str, WindowStarts]]:
         """The name of each run, and its windows."""
         return [(one[0].track.run.name, replace(self.starts, runs=(one,))) for one in self.starts.runs]
