@@ -106,7 +106,7 @@ def test_faults_of_the_rate_turn_the_heading():
     assert delay - delay[0] == pytest.approx((e.turned - seen(rate=late).turned) / 1e-3, abs=1e-3)
     still = seen(by=None)
     none = Evidence(still.run, still.rows, PSI, None, None, None, None)
-    assert columns(none, REFERENCE) == deviations(none) == []
+    assert columns(none, REFERENCE) == deviations(none, PSI) == []
 
 
 @pytest.mark.parametrize("kind", DEVIATIONS)
@@ -119,10 +119,10 @@ def test_a_deviation_of_the_compass_turns_heading_and_way(kind):
     }[kind]
     size, e = 1e-5, seen()
     measured = turned(PSI + size * law, U, V)
-    (found,) = (c for c in deviations(e) if c.kind == kind)
+    (found,) = (c for c in deviations(e, e.psi) if c.kind == kind)
     assert found.path[:, 2] == pytest.approx(law)
     assert found.path[:, :2] == pytest.approx(adds(e, seen(velocity=measured), size), abs=1e-3)
-    (aside,) = (c for c in deviations(seen(by=("speed", "course"))) if c.kind == kind)
+    (aside,) = (c for c in deviations(seen(by=("speed", "course")), PSI) if c.kind == kind)
     assert not aside.path[:, :2].any(), "it has a compass of its own"
 
 
@@ -480,7 +480,7 @@ def test_two_clocks_differ_by_more_than_noise_and_half_of_what_a_clock_changes(m
     )
     e = seen()
     problem = SimpleNamespace(evidence=e, noise=(0.1, 0.2), gaps=[(3.0, 4.0)], without=frozenset({7}))
-    path = SimpleNamespace(problem=problem, columns=[*columns(e, REFERENCE), *deviations(e)])
+    path = SimpleNamespace(problem=problem, columns=[*columns(e, REFERENCE), *deviations(e, e.psi)])
     assert motion._two_clocks(path) is torn
     (way, *given), (turn, *other) = asked
     assert (way.rate, turn.velocity, turn.by) == (None, None, None)

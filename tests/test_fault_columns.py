@@ -112,7 +112,9 @@ def test_a_column_is_what_one_unit_of_its_fault_adds_to_the_path(by, channel, ki
     e = evidence(run_with(by))
     assert e.by == by
     (column,) = [
-        c for c in (*columns(e, REFERENCE), *deviations(e)) if (c.channel, c.kind) == (channel, kind)
+        c
+        for c in (*columns(e, REFERENCE), *deviations(e, e.psi))
+        if (c.channel, c.kind) == (channel, kind)
     ]
     added = (contradiction(run_with(by, channel, kind, size)) - contradiction(run_with(by))) / size
     expected = column.path - column.path[0]

@@ -131,11 +131,11 @@ def test_a_scale_is_stated_in_percent():
     assert found["u", "scale"].sentence.startswith("u and v are 5.0 % too small")
 
 
-def swung(deviation=0.0):
-    """A run all round the compass, which is off by heading as iron makes it."""
+def swung(deviation=0.0, turning=0.06):
+    """A run all round the compass, a turn and a half, which is off by heading as iron makes it."""
     run = made()
-    more = 0.06 * run.time  # rad: a turn and a half
-    r, psi = run.measured["r"] + 0.06, run.pose[:, 2] + more
+    more = turning * run.time
+    r, psi = run.measured["r"] + turning, run.pose[:, 2] + more
     v_n, v_e = rotate_to_earth(psi, run.measured["u"], run.measured["v"])
     x, y = (np.concatenate([[0.0], np.cumsum((a[1:] + a[:-1]) * H / 2)]) for a in (v_n, v_e))
     rng = np.random.default_rng(3)
@@ -151,6 +151,16 @@ def test_a_compass_off_by_heading_is_no_clock_that_wanders():
     assert not told(swung())
     repaired = examine(swung(0.07), REFERENCE).run.pose[:, 2]
     assert np.std(repaired - swung().pose[:, 2]) < 0.006
+
+
+def test_a_compass_is_told_from_a_clock_by_a_part_of_the_headings():
+    """Though no speed is measured; and noise that a repair would lessen speaks for no compass."""
+    seen, true = swung(0.05, 0.02), swung(0.0, 0.02)
+    assert np.ptp(true.pose[:, 2]) < 5.0
+    found = examine(replace(seen, measured={"r": seen.measured["r"]}), REFERENCE)
+    assert {f.channel for f in found.findings} == {"psi"}
+    off = found.run.pose[:, 2] - true.pose[:, 2]
+    assert np.std(off) < 0.1 * np.std(seen.pose[:, 2] - true.pose[:, 2])
 
 
 @pytest.mark.parametrize("either", [True, False])

@@ -235,12 +235,19 @@ class Path:
         left, border, self._by_constants = off[:, 0], off[:, 1:], found[:, 1:]
         self.covariance = np.linalg.pinv(border.T @ border, hermitian=True)
         self.constants = self.covariance @ (border.T @ left)
-        self.clock = (found[:, 0] - self._by_constants @ self.constants)[CLOCKS][:-1]
+        unknown = found[:, 0] - self._by_constants @ self.constants
+        self.clock, self._heading = unknown[CLOCKS][:-1], unknown[HEADING::STATES]
         self.residual = left - border @ self.constants
         clocks = [CLOCK, RATE]
         prior = np.tensordot(self.system.precision[clocks], problem.equations.normals[clocks], 1)
         factor = cholesky_banded(prior[::STATES, CLOCKS], lower=True)
         self.criterion = self.system.deviance(self.residual) - 2.0 * float(np.log(factor[0]).sum())
+
+    @property
+    def heading(self) -> np.ndarray:
+        """(n,) [rad]: between the nodes as the yaw rate has it."""
+        e, nodes = self.problem.evidence, self.problem.nodes
+        return e.turned + np.interp(e.time, e.time[nodes], self._heading - e.turned[nodes])
 
     def likeliest_std(self, group: int) -> float:
         """Standard deviation of a group by its residuals and the equations that it has to itself."""

@@ -106,14 +106,18 @@ def _of_rate(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
     ]
 
 
-def deviations(e: Evidence) -> list[FaultColumn]:
+def deviations(e: Evidence, heading: np.ndarray) -> list[FaultColumn]:
     """The heading is measured too large by the value times a function of itself.
 
     Velocity in the ship's own axes is turned by it. Without a yaw rate nothing shows it.
+
+    Args:
+        e: what the channels say.
+        heading: (n,), without noise [rad]: else a deviation that grows with the heading seems to lessen noise.
     """
     made = []
     for kind, law in DEVIATIONS.items() if e.rate is not None else ():
-        path = _path(e, turn=law(e.psi))
+        path = _path(e, turn=law(heading))
         if e.by == ("u", "v") and e.velocity is not None:
             across = np.column_stack([e.velocity[:, 1], -e.velocity[:, 0]]) * path[:, 2:]
             path[:, :2] = integral(e.time, across)

@@ -154,13 +154,15 @@ def _estimated(
     wanders = path.criterion - loose.criterion > likelier and _uneven(loose)
     if wanders:
         path = loose
-    # Headings all round, as a ship is swung to adjust its compass.
-    swung, either = float(np.ptp(e.psi[e.rows])) > 2.0 * np.pi, False
+    # Headings all round, as a ship is swung to adjust its compass; half of them determine its deviations.
+    turned, either = float(np.ptp(e.psi[e.rows])), False
+    swung = turned > 2.0 * np.pi
     # A compass that is off by heading looks like a wandering clock.
     if e.rate is not None and (swung or wanders):
-        deviating = problem.solve([*every, *deviations(e)], fixed_clock=True)
-        either = deviating.criterion + deviates < path.criterion + likelier * wanders
-        if either and swung:
+        deviating = problem.solve([*every, *deviations(e, loose.heading)], fixed_clock=True)
+        gain = path.criterion - deviating.criterion - deviates
+        either = gain > -likelier * wanders
+        if either and (swung or (turned > np.pi and gain > 0.0)):
             path, wanders, either = deviating, False, False
     either = either or (wanders and e.velocity is None)  # nor does a way tell of it
     torn = wanders and not either and _two_clocks(path)
