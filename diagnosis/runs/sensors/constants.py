@@ -113,7 +113,7 @@ def deviations(e: Evidence, heading: np.ndarray) -> list[FaultColumn]:
 
     Args:
         e: what the channels say.
-        heading: (n,), without noise [rad]: else a deviation that grows with the heading seems to lessen noise.
+        heading: (n,), without noise [rad], which a deviation that follows it would seem to lessen.
     """
     made = []
     for kind, law in DEVIATIONS.items() if e.rate is not None else ():

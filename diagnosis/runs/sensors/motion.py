@@ -154,7 +154,7 @@ def _estimated(
     wanders = path.criterion - loose.criterion > likelier and _uneven(loose)
     if wanders:
         path = loose
-    # Headings all round, as a ship is swung to adjust its compass; half of them determine its deviations.
+    # Headings all round, as a ship is swung to adjust its compass; half of them determine it, too.
     turned, either = float(np.ptp(e.psi[e.rows])), False
     swung = turned > 2.0 * np.pi
     # A compass that is off by heading looks like a wandering clock.
