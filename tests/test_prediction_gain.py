@@ -16,7 +16,8 @@ from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
 from diagnosis.verdict.coefficients import any_sure, better_calibration, needless
-from diagnosis.verdict.confidence import confidence_of
+from diagnosis.verdict.confidence import Doubts
+from diagnosis.verdict.judging import with_confidence
 from diagnosis.verdict.prediction_gain import (
     PairedChange,
     PredictionGain,
@@ -240,5 +241,6 @@ def test_what_only_all_coefficients_together_make_up_is_no_change_of_coefficient
     ]
     assert _spanned(*columns)
     assert without_gain(gain, findings, start, runs, names) == {"Y_ur"}
-    sure = confidence_of(each[0], start).own >= 0.8
-    assert (sure, any_sure(Findings(each[:1], model=start), start, {"Y_ur"})) == (True, False)
+    for unshown, sure in ((set(), True), ({"Y_ur"}, False)):
+        doubts = Doubts(without_gain=unshown)
+        assert any_sure(with_confidence(Findings(each[:1], model=start), start, doubts)) == sure

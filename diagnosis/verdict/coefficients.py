@@ -16,7 +16,7 @@ from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import gain, harm, predicts_worse
-from .confidence import FOUND, Doubts, confidence_of, may_be_none
+from .confidence import FOUND, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
 
@@ -40,10 +40,9 @@ def any_finding(found: Findings, start: Model) -> bool:
     return any(confidence_of(f, start).is_finding for f in found.effects)
 
 
-def any_sure(found: Findings, start: Model, without_gain: Collection[str]) -> bool:
-    """Whether any effect is a sure finding, or without a confidence, and predictions show it."""
-    doubts = Doubts(without_gain=without_gain)
-    return not all(confidence_of(f, start, doubts).own < FOUND for f in found.effects)
+def any_sure(learned: Findings) -> bool:
+    """Whether any effect with its confidence is a sure finding, or has none."""
+    return not all(f.confidence < FOUND for f in learned.effects)
 
 
 def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Conclusion:
@@ -120,8 +119,8 @@ def better_calibration(
         without_gain: ids of the effects that predictions do not show.
 
     Returns:
-        None where it predicts no better, beyond chance, is worse than the initial model, or has a hull
-        that drives the ship on; or the method does not fit its findings without a part of the data.
+        None where it predicts no better, beyond chance, predicts worse than the initial model, or has a
+        hull that drives the ship on; or the method does not fit its findings without a part of the data.
     """
     if isinstance(found, Findings) and not data.judges(found):
         return None
@@ -129,7 +128,7 @@ def better_calibration(
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
     better = needless(found, without_gain) or predicts_worse(now, its)
-    return calibration if better and not harm(its, first) else None
+    return calibration if better and not predicts_worse(its, first) else None
 
 
 def needless(found: Findings | Model, without_gain: Collection[str]) -> bool:

@@ -1,9 +1,9 @@
 """The judgement: evidence of a search and data that decide in, one verdict out."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -152,17 +152,19 @@ def judge(
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (changed and not left)
-    gain, unshown = None, set[str]()
+    gain, coefficients, unshown = None, calibration and calibration.findings, set[str]()
+    now = _predicting(fit.findings, data, changed)
     if calibrates:
         advance("gain of the search over calibration")
-        coefficients = calibration and calibration.findings
-        now = _predicting(fit.findings, data, changed)
         gain = gain_of_search(data, start, coefficients, fit.findings, now)
         unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
+    advance("residual")
+    weighed = _weighed(fit.findings, data, changed, unshown)
+    if calibrates:
         other = None
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
-        if other is None and not any_sure(fit.findings, start, unshown):
+        if other is None and not any_sure(weighed.learned):
             other = better_calibration(calibration, now, data, drives, unshown)
         nothing = (
             other is None
@@ -176,26 +178,47 @@ def judge(
             fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
             gain = gain_of_search(data, start, coefficients, fit.findings, now)
-    advance("residual")
-    # What fails at times of its own in a validation run says nothing of what was learned of others.
-    judged = train if fit.findings.model.runs else data.runs
-    remainder = remainder_of(judged, start, fit.findings, changed)
-    explained = shares(fit.findings, start, data.validate)
-    alone = unique_shares(fit.findings, start, train, data.validate)
-    doubts = Doubts(
-        residual=unexplained_axes(fit.findings, remainder, start),
-        of_data=doubt_of_data(train),
-        replaceable=replaceable(fit.findings, explained, alone),
-        on_one_line=on_one_line(fit.findings, start, train),
-        smoothed=faster_than_smoothing(fit.findings, start, train),
-        without_gain=unshown,
-    )
-    learned = with_confidence(fit.findings, start, doubts)
-    known, force = fit.posterior, fit.unrecorded
+            weighed = _weighed(fit.findings, data, changed, set())
     decided = DecidedFindings(
-        learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force
+        weighed.learned,
+        withdrawn,
+        weighed.remainder,
+        refitted,
+        dropped,
+        weighed.shares,
+        weighed.unique,
+        fit.posterior,
+        fit.unrecorded,
     )
     return decided, gain
+
+
+class _Weighed(NamedTuple):
+    """Findings with their confidence, what they leave, and what they explain."""
+
+    learned: Findings
+    remainder: Remainder
+    shares: Sequence[float]
+    unique: Sequence[float | None]
+
+
+def _weighed(found: Findings, data: ValidationData, changed: bool, unshown: Collection[str]) -> _Weighed:
+    """The findings with their confidence; ``unshown`` are those that predictions do not show."""
+    start, train = data.start, data.train
+    # What fails at times of its own in a validation run says nothing of what was learned of others.
+    judged = train if found.model.runs else data.runs
+    remainder = remainder_of(judged, start, found, changed)
+    explained = shares(found, start, data.validate)
+    alone = unique_shares(found, start, train, data.validate)
+    doubts = Doubts(
+        residual=unexplained_axes(found, remainder, start),
+        of_data=doubt_of_data(train),
+        replaceable=replaceable(found, explained, alone),
+        on_one_line=on_one_line(found, start, train),
+        smoothed=faster_than_smoothing(found, start, train),
+        without_gain=unshown,
+    )
+    return _Weighed(with_confidence(found, start, doubts), remainder, explained, alone)
 
 
 def _predicting(found: Findings, data: ValidationData, changed: bool) -> Findings | Model:
