@@ -35,7 +35,8 @@ WINDOWS = 40
 class Data:
     """Data that decide, with errors by model: mean squares of ``sizes``, paired noise on top."""
 
-    def __init__(self, sizes, known=True, validate=(), windows=WINDOWS):
+    def __init__(self, sizes, known=True, validate=(), windows=WINDOWS, omega=None):
+        self.omega = omega or {}  # model error, 1 of all others
         self.sizes, self.known, self.validate, self.where = sizes, known, validate, "validation runs"
         self.windows, self.start = windows, START
 
@@ -46,8 +47,11 @@ class Data:
         common = np.random.default_rng(0).exponential(1.0, self.windows)
         own = np.random.default_rng(1)
         return [
-            Losses(np.ones(4), *(s * common + 0.05 * own.uniform(size=self.windows) for _ in "ph"))
-            for s in (self.sizes[id(m)] for m in models)
+            Losses(
+                np.full(4, self.omega.get(id(m), 1.0)),
+                *(self.sizes[id(m)] * common + 0.05 * own.uniform(size=self.windows) for _ in "ph"),
+            )
+            for m in models
         ]
 
 
@@ -93,7 +97,8 @@ def test_without_a_finding_the_coefficients_stay_calibrated_where_that_predicts_
     start, calibrated, learned, taken
 ):
     fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(0)
-    data = Data({id(START): start, id(fit.findings): calibrated, id(end): learned})
+    sizes = {id(START): start, id(fit.findings): calibrated, id(end): learned}
+    data = Data(sizes, omega={id(fit.findings): 2.0})  # predictions decide: it is fitted to these
     assert better_calibration(fit, end, data, lambda *_: False) is (fit if taken else None)
     assert better_calibration(fit, end, data, lambda a, b: (a, b) == (BETTER, START)) is None
     assert better_calibration(None, end, data, lambda *_: False) is None
