@@ -22,8 +22,10 @@ from diagnosis.predictors.uncertainty import correlated_windows, omega_std
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
+from diagnosis.search.conclusion import AcceptedEffect
 from diagnosis.search.effect_evidence import credible
 from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.forward_selection import taken_over
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.refinement import at_limit
@@ -513,6 +515,32 @@ def test_a_law_beside_a_mere_possibility_of_its_family_stays_sure():
     made = [Finding(i, {}, {}, c, [], 0.9, 0.9, together=c) for i, c in (("N_|r|r", 0.99), ("N_r", 0.3))]
     found = with_confidence(Findings(made, model=start), start, Doubts()).effects
     assert [f.confidence for f in found] == [0.99, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("other", "had", "sure"),
+    [(0.99, ["lag"], True), (0.3, ["lag"], False), (0.3, [], True), (None, ["lag"], False)],
+)
+def test_an_effect_that_took_the_place_of_another_rests_on_the_other_findings(other, had, sure):
+    """One that is not sure, or is not left, is none to rest on: the first may be the cause."""
+    start = Model()
+    made = [Finding("mass", {}, {}, 0.99, [], 0.9, 0.9, together=0.99, instead_of=had)]
+    made += [Finding("N_r", {}, {}, other, [], 0.9, 0.9, together=other)] if other else []
+    first, *_ = with_confidence(Findings(made, model=start), start, Doubts()).effects
+    assert (first.confidence, first.together) == ((0.99, 0.99) if sure else (0.5, 0.5))
+    assert first.alike == ([] if sure else had)
+    assert bool(first.doubt) != sure
+
+
+def test_a_law_that_gives_way_is_another_cause_and_a_free_curve_is_none():
+    old, new = (AcceptedEffect(i, (), {}, {}) for i in ("lag", "mass"))
+    ship, curve = Model().ship, AcceptedEffect("thrust_curve", (), {}, {})
+    assert ship.effects["thrust_curve"].search.smooth
+    taken = taken_over(new, old, ship)
+    assert (taken.id, taken.instead_of) == ("mass", ("lag",))
+    assert taken_over(new, curve, ship).instead_of == ()
+    assert taken_over(AcceptedEffect("N_r", (), {}, {}), taken, ship).instead_of == ("lag", "mass")
+    assert taken_over(old, taken, ship).instead_of == ("mass",)
 
 
 @pytest.mark.parametrize(

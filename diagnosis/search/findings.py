@@ -77,6 +77,7 @@ class Finding(ShortRepr):
         together: probability that it or one of ``alike`` is a true cause; else as ``confidence``.
         doubt: what speaks against it in addition to the evidence, as a part of a sentence.
         set_evidence: what ``together`` is made of; None where a method has none.
+        instead_of: ids that had its place until the other findings were there.
     """
 
     id: str
@@ -91,6 +92,7 @@ class Finding(ShortRepr):
     together: float = np.nan
     doubt: str = ""
     set_evidence: EffectEvidence | None = None
+    instead_of: Sequence[str] = ()
 
     @property
     def of_runs(self) -> list[str]:

@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fmus.ship import Ship
+
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import commanded
@@ -174,10 +176,16 @@ def searched_again(
         chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
         if weighed is not None and chosen is not None:
             t, _, best = weighed
-            found[k] = accepted_effect(best, rng, chosen)
+            found[k] = taken_over(accepted_effect(best, rng, chosen), found[k], at.start.ship)
             at = best.of(chosen)
             due = [(k + j) % count for j in range(1, count)]
     return at, found
+
+
+def taken_over(new: AcceptedEffect, old: AcceptedEffect, ship: Ship) -> AcceptedEffect:
+    """An effect in the place of another; a free curve stood for any law, a law for another cause."""
+    had = {*old.instead_of} if ship.effects[old.id].search.smooth else {*old.instead_of, old.id}
+    return replace(new, instead_of=tuple(sorted(had - {new.id})))
 
 
 def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> AcceptedEffect:

@@ -37,6 +37,7 @@ ON_ONE_LINE = "with another finding it makes up a force of another shape on the 
 RESIDUAL = "a residual that it does not explain acts on the same axis"
 RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
+OUSTED = "without the findings that are not sure, another effect explains as much"
 NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
@@ -53,6 +54,7 @@ class Doubts(NamedTuple):
         replaceable: ids of the effects without which all else, fitted anew, explains as much.
         smoothed: ids of the filters that are faster than the smoothing.
         without_gain: ids of the effects that predictions do not show, as calibration predicts as well.
+        unsettled: ids of the effects that took the place of another beside findings that are not sure.
     """
 
     residual: Collection[str] = ()
@@ -63,6 +65,7 @@ class Doubts(NamedTuple):
     replaceable: Collection[str] = ()
     smoothed: Collection[str] = ()
     without_gain: Collection[str] = ()
+    unsettled: Collection[str] = ()
 
 
 NO_DOUBTS = Doubts()
@@ -120,6 +123,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         ON_ONE_LINE: f.id in doubts.on_one_line,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
+        OUSTED: f.id in doubts.unsettled,
         NO_GAIN: f.id in doubts.without_gain,
     }
     holding = [text for text, holds in all_doubts.items() if holds]

@@ -267,12 +267,23 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
     doubts = doubts._replace(
         of_parts=in_parts(found, start, alone),
         rivals={i for f, c in zip(found.effects, alone, strict=True) if c.own < FOUND for i in f.alike},
+        unsettled=unsettled(found, alone),
     )
     effects = []
     for f in found.effects:
         c = confidence_of(f, start, doubts)
-        effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
+        alike = [*f.alike, *(i for i in f.instead_of if f.id in doubts.unsettled and i not in f.alike)]
+        effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt, alike=alike))
     return replace(found, effects=effects)
+
+
+def unsettled(found: Findings, alone: Sequence[Confidence]) -> set[str]:
+    """The effects that took the place of another beside findings that are not sure, or not left."""
+    sure = {f.id for f, c in zip(found.effects, alone, strict=True) if c.own >= FOUND}
+    every = {f.id for f in found.effects}
+    return {
+        f.id for f in found.effects if f.instead_of and not (len(every) > 1 and every - {f.id} <= sure)
+    }
 
 
 def remainder_of(
