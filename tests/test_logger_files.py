@@ -13,6 +13,7 @@ from cosim import InputError
 from diagnosis.predictors import ship_with
 from diagnosis.runs import common_layout, propose, read
 from diagnosis.runs.columns.geographic import EQUATOR, SQUARED_ECCENTRICITY
+from diagnosis.runs.files.tables import date_stamps
 
 TIME = np.arange(0.0, 60.0, 0.5)
 NORTH, EAST = 40.0 * np.sin(0.05 * TIME), 60.0 * np.cos(0.05 * TIME)
@@ -115,21 +116,36 @@ def test_a_leap_second_is_a_second(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.time, TIME, atol=1e-9)
 
 
-def test_dates_with_the_day_first(tmp_path: Path) -> None:
-    clock = pd.Timestamp("2026-05-04T23:59:40") + pd.to_timedelta(TIME, "s")
-    stamps = [f"{t:%d.%m.%Y %H:%M:%S}.{t.microsecond // 10000:02d}" for t in clock]
-    run = read(written(tmp_path / "a.csv", table(time=stamps)))
-    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+FORMS = (
+    "%d.%m.%Y %H:%M:%S.%f",
+    "%d.%m.%y %H:%M:%S,%f",
+    "%d/%m/%Y %H:%M:%S.%f",
+    "%m/%d/%Y %I:%M:%S.%f %p",
+    "%m-%d-%Y %H:%M:%S.%f",
+    "%d-%b-%Y %H:%M:%S.%f",
+    "%b %d, %Y %I:%M:%S.%f %p",
+    "%a %b %d %H:%M:%S.%f %Y",
+    "%Y:%m:%d %H:%M:%S:%f",
+    "%Y%m%dT%H%M%S.%f",
+    "%I:%M:%S.%f %p",
+    "%H:%M:%S:%f",
+)
 
 
-def test_a_date_with_slashes_is_ambiguous(tmp_path: Path) -> None:
-    path = written(
-        tmp_path / "a.csv", table(time=[f"05/04/2026 09:30:{k:02d}" for k in range(TIME.size)])
-    )
-    with pytest.raises(
-        InputError, match=r"time = '05/04/2026 09:30:00' is not a number or a time stamp"
-    ):
-        read(path)
+@pytest.mark.parametrize("begin", ["2026-05-04T23:59:40", "2026-12-31T11:59:40"])
+@pytest.mark.parametrize("form", FORMS)
+def test_the_same_instants_in_any_form_are_the_same_times(form: str, begin: str) -> None:
+    """Past noon or midnight, with a day that may be a month: in one log the shorter time has passed."""
+    clock = pd.Timestamp(begin) + pd.to_timedelta(TIME, "s")
+    seconds = date_stamps(pd.Series(clock.strftime(form)), "'a.csv'")
+    np.testing.assert_allclose(seconds, TIME, atol=1e-6)
+
+
+def test_a_text_that_is_no_stamp_is_none() -> None:
+    for texts in (["on", "off"], ["A1", "A2"], ["May", "Auto"], ["12 deg", "13 deg"], ["1:2:3", "x"]):
+        assert date_stamps(pd.Series(texts)) is None
+    with pytest.raises(InputError, match=r"'31\.31\.2026 10:00:00' is not a time stamp"):
+        date_stamps(pd.Series(["30.12.2026 10:00:00", "31.31.2026 10:00:00"]), "'a.csv'")
 
 
 def test_an_index_of_a_parquet_file_is_a_column(tmp_path: Path) -> None:

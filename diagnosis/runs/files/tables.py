@@ -3,11 +3,13 @@
 import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from dateutil.parser import ParserError, parse
 from scipy.constants import day
 
 from cosim import InputError
@@ -28,9 +30,12 @@ from .message_fields import message_fields, with_fields
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
-DAY_FIRST = re.compile(r"^(\d\d)\.(\d\d)\.(\d{4})[ T]")
-TIME_OF_DAY = re.compile(r"^(?=\d\d:\d\d:\d\d)")
-ANY_DAY = "2000-01-01 "  # of times without a date
+# A time of day, a date before it, and half of the day, zone or year behind it.
+STAMP = re.compile(
+    r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
+    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
+)
+ANY_DAY = datetime(2000, 1, 1)  # of times without a date
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 
@@ -140,8 +145,8 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
 def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None:
     """Seconds since the first of a column of date stamps, NaN where empty; None: numbers.
 
-    Stamps are of ISO 8601, or have a date such as 31.12.2026, or none: then a day begins where the time
-    falls by more than half a day. A leap second of UTC is a second.
+    Stamps are of ISO 8601, or have a date such as 31.12.2026, 12/31/2026 or Dec 31, 2026, or none: then
+    a day begins where the time falls by more than half a day. A leap second of UTC is a second.
 
     Args:
         cells: the column.
@@ -157,15 +162,15 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
                 return None
         except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
             return None
-        cells = cells.astype("string").str.strip().str.replace(",", ".")
-        given = cells.str.replace(DAY_FIRST, r"\3-\2-\1 ", regex=True)
-        without_date = bool(cells.dropna().str.contains(TIME_OF_DAY).all())
-        given = given.str.replace(TIME_OF_DAY, ANY_DAY, regex=True) if without_date else given
-        leap = np.asarray(given.str.contains(LEAP_SECOND).fillna(False), bool)
-        stamps = given.mask(leap, given.str.replace(LEAP_SECOND, ":59", regex=True))
+        cells = cells.astype("string").str.strip()
+        leap = np.asarray(cells.str.contains(LEAP_SECOND).fillna(False), bool)
+        given = cells.mask(leap, cells.str.replace(LEAP_SECOND, ":59", regex=True))
+        iso = given.str.replace(",", ".")
+        stamps = pd.to_datetime(iso, errors="coerce", utc=True, format="ISO8601")
+        if stamps.isna().all():
+            stamps, without_date = _other_stamps(given)
     else:
-        stamps = cells
-    stamps = pd.to_datetime(stamps, errors="coerce", utc=True, format="ISO8601")
+        stamps = pd.to_datetime(cells, errors="coerce", utc=True)
     if stamps.isna().all():
         return None
     wrong = _first(cells, stamps.isna())
@@ -177,6 +182,34 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         seconds[there] = np.unwrap(seconds[there], period=day)
     ends = pd.DatetimeIndex(stamps[leap]).floor("s").unique() + pd.Timedelta(seconds=1)
     return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
+
+
+def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
+    """Times of stamps in other forms than ISO 8601, and whether none has a date.
+
+    Of a date whose day may be its month, the log takes the shorter time.
+    """
+    parts = cells.astype(object).str.extract(STAMP)
+    dates = parts["date"].str.replace(":", "-").str.cat(parts["rest"], sep=" ").str.strip(" ,")
+    half = parts["half"].str.lower().str[0]
+    hours = parts["h"].astype(float)
+    hours = hours.mask(half.notna(), hours % 12.0 + 12.0 * (half == "p"))
+    seconds = parts["s"].str.replace("[,:]", ".", regex=True).astype(float).fillna(0.0)
+    clock = pd.to_timedelta(3600.0 * hours + 60.0 * parts["min"].astype(float) + seconds, unit="s")
+    found = []
+    for day_first in (True, False):
+        days = {text: _day(text, day_first) for text in dates.dropna().unique()}
+        stamps = pd.to_datetime(dates.map(days), utc=True) + clock
+        found.append((int(stamps.isna().sum()), stamps.max() - stamps.min(), stamps))
+    return min(found, key=lambda f: f[:2])[2], bool((dates.dropna() == "").all())
+
+
+def _day(text: str, day_first: bool) -> datetime | None:
+    """A date in any form; None: it is none."""
+    try:
+        return parse(text, dayfirst=day_first, default=ANY_DAY) if text else ANY_DAY
+    except (ParserError, OverflowError):
+        return None
 
 
 def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
