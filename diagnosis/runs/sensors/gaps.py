@@ -58,7 +58,9 @@ def gaps(e: Evidence) -> list[SensorFinding]:
         if value > 0.0:
             by_speed = value, max(low, 0.0), high
             likely = _elsewhere(e, speed, (a, b), value) or by_speed
-            value, low, high = min(likely, by_speed, key=lambda each: each[2] - each[1])
+            (value, low, high), other = sorted((likely, by_speed), key=lambda each: each[2] - each[1])
+            if not (low <= other[0] <= high or other[1] <= value <= other[2]):  # one of them is wrong
+                low, high = min(low, other[1]), max(high, other[2])
         start, end = float(time[a]), float(time[b])
         many = "are missing in" if value > 0.0 else "were never in"
         text = f"{abs(value):.3g} s {many} the log near {0.5 * (start + end):.1f} s"
