@@ -169,6 +169,21 @@ def without(start, seconds):
     )
 
 
+@pytest.mark.parametrize(
+    ("elsewhere", "both"),
+    [((10.05, 6.0, 12.0), False), ((14.0, 9.0, 19.0), False), ((14.0, 13.0, 15.0), True)],
+)
+def test_two_estimates_of_a_jump_that_contradict_each_other_are_both_in_its_interval(
+    monkeypatch, elsewhere, both
+):
+    """By its speed ten seconds are missing; by how the ship goes elsewhere it may be more."""
+    (alone,) = gaps(evidence(without(50.0, 10.0)))
+    monkeypatch.setattr("diagnosis.runs.sensors.gaps._elsewhere", lambda *_: elsewhere)
+    (gap,) = gaps(evidence(without(50.0, 10.0)))
+    assert gap.value == alone.value
+    assert gap.ci95 == ((alone.ci95[0], elsewhere[2]) if both else alone.ci95)
+
+
 @pytest.mark.parametrize("seconds", [0.8, 3.0, 10.0])
 def test_seconds_without_rows_are_found_where_they_are(seconds):
     (gap,) = gaps(evidence(without(50.0, seconds)))
