@@ -31,6 +31,8 @@ READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 DAY_FIRST = re.compile(r"^(\d\d)\.(\d\d)\.(\d{4})[ T]")
 TIME_OF_DAY = re.compile(r"^(?=\d\d:\d\d:\d\d)")
 ANY_DAY = "2000-01-01 "  # of times without a date
+SLASHES = re.compile(r"^(\d{1,2})/(\d{1,2})/(\d{4})[ T]")
+HALF_DAY = re.compile(r"(?<!\d)(\d{1,2})(:\d\d(?::\d\d(?:\.\d*)?)?) ?([AP])\.?M\.?$", re.IGNORECASE)
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 
@@ -141,7 +143,8 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
     """Seconds since the first of a column of date stamps, NaN where empty; None: numbers.
 
     Stamps are of ISO 8601, or have a date such as 31.12.2026, or none: then a day begins where the time
-    falls by more than half a day. A leap second of UTC is a second.
+    falls by more than half a day. A leap second of UTC is a second. Of a date such as 03/06/2026 day or
+    month is first, as the run is shorter: within a day both give the same.
 
     Args:
         cells: the column.
@@ -158,8 +161,9 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
             return None
         cells = cells.astype("string").str.strip().str.replace(",", ".")
-        given = cells.str.replace(DAY_FIRST, r"\3-\2-\1 ", regex=True)
-        without_date = bool(cells.dropna().str.contains(TIME_OF_DAY).all())
+        given = cells.str.replace(HALF_DAY, _of_whole_day, regex=True)
+        given = _without_slashes(given.str.replace(DAY_FIRST, r"\3-\2-\1 ", regex=True))
+        without_date = bool(given.dropna().str.contains(TIME_OF_DAY).all())
         given = given.str.replace(TIME_OF_DAY, ANY_DAY, regex=True) if without_date else given
         leap = np.asarray(given.str.contains(LEAP_SECOND).fillna(False), bool)
         stamps = given.mask(leap, given.str.replace(LEAP_SECOND, ":59", regex=True))
@@ -177,6 +181,27 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         seconds[there] = np.unwrap(seconds[there], period=day)
     ends = pd.DatetimeIndex(stamps[leap]).floor("s").unique() + pd.Timedelta(seconds=1)
     return seconds + leap + sum(np.asarray(stamps >= end, float) for end in ends)
+
+
+def _of_whole_day(stamp: re.Match[str]) -> str:
+    """A time of half a day, as 1:05:00 PM, in 24 hours."""
+    hour = int(stamp[1]) % 12 + 12 * (stamp[3] in "pP")
+    return f"{hour:02}{stamp[2]}"
+
+
+def _without_slashes(cells: pd.Series) -> pd.Series:
+    """Stamps with dates of slashes in ISO 8601, by the order of day and month that is shorter."""
+    parts = cells.str.extract(SLASHES)
+    if not parts.notna().any(axis=None):
+        return cells
+    rest = cells.str.replace(SLASHES, "", regex=True)
+    orders = [
+        (parts[2] + "-" + parts[month].str.zfill(2) + "-" + parts[1 - month].str.zfill(2) + " " + rest)
+        for month in (0, 1)
+    ]
+    read = [pd.to_datetime(o, errors="coerce", utc=True, format="ISO8601") for o in orders]
+    best = min((0, 1), key=lambda k: (read[k].isna().sum(), read[k].max() - read[k].min()))
+    return orders[best].fillna(cells)
 
 
 def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
