@@ -258,7 +258,10 @@ def test_units_have_their_factors_by_definition() -> None:
 
 @pytest.mark.parametrize(
     ("written_so", "unit"),
-    [("RPM", "rpm"), ("rev/min", "rpm"), ("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s")],
+    [
+        *(("RPM", "rpm"), ("rev/min", "rpm"), ("U/min", "rpm"), ("tr/min", "rpm")),
+        *(("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s")),
+    ],
 )
 def test_usual_spellings_of_a_unit_are_that_unit(written_so: str, unit: str) -> None:
     assert spelt(written_so) == unit
@@ -539,6 +542,39 @@ def test_the_only_date_stamps_are_the_time_whatever_their_name(
     found = propose(written(tmp_path / "a.csv", table), OTTER)
     assert found.layout.column("time").name == name
     assert (found.run is not None) == bool(name)
+
+
+@pytest.mark.parametrize(
+    ("start", "stamp"),
+    [
+        ("2026-11-20T11:59:30", "%m/%d/%Y %I:%M:%S.%f %p"),
+        ("2026-06-03T23:59:30", "%d/%m/%Y %H:%M:%S,%f"),
+        ("2026-06-03T23:59:30", "%m/%d/%Y %H:%M:%S.%f"),
+        ("2026-06-03T12:59:30", "%I:%M:%S.%f %p"),
+    ],
+)
+def test_dates_with_slashes_and_half_days_are_stamps(tmp_path: Path, start: str, stamp: str) -> None:
+    """Day or month first is not stated; a run that is a month longer in one order is of the other."""
+    stamps = pd.Timestamp(start) + pd.to_timedelta(boat()["time"], unit="s")
+    path = written(tmp_path / "a.csv", boat().assign(time=stamps.dt.strftime(stamp)))
+    run = propose(path, OTTER).run
+    assert run is not None
+    np.testing.assert_allclose(run.time - run.time[0], boat()["time"] - boat()["time"][0], atol=1e-6)
+
+
+def test_a_unit_may_follow_a_slash(tmp_path: Path) -> None:
+    """ISO 80000-1: a quantity divided by its unit is a number."""
+    table = boat().assign(x=1e3 * boat()["x"], psi=np.degrees(boat()["psi"]))
+    names = {"time": "t/s", "x": "x/mm", "y": "y/m", "psi": "psi/deg"}
+    run = propose(written(tmp_path / "a.csv", table.rename(columns=names)), OTTER).run
+    assert run is not None
+    np.testing.assert_allclose(run.pose, boat()[["x", "y", "psi"]], atol=1e-9)
+
+
+def test_a_time_of_another_name_is_likely_where_rows_are_repeated(tmp_path: Path) -> None:
+    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "epoch"})
+    found = propose(written(tmp_path / "a.csv", table), OTTER)
+    assert [c.name for c in found.likely["time"]] == ["epoch"]
 
 
 def test_a_struct_of_matlab_is_a_table(tmp_path: Path) -> None:

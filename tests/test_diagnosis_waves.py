@@ -126,11 +126,18 @@ def test_a_burst_is_above_the_spectrum_in_one_segment_and_waves_are_in_most():
 def test_beside_waves_alone_no_coefficient_is_suspect(monkeypatch, others):
     """Without another effect the model is the first one; suspects are those of a model with the effects."""
     effects = [Finding("X_u", {"delta_X_u": -1.0}, {}, 0.9, [], 0.9, 0.9)] * others
-    found = Findings(effects, suspects=[Suspect("m", 3.0, 20.0)])
+    first, other = Model(), Model().plus({"delta_X_u": -1.0})
+    found = Findings(
+        effects, suspects=[Suspect("m", 3.0, 20.0)], fold_models=[other] * 4, run_models=[other] * 2
+    )
     done = SimpleNamespace(model=Model(), findings=lambda ids=None: found)
     peak = SimpleNamespace(peak=3.0, force=1.0, confidence=0.9, share=0.5)
     monkeypatch.setattr(forward_selection, "search", lambda *_: done)
     monkeypatch.setattr(forward_selection, "find_waves", lambda *_: peak)
-    learned = forward_selection.ForwardSelection().fit([], Model(), None, silent, 0)
+    learned = forward_selection.ForwardSelection().fit([], first, None, silent, 0)
     assert [f.id for f in learned.effects] == ["waves", "X_u"][: 1 + others]
     assert len(learned.suspects) == others
+    # What is predicted without a fold is what was learned, and not other coefficients.
+    expected = other if others else first
+    assert all(m is expected for m in [*learned.fold_models, *learned.run_models])
+    assert (len(learned.fold_models), len(learned.run_models)) == (4, 2)

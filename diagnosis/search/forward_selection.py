@@ -77,9 +77,12 @@ class ForwardSelection:
             if ids is not None and waves.id not in ids:
                 return found
             effects, ranking = [waves, *found.effects], [ranked, *found.ranking]
+            found = replace(found, effects=effects, ranking=ranking, refit=with_waves)
+            if len(effects) > 1:
+                return found
             # Without another effect the coefficients are those of the first model, and none is suspect.
-            suspects = found.suspects if found.effects else []
-            return replace(found, effects=effects, ranking=ranking, suspects=suspects, refit=with_waves)
+            folds, of_runs = ([model] * len(each) for each in (found.fold_models, found.run_models))
+            return replace(found, suspects=[], fold_models=folds, run_models=of_runs)
 
         return with_waves()
 

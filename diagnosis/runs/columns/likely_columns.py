@@ -126,7 +126,7 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     Returns:
         Such as ``surge speed`` -> (n,); empty without time and position.
     """
-    if not {"time", "x", "y"} <= known.keys() or known["time"].size < FEWEST:
+    if not {"time", "x", "y"} <= known.keys() or np.isfinite(known["time"]).sum() < FEWEST:
         return {}
     t = known["time"]
     apart = float(np.nanmedian(np.diff(t)))
@@ -207,9 +207,10 @@ def _evidence(
     )
     reasons, score, like = [], 0.0, 1.0 if means else _likeness(signal, bare)
     if quantity == "time":
-        if not np.all(np.diff(numbers) > 0.0):
+        steps = np.diff(numbers)  # rows may be repeated
+        if not (np.all(steps >= 0.0) and np.median(steps) > 0.0):
             return None
-        reasons, score = ["increases in each row"], 1.0
+        reasons, score = ["increases from row to row"], 1.0
     if like >= LIKELY:
         reasons, score = [*reasons, "by its name"], score + like
     if unit in UNITS[quantity]:

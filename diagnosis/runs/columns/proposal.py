@@ -384,7 +384,10 @@ def _without_unit(name: str, below: str) -> tuple[str, str]:
 
 
 def _unit_at_the_end(name: str) -> tuple[str, str]:
-    """A name without the unit that its last words are, as x_mm and yaw_rate_deg_s, and the unit."""
+    """A name without the unit that its last words are, as x_mm, yaw_rate_deg_s, x/mm, and the unit."""
+    quantity, _, unit = name.partition("/")  # ISO 80000-1, 7.1.2
+    if quantity and spelt(unit) in NAMED_UNITS:
+        return quantity, spelt(unit)
     words = name.split("_")
     for count in (2, 1):
         unit = spelt("/".join(words[-count:]))

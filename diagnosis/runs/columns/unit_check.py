@@ -36,7 +36,7 @@ SPELT = {
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
-    **dict.fromkeys(("1/min", "r/min", "rev/min", "min-1", "min^-1"), "rpm"),
+    **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "min-1", "min^-1"), "rpm"),
     **dict.fromkeys(("°/min",), "deg/min"),
     **{f"{unit}/sec": f"{unit}/s" for unit in ("m", "rad", "deg")},
 }
