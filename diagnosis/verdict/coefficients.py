@@ -76,7 +76,7 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
 def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
-    No effect follows from it. Each training run is predicted without it; a current is in it where that
+    It also takes the place of effects that do not predict better than it. No effect follows from it. Each training run is predicted without it; a current is in it where that
     shows beyond chance, and is beyond its own uncertainty. Validation runs can reject it.
     """
     train, start = data.train, data.start
@@ -94,7 +94,8 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         best = flowing
     else:
         now = still
-    if harm(now, first) or gain(other, now) <= 0.0:
+    no_better = predicts_worse(now, other) if found.effects else gain(other, now) <= 0.0
+    if harm(now, first) or no_better:
         return None
     its, others = data.losses(best.findings.model, start)
     return None if data.validate and harm(its, others) else best
