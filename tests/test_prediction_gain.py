@@ -119,6 +119,19 @@ def test_an_effect_that_may_be_none_and_is_not_shown_gives_way_to_coefficients(i
     assert not needless(START, unshown)
 
 
+@pytest.mark.parametrize(
+    ("calibrated", "learned", "taken"), [(4.0, 4.0, True), (4.0, 9.0, True), (4.0, 1.0, False)]
+)
+def test_effects_none_of_which_is_a_finding_give_way_unless_they_predict_better(
+    calibrated, learned, taken
+):
+    fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(1)
+    data = Data({id(START): 9.0, id(fit.findings): calibrated, id(end): learned})
+    for believed in (False, True):
+        given = better_calibration(fit, end, data, lambda *_: False, believed=believed)
+        assert given is (fit if taken and (not believed or learned > calibrated) else None)
+
+
 def test_the_standard_error_is_paired_and_covers_the_difference():
     """Over repeated noise the difference scatters by as much as its standard error says."""
     rng, sizes, found = np.random.default_rng(2), {id(START): 1.0, id(BETTER): 1.0}, []

@@ -76,8 +76,9 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
 def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
-    It also takes the place of effects that do not predict better than it. No effect follows from it. Each training run is predicted without it; a current is in it where that
-    shows beyond chance, and is beyond its own uncertainty. Validation runs can reject it.
+    It also takes the place of effects that do not predict better than it. No effect follows from it.
+    Each training run is predicted without it; a current is in it where that shows beyond chance, and is
+    beyond its own uncertainty. Validation runs can reject it.
     """
     train, start = data.train, data.start
     if len(train) < WHOLE_RUNS or not any(prior.std.values()):
@@ -107,10 +108,12 @@ def better_calibration(
     data: ValidationData,
     drives: Callable[[Model, Model], bool],
     without_gain: Collection[str] = (),
+    believed: bool = True,
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
-    It also takes the place of effects that predict no better, each with intervals that hold zero.
+    It also takes the place of effects that predict no better, if none of them is a finding, or each has
+    intervals that hold zero.
 
     Args:
         calibration: the fit; None: there is none.
@@ -118,6 +121,7 @@ def better_calibration(
         data: the data that decide.
         drives: whether the hull of a model drives the ship on more than that of another.
         without_gain: ids of the effects that predictions do not show.
+        believed: whether any effect is a finding.
 
     Returns:
         None where it predicts no better, beyond chance, predicts worse than the initial model, or has a
@@ -128,7 +132,8 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    better = needless(found, without_gain) or predicts_worse(now, its)
+    idle = not (believed or predicts_worse(its, now))
+    better = needless(found, without_gain) or idle or predicts_worse(now, its)
     return calibration if better and not predicts_worse(its, first) else None
 
 

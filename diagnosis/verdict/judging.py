@@ -165,7 +165,8 @@ def judge(
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
         if other is None and not any_sure(weighed.learned):
-            other = better_calibration(calibration, now, data, drives, unshown)
+            believed = not weighed.learned.effects or any(map(is_finding, weighed.learned.effects))
+            other = better_calibration(calibration, now, data, drives, unshown, believed)
         nothing = (
             other is None
             and needless(fit.findings, unshown)
