@@ -235,7 +235,8 @@ class Path:
         left, border, self._by_constants = off[:, 0], off[:, 1:], found[:, 1:]
         self.covariance = np.linalg.pinv(border.T @ border, hermitian=True)
         self.constants = self.covariance @ (border.T @ left)
-        self.clock = (found[:, 0] - self._by_constants @ self.constants)[CLOCKS][:-1]
+        nodes = found[:, 0] - self._by_constants @ self.constants
+        self.clock, self._turned = nodes[CLOCKS][:-1], nodes[HEADING::STATES]
         self.residual = left - border @ self.constants
         clocks = [CLOCK, RATE]
         prior = np.tensordot(self.system.precision[clocks], problem.equations.normals[clocks], 1)
@@ -247,6 +248,11 @@ class Path:
         off = self.residual[self.problem.equations.group == group]
         alone = max(off.size - self.system.trace(group), 1.0)
         return float(self.std[group] * np.sqrt((off**2).sum() / alone))
+
+    def heading(self) -> np.ndarray:
+        """(n,) [rad], of the path in all rows: by the yaw rate from node to node."""
+        e, p = self.problem.evidence, self.problem
+        return e.turned + np.interp(e.time, p.edges, self._turned - e.turned[p.nodes])
 
     @property
     def deviation(self) -> np.ndarray:

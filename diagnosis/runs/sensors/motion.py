@@ -158,7 +158,9 @@ def _estimated(
     swung, either = float(np.ptp(e.psi[e.rows])) > 2.0 * np.pi, False
     # A compass that is off by heading looks like a wandering clock.
     if e.rate is not None and (swung or wanders):
-        deviating = problem.solve([*every, *deviations(e)], fixed_clock=True)
+        # Of a measured heading the noise would be on both sides, and look like a deviation by it.
+        smooth = replace(e, psi=path.heading())
+        deviating = problem.solve([*every, *deviations(smooth)], fixed_clock=True)
         either = deviating.criterion + deviates < path.criterion + likelier * wanders
         if either and swung:
             path, wanders, either = deviating, False, False
