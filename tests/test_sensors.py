@@ -163,6 +163,19 @@ def test_a_compass_is_told_from_a_clock_by_a_part_of_the_headings():
     assert np.std(off) < 0.1 * np.std(seen.pose[:, 2] - true.pose[:, 2])
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_noise_of_the_heading_is_no_deviation_of_the_compass(seed):
+    """A ship that once turned about, and then heads north: both sides of the fit have the same noise."""
+    t, rng = np.arange(0.0, 400.0, 0.2), np.random.default_rng(seed)
+    psi = 0.5 * np.sin(0.2 * t) + np.pi * (1.0 + np.tanh((t - 60.0) / 20.0))
+    noise = rng.normal(0.0, 0.01, (2, t.size))
+    pose = np.column_stack([t, 0.0 * t, psi + noise[0]]) + rng.normal(
+        0.0, [0.01, 0.01, 1e-9], (t.size, 3)
+    )
+    run = Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": np.gradient(psi, t) + noise[1]})
+    assert not told(run)
+
+
 @pytest.mark.parametrize("either", [True, False])
 def test_a_clock_that_a_compass_would_look_like_is_told_with_it(monkeypatch, either):
     monkeypatch.setattr(motion, "_stretches", lambda path: [(0.0, 60.0, 1.1, 0.01)])
