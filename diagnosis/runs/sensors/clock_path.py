@@ -25,6 +25,7 @@ import numpy as np
 from scipy.linalg import cholesky_banded
 from scipy.sparse import csr_array
 
+from ..cleaning import noise as noise_of
 from ..smoothing.outliers import OUTLIER
 from ..smoothing.penalised import Equations, LinearSystem
 from ..thinning import MOST_ROWS
@@ -75,7 +76,8 @@ class PathProblem:
         time, rows = e.time, e.rows
         for start, end in gaps:
             rows = rows[(time[rows] <= start) | (time[rows] >= end)]
-        spacing = max(SPACING, float(time[rows[-1]] - time[rows[0]]) * MOST_SAMPLES / MOST_ROWS)
+        spacing = 0.0 if _noisier_than_pose(e, noise) else SPACING
+        spacing = max(spacing, float(time[rows[-1]] - time[rows[0]]) * MOST_SAMPLES / MOST_ROWS)
         self.nodes = rows[_spaced(time[rows], spacing)]
         self.edges = time[self.nodes]
         self.cut = np.zeros(self.nodes.size - 1, bool)
@@ -268,6 +270,18 @@ class Path:
         variance = (right * self.system.inverse(right)).sum(axis=0)
         variance += (by_constants * (self.covariance @ by_constants)).sum(axis=0)
         return np.sqrt(variance)
+
+
+def _noisier_than_pose(e: Evidence, of_pose: Sequence[float]) -> bool:
+    """Whether noise of velocity or yaw rate, integrated between two nodes, is beyond that of the pose.
+
+    Samples of the pose in between would have it in place of their own, and the clock would lessen it.
+    """
+    step = float(np.median(np.diff(e.time)))
+    beside = (e.velocity, None if e.rate is None else e.rate[:, None])
+    walks = [0.0 if x is None else float(np.hypot.reduce(noise_of(x))) for x in beside]
+    walked = np.sqrt(step * SPACING) * np.array(walks)
+    return bool((walked > np.asarray(of_pose)).any())
 
 
 def _components(directions: np.ndarray) -> list[Component]:
