@@ -166,7 +166,7 @@ def test_a_compass_is_told_from_a_clock_by_a_part_of_the_headings():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_noise_of_a_yaw_rate_is_no_clock(seed):
     """Of a gyro whose noise turns it by more between two nodes than the heading is uncertain by."""
-    t, rng = np.arange(0.0, 200.0, 0.2), np.random.default_rng(seed)
+    t, rng = np.arange(0.0, 400.0, 0.2), np.random.default_rng(seed)
     psi = 2.5 * np.sin(0.05 * t) + 0.8 * np.sin(0.11 * t)
     noise = rng.normal(size=(3, t.size)) * [[0.05], [0.05], [np.radians(0.025)]]
     pose = np.column_stack([2.0 * t, 0.0 * t, psi]) + noise.T
