@@ -135,6 +135,19 @@ def test_date_stamps_feet_and_any_factor(tmp_path, kind):
     np.testing.assert_allclose(run.pose, POSE, atol=1e-9)
 
 
+@pytest.mark.parametrize(("unit", "per"), [("s", 1.0), ("ms", 1e-3)])
+def test_times_of_an_epoch_count_from_the_first(tmp_path, unit, per):
+    other = with_tau().assign(time=np.round((TIME + 1.765e9) / per))
+    other.to_csv(tmp_path / "a.csv", index=False)
+    (tmp_path / "a.csv.json").write_text(
+        json.dumps({"columns": {"time": {"name": "time", "unit": unit}}})
+    )
+    expected = np.round((TIME + 1.765e9) / per) * per
+    np.testing.assert_allclose(
+        diagnosis.read(tmp_path / "a.csv").time, expected - expected[0], atol=1e-5
+    )
+
+
 def test_first_stamp_that_is_none_is_told(tmp_path):
     stamps = (pd.Timestamp("2026-11-20T09:30:00Z") + pd.to_timedelta(TIME, unit="s")).astype(str)
     with_tau().assign(time=np.where(np.arange(N) == 7, "noon", stamps)).to_csv(

@@ -231,6 +231,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
             if signal in POSE:
                 unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
                 steps[signal] = resolution(read) * abs(column.factor) * unit
+        if signal == "time" and np.nanmin(values, initial=np.inf) > LARGEST:  # of an epoch
+            values = values - values[np.isfinite(values)][0]
         columns[signal] = values
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
