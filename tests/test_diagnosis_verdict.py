@@ -110,6 +110,20 @@ def test_remainder_repeats_with_what_it_was_made_of(lap, space):
     assert how.lasts > 2.0
 
 
+@pytest.mark.parametrize("fixed", [True, False])
+def test_a_force_to_north_that_depends_on_the_place_repeats_there_on_any_heading(lap, fixed):
+    """As the pull of a cable; a force that turns with another period repeats nowhere."""
+    (w,) = lap
+    t = w.smoothed.time
+    spun = replace(w.smoothed, eta=np.column_stack([w.smoothed.eta[:, :2], 2.0 * np.pi * t / 13.0]))
+    psi, north = spun.eta[:, 2], np.sin(2.0 * spun.eta[:, 0])
+    off = psi if fixed else np.cumsum(np.random.default_rng(1).normal(0.0, 0.2, t.size))
+    body = np.column_stack([north * np.cos(off), -north * np.sin(off), 0.0 * north])
+    error = w.smooth @ np.nan_to_num(body)
+    how = recurrence([replace(w, smoothed=spun)], error - error.mean(axis=0))
+    assert [each.best for each in how[:2]] == (["place", "place"] if fixed else [None, None])
+
+
 def test_error_that_is_large_in_one_part_of_the_basin_is_said_to_be_there(lap):
     (w,) = lap
     noise = 0.01 * np.random.default_rng(2).standard_normal((w.middle.size, 3))

@@ -2,11 +2,12 @@
 
 A window's error is predicted by the mean over its neighbours in a space (place, motion, commands), of
 windows that are two blocks from it in time or in another run. The squared correlation of prediction and
-error is the share that repeats there. By chance it is as in series that are shifted in time against
-that space, which keeps how long an error lasts.
+error is the share that repeats there. At a place surge and sway may repeat in the body frame, as drag
+does, or to north and east, as the pull of a cable. By chance it is as in series that are shifted in time
+against that space, which keeps how long an error lasts.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +53,8 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     """
     run = np.repeat(np.arange(len(data)), [w.middle.size for w in data])
     time = np.concatenate([w.middle for w in data])
-    place, motion, command = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
+    place, motion, command, turn = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
+    to_earth = (left[:, 0] + 1j * left[:, 1]) * turn
     apart = 2 * BLOCK * data[0].scale.time
     least = round(apart / data[0].every) + 1  # windows, of a shift after which none is its own neighbour
     count = SETTINGS.neighbours + 2 * least  # a pass of so long to both sides has fewer windows
@@ -72,6 +74,9 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     for k in range(3):
         error = left[:, k]
         shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
+        if k < 2:
+            fixed = _share(to_earth, neighbours["place"], offsets, (np.real, np.imag)[k], turn)
+            shares["place"] = max(shares["place"], fixed)
         if not any(shares.values()):  # as of a damping that is larger at some places
             shares[TOGETHER] = _share(error, together, offsets)
         others = (np.ones_like(error), motion[:, k])
@@ -83,10 +88,14 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     return found
 
 
-def _of_run(w: WeakWindows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Means over the windows of a run: place (K, 2), motion (K, 3), command (K, 3)."""
+def _of_run(w: WeakWindows) -> tuple[np.ndarray, ...]:
+    """Means over the windows of a run: place (K, 2), motion (K, 3), command (K, 3), heading (K,).
+
+    The heading is a rotation in the complex plane, north its real axis.
+    """
     eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (w.smoothed.eta, w.smoothed.nu))
-    return w.smooth @ eta[:, :2], w.smooth @ nu, w.held @ w.run.tau_cmd
+    ahead = w.smooth @ np.exp(1j * eta[:, 2])
+    return w.smooth @ eta[:, :2], w.smooth @ nu, w.held @ w.run.tau_cmd, ahead / np.abs(ahead)
 
 
 def _scaled(x: np.ndarray) -> np.ndarray:
@@ -116,13 +125,28 @@ def _mean(x: np.ndarray, rows: np.ndarray, there: np.ndarray) -> np.ndarray:
     return np.einsum("kn,kn...->k...", there, x[rows]) / np.maximum(there.sum(axis=1), 1)[:, None]
 
 
-def _share(error: np.ndarray, near: tuple[np.ndarray, np.ndarray], offsets: np.ndarray) -> float:
-    """Share of an error that its neighbours foretell; 0 if that is chance."""
+def _share(
+    error: np.ndarray,
+    near: tuple[np.ndarray, np.ndarray],
+    offsets: np.ndarray,
+    part: Callable[[np.ndarray], np.ndarray] = np.real,
+    turn: np.ndarray | float = 1.0,
+) -> float:
+    """Share of an error that its neighbours foretell; 0 if that is chance.
+
+    Args:
+        error: (K,); of surge and sway together to north and east, in the complex plane.
+        near: of :func:`_neighbours`.
+        offsets: shifts in time, of which chance is made.
+        part: of it after a rotation, the real or the imaginary one.
+        turn: (K,), heading in the complex plane.
+    """
 
     def foretold(x: np.ndarray) -> float:
-        mean = _mean(x[:, None], *near)[:, 0]
-        size = float(np.sqrt((mean @ mean) * (x @ x)))
-        return max(float(mean @ x), 0.0) ** 2 / size**2 if size > 0.0 else 0.0
+        mean = part(_mean(x[:, None], *near)[:, 0] * np.conj(turn))
+        own = part(x * np.conj(turn))
+        size = float(np.sqrt((mean @ mean) * (own @ own)))
+        return max(float(mean @ own), 0.0) ** 2 / size**2 if size > 0.0 else 0.0
 
     share = foretold(error)
     if share < SETTINGS.repeats:
