@@ -174,6 +174,17 @@ def test_noise_of_a_yaw_rate_is_no_clock(seed):
     assert not told(Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": rate}))
 
 
+@pytest.mark.parametrize("heading", [0.1, 0.5])
+def test_a_yaw_rate_with_more_noise_than_turn_has_no_scale(heading):
+    """Its noise would lessen any factor between rate and heading."""
+    t, rng = np.arange(0.0, 400.0, 0.2), np.random.default_rng(0)
+    psi = 0.3 * np.sin(0.02 * t)
+    noise = rng.normal(size=(3, t.size)) * [[0.05], [0.05], [np.radians(heading)]]
+    pose = np.column_stack([2.0 * t, 0.0 * t, psi]) + noise.T
+    rate = np.gradient(psi, t) + rng.normal(0.0, np.radians(0.6), t.size)
+    assert not told(Run("a", t, pose, np.zeros((t.size, 3)), measured={"r": rate}))
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_noise_of_the_heading_is_no_deviation_of_the_compass(seed):
     """A ship that once turned about, and then heads north: both sides of the fit have the same noise."""

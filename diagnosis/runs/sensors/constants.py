@@ -11,6 +11,7 @@ import numpy as np
 
 from fmus.scale import REFERENCE_LENGTH, Scale
 
+from ..cleaning import noise
 from ..run_constants import HORIZON
 from .evidence import Evidence, integral
 
@@ -63,6 +64,14 @@ def least_place(scale: Scale) -> float:
     return LEAST * REFERENCE_LENGTH * scale.length
 
 
+def _least_scale(values: np.ndarray) -> float:
+    """Share by which the scale of a channel (n, k) may be off at the least.
+
+    Noise of the channel lessens it by the share that noise has in its square (errors in variables).
+    """
+    return max(LEAST, float(np.sum(noise(values) ** 2) / np.sum(np.mean(values**2, axis=0))))
+
+
 def _path(e: Evidence, move: np.ndarray | float = 0.0, turn: np.ndarray | float = 0.0) -> np.ndarray:
     path = np.zeros((e.time.size, 3))
     path[:, :2], path[:, 2] = move, turn
@@ -86,7 +95,7 @@ def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
         mean, turn = 0.5 * (e.velocity[1:] + e.velocity[:-1]), np.diff(e.psi)
         delay[1:, :2] -= np.cumsum(np.column_stack([-mean[:, 1], mean[:, 0]]) * turn[:, None], axis=0)
     return [
-        FaultColumn(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST),
+        FaultColumn(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), _least_scale(e.velocity)),
         FaultColumn(axes, "offset", "rad", "velocity", _path(e, across), LEAST),
         FaultColumn("x", "place", "m", "velocity", ahead, place, False),
         FaultColumn("y", "place", "m", "velocity", aside, place, False),
@@ -100,7 +109,7 @@ def _of_rate(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
         return []
     offset = _path(e, turn=e.time[0] - e.time)
     return [
-        FaultColumn("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST),
+        FaultColumn("r", "scale", "1", "rate", _path(e, turn=-e.turned), _least_scale(e.rate[:, None])),
         FaultColumn("r", "offset", "rad/s", "rate", offset, LEAST / (HORIZON * scale.time)),
         FaultColumn("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
     ]
