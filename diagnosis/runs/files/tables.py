@@ -35,7 +35,7 @@ STAMP = re.compile(
     r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
 )
-ANY_DAY = datetime(2000, 1, 1)  # of times without a date
+ANY_DAY = pd.Timestamp(0)  # of times without a date
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 
