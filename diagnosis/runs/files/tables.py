@@ -35,7 +35,6 @@ STAMP = re.compile(
     r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
 )
-ANY_DAY = pd.Timestamp(0)  # of times without a date
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 
@@ -206,8 +205,9 @@ def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
 
 def _day(text: str, day_first: bool) -> datetime | None:
     """A date in any form; None: it is none."""
+    any_day = pd.Timestamp(0)  # of times without a date
     try:
-        return parse(text, dayfirst=day_first, default=ANY_DAY) if text else ANY_DAY
+        return parse(text, dayfirst=day_first, default=any_day) if text else any_day
     except (ParserError, OverflowError):
         return None
 
