@@ -11,7 +11,7 @@ from diagnosis.predictors import Model, weak_windows
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
-from diagnosis.search.findings import Findings
+from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.prediction_fit.coefficient_calibration import (
     LEFT_OUT,
     Calibration,
@@ -136,6 +136,18 @@ def test_it_is_kept_where_runs_left_out_are_predicted_better():
     assert not out.findings.suspects
     assert "vessel.X_u" in out.posterior.names
     assert abs(out.findings.model.value("V_e")) < 1e-3, "still water"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("as_well", [True, False])
+def test_effects_none_of_which_is_a_finding_give_way_to_what_predicts_as_well(as_well):
+    data = ValidationData(runs()[:3], [], Model(), np.ones(3))
+    known = calibrated(nothing_found(), data, PRIOR)
+    true = [Model().plus({"delta_X_u": DRAG, "body_bias_N": N}) for N in MOMENTS[:3]]
+    folds = known.findings.fold_models if as_well else true
+    found = Finding("lag", {"lag": 0.1}, {}, 0.0, [], 0.5, 0.5, Model())
+    out = calibrated(replace(nothing_found(), effects=[found], fold_models=folds), data, PRIOR)
+    assert (out is not None) == as_well
 
 
 @pytest.mark.slow
