@@ -122,7 +122,7 @@ def test_a_damping_that_differs_from_place_to_place_repeats_with_both_together(e
 def test_an_error_of_short_runs_is_compared_with_itself_at_many_shifts(monkeypatch):
     """By one shift alone half of all errors would repeat."""
     offsets = []
-    monkeypatch.setattr(recurrences, "_share", lambda error, near, at: offsets.append(at) or 0.0)
+    monkeypatch.setattr(recurrences, "_share", lambda error, near, at, *_: offsets.append(at) or 0.0)
     rng, n = np.random.default_rng(0), 130
     w = SimpleNamespace(
         middle=np.arange(float(n)),

@@ -159,7 +159,7 @@ def judge(
         gain = gain_of_search(data, start, coefficients, fit.findings, now)
         unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
     advance("residual")
-    weighed = _weighed(fit.findings, data, changed, unshown)
+    weighed = _in_doubt(fit.findings, data, changed, unshown)
     if calibrates:
         other = None
         if not any_finding(fit.findings, start):
@@ -179,7 +179,7 @@ def judge(
             fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
             gain = gain_of_search(data, start, coefficients, fit.findings, now)
-            weighed = _weighed(fit.findings, data, changed, set())
+            weighed = _in_doubt(fit.findings, data, changed, set())
     decided = DecidedFindings(
         weighed.learned,
         withdrawn,
@@ -194,7 +194,7 @@ def judge(
     return decided, gain
 
 
-class _Weighed(NamedTuple):
+class _FindingsInDoubt(NamedTuple):
     """Findings with their confidence, what they leave, and what they explain."""
 
     learned: Findings
@@ -203,7 +203,9 @@ class _Weighed(NamedTuple):
     unique: Sequence[float | None]
 
 
-def _weighed(found: Findings, data: ValidationData, changed: bool, unshown: Collection[str]) -> _Weighed:
+def _in_doubt(
+    found: Findings, data: ValidationData, changed: bool, unshown: Collection[str]
+) -> _FindingsInDoubt:
     """The findings with their confidence; ``unshown`` are those that predictions do not show."""
     start, train = data.start, data.train
     # What fails at times of its own in a validation run says nothing of what was learned of others.
@@ -219,7 +221,7 @@ def _weighed(found: Findings, data: ValidationData, changed: bool, unshown: Coll
         smoothed=faster_than_smoothing(found, start, train),
         without_gain=unshown,
     )
-    return _Weighed(with_confidence(found, start, doubts), remainder, explained, alone)
+    return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
 
 
 def _predicting(found: Findings, data: ValidationData, changed: bool) -> Findings | Model:
