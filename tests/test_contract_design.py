@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim import InputError
-from diagnosis.design import order_library, rehearsal, run_plan
+from diagnosis.design import Designer, Limits, order_library, rehearsal, run_plan
+from diagnosis.design.designing import FASTER
 from diagnosis.design.information import Hypothesis, Knowledge
 from diagnosis.design.manoeuvre_library import TEXTS, PlanStep
 from diagnosis.design.order_library import ORDERS, Orders, asked_of
@@ -25,6 +26,53 @@ from fmus.ship import ship
 NONE = {n.name: 0.0 for n in variables(ship().vessel.params) if n.name[:2] in ("X_", "Y_", "N_")
         and not n.name.endswith("dot")}  # fmt: skip
 H = 0.1
+
+
+# What a plan may use
+
+
+def designer(eta, nu, known, **limits):
+    """Plans of the default ship, which has measured some poses and velocities, not all of them known."""
+    data = [SimpleNamespace(smoothed=SimpleNamespace(eta=eta, nu=nu), known=known)]
+    return Designer(data, None, Model(), Limits(60.0, **limits))
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 10**6), st.floats(0.0, 0.3), st.floats(2.0, 40.0))
+def test_the_room_and_the_speeds_of_a_plan_are_those_of_its_runs(seed, margin, longest):
+    """A ship's length around the hull wherever it was; all of the length lies between the actuators."""
+    rng = np.random.default_rng(seed)
+    eta, nu = rng.normal(size=(300, 3)) * longest, rng.normal(size=(300, 3)) * [0.3, 0.1, 0.05]
+    known = rng.random(300) < 0.8
+    eta[~known], nu[~known] = 1e6, 1e6
+    d = designer(eta, nu, known, margin=margin)
+    corners = np.array(ship().description.outline)
+    length = np.ptp(corners[:, 0])
+    for axis, (low, high) in enumerate((d.basin.north, d.basin.east)):
+        seen = eta[known, axis]
+        assert (low, high) == pytest.approx((seen.min() - 1.5 * length, seen.max() + 1.5 * length))
+    narrow = d.basin.size.min()
+    r, half = d.reach, np.abs(corners[:, 0]).max()
+    assert (r.aft, r.fore, r.time) == (-half, half, 1.0)
+    assert r.room == pytest.approx(narrow - 2.0 * (margin + half))
+    speeds = np.sort(np.hypot(*nu[known, :2].T))
+    assert speeds[-6] * FASTER < r.speed < speeds[-1] * FASTER
+    # The largest circle in the room can be turned at full speed.
+    assert r.rate * max(0.5 * r.room, half) > r.speed * (1.0 - 1e-9)
+    assert r.rate >= FASTER * np.sort(np.abs(nu[known, 2]))[-6]
+    given = designer(eta, nu, known, margin=margin, size=(9.0, 7.0)).basin
+    assert given.size == pytest.approx([9.0, 7.0])
+    assert given.middle == pytest.approx(d.basin.middle)
+
+
+def test_a_tenth_of_the_ship_is_its_margin_and_a_basin_has_room_for_both():
+    still, known = np.zeros((9, 3)), np.ones(9, bool)
+    length = np.ptp(np.array(ship().description.outline)[:, 0])
+    least = 1.2 * length
+    fits = designer(still, still, known, basin=Basin((0.0, 1.01 * least), (0.0, 3.0 * least)))
+    assert fits.margin == pytest.approx(0.1 * length)
+    with pytest.raises(InputError, match="is too small: ship and margin need more than"):
+        designer(still, still, known, basin=Basin((0.0, 3.0 * least), (0.0, 0.99 * least)))
 
 
 # Tracks by orders

@@ -9,6 +9,7 @@ from support.ccode import stepped
 from support.project import COMPONENTS, with_values
 
 from fmus.declare import flatten, packer, variables
+from fmus.guidance.pace import PathTiming, PulseClock, tick
 from fmus.signals import Target
 
 # Paths that follow nothing but time.
@@ -102,6 +103,20 @@ def test_pulsing_target_stands_still_and_goes_on_at_full_speed():
     assert (rows[still, 3:] == 0.0).all()
     assert np.ptp(rows[still & (np.arange(len(rows)) < 1500), 0]) < 1e-12
     assert speed.min() == 0.0
+
+
+@pytest.mark.parametrize("width", [0.07, 0.5, 0.9])
+@pytest.mark.parametrize("asked", [1e-3, 0.2, 100.0])
+def test_a_change_of_speed_takes_its_time_but_no_longer_than_the_shorter_part(asked, width):
+    p = PathTiming(pulse=0.75, pulse_period=4.0, pulse_width=width, pulse_rise=asked)
+    rise = min(asked, 4.0 * width, 4.0 * (1.0 - width))
+
+    def speed(t):
+        return tick(PulseClock(), p, t)[1].factor
+
+    for begins, slow, quick in ((8.0, 0.25, 1.0), (8.0 + 4.0 * width, 1.0, 0.25)):
+        seen = [speed(begins + share * rise) for share in (1e-6, 0.5, 1.0 - 1e-6)]
+        assert seen == pytest.approx([slow, 0.625, quick], abs=1e-6)
 
 
 @pytest.mark.parametrize("h", [0.01, 0.7, 15.0])

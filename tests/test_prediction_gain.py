@@ -12,6 +12,7 @@ from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import Finding, Findings, Model, load, weak_windows
 from diagnosis.predictors import ship_with
+from diagnosis.predictors.weak_form import SMALL
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
@@ -262,3 +263,16 @@ def test_what_only_all_coefficients_together_make_up_is_no_change_of_coefficient
     for unshown, sure in ((set(), True), ({"Y_ur"}, False)):
         doubts = Doubts(without_gain=unshown)
         assert any_sure(with_confidence(Findings(each[:1], model=start), start, doubts)) == sure
+
+
+@pytest.mark.parametrize("off", [0.0, 0.9, 1.1, 30.0])
+def test_columns_are_made_up_of_others_to_the_error_of_a_small_step(off):
+    """Each one of them, whatever its size; a column of zeros changes nothing and is not."""
+    rng = np.random.default_rng(3)
+    base = np.linalg.qr(rng.normal(size=(50, 5)))[0]
+    others, beyond = base[:, :3] @ rng.normal(size=(3, 3)), base[:, 3]
+    within = (others @ rng.normal(size=(3, 2))) * [1.0, 1e6]
+    error = off * SMALL * beyond[:, None] * np.linalg.norm(within, axis=0)
+    assert _spanned(within + error * [0.0, 1.0], others) == (off < 1.0)
+    assert _spanned(within + error * [1.0, 0.0], others) == (off < 1.0)
+    assert not _spanned(within * [1.0, 0.0], others)

@@ -162,10 +162,18 @@ def test_reason_follows_the_numbers(fall, said):
     assert "VSP" not in expected.reason(fall._replace(single=0.0), 2.5)
 
 
-def test_targets_are_for_the_runs_that_they_name():
-    assert expected.wanted("surge", STEERED) == 4.0
-    assert expected.wanted("surge", BY_HAND) is None
-    assert expected.wanted("yaw", BY_HAND) == expected.wanted("yaw", STEERED) == 2.5
+def test_targets_are_those_that_the_kept_report_states_for_its_runs():
+    """They were set before the study."""
+    report = (ROOT / "docs" / "studies" / "measured_ship" / "report.md").read_text("utf-8")
+    cell = r" ([^|]*) \|"
+    stated = re.findall(rf"^\| \w+, (.+) \| (\w+) \[N(?: m)?\] \|{cell * 4}", report, re.MULTILINE)
+    assert {row[:2] for row in stated} == {(k, a) for k in (STEERED, BY_HAND) for a in expected.AXES}
+    for kind, axis, *_, fall, target in stated:
+        wanted = expected.wanted(axis, kind)
+        reached = (
+            f"{wanted:g}×: {'' if wanted <= float(fall[:-1]) else 'not '}reached" if wanted else "–"
+        )
+        assert target == reached
 
 
 def found(*effects, suspects=()):

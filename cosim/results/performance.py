@@ -41,7 +41,6 @@ METRICS = (
 )
 # Where the scenario states the role power.
 ENERGY = Metric("energy", "J", "energy of the actuators: integral of their power")
-OVER_TIME = ("ISE", "IAE", "W", "I_tau_dot", "IAEW", "IAEWWT", "IWWT")
 
 # Rounding that the ends of a window may have [s]; steps are at least 1e-6 s.
 WINDOW_TOLERANCE = 1e-9
