@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.linalg import cholesky_banded
+from scipy.sparse import csr_matrix
 from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoothed, true_nu
 
 from diagnosis import InputError, Run, clean, read, smooth
@@ -14,7 +15,15 @@ from diagnosis.runs.smoothing import smoother
 from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
 from diagnosis.runs.smoothing.penalised import LinearSystem, Problem, Rates, Spline, solve
-from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, middles, roughness, third
+from diagnosis.runs.smoothing.spline import (
+    SplineCovariance,
+    basis,
+    inverse_band,
+    knots,
+    middles,
+    roughness,
+    third,
+)
 from fmus.frames import rotate_to_body
 
 pytestmark = pytest.mark.numerical
@@ -348,3 +357,23 @@ def test_outliers_are_first_looked_for_with_a_spline_of_two_sampling_periods(per
     leverage = (p.share * p.spline.b.variance(fit.covariance) / p.sigma**2)[100:-100]
     for k, rows in enumerate((p.share > 0.0)[100:-100].T):
         assert np.mean(leverage[rows, k]) == pytest.approx(1.0 / 6.0, rel=0.05)
+
+
+def test_the_variance_of_a_sum_is_that_of_the_coefficients():
+    """a^T (L L^T)^-1 a, a the sum of the basis functions, in stretches and for each channel of its own."""
+    rng = np.random.default_rng(5)
+    grid = knots(np.array([0.0, 30.0]), np.array([20.0, 45.0]), 0.5)
+    bands = rng.uniform(-0.3, 0.3, (3, 6, grid.size))
+    bands[:, 0] = rng.uniform(1.0, 2.0, (3, grid.size))
+    time = np.sort(np.concatenate([rng.uniform(0.0, 20.0, 60), rng.uniform(30.0, 45.0, 50)]))
+    weights = np.zeros((4, time.size))
+    for row, first in enumerate((0, 20, 40, 70)):
+        weights[row, first : first + 9] = rng.normal(size=9)
+    covariance = SplineCovariance(grid, bands, 7.0)
+    for derivative in (0, 1, 2):
+        found = covariance.variance(csr_matrix(weights), time + 7.0, derivative)
+        a = weights @ basis(grid, time, derivative).matrix.toarray()
+        for channel, band in enumerate(bands):
+            L = sum(np.diag(b[: grid.size - k], -k) for k, b in enumerate(band))
+            expected = np.einsum("ki,ij,kj->k", a, np.linalg.inv(L @ L.T), a)
+            assert found[:, channel] == pytest.approx(expected, rel=1e-6)

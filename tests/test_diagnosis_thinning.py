@@ -9,6 +9,7 @@ from support.measured import lacking_at_all_rows, sail, smoothed
 from diagnosis.predictors import Model, omega, ship_with, weak_windows
 from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.runs import Run, clean, thinned, thinning
+from diagnosis.runs.cleaning import Track
 
 
 @pytest.fixture
@@ -114,3 +115,30 @@ def test_fewer_rows_end_where_the_motion_is_unknown(w):
     ends = time[np.flatnonzero(np.diff(known))]
     assert ends == pytest.approx(w.run.time[[332, 776]])
     assert {w.run.time[0], w.run.time[-1]} <= set(time)
+
+
+def test_rare_rows_are_filled_up_between_but_not_over_a_gap():
+    """Rows in between have no measurement and the commands of the row before; nothing else changes."""
+    rng, n = np.random.default_rng(0), 40
+    time = np.cumsum(np.append(0.0, rng.uniform(0.2, 2.2, n - 1)))
+    time[20:] += 30.0
+    pose, tau, fresh = rng.normal(size=(n, 3)), rng.normal(size=(n, 3)), np.ones((n, 3), bool)
+    frozen, dropped = rng.random((2, n)) < 0.2
+    run = Run("rare", time, pose, tau, measured={"u": pose[:, 0]})
+    track = Track(run, pose, fresh, frozen, dropped, ~fresh[:, 0], 1.2, 0, ())
+    found = thinning.filled_up(track)
+    old = np.isin(found.run.time, time)
+    for name in ("pose", "fresh", "frozen", "dropped"):
+        assert np.array_equal(getattr(found, name)[old], getattr(track, name))
+        assert not np.nan_to_num(getattr(found, name)[~old]).any()
+    assert np.array_equal(found.between, ~old)
+    assert np.isnan(found.pose[~old]).all()
+    assert np.array_equal(found.run.measured["u"], found.pose[:, 0], equal_nan=True)
+    before = np.searchsorted(time, found.run.time, side="right") - 1
+    assert np.array_equal(found.run.tau_cmd, tau[before])
+    for k, step in enumerate(np.diff(time)):  # as few even parts as are at most half a second long
+        parts = found.run.time[before == k] - time[k]
+        many = 1 if k == 19 else int(np.ceil(step / 0.5))
+        assert parts == pytest.approx(np.arange(many) * step / many)
+    quick = replace(track, run=replace(run, time=0.5 * np.arange(n)))
+    assert thinning.filled_up(quick) is quick

@@ -1,5 +1,6 @@
 """What a fault of a sensor does to the path, and its repair: both against the definition of the fault."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from diagnosis import Run
 from diagnosis.runs import closure
 from diagnosis.runs.cleaning import noise
+from diagnosis.runs.sensors import further_channels
 from diagnosis.runs.sensors.constants import DEVIATIONS, columns, deviations, least_place
 from diagnosis.runs.sensors.evidence import (
     FEWEST,
@@ -321,3 +323,38 @@ def test_faults_matter_from_half_a_percent_on(length):
     assert least["r offset"] == pytest.approx(0.005 / (8.0 * length**0.5))
     assert least["u delay"] == least["r delay"] == pytest.approx(STEP / 2.0)
     assert isinstance(e, Evidence)
+
+
+@pytest.mark.parametrize("given", [(0, 1), (0,), (1,)])
+@pytest.mark.parametrize(
+    ("size", "current"), [(1.25, (0.03, -0.05)), (1.0, (0.03, -0.05)), (0.8, (0.0, 0.0))]
+)
+def test_the_speed_through_water_has_one_scale_and_leaves_the_current(given, size, current):
+    """u, v over ground are those through the water and the current in the ship's axes."""
+    run = run_with(PAIRS[0])
+    u, v, psi = motion(T)
+    ahead, aside = turned(-psi, *current)
+    through = np.stack([u - ahead, v - aside])
+    noise = np.random.default_rng(4).normal(size=through.shape)
+    names = [further_channels.WATER[k] for k in given]
+    water = {name: size * through[k] + 1e-4 * noise[k] for k, name in zip(given, names, strict=True)}
+    found = further_channels.through_water(replace(run, measured={**run.measured, **water}), REFERENCE)
+    assert [(f.channel, f.kind) for f in found.findings] == [(names[0], "scale")] * (size != 1.0)
+    for f in found.findings:
+        assert f.value == pytest.approx(size, abs=0.01)
+        assert f.ci95[0] < size < f.ci95[1]
+    for k, name in zip(given, names, strict=True):
+        assert found.run.measured[name] == pytest.approx(through[k], abs=0.01)
+    if any(current):
+        (note,) = found.notes
+        north, east = map(float, re.findall(r"(-?[\d.]+) m/s", note))
+        assert (north, east) == pytest.approx(current, abs=2e-3)
+    else:
+        assert found.notes == ()
+
+
+def test_without_a_speed_through_water_or_enough_of_it_a_run_is_as_it_was():
+    run = run_with(PAIRS[0])
+    assert further_channels.through_water(run, REFERENCE).run is run
+    few = replace(run, measured={**run.measured, "u_water": np.where(T < 0.25, 0.1, np.nan)})
+    assert further_channels.through_water(few, REFERENCE).run is few

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from math import cos, pi, sin
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -319,3 +320,30 @@ def test_directions_are_from_where_it_blows():
     """A northerly wind moves the air to the south."""
     assert air_velocity(3.0, 0.0) == pytest.approx((-3.0, 0.0))
     assert air_velocity(3.0, 0.5 * pi) == pytest.approx((-3.0 * cos(0.5 * pi), -3.0 * sin(0.5 * pi)))
+
+
+@pytest.mark.parametrize("relative", [False, True])
+def test_the_air_is_that_of_the_measured_wind_and_on_a_line_where_none_was_measured(relative):
+    """A wind is named by where it comes from; relative to the ship, whose velocity it does not have."""
+    rng, n = np.random.default_rng(6), 50
+    time, psi = np.cumsum(rng.uniform(0.1, 1.0, n)), rng.uniform(-9.0, 9.0, n)
+    nu, air = rng.normal(size=(n, 3)), rng.normal(size=(n, 2))
+    c, s = np.cos(psi), np.sin(psi)
+    seen = air.copy()
+    if relative:
+        seen = (
+            np.column_stack([c * air[:, 0] + s * air[:, 1], c * air[:, 1] - s * air[:, 0]]) - nu[:, :2]
+        )
+    power, from_ = np.hypot(*seen.T), np.arctan2(-seen[:, 1], -seen[:, 0])
+    lost = np.isin(np.arange(n), [0, 1, 20, 21, 22, 49])
+    power[lost] = np.nan
+    after = "_relative" if relative else ""
+    run = SimpleNamespace(
+        time=time, measured={f"wind_speed{after}": power, f"wind_direction{after}": from_}
+    )
+    expected = np.column_stack([np.interp(time, time[~lost], x[~lost]) for x in air.T])
+    assert air_along(run, psi, nu) == pytest.approx(expected, abs=1e-9)
+    del run.measured[f"wind_direction{after}"]
+    assert air_along(run, psi, nu) is None
+    run.measured = {f"wind_speed{after}": np.full(n, np.nan), f"wind_direction{after}": from_}
+    assert air_along(run, psi, nu) is None
