@@ -538,8 +538,9 @@ def test_a_law_beside_a_mere_possibility_of_its_family_stays_sure():
 def test_an_effect_that_took_the_place_of_another_rests_on_the_other_findings(other, had, sure):
     """One that is not sure, or is not left, is none to rest on: the first may be the cause."""
     start = Model()
-    made = [Finding("mass", {}, {}, 0.99, [], 0.9, 0.9, together=0.99, instead_of=had)]
+    made = [Finding("mass", {}, {}, 0.99, [], 0.9, 0.9, together=0.99, instead_of=had, beside=["N_r"])]
     made += [Finding("N_r", {}, {}, other, [], 0.9, 0.9, together=other)] if other else []
+    made += [Finding("lag", {}, {}, 0.3, [], 0.1, 0.1, together=0.3)]  # found later
     first, *_ = with_confidence(Findings(made, model=start), start, Doubts()).effects
     assert (first.confidence, first.together) == ((0.99, 0.99) if sure else (0.5, 0.5))
     assert first.alike == ([] if sure else had)

@@ -30,13 +30,15 @@ class AcceptedEffect:
         intervals: 95 % interval of each change point [s] and of each parameter that it is not smooth in.
         weights: id -> probability of the effect and of its rivals, of the candidates together 1.
         instead_of: ids that had its place before others were found.
+        beside: ids of these, when it took the place.
     """
 
     id: str
     names: Sequence[str]
     intervals: Mapping[str, tuple[float, float]]
     weights: Mapping[str, float]
-    instead_of: tuple[str, ...] = ()
+    instead_of: Sequence[str] = ()
+    beside: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,8 @@ class Selection:
             together = seen._replace(bagged=of_set * set_share)
             q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
             found = Finding(p.id, values, ci95, np.nan, alike, q2, shares[k], nested[k], seen)
-            effects.append(replace(found, set_evidence=together, instead_of=p.instead_of))
+            found = replace(found, set_evidence=together, instead_of=p.instead_of, beside=p.beside)
+            effects.append(found)
         prior, sigma = self.t.prior, np.asarray(self.t.sigma)
         model = self.model if effects else self.at.start
         folds, runs = self._fold_models()

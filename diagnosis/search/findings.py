@@ -77,7 +77,8 @@ class Finding(ShortRepr):
         together: probability that it or one of ``alike`` is a true cause; else as ``confidence``.
         doubt: what speaks against it in addition to the evidence, as a part of a sentence.
         set_evidence: what ``together`` is made of; None where a method has none.
-        instead_of: ids that had its place until the other findings were there.
+        instead_of: ids that had its place until other findings were there.
+        beside: ids of these findings, of which some may be withdrawn.
     """
 
     id: str
@@ -93,6 +94,7 @@ class Finding(ShortRepr):
     doubt: str = ""
     set_evidence: EffectEvidence | None = None
     instead_of: Sequence[str] = ()
+    beside: Sequence[str] = ()
 
     @property
     def of_runs(self) -> list[str]:

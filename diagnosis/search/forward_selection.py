@@ -179,7 +179,8 @@ def searched_again(
         chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
         if weighed is not None and chosen is not None:
             t, _, best = weighed
-            found[k] = taken_over(accepted_effect(best, rng, chosen), found[k], at.start.ship)
+            taken = taken_over(accepted_effect(best, rng, chosen), found[k], at.start.ship)
+            found[k] = replace(taken, beside=[p.id for p in others])
             at = best.of(chosen)
             due = [(k + j) % count for j in range(1, count)]
     return at, found

@@ -270,8 +270,9 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
     doubts = doubts._replace(
         of_parts=in_parts(found, start, alone),
         rivals={i for f, c in zip(found.effects, alone, strict=True) if c.own < FOUND for i in f.alike},
-        unsettled=unsettled(found, alone),
     )
+    each = [confidence_of(f, start, doubts) for f in found.effects]
+    doubts = doubts._replace(unsettled=unsettled(found, each))
     effects = []
     for f in found.effects:
         c = confidence_of(f, start, doubts)
@@ -280,13 +281,10 @@ def with_confidence(found: Findings, start: Model, doubts: Doubts) -> Findings:
     return replace(found, effects=effects)
 
 
-def unsettled(found: Findings, alone: Sequence[Confidence]) -> set[str]:
+def unsettled(found: Findings, each: Sequence[Confidence]) -> set[str]:
     """The effects that took the place of another beside findings that are not sure, or not left."""
-    sure = {f.id for f, c in zip(found.effects, alone, strict=True) if c.own >= FOUND}
-    every = {f.id for f in found.effects}
-    return {
-        f.id for f in found.effects if f.instead_of and not (len(every) > 1 and every - {f.id} <= sure)
-    }
+    sure = {f.id for f, c in zip(found.effects, each, strict=True) if c.own >= FOUND}
+    return {f.id for f in found.effects if f.instead_of and not sure.issuperset(f.beside)}
 
 
 def remainder_of(
