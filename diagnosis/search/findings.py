@@ -78,7 +78,7 @@ class Finding(ShortRepr):
         doubt: what speaks against it in addition to the evidence, as a part of a sentence.
         set_evidence: what ``together`` is made of; None where a method has none.
         instead_of: ids that had its place until other findings were there.
-        beside: ids of these findings, of which some may be withdrawn.
+        beside: ids of these findings, of which some may be rejected later.
     """
 
     id: str
