@@ -63,6 +63,7 @@ class PathProblem:
         noise: (2,), of the samples' positions and headings [m, rad], to begin with.
         gaps: pairs of times [s] of the log between which it jumps.
         without: samples left out.
+        spacing: time between two nodes at the least [s].
     """
 
     def __init__(
@@ -71,12 +72,12 @@ class PathProblem:
         noise: Sequence[float],
         gaps: Sequence[tuple[float, float]] = (),
         without: frozenset[int] = frozenset(),
+        spacing: float = SPACING,
     ) -> None:
         self.evidence, self.noise, self.gaps, self.without = e, noise, gaps, without
         time, rows = e.time, e.rows
         for start, end in gaps:
             rows = rows[(time[rows] <= start) | (time[rows] >= end)]
-        spacing = 0.0 if _noisier_than_pose(e, noise) else SPACING
         spacing = max(spacing, float(time[rows[-1]] - time[rows[0]]) * MOST_SAMPLES / MOST_ROWS)
         self.nodes = rows[_spaced(time[rows], spacing)]
         self.edges = time[self.nodes]
@@ -272,7 +273,7 @@ class Path:
         return np.sqrt(variance)
 
 
-def _noisier_than_pose(e: Evidence, of_pose: Sequence[float]) -> bool:
+def noisier_than_pose(e: Evidence, of_pose: Sequence[float]) -> bool:
     """Whether noise of velocity or yaw rate, integrated between two nodes, is beyond that of the pose.
 
     Samples of the pose in between would have it in place of their own, and the clock would lessen it.

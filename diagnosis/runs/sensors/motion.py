@@ -15,7 +15,17 @@ from fmus.scale import Scale
 from ..cleaning import noise
 from ..files.reading import Run
 from ..run_constants import BLOCKS
-from .clock_path import DRIFT, HEADING, NEGLIGIBLE, TURN, Path, PathProblem, integral_of
+from .clock_path import (
+    DRIFT,
+    HEADING,
+    NEGLIGIBLE,
+    SPACING,
+    TURN,
+    Path,
+    PathProblem,
+    integral_of,
+    noisier_than_pose,
+)
 from .constants import DEVIATIONS, LEAST, FaultColumn, columns, deviations
 from .evidence import FEWEST, SURE, Evidence, evidence, large, spread_of, straight
 from .gaps import gaps
@@ -134,24 +144,26 @@ def _correction(
 
 
 def _estimated(
-    e: Evidence, every: Sequence[FaultColumn], jumps: Sequence[SensorFinding]
+    e: Evidence, every: Sequence[FaultColumn], jumps: Sequence[SensorFinding], spacing: float = SPACING
 ) -> MotionFaults:
-    """The likeliest clock and the constants that are sure."""
+    """The likeliest clock and the constants that are sure, by nodes some seconds apart."""
     cut = [*((jump.start, jump.end) for jump in jumps), *e.unlogged]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
     sizes = max(float(np.hypot(*sigma[:2])), NEGLIGIBLE), max(float(sigma[2]), NEGLIGIBLE)
     # Where the mean rate of the clock is free, there is one scale less.
     level = "r" if e.rate is not None else (e.by or ("",))[0]
     free = [c for c in every if (c.channel, c.kind) != (level, "scale")]
-    problem = PathProblem(e, sizes, cut)
+    problem = PathProblem(e, sizes, cut, spacing=spacing)
     loose = problem.solve(free)
     if without := problem.outliers(loose):
-        problem = PathProblem(e, sizes, cut, without)
+        problem = PathProblem(e, sizes, cut, without, spacing)
         loose = problem.solve(free)
     path = problem.solve(every, fixed_clock=True)
     likelier = SURE**2  # of a clock, and of a compass by the same chance
     deviates = float(chdtri(len(DEVIATIONS), chdtrc(1, likelier)))
     wanders = path.criterion - loose.criterion > likelier and _uneven(loose)
+    if wanders and spacing and noisier_than_pose(e, sizes):  # that may be noise
+        return _estimated(e, every, jumps, 0.0)
     if wanders:
         path = loose
     # Headings all round, as a ship is swung to adjust its compass; half of them determine it, too.
