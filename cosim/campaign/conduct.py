@@ -250,8 +250,9 @@ class _Work:
         for job, row in rows:
             if row.log:
                 keep_log(self.folder, job.hash, row.log)
-            self.journal.add(job.hash, row)
-            self._count(row, self.waiting.pop(job.hash, 0))
+            with Held():  # what is on the disk is counted
+                self.journal.add(job.hash, row)
+                self._count(row, self.waiting.pop(job.hash, 0))
             if len(self.journal.rows) <= SMALL or time.monotonic() >= self.due:
                 self._keep("running")
             progress(self.ended, self.failed, len(self.cases))
