@@ -205,7 +205,7 @@ def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
 
 def _day(text: str, day_first: bool) -> datetime | None:
     """A date in any form; None: it is none."""
-    any_day = pd.Timestamp(0)  # of times without a date
+    any_day = datetime.min.replace(year=1970)  # of times without a date
     try:
         return parse(text, dayfirst=day_first, default=any_day) if text else any_day
     except (ParserError, OverflowError):
