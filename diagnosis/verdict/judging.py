@@ -159,13 +159,13 @@ def judge(
         gain = gain_of_search(data, start, coefficients, fit.findings, now)
         unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
     advance("residual")
-    weighed = _in_doubt(fit.findings, data, changed, unshown)
+    doubted = _in_doubt(fit.findings, data, changed, unshown)
     if calibrates:
         other = None
         if not any_finding(fit.findings, start):
             other = calibrated(fit.findings, data, prior)
-        if other is None and not any_sure(weighed.learned):
-            believed = not weighed.learned.effects or any(map(is_finding, weighed.learned.effects))
+        if other is None and not any_sure(doubted.learned):
+            believed = not doubted.learned.effects or any(map(is_finding, doubted.learned.effects))
             other = better_calibration(calibration, now, data, drives, unshown, believed)
         nothing = (
             other is None
@@ -179,15 +179,15 @@ def judge(
             fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
             gain = gain_of_search(data, start, coefficients, fit.findings, now)
-            weighed = _in_doubt(fit.findings, data, changed, set())
+            doubted = _in_doubt(fit.findings, data, changed, set())
     decided = DecidedFindings(
-        weighed.learned,
+        doubted.learned,
         withdrawn,
-        weighed.remainder,
+        doubted.remainder,
         refitted,
         dropped,
-        weighed.shares,
-        weighed.unique,
+        doubted.shares,
+        doubted.unique,
         fit.posterior,
         fit.unrecorded,
     )
