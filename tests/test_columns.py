@@ -630,6 +630,48 @@ def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: 
     assert np.sqrt(np.nanmean((s.nu[inside, 0] - true[inside]) ** 2)) < 0.02
 
 
+@pytest.mark.parametrize("stated", [{}, {"unit": "rad"}], ids=["a name alone", "with its unit"])
+def test_a_heading_that_is_named_gets_the_unit_of_its_values(
+    tmp_path: Path, stated: dict[str, str]
+) -> None:
+    """A blank that was filled with a name says nothing of the unit; a unit that is stated stays."""
+    table = zigzag(psi="where it points")
+    table["where it points"] = np.degrees(table["where it points"]) % 360.0
+    path = written(tmp_path / "a.csv", table)
+    psi = {"name": "where it points", **stated}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"psi": psi}}))
+    told = propose(path, TANKER).layout.column("psi")
+    assert (told.name, told.unit) == (psi["name"], stated.get("unit", "deg"))
+
+
+@pytest.mark.parametrize("factor", [None, 1.0], ids=["names alone", "with a factor"])
+def test_latitude_and_longitude_that_are_named_are_read_as_metres(
+    tmp_path: Path, factor: float | None
+) -> None:
+    """A factor that is stated stays: then the columns are lengths, whatever they are called."""
+    table = zigzag(x="Latitud", y="Longitud")
+    table["Latitud"] = 36.0 + table["Latitud"] / 111_000.0
+    table["Longitud"] = -5.0 + table["Longitud"] / 90_000.0
+    path = written(tmp_path / "a.csv", table)
+    more = {} if factor is None else {"factor": factor}
+    named = {"x": {"name": "Latitud", **more}, "y": {"name": "Longitud", **more}}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": named}))
+    x = propose(path, TANKER).layout.column("x")
+    assert x.factor == (pytest.approx(110_959.0, rel=1e-3) if factor is None else factor)
+
+
+@pytest.mark.parametrize(("unit", "known"), [("mm", True), ("port", False)])
+def test_a_unit_may_follow_the_word_in(tmp_path: Path, unit: str, known: bool) -> None:
+    name = f"northing in {unit}"
+    table = zigzag(x=name)
+    table[name] *= 1000.0
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    if known:
+        assert (found.layout.column("x").name, found.layout.column("x").unit) == (name, "mm")
+    else:
+        assert found.layout.column("x").name == ""
+
+
 def test_a_compass_and_one_shaft_are_known(tmp_path: Path) -> None:
     table = zigzag(psi="compass_deg", **{"propeller.n": "rpm"})
     table["compass_deg"], table["rpm"] = np.degrees(table["compass_deg"]) % 360.0, 480.0

@@ -35,7 +35,10 @@ WORDS = {
 }
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Short and other words of names -> the words that actuators' names have.
-MEANT = {"stbd": "starboard", "stb": "starboard", "right": "starboard", "left": "port"}
+MEANT = {
+    **dict.fromkeys(("stbd", "stb", "sb", "right"), "starboard"),
+    **dict.fromkeys(("ps", "left"), "port"),
+}
 # Words of a column that holds the sign of another one, and its cells of a negative value.
 SIGN = frozenset(("dir", "direction", "sign", "gear"))
 ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
