@@ -630,6 +630,24 @@ def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: 
     assert np.sqrt(np.nanmean((s.nu[inside, 0] - true[inside]) ** 2)) < 0.02
 
 
+@pytest.mark.parametrize("known", ["compass_heading", "where it points"])
+def test_a_heading_in_rows_of_its_own_shows_its_unit_and_the_motion(tmp_path: Path, known: str) -> None:
+    """A row with position, heading and command at once is none there: the last values count."""
+    table = zigzag(psi=known, **{"rudder.delta": "b"})
+    time, heading = NAMES["time"], np.degrees(table[known]) % 360.0
+    rest = table.drop(columns=[known, "b"])
+    parts = [rest.iloc[::2], table[[time]].assign(**{known: heading}), table[[time, "b"]]]
+    each = [part.assign(**{time: part[time] + 0.03 * k}) for k, part in enumerate(parts)]
+    path = written(tmp_path / "a.csv", pd.concat(each).sort_values(time))
+    likely = propose(path, TANKER).likely
+    assert ("psi" in likely) == (known != "compass_heading")  # without a heading no motion is known
+    shown = any("correlates" in reason for c in likely["rudder.delta"] for reason in c.reasons)
+    assert shown == ("psi" not in likely)
+    filled = {"psi": known, "rudder.delta": "b"}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": filled}))
+    assert propose(path, TANKER).layout.column("psi").unit == "deg"
+
+
 @pytest.mark.parametrize("stated", [{}, {"unit": "rad"}], ids=["a name alone", "with its unit"])
 def test_a_heading_that_is_named_gets_the_unit_of_its_values(
     tmp_path: Path, stated: dict[str, str]

@@ -41,6 +41,7 @@ from .geographic import geographic_pair, local_columns, one_origin, refuse_minut
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
+    held_values,
     likely_columns,
     meaning_of_words,
     motion_of,
@@ -440,12 +441,13 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     if unit:
         yield "time", unit
     run = run.rows(in_order(run.time))
-    there = ~lost(run.pose)
-    fresh = there & ~repeated(run.pose, there)
+    pose = np.column_stack([held_values(channel) for channel in run.pose.T])
+    there = ~lost(pose)
+    fresh = there & ~repeated(pose, there)
     if fresh.sum() > 1:
         time = UNITS["time"][unit or "s"] * run.time[fresh]
         angles = doubts_of_angles(other_angles(run.measured))
-        for doubt in chain(doubts(time, run.pose[fresh]), angles):
+        for doubt in chain(doubts(time, pose[fresh]), angles):
             yield from ((signal, doubt.unit) for signal in doubt.signals)
 
 
