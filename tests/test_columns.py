@@ -511,6 +511,19 @@ def test_messages_have_their_heading_as_a_quaternion(tmp_path: Path, suffix: str
     np.testing.assert_allclose(np.sin(run.pose[:, 2] - boat()["psi"]), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "north"), [("X [mm]", "Y [mm]", "Y [mm]"), ("N [mm]", "E [mm]", "N [mm]")]
+)
+def test_axes_beside_a_quaternion_may_have_units(
+    tmp_path: Path, first: str, second: str, north: str
+) -> None:
+    """Those of letters are of a message, to east and north; the others are named, and stay."""
+    names = {"pose.pose.position.x": first, "vehicle_local_position.y": second}
+    found = propose(written(tmp_path / "a.csv", message(boat()).rename(columns=names)), OTTER)
+    x = found.layout.column("x")
+    assert (x.name, x.unit) == (north, "mm")
+
+
 def test_axes_that_are_stated_stay_beside_a_quaternion(tmp_path: Path) -> None:
     """North and east are named. A width beside x, y and z is no quaternion."""
     table = message(boat()).rename(

@@ -307,7 +307,8 @@ def _of_message(
     if psi is None or psi.name not in fields or "psi" in kept:
         return {}
     turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
-    if {"x", "y"} <= columns.keys() - kept and columns["x"].name.casefold().endswith("x"):
+    known = {"x", "y"} <= columns.keys() - kept
+    if known and _without_unit(columns["x"].name, "")[0].casefold().endswith("x"):
         turned |= {"x": columns["y"], "y": columns["x"]}
     return turned
 
