@@ -259,8 +259,8 @@ def test_units_have_their_factors_by_definition() -> None:
 @pytest.mark.parametrize(
     ("written_so", "unit"),
     [
-        *(("RPM", "rpm"), ("rev/min", "rpm"), ("U/min", "rpm"), ("tr/min", "rpm")),
-        *(("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s")),
+        *(("RPM", "rpm"), ("rev/min", "rpm"), ("U/min", "rpm"), ("tr/min", "rpm"), ("o/min", "rpm")),
+        *(("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s"), ("grader", "deg")),
     ],
 )
 def test_usual_spellings_of_a_unit_are_that_unit(written_so: str, unit: str) -> None:
@@ -689,6 +689,13 @@ def test_latitude_and_longitude_that_are_named_are_read_as_metres(
     (tmp_path / "a.csv.json").write_text(json.dumps({"columns": named}))
     x = propose(path, TANKER).layout.column("x")
     assert x.factor == (pytest.approx(110_959.0, rel=1e-3) if factor is None else factor)
+
+
+def test_a_unit_with_a_slash_may_follow_the_word_in(tmp_path: Path) -> None:
+    """The slash is that of revolutions by minutes, and not of a quantity in minutes."""
+    table = zigzag(**{"propeller.n": "propeller in U/min"})
+    table["propeller in U/min"] *= 60.0
+    assert propose(written(tmp_path / "a.csv", table), TANKER).layout.column("propeller.n").unit == "rpm"
 
 
 @pytest.mark.parametrize(("unit", "known"), [("mm", True), ("port", False)])

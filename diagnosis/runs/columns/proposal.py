@@ -398,7 +398,7 @@ def _without_unit(name: str, below: str) -> tuple[str, str]:
 
 def _unit_at_the_end(name: str) -> tuple[str, str]:
     """A name without the unit that its last words are, as x_mm, yaw_rate_deg_s, x/mm, x in mm."""
-    for mark in ("/", " in "):  # ISO 80000-1, 7.1.2, and tables of DIN 461
+    for mark in (" in ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
         quantity, _, unit = name.partition(mark)
         if quantity and spelt(unit) in NAMED_UNITS:
             return quantity, spelt(unit)

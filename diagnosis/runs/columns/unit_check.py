@@ -32,11 +32,12 @@ UNITS: dict[str, dict[str, float]] = {
 SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
     **dict.fromkeys(("kt", "kts", "knot", "knots"), "kn"),
-    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **dict.fromkeys(("degree", "degrees", "grader", "Grad"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
-    **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "min-1", "min^-1"), "rpm"),
+    **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "o/min", "omdr/min"), "rpm"),
+    **dict.fromkeys(("min-1", "min^-1"), "rpm"),
     **dict.fromkeys(("°/min",), "deg/min"),
     **{f"{unit}/sec": f"{unit}/s" for unit in ("m", "rad", "deg")},
 }
