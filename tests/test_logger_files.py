@@ -203,3 +203,17 @@ def test_a_text_in_utf_16_is_named_with_the_line_that_reads_it(tmp_path: Path) -
         read(path)
     path.with_name("a.csv.json").write_text('{"encoding": "utf-16"}')
     np.testing.assert_allclose(read(path).pose[:, 0], NORTH)
+
+
+@pytest.mark.parametrize(("mark", "coarse"), [(1e38, False), (1e8, False), (None, True)])
+def test_a_mark_of_a_missing_value_does_not_make_the_others_coarse(
+    tmp_path: Path, mark: float | None, coarse: bool
+) -> None:
+    """A value that is no position says nothing of the rounding; values in whole metres do."""
+    x = np.round(NORTH, 4)
+    if mark is None:
+        x = np.round(NORTH)
+    else:
+        x[::40] = mark
+    run = read(written(tmp_path / "a.csv", table(x=x)))
+    assert (np.median(run.coarse[:, 0]) > 0.5) == coarse

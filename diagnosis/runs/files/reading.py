@@ -230,7 +230,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
             values = to_si(read, signal, column, quantity[signal])
             if signal in POSE:
                 unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
-                steps[signal] = resolution(read) * abs(column.factor) * unit
+                there = np.where(np.abs(values) < LARGEST, read, np.nan)  # 1e38 is no measurement
+                steps[signal] = resolution(there) * abs(column.factor) * unit
         if signal == "time" and np.nanmin(values, initial=np.inf) > LARGEST:  # of an epoch
             values = values - values[np.isfinite(values)][0]
         columns[signal] = values
