@@ -164,6 +164,75 @@ def test_a_log_with_commands_of_actuators_needs_its_ship(tmp_path: Path) -> None
     assert "blanks" not in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("factors", "units"),
+    [
+        (
+            {"propeller.n": 60.0, "rudder.delta": np.degrees(1.0)},
+            {"propeller.n": "rpm", "rudder.delta": "deg"},
+        ),
+        ({"propeller.n": 60.0}, {"propeller.n": "rpm", "rudder.delta": None}),
+        ({"rudder.delta": np.degrees(1.0)}, {"propeller.n": None, "rudder.delta": "deg"}),
+        ({}, {"propeller.n": None, "rudder.delta": None}),
+        # Within 1.5 times its limit it overshoots; by 2 pi both rpm and rad/s are within.
+        ({"rudder.delta": 3.0}, {"rudder.delta": None}),
+        ({"propeller.n": 3.0}, {"propeller.n": None}),
+    ],
+)
+def test_commands_far_beyond_their_limits_are_in_the_unit_within(
+    tmp_path: Path, factors: dict[str, float], units: dict[str, str | None]
+) -> None:
+    names = {"propeller.n": "propeller", "rudder.delta": "rudder_cmd"}
+    table = zigzag(**names)
+    for signal, factor in factors.items():
+        table[names[signal]] *= factor
+    layout = propose(written(tmp_path / "a.csv", table), TANKER).layout
+    assert {s: layout.column(s).unit for s in units} == units
+    assert {s: layout.column(s).name for s in names} == names
+    # What is stated stands.
+    told = {"columns": {"rudder.delta": {"name": "rudder_cmd", "factor": 0.5}}}
+    (tmp_path / "a.csv.json").write_text(json.dumps(told))
+    column = propose(tmp_path / "a.csv", TANKER).layout.column("rudder.delta")
+    assert (column.factor, column.unit) == (0.5, None)
+
+
+def test_a_column_called_as_an_actuator_is_its_only_command() -> None:
+    quantity = quantities(TANKER)
+    for name in ("rudder", "Rudder order", "rudder angle", "/rudder/cmd.data"):
+        assert meaning_of_words(name, "", quantity) == "rudder.delta"
+    assert meaning_of_words("propeller speed", "", quantity) == "propeller.n"
+    for name in ("rudder rate", "rudder velocity", "rudder power", "rudder torque"):
+        assert meaning_of_words(name, "", quantity) != "rudder.delta"
+    pod = {"pod.n": "shaft speed", "pod.alpha": "angle", "pod.thrust": "force"}
+    assert meaning_of_words("pod", "", pod) == ""
+    assert meaning_of_words("pod ang", "", pod) == "pod.alpha"
+    assert meaning_of_words("pod speed", "", pod) == "pod.n"
+    assert meaning_of_words("pod angular speed", "", pod) != "pod.alpha"
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("TimeUS", "us"), ("time_boot_ms", "ms"), ("timestamp_usec", "us"), ("TIMEMS", "ms")],
+)
+def test_the_unit_at_the_end_of_the_name_of_a_time(tmp_path: Path, name: str, unit: str) -> None:
+    table = zigzag(time=name)
+    table[name] = np.round(table[name] / UNITS["time"][unit])
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert (found.layout.column("time").name, found.layout.column("time").unit) == (name, unit)
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.time, zigzag()[NAMES["time"]], atol=1e-9)
+
+
+def test_a_heading_in_rows_of_its_own_is_seen_to_be_in_degrees(tmp_path: Path) -> None:
+    table = zigzag(psi="yaw", x="north", y="east")
+    table["yaw"] = np.degrees(8.0 * table["yaw"]) % 360.0
+    heading = table[[NAMES["time"], "yaw"]].assign(**{NAMES["time"]: table[NAMES["time"]] + 0.03})
+    rows = pd.concat([table.drop(columns="yaw"), heading]).sort_values(NAMES["time"])
+    layout = propose(written(tmp_path / "a.csv", rows), TANKER).layout
+    assert layout.column("psi").unit == "deg"
+    assert layout.column("x").unit is None
+
+
 def test_a_folder_is_not_a_measurement(tmp_path: Path) -> None:
     path = written(tmp_path / "a.csv", zigzag())
     for folder in (tmp_path, Path()):

@@ -9,16 +9,17 @@ import numpy as np
 
 from ...execution.short_text import SHOWN
 from ..run_constants import EVERY, FEWEST
+from .columns import OUTPUTS
 from .unit_check import UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
 FILLERS = frozenset(
     (
         *("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
-        *("mid", "midship", "position", "pos", "coordinate", "angle", "dir", "direction"),
+        *("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "dir", "direction"),
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
-        *("sign", "gear"),
+        *("sign", "gear", "data", "value"),
         *("gyro", "compass", "utm"),
     )
 )
@@ -34,6 +35,9 @@ WORDS = {
     "rate": dict.fromkeys(("r", "yaw", "psi", "heading"), "r"),
 }
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
+# Quantity of a command -> words that tell it; words of a speed, which an angle is not.
+KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
+CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
 # Short and other words of names -> the words that actuators' names have.
 MEANT = {"stbd": "starboard", "stb": "starboard", "right": "starboard", "left": "port"}
 # Words of a column that holds the sign of another one, and its cells of a negative value.
@@ -75,7 +79,8 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
 
     Args:
         name: of the column, without its unit.
-        unit: of the column; without one only an actuator's command is told, as in ``port/n_cmd``.
+        unit: of the column; without one only an actuator's command is told, as in ``port/n_cmd``,
+            ``port angle``, or ``rudder`` where that has one command.
         quantity: signal -> quantity.
     """
     words = words_of(name)
@@ -89,10 +94,19 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
         s
         for s, q in quantity.items()
         if "." in s
-        and (unit in UNITS[q] or (not unit and s.partition(".")[2] in words))
+        and (unit in UNITS[q] or (not unit and _is_command(words, s, quantity)))
         and _is_of_actuator(words, s, q)
     }
     return found.pop() if len(found) == 1 else ""
+
+
+def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
+    """Whether words tell which command of its actuator a column without a unit holds."""
+    actuator, _, command = signal.partition(".")
+    known = KINDS.get(quantity[signal], frozenset())
+    own = {s.partition(".")[2] for s in quantity if s.startswith(f"{actuator}.")}
+    only = own - OUTPUTS.keys() == {command}
+    return command in words or not known.isdisjoint(words) or (only and CHANGES.isdisjoint(words))
 
 
 def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:
@@ -143,7 +157,7 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         found = {"course": _unwrapped(np.arctan2(east, north))}
         if "psi" in known:
             pose = np.column_stack([known["x"], known["y"], known["psi"]])
-            rows = np.isfinite(pose).all(axis=1) & np.isfinite(t)
+            rows = np.isfinite(t)
             degrees = any("psi" in doubt.signals for doubt in doubts(t[rows], pose[rows]))
             psi = _unwrapped(np.radians(known["psi"]) if degrees else known["psi"])
             cos, sin = np.cos(psi), np.sin(psi)

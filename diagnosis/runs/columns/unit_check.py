@@ -34,6 +34,7 @@ SPELT = {
     **dict.fromkeys(("kt", "kts", "knot", "knots"), "kn"),
     **dict.fromkeys(("degree", "degrees"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
+    **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
     **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "min-1", "min^-1"), "rpm"),
@@ -114,6 +115,7 @@ def refuse_units(
     """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
     Args:
+        time, pose: as in :func:`doubts`.
         angles: other angles of the run, by their signals.
 
     Raises:
@@ -124,7 +126,15 @@ def refuse_units(
 
 
 def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
-    """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s]."""
+    """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s].
+
+    Position and heading are NaN in rows without their measurement.
+    """
+    there, turned = np.isfinite(pose[:, :2]).all(axis=1), np.isfinite(pose[:, 2])
+    if there.sum() < 2 or not turned.any():
+        return
+    heading = np.interp(time[there], time[turned], pose[turned, 2])
+    time, pose = time[there], np.column_stack([pose[there, :2], heading])
     second = np.searchsorted(time, time + 1.0)
     second = second[second < time.size]
     dt, step = time[second] - time[: second.size], pose[second] - pose[: second.size]
