@@ -136,6 +136,14 @@ def test_values_of_one_name_and_stamp_have_rows_of_their_own(tmp_path: Path) -> 
     assert joined["b"].dropna().tolist() == [2.0, 4.0]
 
 
+def test_a_value_that_is_no_number_is_in_the_column_of_its_name(tmp_path: Path) -> None:
+    rows = [(0.0, "a", "1"), (0.0, "state", "auto"), (1.0, "a", "2"), (1.0, "state", "off")]
+    pd.DataFrame(rows, columns=["time", "name", "value"]).to_csv(tmp_path / "l.csv", index=False)
+    joined = one_table([tmp_path / "l.csv"])
+    assert joined["a"].tolist() == ["1", "2"]
+    assert joined["state"].tolist() == ["auto", "off"]
+
+
 def test_clocks_of_other_units_are_one(tmp_path: Path) -> None:
     table = sailed()
     pose = topic(tmp_path, "pose", table, POSE)

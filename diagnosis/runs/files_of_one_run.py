@@ -97,7 +97,9 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
     called = {name.strip("_").casefold(): name for name in map(str, table)}
     value = next((called[c] for c in called if c in VALUE), None)
     units = [name for c, name in called.items() if c in UNIT]
-    words = [n for n in table if n not in units and not pd.api.types.is_numeric_dtype(table[n])]
+    words = [
+        n for n in table if n not in {*units, value} and not pd.api.types.is_numeric_dtype(table[n])
+    ]
     texts = [n for n in words if table[n].nunique() > 1]
     if value is None or not texts:
         return table, cells
