@@ -397,7 +397,7 @@ def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantit
     smaller = {size: unit for unit, size in reversed(UNITS[quantity].items()) if size < 1.0}
     if not smaller:
         return None
-    share = max(most[s] / limits[s] for s in most if limits[s] > 0.0)
+    share = max((most[s] / limits[s] for s in most if limits[s] > 0.0), default=0.0)
     within = [unit for size, unit in smaller.items() if size * share <= largest("command")]
     far = share > max(smaller) ** -0.5 or max(most.values()) > largest(quantity)
     return within[0] if far and len(within) == 1 else None
