@@ -12,7 +12,7 @@ from support.command import command
 from cosim import InputError
 from diagnosis import propose_columns
 from diagnosis.predictors import ship_with
-from diagnosis.runs import FOLDER_FILE, line_beside, prepare, propose, read
+from diagnosis.runs import FOLDER_FILE, line_beside, meaning, prepare, propose, read
 from diagnosis.runs.columns.columns import Named, quantities
 from diagnosis.runs.columns.likely_columns import meaning_of_words, motion_of
 from diagnosis.runs.columns.unit_check import UNITS, spelt
@@ -231,6 +231,55 @@ def test_a_heading_in_rows_of_its_own_is_seen_to_be_in_degrees(tmp_path: Path) -
     layout = propose(written(tmp_path / "a.csv", rows), TANKER).layout
     assert layout.column("psi").unit == "deg"
     assert layout.column("x").unit is None
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "signal"),
+    [
+        ("Ruderlage Bb", "deg", "port_rudder.delta"),
+        ("Angle barre tribord", "deg", "starboard_rudder.delta"),
+        ("Régime hélice bâbord", "rpm", "port_screw.n"),
+        ("Drehzahl Propeller Stb", "rpm", "starboard_screw.n"),
+        ("Port Shaft RPM", "rpm", "port_screw.n"),
+        ("STEER.SB.AngleSetpoint", "deg", "starboard_rudder.delta"),
+        ("Bugstrahlruder", "%", "bow.u"),
+        ("Bug Sollwert", "%", "bow.u"),
+        ("Cap vrai", "deg", "psi"),
+        ("Shaft RPM", "rpm", ""),
+        ("Kurs", "deg", ""),
+        ("Heckstrahlruder", "%", ""),
+    ],
+)
+def test_words_of_other_languages_and_short_forms(name: str, unit: str, signal: str) -> None:
+    screws = {f"{side}_screw.n": "shaft speed" for side in ("port", "starboard")}
+    rudders = {f"{side}_rudder.delta": "angle" for side in ("port", "starboard")}
+    quantity = quantities(TANKER) | screws | rudders | {"bow.u": "command"}
+    del quantity["propeller.n"], quantity["rudder.delta"]
+    assert meaning_of_words(name, unit, quantity) == signal
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [("Hochwert", "x"), ("Zeit", "time"), ("OST", "y"), ("Est", "")]
+)
+def test_names_in_other_languages(name: str, signal: str) -> None:
+    assert meaning(name, quantities(TANKER)) == (signal, False)
+
+
+def test_the_part_of_a_path_that_all_names_have_tells_nothing(tmp_path: Path) -> None:
+    table = zigzag()
+    names = {
+        "x": "PLC1.NAV.North_m",
+        "y": "PLC1.NAV.East_m",
+        "psi": "PLC1.GYRO.Heading_rad",
+        "propeller.n": "PLC1.PROP.SpeedSetpoint_rps",
+        "rudder.delta": "PLC1.STEER.AngleSetpoint_rad",
+    }
+    found = propose(written(tmp_path / "a.csv", zigzag(**names)), TANKER)
+    assert {s: found.layout.column(s).name for s in names} == names
+    assert found.run is not None
+    np.testing.assert_array_equal(
+        found.run.commands, table[[NAMES["propeller.n"], NAMES["rudder.delta"]]]
+    )
 
 
 def test_a_folder_is_not_a_measurement(tmp_path: Path) -> None:
@@ -600,14 +649,12 @@ def test_brackets_behind_the_name_of_stamps_are_no_unit(tmp_path: Path, name: st
     np.testing.assert_allclose(run.time - run.time[0], boat()["time"] - boat()["time"][0], atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("others", "name"), [({}, "Zeitstempel"), ({"sent": "2026-01-01T00:00:00"}, "")]
-)
+@pytest.mark.parametrize(("others", "name"), [({}, "Stempel"), ({"sent": "2026-01-01T00:00:00"}, "")])
 def test_the_only_date_stamps_are_the_time_whatever_their_name(
     tmp_path: Path, others: dict[str, str], name: str
 ) -> None:
     stamps = pd.Timestamp("2026-03-29T01:59:30Z") + pd.to_timedelta(boat()["time"], unit="s")
-    table = boat().drop(columns="time").assign(Zeitstempel=stamps.astype(str), note="none", **others)
+    table = boat().drop(columns="time").assign(Stempel=stamps.astype(str), note="none", **others)
     found = propose(written(tmp_path / "a.csv", table), OTTER)
     assert found.layout.column("time").name == name
     assert (found.run is not None) == bool(name)
@@ -641,9 +688,9 @@ def test_a_unit_may_follow_a_slash(tmp_path: Path) -> None:
 
 
 def test_a_time_of_another_name_is_likely_where_rows_are_repeated(tmp_path: Path) -> None:
-    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "epoch"})
+    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "ticks"})
     found = propose(written(tmp_path / "a.csv", table), OTTER)
-    assert [c.name for c in found.likely["time"]] == ["epoch"]
+    assert [c.name for c in found.likely["time"]] == ["ticks"]
 
 
 def test_a_struct_of_matlab_is_a_table(tmp_path: Path) -> None:

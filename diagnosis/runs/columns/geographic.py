@@ -16,7 +16,7 @@ from cosim import InputError
 
 from ..run_constants import NEGLIGIBLE
 from .columns import Column
-from .likely_columns import words_of
+from .name_words import words_of
 from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84

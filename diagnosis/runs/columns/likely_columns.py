@@ -1,6 +1,5 @@
 """Which columns of a measurement a signal is likely to be: by name, unit, range and motion."""
 
-import re
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
 from typing import NamedTuple
@@ -10,6 +9,7 @@ import numpy as np
 from ...execution.short_text import SHOWN
 from ..run_constants import EVERY, FEWEST
 from .columns import OUTPUTS
+from .name_words import words_of
 from .unit_check import UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -20,7 +20,7 @@ FILLERS = frozenset(
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
         *("sign", "gear", "data", "value"),
-        *("gyro", "compass", "utm"),
+        *("gyro", "compass", "utm", "track", "azimuth"),
     )
 )
 # Quantity -> word that is left of a name -> signal.
@@ -38,8 +38,6 @@ REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Quantity of a command -> words that tell it; words of a speed, which an angle is not.
 KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
 CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
-# Short and other words of names -> the words that actuators' names have.
-MEANT = {"stbd": "starboard", "stb": "starboard", "right": "starboard", "left": "port"}
 # Words of a column that holds the sign of another one, and its cells of a negative value.
 SIGN = frozenset(("dir", "direction", "sign", "gear"))
 ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
@@ -61,12 +59,6 @@ class LikelyColumn(NamedTuple):
     name: str
     reasons: Sequence[str]
     score: float
-
-
-def words_of(name: str) -> list[str]:
-    """The words of a name, small letters."""
-    found: list[str] = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
-    return [MEANT.get(word, word) for word in found]
 
 
 def unit_in(name: str) -> str:
@@ -119,10 +111,15 @@ def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:
 
 
 def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
-    """Whether words name an actuator, or the beginning of it, its command and nothing else."""
+    """Whether words name an actuator, or the beginning of it, its command and nothing else.
+
+    A shaft on some side is that of the propeller there.
+    """
     actuator, _, command = signal.partition(".")
-    left = list(words)
-    for word in words_of(actuator):
+    left, own = list(words), words_of(actuator)
+    if quantity == "shaft speed" and len(own) > 1:
+        own = [word for word in own if word != "propeller" or "propeller" in left]
+    for word in own:
         same = [w for w in left if w == word or (len(w) > 2 and word.startswith(w))]
         if not same:
             return False

@@ -4,7 +4,7 @@ import json
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import chain, islice
+from itertools import chain, islice, takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -57,7 +57,8 @@ NO_UNIT = ("", "-")
 # Units that a name may end in; u_1 is the first of several, and not a fraction.
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
 # A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
-TIME_IN = re.compile(r"(?i)(time|timestamp|stamp)(?:_?boot)?_?([mun]s(?:ec)?)")
+TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
+PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
 class Proposal(NamedTuple):
@@ -305,13 +306,20 @@ def _in_unit_of_name(
 def _by_words(
     free: Sequence[tuple[str, str]], columns: Mapping[str, Column], quantity: Mapping[str, str]
 ) -> dict[str, Column]:
-    """Signals that words of names and units tell of columns (name, unit below), where one alone does."""
+    """Signals that words of names and units tell of columns (name, unit below), where one alone does.
+
+    The part of a path that all names with a path have in common, as of a device, tells nothing.
+    """
     found: dict[str, list[Column]] = {}
     shafts: list[Column] = []
+    paths = [parts for name, _ in free if (parts := PATH.split(name)[:-1])]
+    common = [p[0] for p in takewhile(lambda p: len({*p}) == 1, zip(*paths, strict=False))]
     for name, below in free:
         bare, unit = _without_unit(name, below)
         unit = unit or unit_in(bare)
-        if signal := meaning_of_words(bare, unit, quantity):
+        parts = PATH.split(bare)
+        own = parts[len(common) :] if parts[: len(common)] == common else parts
+        if signal := meaning_of_words(" ".join(own), unit, quantity):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
         elif unit in ("rpm", "rps"):

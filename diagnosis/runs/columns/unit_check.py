@@ -31,8 +31,10 @@ UNITS: dict[str, dict[str, float]] = {
 # Other spellings of units in files -> the one above.
 SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
-    **dict.fromkeys(("kt", "kts", "knot", "knots"), "kn"),
-    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),
+    **dict.fromkeys(
+        ("degree", "degrees", "deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"
+    ),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
     **dict.fromkeys(("pct", "percent"), "%"),
