@@ -377,8 +377,8 @@ def test_units_have_their_factors_by_definition() -> None:
 @pytest.mark.parametrize(
     ("written_so", "unit"),
     [
-        *(("RPM", "rpm"), ("rev/min", "rpm"), ("U/min", "rpm"), ("tr/min", "rpm")),
-        *(("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s")),
+        *(("RPM", "rpm"), ("rev/min", "rpm"), ("U/min", "rpm"), ("tr/min", "rpm"), ("o/min", "rpm")),
+        *(("Knots", "kn"), ("°/min", "deg/min"), ("deg/sec", "deg/s"), ("grader", "deg")),
     ],
 )
 def test_usual_spellings_of_a_unit_are_that_unit(written_so: str, unit: str) -> None:
@@ -629,6 +629,19 @@ def test_messages_have_their_heading_as_a_quaternion(tmp_path: Path, suffix: str
     np.testing.assert_allclose(np.sin(run.pose[:, 2] - boat()["psi"]), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "north"), [("X [mm]", "Y [mm]", "Y [mm]"), ("N [mm]", "E [mm]", "N [mm]")]
+)
+def test_axes_beside_a_quaternion_may_have_units(
+    tmp_path: Path, first: str, second: str, north: str
+) -> None:
+    """Those of letters are of a message, to east and north; the others are named, and stay."""
+    names = {"pose.pose.position.x": first, "vehicle_local_position.y": second}
+    found = propose(written(tmp_path / "a.csv", message(boat()).rename(columns=names)), OTTER)
+    x = found.layout.column("x")
+    assert (x.name, x.unit) == (north, "mm")
+
+
 def test_axes_that_are_stated_stay_beside_a_quaternion(tmp_path: Path) -> None:
     """North and east are named. A width beside x, y and z is no quaternion."""
     table = message(boat()).rename(
@@ -744,6 +757,73 @@ def test_messages_of_several_topics_in_rows_of_their_own_are_smoothed(tmp_path: 
     inside = (s.time > 2.0) & (s.time < 57.0)
     true = np.interp(s.time, table["time"], 0.8 * np.ones(len(table)))
     assert np.sqrt(np.nanmean((s.nu[inside, 0] - true[inside]) ** 2)) < 0.02
+
+
+@pytest.mark.parametrize("known", ["compass_heading", "where it points"])
+def test_a_heading_in_rows_of_its_own_shows_its_unit_and_the_motion(tmp_path: Path, known: str) -> None:
+    """A row with position, heading and command at once is none there: the last values count."""
+    table = zigzag(psi=known, **{"rudder.delta": "b"})
+    time, heading = NAMES["time"], np.degrees(table[known]) % 360.0
+    rest = table.drop(columns=[known, "b"])
+    parts = [rest.iloc[::2], table[[time]].assign(**{known: heading}), table[[time, "b"]]]
+    each = [part.assign(**{time: part[time] + 0.03 * k}) for k, part in enumerate(parts)]
+    path = written(tmp_path / "a.csv", pd.concat(each).sort_values(time))
+    likely = propose(path, TANKER).likely
+    assert ("psi" in likely) == (known != "compass_heading")  # without a heading no motion is known
+    shown = any("correlates" in reason for c in likely["rudder.delta"] for reason in c.reasons)
+    assert shown == ("psi" not in likely)
+    filled = {"psi": known, "rudder.delta": "b"}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": filled}))
+    assert propose(path, TANKER).layout.column("psi").unit == "deg"
+
+
+@pytest.mark.parametrize("stated", [{}, {"unit": "rad"}], ids=["a name alone", "with its unit"])
+def test_a_heading_that_is_named_gets_the_unit_of_its_values(
+    tmp_path: Path, stated: dict[str, str]
+) -> None:
+    """A blank that was filled with a name says nothing of the unit; a unit that is stated stays."""
+    table = zigzag(psi="where it points")
+    table["where it points"] = np.degrees(table["where it points"]) % 360.0
+    path = written(tmp_path / "a.csv", table)
+    psi = {"name": "where it points", **stated}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"psi": psi}}))
+    told = propose(path, TANKER).layout.column("psi")
+    assert (told.name, told.unit) == (psi["name"], stated.get("unit", "deg"))
+
+
+@pytest.mark.parametrize("factor", [None, 1.0], ids=["names alone", "with a factor"])
+def test_latitude_and_longitude_that_are_named_are_read_as_metres(
+    tmp_path: Path, factor: float | None
+) -> None:
+    """A factor that is stated stays: then the columns are lengths, whatever they are called."""
+    table = zigzag(x="Latitud", y="Longitud")
+    table["Latitud"] = 36.0 + table["Latitud"] / 111_000.0
+    table["Longitud"] = -5.0 + table["Longitud"] / 90_000.0
+    path = written(tmp_path / "a.csv", table)
+    more = {} if factor is None else {"factor": factor}
+    named = {"x": {"name": "Latitud", **more}, "y": {"name": "Longitud", **more}}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": named}))
+    x = propose(path, TANKER).layout.column("x")
+    assert x.factor == (pytest.approx(110_959.0, rel=1e-3) if factor is None else factor)
+
+
+def test_a_unit_with_a_slash_may_follow_the_word_in(tmp_path: Path) -> None:
+    """The slash is that of revolutions by minutes, and not of a quantity in minutes."""
+    table = zigzag(**{"propeller.n": "propeller in U/min"})
+    table["propeller in U/min"] *= 60.0
+    assert propose(written(tmp_path / "a.csv", table), TANKER).layout.column("propeller.n").unit == "rpm"
+
+
+@pytest.mark.parametrize(("unit", "known"), [("mm", True), ("port", False)])
+def test_a_unit_may_follow_the_word_in(tmp_path: Path, unit: str, known: bool) -> None:
+    name = f"northing in {unit}"
+    table = zigzag(x=name)
+    table[name] *= 1000.0
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    if known:
+        assert (found.layout.column("x").name, found.layout.column("x").unit) == (name, "mm")
+    else:
+        assert found.layout.column("x").name == ""
 
 
 def test_a_compass_and_one_shaft_are_known(tmp_path: Path) -> None:

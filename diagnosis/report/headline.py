@@ -39,7 +39,7 @@ UNEXPLAINED = "A model error remains that no known effect explains."
 NOT_BELIEVED = "The model has an error that no known effect explains with sufficient confidence."
 CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
-    "and predictions of data left out of the fit improve. This does not identify a cause."
+    "and predict data left out of the fit no worse. This does not identify a cause."
 )
 VERDICTS = {
     "found": "An effect is missing and was identified",

@@ -120,6 +120,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     columns |= _of_message(columns, fields, kept)
     columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
+    kept = {s: columns[s] for s in kept}
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     if blank := missing(layout, names, of):
@@ -135,7 +136,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
     for signal, unit in _seen_units(run):
-        if signal not in kept and not layout.column(signal).unit:
+        if signal not in kept or not _is_told(kept[signal]):
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
@@ -291,11 +292,16 @@ def _columns(
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
 
 
+def _is_told(stated: Column) -> bool:
+    """Whether a column has more than a name: what its numbers mean is then stated."""
+    return not {"unit", "factor", "offset"}.isdisjoint(stated.model_fields_set)
+
+
 def _in_unit_of_name(
     stated: Column, signal: str, below: Mapping[str, str], quantity: Mapping[str, str]
 ) -> Column:
     """A column of which only the name is stated, in the unit that stands in that or below it."""
-    if stated.model_fields_set & {"unit", "factor", "offset"}:
+    if _is_told(stated):
         return stated
     bare, unit = _without_unit(stated.name, below.get(stated.name, ""))
     factors = UNITS.get(quantity.get(signal, ""), {})
@@ -341,7 +347,8 @@ def _of_message(
     if psi is None or psi.name not in fields or "psi" in kept:
         return {}
     turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
-    if {"x", "y"} <= columns.keys() - kept and columns["x"].name.casefold().endswith("x"):
+    known = {"x", "y"} <= columns.keys() - kept
+    if known and _without_unit(columns["x"].name, "")[0].casefold().endswith("x"):
         turned |= {"x": columns["y"], "y": columns["x"]}
     return turned
 
@@ -363,10 +370,15 @@ def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Colu
 def _geographic(
     path: Path, layout: Layout, names: Sequence[str], units: Sequence[str]
 ) -> dict[str, Column]:
-    """Position by columns of latitude and longitude, if no other columns are known."""
-    free = [pair for pair in zip(names, units, strict=False) if pair[0] not in _names_of(layout.columns)]
+    """Position by columns of latitude and longitude, if no other columns are known.
+
+    Those that are stated by their names alone are read so, too.
+    """
+    stated = {s: c.name for s in ("x", "y") if (c := layout.columns.get(s)) and not _is_told(c)}
+    taken = _names_of(layout.columns) - {*stated.values()}
+    free = [pair for pair in zip(names, units, strict=False) if pair[0] not in taken]
     pair = geographic_pair({name: _bare(name, below) for name, below in free})
-    if not pair or not layout.columns.keys().isdisjoint(pair):
+    if not pair or any(stated.get(s) != pair[s] for s in layout.columns.keys() & pair):
         return {}
     table = table_of_file(path, layout, set(pair.values()))
     degrees = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
@@ -447,12 +459,13 @@ def _without_unit(name: str, below: str) -> tuple[str, str]:
 
 
 def _unit_at_the_end(name: str) -> tuple[str, str]:
-    """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, TimeUS, and the unit."""
+    """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, x in mm, TimeUS."""
     if stamped := TIME_IN.fullmatch(name):
         return stamped[1], spelt(stamped[2].lower())
-    quantity, _, unit = name.partition("/")  # ISO 80000-1, 7.1.2
-    if quantity and spelt(unit) in NAMED_UNITS:
-        return quantity, spelt(unit)
+    for mark in (" in ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
+        quantity, _, unit = name.partition(mark)
+        if quantity and spelt(unit) in NAMED_UNITS:
+            return quantity, spelt(unit)
     words = name.split("_")
     for count in (2, 1):
         unit = spelt("/".join(words[-count:]))

@@ -32,14 +32,14 @@ UNITS: dict[str, dict[str, float]] = {
 SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
     **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),
-    **dict.fromkeys(
-        ("degree", "degrees", "deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"
-    ),
+    **dict.fromkeys(("degree", "degrees", "grader", "Grad"), "deg"),
+    **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
-    **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "min-1", "min^-1"), "rpm"),
+    **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "o/min", "omdr/min"), "rpm"),
+    **dict.fromkeys(("min-1", "min^-1"), "rpm"),
     **dict.fromkeys(("°/min",), "deg/min"),
     **{f"{unit}/sec": f"{unit}/s" for unit in ("m", "rad", "deg")},
 }

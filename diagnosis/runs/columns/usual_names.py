@@ -11,18 +11,20 @@ CALLED: dict[str, tuple[str, ...]] = {
     "time": (
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
         *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp", "epoch", "unixtime"),
+        "timesincestart",
     ),
     "x": (
         *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
-        "utmn",
+        *("utmn", "northings"),
     ),
     "y": (
         *("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
-        "utme",
+        *("utme", "eastings"),
     ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
         *("hdm", "compass", "gyro", "gyrocompass", "orientation", "quaternion", "quat", "q"),
+        *("compassheading", "gyroheading"),
     ),
     "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
     "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
