@@ -37,6 +37,7 @@ SUBCOMMANDS = {
     "trial": Subcommand(
         "diagnosis.measure_trial", "measures of a manoeuvring trial, simulated or measured"
     ),
+    "join": Subcommand("diagnosis.join", "make one table of the files of one run"),
     "columns": Subcommand(
         "diagnosis.propose_columns", "propose the JSON file that states how to read your measurement"
     ),

@@ -190,6 +190,10 @@ def _blanks(proposals: Iterable["Proposal"], options: argparse.Namespace) -> Ite
             "ship by --ship NAME|FILE.toml; its commands are then looked for"
         )
     if found:
+        yield (
+            "if other files of the run have them, or each row has one value with its name, make one "
+            "table: python -m diagnosis.join FILE... --out RUN.csv"
+        )
         yield "put the columns' names into the blanks of the side-car, and run this command again"
 
 

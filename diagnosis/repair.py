@@ -12,10 +12,10 @@ from math import degrees, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosim import InputError
 from cosim.command import command_parser, run_command
 
 from .commands.command_line import Done, run, ship_option
+from .commands.table_file import table_options, table_target, write_table
 from .execution.progress import Advance
 from .execution.result_folder import together
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from fmus.scale import Scale
 
     from .runs import Examined, Run
-
-KINDS = (".csv", ".parquet")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,22 +35,14 @@ def repair(options: argparse.Namespace, advance: Advance) -> Done:
     from .predictors import ship_with
     from .runs import layout_beside, prepare, table_of  # only now: they take a second to import
 
-    out = options.out
-    if out.suffix not in KINDS:
-        raise InputError(f"'{out}' ends neither in .csv nor in .parquet")
-    if out.exists() and not options.overwrite:
-        raise InputError(f"'{out}' exists; --overwrite replaces it")
+    out = table_target(options)
     craft = ship_with((), options.ship)
     advance("reading and comparing channels")
     prepared = prepare(options.run, craft, anyway=True)  # what cannot be repaired is reported
     repaired = prepared.sensors.run
     side_car = f"{out.name}.json"
     with together(out.parent, (out.name, side_car)) as new:
-        table = table_of(repaired)
-        if out.suffix == ".csv":
-            table.to_csv(new / out.name, index=False)
-        else:
-            table.to_parquet(new / out.name, index=False)
+        write_table(table_of(repaired), new / out.name)
         beside = layout_beside(repaired)
         (new / side_car).write_text(json.dumps(beside, indent=2) + "\n", encoding="utf-8")
     closed = _closed(prepared.raw, repaired, craft.scale)
@@ -102,15 +92,8 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, nothing may be wrong; 2 bad input; 130 interrupted (nothing written)",
     )
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
-    made.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="CSV or Parquet file; FILE.json next to it has the noise",
-    )
+    table_options(made, "CSV or Parquet file; FILE.json next to it has the noise")
     ship_option(made)
-    made.add_argument("--overwrite", action="store_true", help="replace an existing file too")
     return made
 
 

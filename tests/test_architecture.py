@@ -55,6 +55,7 @@ DIAGNOSIS_LAYERS = (
         "compare",
         "criteria",
         "design_run",
+        "join",
         "learn",
         "linearise",
         "measure_trial",

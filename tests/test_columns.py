@@ -12,7 +12,7 @@ from support.command import command
 from cosim import InputError
 from diagnosis import propose_columns
 from diagnosis.predictors import ship_with
-from diagnosis.runs import FOLDER_FILE, line_beside, prepare, propose, read
+from diagnosis.runs import FOLDER_FILE, line_beside, meaning, prepare, propose, read
 from diagnosis.runs.columns.columns import Named, quantities
 from diagnosis.runs.columns.likely_columns import meaning_of_words, motion_of
 from diagnosis.runs.columns.unit_check import UNITS, spelt
@@ -162,6 +162,124 @@ def test_a_log_with_commands_of_actuators_needs_its_ship(tmp_path: Path) -> None
     done = command(propose_columns.main, path, "--ship", "kvlcc2")
     assert "--ship" not in done.stdout
     assert "blanks" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("factors", "units"),
+    [
+        (
+            {"propeller.n": 60.0, "rudder.delta": np.degrees(1.0)},
+            {"propeller.n": "rpm", "rudder.delta": "deg"},
+        ),
+        ({"propeller.n": 60.0}, {"propeller.n": "rpm", "rudder.delta": None}),
+        ({"rudder.delta": np.degrees(1.0)}, {"propeller.n": None, "rudder.delta": "deg"}),
+        ({}, {"propeller.n": None, "rudder.delta": None}),
+        # Within 1.5 times its limit it overshoots; by 2 pi both rpm and rad/s are within.
+        ({"rudder.delta": 3.0}, {"rudder.delta": None}),
+        ({"propeller.n": 3.0}, {"propeller.n": None}),
+    ],
+)
+def test_commands_far_beyond_their_limits_are_in_the_unit_within(
+    tmp_path: Path, factors: dict[str, float], units: dict[str, str | None]
+) -> None:
+    names = {"propeller.n": "propeller", "rudder.delta": "rudder_cmd"}
+    table = zigzag(**names)
+    for signal, factor in factors.items():
+        table[names[signal]] *= factor
+    layout = propose(written(tmp_path / "a.csv", table), TANKER).layout
+    assert {s: layout.column(s).unit for s in units} == units
+    assert {s: layout.column(s).name for s in names} == names
+    # What is stated stands.
+    told = {"columns": {"rudder.delta": {"name": "rudder_cmd", "factor": 0.5}}}
+    (tmp_path / "a.csv.json").write_text(json.dumps(told))
+    column = propose(tmp_path / "a.csv", TANKER).layout.column("rudder.delta")
+    assert (column.factor, column.unit) == (0.5, None)
+
+
+def test_a_column_called_as_an_actuator_is_its_only_command() -> None:
+    quantity = quantities(TANKER)
+    for name in ("rudder", "Rudder order", "rudder angle", "/rudder/cmd.data"):
+        assert meaning_of_words(name, "", quantity) == "rudder.delta"
+    assert meaning_of_words("propeller speed", "", quantity) == "propeller.n"
+    for name in ("rudder rate", "rudder velocity", "rudder power", "rudder torque"):
+        assert meaning_of_words(name, "", quantity) != "rudder.delta"
+    pod = {"pod.n": "shaft speed", "pod.alpha": "angle", "pod.thrust": "force"}
+    assert meaning_of_words("pod", "", pod) == ""
+    assert meaning_of_words("pod ang", "", pod) == "pod.alpha"
+    assert meaning_of_words("pod speed", "", pod) == "pod.n"
+    assert meaning_of_words("pod angular speed", "", pod) != "pod.alpha"
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("TimeUS", "us"), ("time_boot_ms", "ms"), ("timestamp_usec", "us"), ("TIMEMS", "ms")],
+)
+def test_the_unit_at_the_end_of_the_name_of_a_time(tmp_path: Path, name: str, unit: str) -> None:
+    table = zigzag(time=name)
+    table[name] = np.round(table[name] / UNITS["time"][unit])
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert (found.layout.column("time").name, found.layout.column("time").unit) == (name, unit)
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.time, zigzag()[NAMES["time"]], atol=1e-9)
+
+
+def test_a_heading_in_rows_of_its_own_is_seen_to_be_in_degrees(tmp_path: Path) -> None:
+    table = zigzag(psi="yaw", x="north", y="east")
+    table["yaw"] = np.degrees(8.0 * table["yaw"]) % 360.0
+    heading = table[[NAMES["time"], "yaw"]].assign(**{NAMES["time"]: table[NAMES["time"]] + 0.03})
+    rows = pd.concat([table.drop(columns="yaw"), heading]).sort_values(NAMES["time"])
+    layout = propose(written(tmp_path / "a.csv", rows), TANKER).layout
+    assert layout.column("psi").unit == "deg"
+    assert layout.column("x").unit is None
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "signal"),
+    [
+        ("Ruderlage Bb", "deg", "port_rudder.delta"),
+        ("Angle barre tribord", "deg", "starboard_rudder.delta"),
+        ("Régime hélice bâbord", "rpm", "port_screw.n"),
+        ("Drehzahl Propeller Stb", "rpm", "starboard_screw.n"),
+        ("Port Shaft RPM", "rpm", "port_screw.n"),
+        ("STEER.SB.AngleSetpoint", "deg", "starboard_rudder.delta"),
+        ("Bugstrahlruder", "%", "bow.u"),
+        ("Bug Sollwert", "%", "bow.u"),
+        ("Cap vrai", "deg", "psi"),
+        ("Shaft RPM", "rpm", ""),
+        ("Kurs", "deg", ""),
+        ("Heckstrahlruder", "%", ""),
+    ],
+)
+def test_words_of_other_languages_and_short_forms(name: str, unit: str, signal: str) -> None:
+    screws = {f"{side}_screw.n": "shaft speed" for side in ("port", "starboard")}
+    rudders = {f"{side}_rudder.delta": "angle" for side in ("port", "starboard")}
+    quantity = quantities(TANKER) | screws | rudders | {"bow.u": "command"}
+    del quantity["propeller.n"], quantity["rudder.delta"]
+    assert meaning_of_words(name, unit, quantity) == signal
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [("Hochwert", "x"), ("Zeit", "time"), ("OST", "y"), ("Est", "")]
+)
+def test_names_in_other_languages(name: str, signal: str) -> None:
+    assert meaning(name, quantities(TANKER)) == (signal, False)
+
+
+def test_the_part_of_a_path_that_all_names_have_tells_nothing(tmp_path: Path) -> None:
+    table = zigzag()
+    names = {
+        "x": "PLC1.NAV.North_m",
+        "y": "PLC1.NAV.East_m",
+        "psi": "PLC1.GYRO.Heading_rad",
+        "propeller.n": "PLC1.PROP.SpeedSetpoint_rps",
+        "rudder.delta": "PLC1.STEER.AngleSetpoint_rad",
+    }
+    found = propose(written(tmp_path / "a.csv", zigzag(**names)), TANKER)
+    assert {s: found.layout.column(s).name for s in names} == names
+    assert found.run is not None
+    np.testing.assert_array_equal(
+        found.run.commands, table[[NAMES["propeller.n"], NAMES["rudder.delta"]]]
+    )
 
 
 def test_a_folder_is_not_a_measurement(tmp_path: Path) -> None:
@@ -544,14 +662,12 @@ def test_brackets_behind_the_name_of_stamps_are_no_unit(tmp_path: Path, name: st
     np.testing.assert_allclose(run.time - run.time[0], boat()["time"] - boat()["time"][0], atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("others", "name"), [({}, "Zeitstempel"), ({"sent": "2026-01-01T00:00:00"}, "")]
-)
+@pytest.mark.parametrize(("others", "name"), [({}, "Stempel"), ({"sent": "2026-01-01T00:00:00"}, "")])
 def test_the_only_date_stamps_are_the_time_whatever_their_name(
     tmp_path: Path, others: dict[str, str], name: str
 ) -> None:
     stamps = pd.Timestamp("2026-03-29T01:59:30Z") + pd.to_timedelta(boat()["time"], unit="s")
-    table = boat().drop(columns="time").assign(Zeitstempel=stamps.astype(str), note="none", **others)
+    table = boat().drop(columns="time").assign(Stempel=stamps.astype(str), note="none", **others)
     found = propose(written(tmp_path / "a.csv", table), OTTER)
     assert found.layout.column("time").name == name
     assert (found.run is not None) == bool(name)
@@ -585,9 +701,9 @@ def test_a_unit_may_follow_a_slash(tmp_path: Path) -> None:
 
 
 def test_a_time_of_another_name_is_likely_where_rows_are_repeated(tmp_path: Path) -> None:
-    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "epoch"})
+    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "ticks"})
     found = propose(written(tmp_path / "a.csv", table), OTTER)
-    assert [c.name for c in found.likely["time"]] == ["epoch"]
+    assert [c.name for c in found.likely["time"]] == ["ticks"]
 
 
 def test_a_struct_of_matlab_is_a_table(tmp_path: Path) -> None:

@@ -253,7 +253,8 @@ def test_blanks_are_said_once_by_the_measurement_that_shows_most(tmp_path):
     assert found[:2] == [
         "blank: x; likely columns: 'b' (unit, name); 'c' (unit, name)", "blank: psi; likely columns: none",
     ]  # fmt: skip
-    assert found[2].startswith("put the columns' names into the blanks")
+    assert "one table" in found[2]
+    assert found[3].startswith("put the columns' names into the blanks")
     assert [*propose_columns._blanks([proposal()], column_options(tmp_path))] == []
     forces = proposal(blank={f"tau_{a}": [] for a in "XYN"})
     assert any("--ship NAME" in t for t in propose_columns._blanks([forces], column_options(tmp_path)))

@@ -132,7 +132,7 @@ def holed(run):
 def unheard(run):
     """Commands are missing, and held."""
     tau = pd.DataFrame(np.where(silent(run)[:, None], np.nan, run.tau_cmd)).ffill().to_numpy()
-    return replace(run, tau_cmd=tau, held=silent(run))
+    return replace(run, tau_cmd=tau, held=silent(run)[:, None])
 
 
 @pytest.mark.parametrize("change", [holed, unheard])
@@ -156,10 +156,10 @@ def test_where_a_command_is_lost_no_model_is_judged(first, last):
     lost = (run.time < begin) | (run.time > end)
     commands = run.tau_cmd.copy()
     commands[lost, 1] = commands[np.flatnonzero(~lost)[-1], 1]
-    track = clean(replace(run, tau_cmd=commands, held=lost))
+    track = clean(replace(run, tau_cmd=commands, held=lost[:, None]))
     assert ((track.silences % 2 == 1) == lost).mean() > 0.99
     assert sum(note.startswith("commands are missing for") for note in track.notes) == 1
-    other, whole = smoothed(replace(run, tau_cmd=commands, held=lost)), smoothed(run)
+    other, whole = smoothed(replace(run, tau_cmd=commands, held=lost[:, None])), smoothed(run)
     windows = weak_windows(other)
     assert ((windows.middle > begin) & (windows.middle < end)).all()
     rms = [np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0)) for w in (weak_windows(whole), windows)]
@@ -172,7 +172,7 @@ def test_where_a_command_is_lost_no_model_is_judged(first, last):
 
 def test_commands_that_are_written_when_they_change_are_known_all_the_time():
     run, _ = sail(SECONDS, H, given=jumps)
-    held = np.ones(run.time.size, bool)
+    held = np.ones((run.time.size, 1), bool)
     held[::100] = False
     assert (clean(replace(run, held=held)).silences == 0).all()
     assert clean(holed(replace(run, held=None))).silences.tolist().count(1) == 0

@@ -13,6 +13,7 @@ from cosim import InputError
 from diagnosis.predictors import ship_with
 from diagnosis.runs import common_layout, propose, read
 from diagnosis.runs.columns.geographic import EQUATOR, SQUARED_ECCENTRICITY
+from diagnosis.runs.files.matlab_files import _vectors
 from diagnosis.runs.files.tables import date_stamps
 
 TIME = np.arange(0.0, 60.0, 0.5)
@@ -217,3 +218,15 @@ def test_a_mark_of_a_missing_value_does_not_make_the_others_coarse(
         x[::40] = mark
     run = read(written(tmp_path / "a.csv", table(x=x)))
     assert (np.median(run.coarse[:, 0]) > 0.5) == coarse
+
+
+@pytest.mark.parametrize("shape", [(6,), (2, 3)])
+def test_vectors_of_a_machine_with_another_byte_order_are_numbers_of_this_one(
+    shape: tuple[int, ...],
+) -> None:
+    values = np.arange(6.0).reshape(shape)
+    own, other = (dict(_vectors("a", values.astype(order))) for order in ("<f8", ">f8"))
+    assert own.keys() == other.keys()
+    for name, vector in other.items():
+        assert vector.dtype.isnative
+        np.testing.assert_array_equal(vector, own[name])

@@ -85,7 +85,7 @@ def _with_known_commands(s: Smoothed, run: Run, model: Model) -> Smoothed:
     line = moves_on(windows, model) if windows.middle.size else None
     if line is None:
         return s
-    held = rows if run.held is None else rows | run.held
+    held = rows[:, None] if run.held is None else rows[:, None] | run.held
     return motion(prepare(replace(run, held=held, notes=(*run.notes, line)), model.ship))
 
 

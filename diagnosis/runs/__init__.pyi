@@ -27,6 +27,7 @@ from .files.reading import read as read
 from .files.reading import read_frame as read_frame
 from .files.reading import ship_of_logs as ship_of_logs
 from .files.reading import table_of as table_of
+from .files_of_one_run import one_table as one_table
 from .fingerprint import Fingerprint as Fingerprint
 from .fingerprint import fingerprints as fingerprints
 from .fingerprint import samples_sha256 as samples_sha256

@@ -119,7 +119,20 @@ class Track(ShortRepr):
         they change: there they are held.
         """
         time, held = self.run.time, self.run.held
-        stated = np.arange(time.size) if held is None else np.flatnonzero(~held)
+        each = np.zeros((1, time.size), bool) if held is None else held.T
+        begun, ended = np.concatenate([self._unstated(rows) for rows in each], axis=1)
+        order = np.argsort(begun, kind="stable")
+        begun, ended = begun[order], np.maximum.accumulate(ended[order])
+        apart = begun[1:] > ended[:-1]  # of two that overlap one part is made
+        begun, ended = (
+            np.delete(begun, 1 + np.flatnonzero(~apart)),
+            np.delete(ended, np.flatnonzero(~apart)),
+        )
+        return np.searchsorted(begun, time, "left") + np.searchsorted(ended, time, "right")
+
+    def _unstated(self, held: np.ndarray) -> np.ndarray:
+        """(2, m), begin and end [s] of the parts in which a command is not known; ``held`` (n,)."""
+        time, stated = self.run.time, np.flatnonzero(~held)
         written = 2 * stated.size < time.size and 2 * int((np.diff(stated) == 1).sum()) < stated.size
         given = time if written else time[stated]
         longest = long_gap(float(np.median(np.diff(time))), self.scale)
@@ -128,8 +141,7 @@ class Track(ShortRepr):
         last = [np.inf] if time[-1] - given[-1] > longest else []
         given = np.concatenate([first, given, last])
         silent = np.diff(given) > longest
-        begun, ended = given[:-1][silent], given[1:][silent]
-        return np.searchsorted(begun, time, "left") + np.searchsorted(ended, time, "right")
+        return np.array([given[:-1][silent], given[1:][silent]])
 
     def counts(self, spikes: int = 0) -> Counts:
         """Counts of the samples by their use."""
@@ -210,10 +222,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     pose = np.where(measured, run.pose, np.nan)
     gap = long_gap(period, scale)
     of_heading = np.flatnonzero(measured[:, 2])
-    turning = np.interp(run.time[fresh], run.time[of_heading], run.pose[of_heading, 2])
-    as_read = np.column_stack([run.pose[fresh, :2], turning])
-    angles = other_angles(run.measured)
-    refuse_units(run.time[fresh], as_read, angles, where, anyway, run.called or {})
+    refuse_units(run.time, pose, other_angles(run.measured), where, anyway, run.called or {})
     pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])

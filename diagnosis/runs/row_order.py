@@ -169,7 +169,12 @@ def _merged(run: Run) -> Run:
     np.logical_or.at(clash, group, (there & (channels != value[group])).any(axis=1))
     last = np.append(first[1:], True)
     keep = clash[group] | last
-    merged = run.rows(keep)
+    held = run.held
+    if held is not None:  # not where a row of the stamp states the command
+        stated = np.zeros((many, held.shape[1]), bool)
+        np.logical_or.at(stated, group, ~held)
+        held = held & ~(stated[group] & last[:, None])
+    merged = replace(run, held=held).rows(keep)
     one = np.flatnonzero(~clash[group[keep]])
     filled = np.column_stack([merged.pose, *merged.measured.values()])
     filled[one] = value[group[keep][one]]

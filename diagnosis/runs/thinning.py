@@ -79,7 +79,7 @@ def thinned(track: Track) -> Track:
     near = np.searchsorted(run.time, time).clip(0, run.time.size - 1)
     measured = {name: values[near] for name, values in run.measured.items()}
     commands = _mean_commands(run, time)
-    held = None if run.held is None else _by(part, run.held).mean().to_numpy()[:, 0] > 0.5
+    held = None if run.held is None else _by(part, run.held).mean().to_numpy() > 0.5
     note = (
         f"{run.time.size} rows, {row:.3g} s apart, thinned to {time.size}, {width:.3g} s apart: "
         "medians of the pose, means of the commands"

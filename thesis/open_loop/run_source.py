@@ -76,7 +76,7 @@ def gather_source(path: str | Path, anyway: bool = False) -> Source:
     found = {s: run.measured[name] for s, name in names.items() if name in run.measured}
     tau = run.tau_cmd.copy()
     if run.held is not None:
-        tau[run.held] = np.nan
+        tau[run.held.any(axis=1)] = np.nan
     time = run.time - run.time[0]
     regular = float(np.round((time[-1] - time[0]) / (time.size - 1), 9))
     grid = np.arange(time.size) * regular

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from cosim.fmu import FmuVariable
 
 from ...runs import UNITS, meaning
-from ...runs.columns.likely_columns import words_of
+from ...runs.columns.name_words import words_of
 from ...runs.columns.unit_check import largest
 
 # Words that say which frame or whose variable it is, and nothing of which signal.

@@ -16,15 +16,12 @@ from cosim import InputError
 
 from ..run_constants import NEGLIGIBLE
 from .columns import Column
-from .likely_columns import words_of
+from .name_words import words_of
 from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
-# Words of a name, those of Romance languages among them.
-WORDS = {
-    "x": {"lat", "latitude", "latitud", "latitudine"},
-    "y": {"lon", "lng", "long", "longitude", "longitud", "longitudine"},
-}
+# Words of a name.
+WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
 
 def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:

@@ -1,6 +1,5 @@
 """Which columns of a measurement a signal is likely to be: by name, unit, range and motion."""
 
-import re
 from collections.abc import Mapping, Sequence
 from difflib import SequenceMatcher
 from typing import NamedTuple
@@ -9,18 +8,19 @@ import numpy as np
 
 from ...execution.short_text import SHOWN
 from ..run_constants import EVERY, FEWEST
-from .columns import POSE
+from .columns import OUTPUTS, POSE
+from .name_words import words_of
 from .unit_check import UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
 FILLERS = frozenset(
     (
         *("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
-        *("mid", "midship", "position", "pos", "coordinate", "angle", "dir", "direction"),
+        *("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "dir", "direction"),
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
-        *("sign", "gear"),
-        *("gyro", "compass", "utm"),
+        *("sign", "gear", "data", "value"),
+        *("gyro", "compass", "utm", "track", "azimuth"),
     )
 )
 # Quantity -> word that is left of a name -> signal.
@@ -35,11 +35,9 @@ WORDS = {
     "rate": dict.fromkeys(("r", "yaw", "psi", "heading"), "r"),
 }
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
-# Short and other words of names -> the words that actuators' names have.
-MEANT = {
-    **dict.fromkeys(("stbd", "stb", "sb", "right"), "starboard"),
-    **dict.fromkeys(("ps", "left"), "port"),
-}
+# Quantity of a command -> words that tell it; words of a speed, which an angle is not.
+KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
+CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
 # Words of a column that holds the sign of another one, and its cells of a negative value.
 SIGN = frozenset(("dir", "direction", "sign", "gear"))
 ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
@@ -63,12 +61,6 @@ class LikelyColumn(NamedTuple):
     score: float
 
 
-def words_of(name: str) -> list[str]:
-    """The words of a name, small letters."""
-    found: list[str] = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
-    return [MEANT.get(word, word) for word in found]
-
-
 def unit_in(name: str) -> str:
     """The unit that a word of a column's name is, as rpm; empty if none is."""
     return next((word for word in words_of(name) if word in ("rpm", "rps")), "")
@@ -79,7 +71,8 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
 
     Args:
         name: of the column, without its unit.
-        unit: of the column; without one only an actuator's command is told, as in ``port/n_cmd``.
+        unit: of the column; without one only an actuator's command is told, as in ``port/n_cmd``,
+            ``port angle``, or ``rudder`` where that has one command.
         quantity: signal -> quantity.
     """
     words = words_of(name)
@@ -93,10 +86,19 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
         s
         for s, q in quantity.items()
         if "." in s
-        and (unit in UNITS[q] or (not unit and s.partition(".")[2] in words))
+        and (unit in UNITS[q] or (not unit and _is_command(words, s, quantity)))
         and _is_of_actuator(words, s, q)
     }
     return found.pop() if len(found) == 1 else ""
+
+
+def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
+    """Whether words tell which command of its actuator a column without a unit holds."""
+    actuator, _, command = signal.partition(".")
+    known = KINDS.get(quantity[signal], frozenset())
+    own = {s.partition(".")[2] for s in quantity if s.startswith(f"{actuator}.")}
+    only = own - OUTPUTS.keys() == {command}
+    return command in words or not known.isdisjoint(words) or (only and CHANGES.isdisjoint(words))
 
 
 def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:
@@ -109,10 +111,15 @@ def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:
 
 
 def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
-    """Whether words name an actuator, or the beginning of it, its command and nothing else."""
+    """Whether words name an actuator, or the beginning of it, its command and nothing else.
+
+    A shaft on some side is that of the propeller there.
+    """
     actuator, _, command = signal.partition(".")
-    left = list(words)
-    for word in words_of(actuator):
+    left, own = list(words), words_of(actuator)
+    if quantity == "shaft speed" and len(own) > 1:
+        own = [word for word in own if word != "propeller" or "propeller" in left]
+    for word in own:
         same = [w for w in left if w == word or (len(w) > 2 and word.startswith(w))]
         if not same:
             return False

@@ -2,8 +2,9 @@
 
 import json
 import math
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import chain, islice
+from itertools import chain, islice, takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..frozen import repeated
 from ..row_order import in_order
 from .columns import (
+    OF_UNIT,
     POSE,
     UNITS,
     UTF_8,
@@ -41,7 +43,6 @@ from .geographic import geographic_pair, local_columns, one_origin, refuse_minut
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
-    held_values,
     likely_columns,
     meaning_of_words,
     motion_of,
@@ -55,6 +56,9 @@ from .usual_names import meaning
 NO_UNIT = ("", "-")
 # Units that a name may end in; u_1 is the first of several, and not a fraction.
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
+# A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
+TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
+PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
 class Proposal(NamedTuple):
@@ -96,23 +100,16 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     quantity = quantities(of)
     if path.is_dir() or (path.suffix == ".mat" and fits_matlab(of)):
         raise InputError(f"'{path}' is not a CSV, Parquet or MATLAB file with named columns")
-    stated, text = stated_layout(path) or Layout(), Layout()
-    if path.is_file() and path.suffix not in (".parquet", ".mat"):
-        refuse_sentences(path)
-        encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
-        found = text_layout(path, encoding)
-        if found is None:
-            raise InputError(f"'{path}' has no table of numbers below a line of names")
-        text = found.model_copy(update={"encoding": encoding})
-    elif not path.is_file():
+    if not path.is_file():
         read(path, of=of)  # refuses it
-    text = text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
+    stated = stated_layout(path) or Layout()
+    text = text_of(path, stated)
     names = column_names(path, text)
     fields = message_fields(names)
     log = log_of(of.commands)
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
-    units = [*(_units_line(path, text) if text.units_line else []), *[""] * len(names)][: len(names)]
+    units = units_below(path, text, names)
     parts = {name for field in fields.values() for name in field.columns}
     whole = [k for k, name in enumerate(names) if name not in parts]
     names, units = [names[k] for k in whole], [units[k] for k in whole]
@@ -134,7 +131,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     except InputError as error:
         more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
-    columns |= _percent(path, layout, names, of)
+    columns |= _units_of_commands(path, layout, names, of)
     columns |= _signed(path, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
@@ -144,6 +141,38 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
     return Proposal(layout, unused, read(path, layout, of))
+
+
+def text_of(path: Path, stated: Layout) -> Layout:
+    """How a table's text is laid out, by a look at it; what is stated beside it stands.
+
+    Raises:
+        InputError: no table of numbers below names.
+    """
+    text = Layout()
+    if path.suffix not in (".parquet", ".mat"):
+        refuse_sentences(path)
+        encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
+        found = text_layout(path, encoding)
+        if found is None:
+            raise InputError(f"'{path}' has no table of numbers below a line of names")
+        text = found.model_copy(update={"encoding": encoding})
+    return text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
+
+
+def time_column(
+    path: Path, text: Layout, stated: Layout, names: Sequence[str], units: Sequence[str]
+) -> Column | None:
+    """The column of the time of a table, by its name, its unit or its stamps; None: none is known.
+
+    Args:
+        path, text, stated: the table, how it is laid out, and what is stated beside it.
+        names, units: of its columns.
+    """
+    kept = {s: c for s, c in stated.columns.items() if s == "time" and c.name.strip()}
+    columns = _columns(path, text, names, units, {"time": "time"}, kept)
+    columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
+    return columns.get("time")
 
 
 def _with_blanks(
@@ -213,9 +242,13 @@ def _encoding(path: Path) -> str:
     return UTF_8
 
 
-def _units_line(path: Path, text: Layout) -> list[str]:
-    with path.open(encoding=text.encoding) as file:
-        return table_cells(next(islice(file, text.skip + 1, None)), text.separator)
+def units_below(path: Path, text: Layout, names: Sequence[str]) -> list[str]:
+    """The units in the line below the names; empty ones where a table has no such line."""
+    found: list[str] = []
+    if text.units_line:
+        with path.open(encoding=text.encoding) as file:
+            found = table_cells(next(islice(file, text.skip + 1, None)), text.separator)
+    return [*found, *[""] * len(names)][: len(names)]
 
 
 def _columns(
@@ -279,13 +312,20 @@ def _in_unit_of_name(
 def _by_words(
     free: Sequence[tuple[str, str]], columns: Mapping[str, Column], quantity: Mapping[str, str]
 ) -> dict[str, Column]:
-    """Signals that words of names and units tell of columns (name, unit below), where one alone does."""
+    """Signals that words of names and units tell of columns (name, unit below), where one alone does.
+
+    The part of a path that all names with a path have in common, as of a device, tells nothing.
+    """
     found: dict[str, list[Column]] = {}
     shafts: list[Column] = []
+    paths = [parts for name, _ in free if (parts := PATH.split(name)[:-1])]
+    common = [p[0] for p in takewhile(lambda p: len({*p}) == 1, zip(*paths, strict=False))]
     for name, below in free:
         bare, unit = _without_unit(name, below)
         unit = unit or unit_in(bare)
-        if signal := meaning_of_words(bare, unit, quantity):
+        parts = PATH.split(bare)
+        own = parts[len(common) :] if parts[: len(common)] == common else parts
+        if signal := meaning_of_words(" ".join(own), unit, quantity):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
         elif unit in ("rpm", "rps"):
@@ -348,17 +388,39 @@ def _geographic(
     return columns
 
 
-def _percent(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
-    """Commands without a unit that reach beyond -1 to 1, in percent."""
-    own = {s for form in of.command_forms for s, unit in form.items() if unit == "1"}
-    named = {s: layout.column(s) for s in sorted(own) if layout.column(s).name in names}
-    if not named or any(column.unit or column.factor != 1.0 for column in named.values()):
-        return {}
-    table = table_of_file(path, layout, _names_of(named))
-    most = max(float(np.nanmax(np.abs(_numbers(table[n], "")), initial=0.0)) for n in _names_of(named))
-    if not largest("command") < most <= largest("command") / UNITS["command"]["%"]:
-        return {}
-    return {s: column.model_copy(update={"unit": "%"}) for s, column in named.items()}
+def _units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
+    """Commands without a unit that are far beyond the ship's limits, in the only unit within them.
+
+    Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit.
+    """
+    found: dict[str, Column] = {}
+    for form, commands in zip(of.command_forms, of.layouts, strict=True):
+        limits = np.abs(commands.limits(of.nominal_drive.params)).max(axis=1)
+        limits[np.array(commands.round or [False] * limits.size)] = math.tau
+        for si in dict.fromkeys(form.values()):
+            own = {s: x for (s, unit), x in zip(form.items(), limits, strict=True) if unit == si}
+            own = {s: limit for s, limit in own.items() if layout.column(s).name in names}
+            columns = {s: layout.column(s) for s in own}
+            if own and not any(column.unit or column.factor != 1.0 for column in columns.values()):
+                table = table_of_file(path, layout, _names_of(columns))
+                most = {
+                    s: float(np.nanmax(np.abs(_numbers(table[column.name], "")), initial=0.0))
+                    for s, column in columns.items()
+                }
+                unit = _unit_within(most, own, OF_UNIT[si])
+                found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
+    return found
+
+
+def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantity: str) -> str | None:
+    """The only unit in which commands of a quantity are within limits; None: SI, or it is not known."""
+    smaller = {size: unit for unit, size in reversed(UNITS[quantity].items()) if size < 1.0}
+    if not smaller:
+        return None
+    share = max((most[s] / limits[s] for s in most if limits[s] > 0.0), default=0.0)
+    within = [unit for size, unit in smaller.items() if size * share <= largest("command")]
+    far = share > max(smaller) ** -0.5 or max(most.values()) > largest(quantity)
+    return within[0] if far and len(within) == 1 else None
 
 
 def _signed(
@@ -397,7 +459,9 @@ def _without_unit(name: str, below: str) -> tuple[str, str]:
 
 
 def _unit_at_the_end(name: str) -> tuple[str, str]:
-    """A name without the unit that its last words are, as x_mm, yaw_rate_deg_s, x/mm, x in mm."""
+    """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, x in mm, TimeUS."""
+    if stamped := TIME_IN.fullmatch(name):
+        return stamped[1], spelt(stamped[2].lower())
     for mark in (" in ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
         quantity, _, unit = name.partition(mark)
         if quantity and spelt(unit) in NAMED_UNITS:
@@ -442,14 +506,13 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     if unit:
         yield "time", unit
     run = run.rows(in_order(run.time))
-    pose = np.column_stack([held_values(channel) for channel in run.pose.T])
-    there = ~lost(pose)
-    fresh = there & ~repeated(pose, there)
-    if fresh.sum() > 1:
-        time = UNITS["time"][unit or "s"] * run.time[fresh]
-        angles = doubts_of_angles(other_angles(run.measured))
-        for doubt in chain(doubts(time, pose[fresh]), angles):
-            yield from ((signal, doubt.unit) for signal in doubt.signals)
+    there = ~lost(run.pose)
+    zeros = (run.pose == 0.0).all(axis=1)
+    fresh = ~zeros & ~repeated(run.pose, there)
+    time = UNITS["time"][unit or "s"] * run.time[fresh]
+    angles = doubts_of_angles(other_angles(run.measured))
+    for doubt in chain(doubts(time, run.pose[fresh]), angles):
+        yield from ((signal, doubt.unit) for signal in doubt.signals)
 
 
 def _time_unit(time: np.ndarray) -> str | None:

@@ -31,9 +31,11 @@ UNITS: dict[str, dict[str, float]] = {
 # Other spellings of units in files -> the one above.
 SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
-    **dict.fromkeys(("kt", "kts", "knot", "knots"), "kn"),
+    **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),
     **dict.fromkeys(("degree", "degrees", "grader", "Grad"), "deg"),
+    **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
+    **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
     **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "o/min", "omdr/min"), "rpm"),
@@ -115,6 +117,7 @@ def refuse_units(
     """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
     Args:
+        time, pose: as in :func:`doubts`.
         angles: other angles of the run, by their signals.
 
     Raises:
@@ -125,7 +128,15 @@ def refuse_units(
 
 
 def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
-    """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s]."""
+    """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s].
+
+    Position and heading are NaN in rows without their measurement.
+    """
+    there, turned = np.isfinite(pose[:, :2]).all(axis=1), np.isfinite(pose[:, 2])
+    if there.sum() < 2 or not turned.any():
+        return
+    heading = np.interp(time[there], time[turned], pose[turned, 2])
+    time, pose = time[there], np.column_stack([pose[there, :2], heading])
     second = np.searchsorted(time, time + 1.0)
     second = second[second < time.size]
     dt, step = time[second] - time[: second.size], pose[second] - pose[: second.size]

@@ -4,12 +4,13 @@ import re
 from collections.abc import Iterable
 
 from .columns import QUANTITY
+from .name_words import words_of
 
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": (
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
-        *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp"),
+        *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp", "epoch", "unixtime"),
         "timesincestart",
     ),
     "x": (
@@ -77,7 +78,8 @@ def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
     parts[-2:-1] = [part.rpartition("_")[2] for part in parts[-2:-1]]  # vehicle_local_position.x
     last = parts[-1] if len(parts[-1]) > 1 or parts[-1] == "t" or "." not in name else ""
     for part in (name, "".join(parts[-2:]), last):
-        found = known.get(_folded(part), ("", False))
-        if found[0] in signals:
-            return found
+        for said in (_folded(part), "".join(words_of(part))):
+            found = known.get(said, ("", False))
+            if found[0] in signals:
+                return found
     return "", False

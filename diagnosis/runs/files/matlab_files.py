@@ -99,7 +99,8 @@ def _vectors(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
         for part, inner in value.items():
             yield from _vectors(f"{name}.{part}", inner)
     elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "biuf":
-        yield name, value
+        yield name, value.astype(value.dtype.newbyteorder("="))
     elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf":
         rows = value if value.shape[0] < value.shape[1] else value.T
-        yield from ((f"{name}.{k}", row) for k, row in enumerate(rows, 1))
+        native = rows.astype(rows.dtype.newbyteorder("="))
+        yield from ((f"{name}.{k}", row) for k, row in enumerate(native, 1))

@@ -59,7 +59,7 @@ class Run(ShortRepr):
         commands: (n, k), in one of :attr:`fmus.ship.Ship.layouts`; None if not known.
         power: (n, m), force of thrusters as shares of that at full power; None if full.
         notes: what was found that is not as it should be, a line each.
-        held: (n,), rows whose commands are missing in the file, and held; None if none is.
+        held: (n, k), where one of its commands is missing in the file, and held; None if none is.
         called: signal -> its column in the file, of those with another name; None if there is none.
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
@@ -307,7 +307,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         commands,
         power,
         notes,
-        held=np.any(missing, axis=0) if lost else None,
+        held=np.column_stack(missing) if lost else None,
         absent=absent,
         signals=own,
         ship=of.description,

@@ -27,14 +27,10 @@ from ..columns.side_car import (
 from ..run_constants import CHANCE, DIGITS
 from .matlab_files import matlab_table
 from .message_fields import message_fields, with_fields
+from .text_layout import STAMP
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
-# A time of day, a date before it, and half of the day, zone or year behind it.
-STAMP = re.compile(
-    r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
-    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
-)
 LEAP_SECOND = re.compile(r"(?<=:59):60")
 
 

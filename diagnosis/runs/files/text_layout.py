@@ -2,15 +2,21 @@
 
 import csv
 import math
+import re
 from collections import Counter
-from collections.abc import Sequence
-from itertools import islice
+from collections.abc import Callable, Sequence
+from itertools import islice, product
 from pathlib import Path
 
 from ..columns.columns import PREAMBLE, UNITS, Layout
 from ..columns.unit_check import spelt
 
 SEPARATORS = (",", ";", "\t", "|", " ")  # that a table may have between its cells
+# A time of day, a date before it, and half of the day, zone or year behind it.
+STAMP = re.compile(
+    r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
+    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
+)
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
@@ -21,9 +27,12 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
     """
     with path.open(encoding=encoding, errors="replace", newline="") as file:
         lines = list(islice(file, PREAMBLE))
-    found = [_with(separator, decimal, lines) for separator in SEPARATORS for decimal in ".,"]
-    best = max(found, key=lambda each: each[0])
-    return best[1]
+    for is_told in (_is_number, _is_value):
+        pairs = product(SEPARATORS, ".,")
+        best = max((_with(*pair, lines, is_told) for pair in pairs), key=lambda each: each[0])
+        if best[1] is not None:
+            return best[1]
+    return None
 
 
 def table_cells(line: str, separator: str) -> list[str]:
@@ -47,8 +56,15 @@ def _is_number(cell: str, decimal: str) -> bool:
     return True
 
 
-def _with(separator: str, decimal: str, lines: Sequence[str]) -> tuple[float, Layout | None]:
-    """How much of the table is numbers with a separator and a decimal mark, and the layout of that."""
+def _is_value(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number or a time stamp."""
+    return _is_number(cell, decimal) or STAMP.match(cell) is not None
+
+
+def _with(
+    separator: str, decimal: str, lines: Sequence[str], is_told: Callable[[str, str], bool]
+) -> tuple[float, Layout | None]:
+    """How much of the table is told with a separator and a decimal mark, and the layout of that."""
     rows = [(k, table_cells(line, separator)) for k, line in enumerate(lines) if line.strip()]
     widths = Counter(len(cells) for _, cells in rows)
     width = max(widths, key=lambda n: widths[n], default=0)
@@ -57,7 +73,7 @@ def _with(separator: str, decimal: str, lines: Sequence[str]) -> tuple[float, La
 
     def share(cells: Sequence[str]) -> float:
         told = [cell for cell in cells if cell]
-        numbers = sum(_is_number(cell, decimal) for cell in told)
+        numbers = sum(is_told(cell, decimal) for cell in told)
         return numbers / len(told) if told and len(cells) == width else math.nan
 
     shares = [share(cells) for _, cells in rows]

@@ -1,0 +1,43 @@
+"""The words of a column's name, in English and without short forms."""
+
+import re
+import unicodedata
+
+# English words -> those that names have in their place: short forms, German, French, Spanish, Dutch,
+# Norwegian, all without accents.
+FOREIGN = {
+    "starboard": "stbd stb sb right steuerbord tribord estribor stuurboord styrbord",
+    "port": "left ps bb backbord babord babor bakboord",
+    "propeller": "prop screw helice schroef",
+    "rudder": "steer steering helm ruder gouvernail safran barre timon roer",
+    "rudder angle": "ruderlage ruderwinkel roerhoek rorvinkel",
+    "bow": "bowthr bowthruster bug bugstrahl bugstrahler bugstrahlruder boeg baug",
+    "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
+    "thruster": "propulseur strahlruder boegschroef",
+    "angle": "winkel vinkel angulo hoek",
+    "rpm": "drehzahl regime toerental turtall omdreiningstall",
+    "order": "setpoint soll sollwert consigne orden ordre",
+    "measured": "ist istwert mesure medido gemeten",
+    "true": "vrai vraie wahr verdadero",
+    "time": "zeit uhrzeit temps tiempo tijd tid",
+    "timestamp": "zeitstempel horodatage",
+    "north": "nord norte noord",
+    "east": "ost este oost",
+    "northing": "hochwert",
+    "easting": "rechtswert",
+    "latitude": "breite breitengrad latitud latitudine breedtegraad breddegrad",
+    "longitude": "lange langengrad longitud longitudine lengtegraad lengdegrad",
+    "heading": "steuerkurs gierwinkel cap rumbo koers",
+    "yaw rate": "gierrate wenderate",
+    "speed": "geschwindigkeit vitesse velocidad snelheid fart",
+}
+ENGLISH = {word: english for english, words in FOREIGN.items() for word in words.split()}
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name, small letters; numbers are words of their own."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    letters = unicodedata.normalize("NFKD", apart).casefold()
+    plain = "".join(c for c in letters if not unicodedata.combining(c))
+    found: list[str] = re.findall(r"[a-z]+|\d+", plain)
+    return " ".join(ENGLISH.get(word, word) for word in found).split()

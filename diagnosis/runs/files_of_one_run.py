@@ -1,0 +1,143 @@
+"""Files of one run as one table: a file for each topic, and tables with one value in a row."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from cosim import InputError
+
+from .columns.columns import Column, Layout, stated_layout, to_si
+from .columns.proposal import text_of, time_column, units_below
+from .files.message_fields import message_fields
+from .files.tables import column_names, date_stamps, numbers, table_of_file
+
+TIME = "time"  # the column of the time in the one table
+VALUE = frozenset(("value", "val", "reading", "data"))  # names of the column with all values
+UNIT = frozenset(("unit", "units"))  # of that with their units
+
+
+class _Part(NamedTuple):
+    """A file's table without its time, that time as it is written, its column, and where it is from."""
+
+    table: pd.DataFrame
+    cells: pd.Series
+    time: Column
+    path: Path
+
+
+def one_table(paths: Sequence[Path]) -> pd.DataFrame:
+    """The rows of several files of one run, in the order of their time.
+
+    Files with the same columns follow each other; others have rows of their own, in which the columns of
+    the rest are empty. A column whose name is there already has its file's name before it. A unit that
+    stands below a name stands behind it. Of a table with one value in a row each name is a column.
+
+    Returns:
+        A table with the column ``time``: seconds, or numbers whose unit no file states.
+
+    Raises:
+        InputError: a file is no table, no column of its time is known, or files have no time in common.
+    """
+    parts = [_part(path) for path in paths]
+    times = _times(parts)
+    groups: dict[tuple[str, ...], list[pd.DataFrame]] = {}
+    spans: dict[tuple[str, ...], tuple[float, float, Path]] = {}
+    for part, time in zip(parts, times, strict=True):
+        names = tuple(part.table)
+        groups.setdefault(names, []).append(part.table.assign(**{TIME: time}))
+        low, high, path = spans.get(names, (np.inf, -np.inf, part.path))
+        spans[names] = (np.nanmin(time, initial=low), np.nanmax(time, initial=high), path)
+    _refuse_apart(list(spans.values()))
+    taken: set[str] = set()
+    tables = []
+    for names, group in groups.items():
+        stem = spans[names][2].stem
+        own = {name: f"{stem}.{name}" if name in taken else name for name in names}
+        taken |= set(own.values())
+        tables.append(pd.concat(group, ignore_index=True).rename(columns=own))
+    table = pd.concat(tables, ignore_index=True).sort_values(TIME, kind="stable", ignore_index=True)
+    return table.filter(items=[TIME, *(name for name in table if name != TIME)])
+
+
+def _part(path: Path) -> _Part:
+    """A file's table, its time apart."""
+    if not path.is_file():
+        raise InputError(f"no such file: '{path}'")
+    stated = stated_layout(path) or Layout()
+    text = text_of(path, stated)
+    names = column_names(path, text)
+    fields = message_fields(names)
+    units = units_below(path, text, names)
+    found = time_column(path, text, stated, names, units)
+    if found is None:
+        raise InputError(
+            f"no column of '{path}' is known as its time; its columns: {', '.join(names)}; state it: "
+            f'put {{"columns": {{"time": "NAME"}}}} into \'{path}.json\''
+        )
+    columns = [name for name in names if name not in fields]
+    table = table_of_file(path, text, {*columns, found.name})
+    cells = table[found.name]
+    stamp = set(fields[found.name].columns) if found.name in fields else set()
+    told = dict(zip(names, units, strict=True))
+    table = table.filter(items=[name for name in columns if name not in {*stamp, found.name}])
+    table, cells = _by_names(table, cells)
+    return _Part(
+        table.rename(columns=lambda n: f"{n} [{told[n]}]" if told.get(n) else n), cells, found, path
+    )
+
+
+def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.Series]:
+    """A table with one value in a row, as ``time, name, value``, with a column for each name.
+
+    Its values are in a column that is called so; the texts beside them that change make up the name.
+    """
+    called = {name.strip("_").casefold(): name for name in map(str, table)}
+    value = next((called[c] for c in called if c in VALUE), None)
+    units = [name for c, name in called.items() if c in UNIT]
+    words = [
+        n for n in table if n not in {*units, value} and not pd.api.types.is_numeric_dtype(table[n])
+    ]
+    texts = [n for n in words if table[n].nunique() > 1]
+    if value is None or not texts:
+        return table, cells
+    names = table[texts].astype("string").fillna("").agg(".".join, axis=1)
+    for unit in units:
+        there = table[unit].notna()
+        names = names.mask(there, names + " [" + table[unit].astype("string").fillna("") + "]")
+    # Values of one stamp are in one row, unless a name has several there.
+    row = pd.MultiIndex.from_arrays([cells, cells.groupby([cells, names]).cumcount()])
+    numbered, stamps = row.factorize()
+    wide = pd.DataFrame({"row": numbered, "name": names, "value": table[value]})
+    wide = wide.pivot(index="row", columns="name", values="value").reindex(columns=names.unique())
+    wide.columns.name = None
+    return wide, pd.Series(stamps.get_level_values(0), name=cells.name)
+
+
+def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
+    """The times of each part, by one clock."""
+    stamps = [date_stamps(part.cells) is not None for part in parts]
+    ends = np.cumsum([len(part.cells) for part in parts])[:-1]
+    if all(stamps):
+        seconds = date_stamps(pd.concat([p.cells for p in parts], ignore_index=True), "the files' times")
+        assert seconds is not None
+        return np.split(seconds, ends)
+    if any(stamps):
+        dated, other = parts[stamps.index(True)].path, parts[stamps.index(False)].path
+        raise InputError(f"'{dated}' has date stamps, '{other}' numbers: they have no clock in common")
+    read = [numbers(part.cells, part.path, Layout()) for part in parts]
+    return [to_si(time, TIME, part.time, TIME) for part, time in zip(parts, read, strict=True)]
+
+
+def _refuse_apart(spans: Sequence[tuple[float, float, Path]]) -> None:
+    """Refuse files whose times are all before or after those of the first one."""
+    low, high, first = spans[0]
+    for begin, end, path in spans[1:]:
+        if not (begin <= high and low <= end):
+            raise InputError(
+                f"'{first}' and '{path}' have no time in common: {low:.10g} to {high:.10g}, "
+                f"{begin:.10g} to {end:.10g}; if these are in other units, state them: put "
+                f'{{"columns": {{"time": {{"name": "NAME", "unit": "ms"}}}}}} into \'{path}.json\''
+            )
