@@ -48,7 +48,9 @@ def test_a_course_has_its_largest_size_as_unit_and_its_noise_in_that():
     assert found.period == pytest.approx(77.0 / POINTS)
     at = time[0] + found.period * np.arange(len(found.course))
     assert len(found.course) == POINTS
-    assert found.course * sizes == pytest.approx(swings(at, 1) * [2.0, 0.05, 1e-3], abs=2e-3 * sizes.max())
+    assert found.course * sizes == pytest.approx(
+        swings(at, 1) * [2.0, 0.05, 1e-3], abs=2e-3 * sizes.max()
+    )
 
 
 def test_a_course_is_no_finer_than_the_samples_and_leaves_out_what_is_not_known():
@@ -90,7 +92,14 @@ def test_what_json_holds_is_read_again_to_half_a_step():
 
 @pytest.mark.parametrize(
     "damage",
-    [{"course": "?"}, {"certain": [1.0]}, {"certain": "x"}, {"period": "x"}, {"course": "AAA="}, {"name": ...}],
+    [
+        {"course": "?"},
+        {"certain": [1.0]},
+        {"certain": "x"},
+        {"period": "x"},
+        {"course": "AAA="},
+        {"name": ...},
+    ],
 )
 def test_a_damaged_list_is_refused_with_its_file(damage):
     time = np.arange(0.0, 60.0, 0.25)
@@ -107,7 +116,8 @@ def brute(piece, course, moving):
     m = len(piece)
     parts = [course[k : k + m] for k in range(len(course) - m + 1)]
     each = [
-        [abs(np.corrcoef(piece[:, j], part[:, j])[0, 1]) for j in range(3) if moving[j]] for part in parts
+        [abs(np.corrcoef(piece[:, j], part[:, j])[0, 1]) for j in range(3) if moving[j]]
+        for part in parts
     ]
     return max(map(np.mean, each))
 

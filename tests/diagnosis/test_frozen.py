@@ -150,7 +150,9 @@ def test_a_ship_at_rest_may_have_a_constant_speed():
     assert without_frozen(run) is run
     wrapped = still.copy()
     wrapped[:, 2] = np.where(np.arange(N) % 3, np.pi, -np.pi) + still[:, 2]
-    assert not without_frozen(replace(run, pose=wrapped)).notes, "a heading that goes round does not move"
+    assert not without_frozen(replace(run, pose=wrapped)).notes, (
+        "a heading that goes round does not move"
+    )
 
 
 def test_rows_without_a_value_do_not_end_a_stretch():
