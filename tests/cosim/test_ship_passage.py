@@ -1,5 +1,7 @@
 """The contract of a passage: ways along a track, instants of an order, and the speed of the approach."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -43,7 +45,7 @@ def test_the_way_is_the_length_of_the_track(points, share):
     x, y = np.array(points).T
     time = np.linspace(5.0, 9.0, len(points))
     p = passage(time, x, y, 0.0 * x, 0.0 * x)
-    lengths = [abs(complex(b[0] - a[0], b[1] - a[1])) for a, b in zip(points, points[1:], strict=False)]
+    lengths = [abs(complex(b[0] - a[0], b[1] - a[1])) for a, b in pairwise(points)]
     assert p.way == pytest.approx(np.cumsum([0.0, *lengths]))
     middle = 5.0 + 4.0 * share
     assert p.along(5.0, middle) + p.along(middle, 9.0) == pytest.approx(sum(lengths), abs=1e-9)

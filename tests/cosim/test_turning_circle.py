@@ -22,7 +22,7 @@ def circle(side=1.0, speed=2.0, rate=0.1, until=100.0, course=0.7, out=None, dec
     psi = course + np.concatenate([[0.0], np.cumsum(r[:-1] * h)])
     middle = psi[:-1] + 0.5 * h * r[:-1]
     steps = speed * h * np.column_stack([np.cos(middle), np.sin(middle)])
-    x, y = np.vstack([[3.0, -4.0], [3.0, -4.0] + np.cumsum(steps, axis=0)]).T
+    x, y = np.cumsum(np.vstack([[3.0, -4.0], steps]), axis=0).T
     return passage(time, x, y, psi, order)
 
 
