@@ -1,5 +1,6 @@
 """The parts of the forward selection, by direct least squares and by the definitions of their numbers."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diagnosis import Model
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search import forward_selection
 from diagnosis.search.candidates import Candidate, CandidateShape
-from diagnosis.search.findings import MOST_REPORTED
+from diagnosis.search.findings import MOST_REPORTED, Finding, Findings, Ranked
 from diagnosis.search.forward_selection import (
+    ForwardSelection,
     _fall,
     _force,
     _without,
@@ -230,3 +233,73 @@ def test_shares_are_odds_of_scores_on_blocks_that_are_drawn_anew():
     share = first_share(one_block, np.random.default_rng(0))[1]
     drawn_once = 1.0 - 0.9**10  # that the block of 100 is drawn at all
     assert share == pytest.approx(drawn_once, abs=4.0 * np.sqrt(0.25 / REPLICATES))
+
+
+# Waves, which are no force of the model
+
+
+PEAK = SimpleNamespace(peak=1.7, force=0.4, confidence=0.95, share=0.6)
+
+
+def with_waves(monkeypatch, effects, peak=PEAK):
+    """What the selection finds, where a search has found some effects."""
+    start = Model()
+    found = [Finding(name, {}, {}, 0.9, [], 0.5, 0.5, replace(start)) for name in effects]
+    ranked = [Ranked("X_u", 3.0, 0.4)]
+
+    class Done:
+        model = "learned"
+
+        def findings(self, ids=None):
+            kept = [f for f in found if ids is None or f.id in ids]
+            return Findings(kept, ranked, fold_models=["a", "b"], run_models=["c"], suspects=["suspect"])
+
+    cleared = []
+    runs = [
+        SimpleNamespace(smoothed=k, memory=SimpleNamespace(clear=lambda k=k: cleared.append(k)))
+        for k in range(2)
+    ]
+
+    def look(smoothed, model, rng):
+        assert (smoothed, model, cleared) == ([0, 1], "learned", [0, 1])
+        return peak
+
+    monkeypatch.setattr(forward_selection, "search", lambda *_: Done())
+    monkeypatch.setattr(forward_selection, "find_waves", look)
+    said = []
+    return start, ForwardSelection().fit(runs, start, None, said.append, 0), said
+
+
+def test_waves_come_first_and_leave_the_model_as_it_is(monkeypatch):
+    start, found, said = with_waves(monkeypatch, ["X_u"])
+    assert said == ["waves"]
+    waves, drag = found.effects
+    assert (waves.id, drag.id) == ("waves", "X_u")
+    assert waves.values == {"wave_peak": 1.7 - start.value("wave_peak"), "wave_force": 0.4}
+    assert (waves.confidence, waves.q2, waves.share) == (0.95, 0.6, 0.6)
+    assert waves.model is start
+    assert [r.id for r in found.ranking] == ["waves", "X_u"]
+    assert (found.ranking[0].score, found.ranking[0].q2) == (0.0, 0.6)
+    assert (found.fold_models, found.run_models, found.suspects) == (["a", "b"], ["c"], ["suspect"])
+
+
+def test_waves_alone_are_beside_the_first_model_in_each_fold(monkeypatch):
+    """Without another effect the coefficients are those of the first model."""
+    start, found, _ = with_waves(monkeypatch, [])
+    assert [f.id for f in found.effects] == ["waves"]
+    assert found.fold_models == [start, start]
+    assert found.run_models == [start]
+    assert found.suspects == []
+
+
+def test_findings_are_fitted_anew_with_the_waves_or_without_them(monkeypatch):
+    _, found, _ = with_waves(monkeypatch, ["X_u", "N_r"])
+    assert [f.id for f in found.refit(["waves", "N_r"]).effects] == ["waves", "N_r"]
+    assert [f.id for f in found.refit(["N_r"]).effects] == ["N_r"]
+    assert [r.id for r in found.refit(["N_r"]).ranking] == ["X_u"]
+
+
+def test_without_waves_the_findings_are_those_of_the_search(monkeypatch):
+    _, found, _ = with_waves(monkeypatch, ["X_u"], None)
+    assert [f.id for f in found.effects] == ["X_u"]
+    assert [r.id for r in found.ranking] == ["X_u"]
