@@ -14,9 +14,7 @@ from diagnosis.verdict import coefficients
 from diagnosis.verdict.coefficients import (
     _flows,
     any_sure,
-    better_calibration,
     calibrated,
-    needless,
 )
 
 START = Model()
@@ -32,22 +30,6 @@ def effect(name="X_u", confidence=0.5, interval=(-1.0, 1.0)):
 )
 def test_any_effect_is_sure_with_the_confidence_of_a_finding_or_with_none(confidences, sure):
     assert any_sure(Findings([effect(confidence=c) for c in confidences])) == sure
-
-
-@pytest.mark.parametrize(
-    ("effects", "unshown", "so"),
-    [
-        ([effect()], {"X_u"}, True),
-        ([effect()], set(), False),
-        ([effect(interval=(0.1, 1.0))], {"X_u"}, False),
-        ([effect(), effect("N_r")], {"X_u"}, False),
-        ([effect(), effect("N_r")], {"X_u", "N_r"}, True),
-        ([], {"X_u"}, False),
-    ],
-)
-def test_effects_are_needless_if_each_may_be_zero_and_predicts_no_better(effects, unshown, so):
-    assert needless(Findings(effects), unshown) == so
-    assert not needless(START, unshown)
 
 
 # Losses by name: the smaller, the better; a model is worse by more than chance if it is by one or more
@@ -161,54 +143,3 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
     )
     chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}))
     assert chosen is {"still": still, "flowing": flowing, None: None}[taken]
-
-
-BETTER = {
-    "judges": True,
-    "calibration": True,
-    "drives": False,
-    "now": 10.0,
-    "its": 5.0,
-    "first": 10.0,
-    "unshown": (),
-    "believed": True,
-    "effects": [effect()],
-}
-
-
-@pytest.mark.parametrize(
-    ("changes", "taken"),
-    [
-        ({}, True),
-        ({"judges": False}, False),
-        ({"calibration": False}, False),
-        ({"drives": True}, False),
-        ({"its": 9.5}, False),  # no better beyond chance
-        ({"its": 9.5, "believed": False}, True),  # nor worse, and no effect is a finding
-        ({"its": 11.5, "believed": False}, False),
-        ({"its": 9.5, "unshown": ("X_u",)}, True),  # nor do the effects predict better
-        ({"its": 9.5, "first": 8.0, "unshown": ("X_u",)}, False),
-        ({"first": 3.5}, False),
-        ({"effects": None}, True),
-        ({"effects": None, "judges": False}, True),  # of a model there is nothing to fit
-    ],
-)
-def test_a_calibration_takes_the_place_of_what_predicts_worse(changes, taken, by_numbers):
-    case = BETTER | changes
-    found = START if case["effects"] is None else Findings(case["effects"])
-    calibration = SimpleNamespace(findings=SimpleNamespace(model="calibrated"))
-    asked = []
-
-    def drives(model, start):
-        asked.append((model, start))
-        return case["drives"]
-
-    data = SimpleNamespace(
-        start=START,
-        judges=lambda f: case["judges"],
-        losses=lambda *_: [case["now"], case["its"], case["first"]],
-    )
-    given = calibration if case["calibration"] else None
-    chosen = better_calibration(given, found, data, drives, case["unshown"], case["believed"])
-    assert chosen is (calibration if taken else None)
-    assert all(pair == ("calibrated", START) for pair in asked)

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diagnosis import Model
 from diagnosis.predictors.shooting import UNKNOWN
+from diagnosis.search.candidates import SMALL
 from diagnosis.search.prediction_fit import fit as fits
 from diagnosis.search.prediction_fit.coefficient_calibration import Calibration
 from diagnosis.search.prediction_fit.fit import (
@@ -19,6 +21,8 @@ from diagnosis.search.prediction_fit.fit import (
     running,
     whitened,
 )
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import RefinedModel
 
 W, T, Q = 5, 4, 3  # windows, instants, parameters
 seeds = st.integers(0, 1000)
@@ -236,7 +240,7 @@ class Estimate(np.ndarray):
 @given(seeds, st.sampled_from([1.0, 4.0]))
 def test_a_linear_problem_is_solved_with_its_covariance_and_without_each_fold(seed, spread):
     p = Linear(seed, spread)
-    found = fit_to(p, Estimate(np.zeros(Q)))
+    found = fit_to(p, Estimate(np.full(Q, 3.0)))
     k, P = 1.0 / spread, p.precision
     S = np.linalg.inv(k * p.A.T @ p.A + P)
     assert np.asarray(found.estimate) == pytest.approx(S @ (k * p.A.T @ p.y), abs=1e-5)
@@ -247,3 +251,114 @@ def test_a_linear_problem_is_solved_with_its_covariance_and_without_each_fold(se
         A, y = p.A[p.part != fold], p.y[p.part != fold]
         expected = np.linalg.solve(k * A.T @ A + P, k * A.T @ y)
         assert model == pytest.approx(expected, abs=1e-5), "without the fold, exactly"
+
+
+# Its parameters and folds
+
+
+def made(monkeypatch, exact=()):
+    """A problem of two runs of six blocks, with an effect beside the coefficients."""
+    monkeypatch.setattr(fits, "measurement_std", lambda w, model: np.zeros((w.middle.size, 3)))
+    start = Model()
+    prior = NominalPrior.of(start, 0.1)
+    for name in exact:
+        prior.std[name] = 0.0
+    runs = [
+        SimpleNamespace(
+            middle=10.0 * k + np.arange(12.0), block=np.repeat(np.arange(6), 2), smoothed=f"run {k}"
+        )
+        for k in range(2)
+    ]
+    values = {"lag": 0.4, "V_n": 0.0}
+    at = RefinedModel(start, 0.1 * np.arange(prior.size), values, np.diag([4.0, 25.0]))
+    windows = [
+        SimpleNamespace(
+            runs=["run 1", "run 0"],
+            run=np.array([0, 0, 1, 1, 1, 1]),
+            start=np.array([9.0, 16.5, -1.0, 5.9, 6.0, 11.5]),
+        )
+    ]
+    return PredictionFit(runs, [], at, prior), at, prior, windows, {id("run 0"): 0, id("run 1"): 1}
+
+
+def test_parameters_are_in_units_of_the_ship_and_coefficients_in_standard_deviations(monkeypatch):
+    p, at, prior, *_ = made(monkeypatch)
+    units = [at.start.unit("lag"), at.start.unit("V_n")]
+    assert p.names == ["lag", "V_n", *prior.std]
+    assert p.unit == pytest.approx([*units, *prior.std.values()])
+    assert p.theta(at) == pytest.approx([0.4 / units[0], 0.0, *at.offset])
+    expected = [4.0 * units[0] ** 2, 25.0 * units[1] ** 2, *[1.0] * prior.size]
+    assert p.precision == pytest.approx(np.diag(expected))
+    steps = {"lag": 0.4, "V_n": SMALL * units[1], **prior.std}
+    assert p._steps == pytest.approx({n: SMALL * s for n, s in steps.items()})
+
+
+@given(st.lists(st.floats(0.0, 2.0), min_size=4, max_size=4))
+@settings(max_examples=10)
+def test_a_step_moves_the_parameters_by_it(step):
+    with pytest.MonkeyPatch.context() as patch:
+        p, at, *_ = made(patch)
+    whole = np.zeros(len(p.names))
+    whole[[0, 1, 2, -1]] = step
+    assert p.theta(p.moved(at, whole)) - p.theta(at) == pytest.approx(whole)
+
+
+def test_a_coefficient_that_is_exact_is_no_parameter(monkeypatch):
+    first = next(iter(NominalPrior.of(Model(), 0.1).std))
+    p, at, prior, *_ = made(monkeypatch, exact=[first])
+    assert p.names == ["lag", "V_n", *(n for n in prior.std if n != first)]
+    moved = p.moved(at, np.ones(len(p.names)))
+    assert moved.offset == pytest.approx(at.offset + np.array([0.0, *[1.0] * (prior.size - 1)]))
+    assert first not in p._steps
+
+
+def test_a_window_is_of_the_fold_in_which_it_begins(monkeypatch):
+    """One that begins before the first block is of the first fold of its run."""
+    p, _, _, windows, place = made(monkeypatch)
+    p.windows, p._place = windows, place
+    assert [(run, blocks.tolist()) for run, blocks in p.folds] == [(0, [*range(6)]), (1, [*range(6)])]
+    (found,) = p.fold_of_window
+    assert found.tolist() == [1, 1, 0, 0, 0, 0]
+    monkeypatch.setattr(
+        fits,
+        "run_folds",
+        lambda runs, least: [(r, b) for r in (0, 1) for b in (np.arange(3), np.arange(3, 6))],
+    )
+    q, *_ = made(monkeypatch)
+    q.windows, q._place = windows, place
+    (found,) = q.fold_of_window
+    assert found.tolist() == [2, 3, 0, 0, 1, 1], "the fourth block begins after six seconds"
+
+
+def test_the_cost_is_the_prior_and_the_likelihood_at_its_power(monkeypatch):
+    p, at, *_ = made(monkeypatch)
+    rng = np.random.default_rng(0)
+    residuals, factors = rng.standard_normal((2, W, T, 3)), rng.standard_normal((2, W, 3 * T, 3 * T))
+    p.windows = [SimpleNamespace(residuals=lambda model, r=r: r) for r in residuals]
+    squares = [
+        float(np.sum((f @ r.reshape(W, -1, 1)) ** 2)) for f, r in zip(factors, residuals, strict=True)
+    ]
+    theta = p.theta(at)
+    expected = theta @ p.precision @ theta + 0.3 * np.mean(squares)
+    assert p.cost(at, factors, 0.3) == pytest.approx(expected)
+    residuals[1, 2] = np.nan
+    assert p.cost(at, factors, 0.3) == np.inf, "it runs away in a window"
+
+
+def test_windows_of_one_kind_of_commands_are_together_and_empty_ones_left_out(monkeypatch):
+    def accurate(smoothed, length, model):
+        return SimpleNamespace(smoothed=smoothed, length=length, run=np.zeros(0 if length > 15.0 else 2))
+
+    monkeypatch.setattr(fits, "Shooting", SimpleNamespace(accurate=accurate))
+    runs = [
+        SimpleNamespace(run=SimpleNamespace(signals=s), smoothed=k, horizon=h)
+        for k, (s, h) in enumerate([(("a",), 8.0), (("b",), 6.0), (("a",), 8.0)])
+    ]
+    found = fits.shootings(runs, None, [0.5, 1.0, 2.0])
+    assert [(s.smoothed, s.length) for s in found] == [
+        ([0, 2], 4.0),
+        ([0, 2], 8.0),
+        ([1], 3.0),
+        ([1], 6.0),
+        ([1], 12.0),
+    ]
