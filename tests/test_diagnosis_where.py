@@ -154,7 +154,7 @@ def test_uncertainty_is_the_error_where_rows_are_missing():
 
 
 def test_the_true_model_leaves_nothing_with_or_without_dropouts():
-    run = sail(240.0, h=0.05, noise=0.1, seed=3, given=jumps)[0]
+    run = sail(150.0, h=0.05, noise=0.1, seed=3, given=jumps)[0]
     for each in (run, dropped_out(run, np.s_[:], 0), without_rows(run, 0)):
         w = windows(each)
         left = remaining([w], Model(), Model())
