@@ -14,12 +14,14 @@ from diagnosis.design.hypotheses import (
     _left,
     _weights,
     block_of,
+    knowledge,
     rivals,
     usable,
 )
 from diagnosis.execution.short_text import SHOWN
 from diagnosis.search.candidates import SMALL, CandidateShape
 from diagnosis.search.prior import NominalPrior
+from diagnosis.search.shortlist import LENGTH
 
 
 def effect(name, others=(), confidence=0.9):
@@ -211,3 +213,79 @@ def test_columns_are_slopes_of_the_model_error_in_units_of_the_noise(monkeypatch
     rows = s.rows([])
     assert rows[4] == pytest.approx(found[1, 1])
     assert s.gram([]) == pytest.approx(rows.T @ rows)
+
+
+# All that a diagnosis leaves open
+
+
+class Made:
+    """A space of two parameters of the ship and two of each effect, on data that are made up."""
+
+    def __init__(self, effects, data):
+        self.blocks = dict.fromkeys(effects)
+        self.nuisance, self.sigma, self._rows = ["X_u", "N_r"], NOISE, data
+
+    def places(self):
+        return {n: np.array([2 + 2 * k, 3 + 2 * k]) for k, n in enumerate(self.blocks)}
+
+    def rows(self, data):
+        return self._rows
+
+
+def known(monkeypatch, found, without=()):
+    """The knowledge by findings; effects whose name begins with z cannot be designed for."""
+    rng = np.random.default_rng(0)
+    error, asked = rng.standard_normal((K, 3)), []
+
+    def space_of(data, start, prior, ids):
+        asked.extend(ids)
+        effects = [i for i in ids if i not in without]
+        p = 2 + 2 * len(effects)
+        return Made(effects, rng.standard_normal((3 * K, p))), np.eye(p), np.zeros(p)
+
+    monkeypatch.setattr(hypotheses, "usable", lambda start, name: not name.startswith("z"))
+    monkeypatch.setattr(hypotheses, "space_of", space_of)
+    monkeypatch.setattr(hypotheses, "model_error", lambda data, start: error)
+    space, k = knowledge([], None, None, found)
+    return space, k, asked, error
+
+
+def test_hypotheses_are_one_rival_of_each_effect_with_their_parameters_and_the_ship_s(monkeypatch):
+    found = [Rival(("a", "b"), 0.7), Rival(("c", "zero", ""), 0.9)]
+    space, k, asked, error = known(monkeypatch, found)
+    assert asked == ["a", "b", "c"]
+    assert {h.ids for h in k.hypotheses} == {("a", "c"), ("b", "c"), ("a",), ("b",)}
+    for h in k.hypotheses:
+        own = np.concatenate([space.places()[n] for n in h.ids])
+        assert h.own.tolist() == own.tolist()
+        assert h.columns.tolist() == [0, 1, *own]
+    A = space.rows([])
+    assert pytest.approx(A.T @ A) == k.G
+    assert k.b == pytest.approx(A.T @ (error / NOISE).ravel())
+    assert k.weights.sum() == pytest.approx(1.0)
+    assert (np.diff(k.weights) <= 0.0).all(), "the likeliest first"
+    first = np.array(["a" in h.ids for h in k.hypotheses])
+    assert k.weights[first].sum() == pytest.approx(0.7, abs=0.01)
+    assert k.listed == 1.0
+
+
+def test_an_effect_without_a_rival_leaves_its_doubt_to_none_of_the_hypotheses(monkeypatch):
+    found = [Rival(("a",), 0.8), Rival(("b",), 0.6), Rival(("c",), np.nan), Rival(("d", "e"), 0.1)]
+    _, k, *_ = known(monkeypatch, found)
+    assert k.listed == 0.6
+    assert {h.ids for h in k.hypotheses} == {("a", "b", "c", "d"), ("a", "b", "c", "e")}
+
+
+def test_effects_that_do_nothing_in_the_runs_are_left_out(monkeypatch):
+    _, k, *_ = known(monkeypatch, [Rival(("a", "b"), 0.8)], without=("b",))
+    assert [h.ids for h in k.hypotheses] == [("a",), ()]
+    _, nothing, *_ = known(monkeypatch, [Rival(("zero",), 0.8)])
+    assert [h.ids for h in nothing.hypotheses] == [()]
+    assert nothing.weights.tolist() == [1.0]
+
+
+def test_the_likeliest_hypotheses_alone_are_kept(monkeypatch):
+    names = tuple(f"e{k}" for k in range(LENGTH + 3))
+    _, k, *_ = known(monkeypatch, [Rival(names, np.nan)])
+    assert len(k.hypotheses) == LENGTH
+    assert k.weights.sum() == pytest.approx(1.0)
