@@ -63,8 +63,9 @@ def test_windows_on_both_sides_of_a_gap_are_as_far_apart_as_their_times():
     pairs = [(k, k + 3) for k in (0, 1, 5, 6)] + [(4, 5)]
     assert found[3] == pytest.approx(np.mean([error[a] * error[b] for a, b in pairs], axis=0))
     years = autocovariance(series(10, gap=[(5, 1e9)]), error, 4)
-    inside = [(k, k + 1) for k in (0, 1, 2, 3, 5, 6, 7, 8)]
-    assert years[1] == pytest.approx(np.mean([error[a] * error[b] for a, b in inside], axis=0))
+    for lag in (1, 3, 4):
+        inside = [(k, k + lag) for k in range(10 - lag) if k // 5 == (k + lag) // 5]
+        assert years[lag] == pytest.approx(np.mean([error[a] * error[b] for a, b in inside], axis=0))
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
@@ -231,3 +232,61 @@ def test_what_the_measurement_and_missing_rows_leave_uncertain_adds_up(monkeypat
     monkeypatch.setattr(uncertainty, "command_variance", lambda w, model: np.full((4, 3), 16.0))
     assert omega_std(None, "model") == pytest.approx(5.0)
     assert measurement_std(None, "model") == pytest.approx(3.0)
+
+
+def measured(time=1.0, rounding=0.0, response=1.0, late=0.0, noise=0.1):
+    """Windows of a ship of a size, and a model with filters, or without."""
+    w = windows(time=time * TIME, noise=noise, width=3.0 * time)
+    w.scale = SimpleNamespace(time=time, forces=np.array([1.0, 1.0, 1.0]))
+    w.smoothed.track.usual_rounding = np.full(3, rounding)
+
+    class Filters:
+        squared_time = np.full(3, late)
+
+        def first_response(self, period):
+            assert period == pytest.approx(w.smoothed.track.periods)
+            return np.full(3, response)
+
+        def __bool__(self):
+            return response < 1.0
+
+    return w, SimpleNamespace(filters=Filters())
+
+
+def of_orders(monkeypatch, *args, corner=4.0, **kwargs):
+    """Variances of the pose and its derivatives in a window, as forces would take them."""
+    w, model = measured(*args, **kwargs)
+    found = []
+
+    def force(w, model, variances):
+        found.extend(float(variances(k, np.full((1, 3), corner))[0, 0]) for k in range(3))
+        return np.zeros((1, 3))
+
+    monkeypatch.setattr(uncertainty, "_force_variance", force)
+    monkeypatch.setattr(uncertainty, "_sampled", lambda w: np.full((1, 3), w.smoothed.track.periods[0]))
+    variance = uncertainty._measurement_variance(w, model)
+    assert (variance > 0.0).all(), "no measurement is exact"
+    assert (variance < 1e-6).all()
+    return np.array(found)
+
+
+def test_noise_is_white_and_its_derivatives_vary_by_the_time_of_the_ship(monkeypatch):
+    """Of a ship with times T-fold a derivative of order k varies by T^(-2 k), with samples T apart."""
+    first = of_orders(monkeypatch)
+    assert of_orders(monkeypatch, noise=0.3) == pytest.approx(9.0 * first)
+    assert of_orders(monkeypatch, time=2.0) == pytest.approx(first * 2.0 ** (-2.0 * np.arange(3)))
+
+
+def test_a_filter_that_is_undone_makes_noise_larger_and_rounding_by_its_lag(monkeypatch):
+    """Noise entered before it, of which a new sample has a share; rounding came behind."""
+    first = of_orders(monkeypatch)
+    assert of_orders(monkeypatch, response=0.2) == pytest.approx(25.0 * first)
+    rounded = of_orders(monkeypatch, response=0.2, rounding=0.1, late=0.0)
+    assert rounded == pytest.approx(first), "all noise is rounding"
+    half = of_orders(monkeypatch, response=0.2, rounding=0.06)
+    assert half == pytest.approx((0.64 * 25.0 + 0.36) * first)
+    late = of_orders(monkeypatch, response=0.2, rounding=0.1, late=0.5)
+    assert late[:2] - first[:2] == pytest.approx(0.5 * first[1:], rel=0.02), "of the next derivative"
+    assert of_orders(monkeypatch, rounding=0.5) == pytest.approx(first), (
+        "rounding is a part of the noise"
+    )
