@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from diagnosis import Run
 from diagnosis.execution.short_text import SHOWN
@@ -107,10 +108,8 @@ def test_outliers_are_samples_that_disagree_with_the_times_of_the_first():
 @given(st.integers(0, 30), st.floats(0.3, 0.95), st.sampled_from([0.1, 2.0]))
 def test_a_correlation_has_the_time_constant_of_its_process(seed, rho, h):
     """Residuals of a first order: -h / log(rho)."""
-    rng, n = np.random.default_rng(seed), 4000
-    x = np.zeros(n)
-    for k in range(1, n):
-        x[k] = rho * x[k - 1] + rng.standard_normal()
+    n = 4000
+    x = lfilter([1.0], [1.0, -rho], np.random.default_rng(seed).standard_normal(n))
     found = _correlation(h * np.arange(n), x)
     assert np.exp(-h / found) == pytest.approx(rho, abs=0.07)
 

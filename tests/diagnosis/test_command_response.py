@@ -63,7 +63,7 @@ def test_idle_speeds_are_those_of_the_reference_times_the_scale():
     assert idle(four) == pytest.approx(np.multiply(IDLE, [2.0, 2.0, 0.5]))
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(st.floats(-0.5, 1.5), st.integers(0, 100))
 def test_a_delayed_command_is_its_mean_over_a_step_that_much_earlier(delay, seed):
     """Rows of a clock that is not even; before the run the first command was there."""

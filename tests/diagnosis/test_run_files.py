@@ -108,6 +108,7 @@ def test_a_run_begins_where_its_track_does_and_lasts_whole_steps(tmp_path, secon
     assert cosim.load_scenario({**content, "recordings": []}).name == "next_7"
 
 
+@pytest.mark.quick
 def test_a_picture_has_the_basin_the_target_and_the_tracks_by_each_hypothesis(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(run_files, "hulls", lambda poses, outline: drawn.append(poses) or [np.eye(4, 2)])
