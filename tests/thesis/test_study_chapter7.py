@@ -129,6 +129,7 @@ def test_products_are_insignificant_if_no_more_are_significant_than_by_chance(si
     assert (analysis_tables.by_chance(unsure) > analysis_tables.CHANCE) is chance
 
 
+@pytest.mark.quick
 def test_pictures_of_the_regressions(found, tmp_path, drawn):
     told(tmp_path, analysis_tables.write_regressions, found, "made")
     assert {name.removeprefix("made_") for name in drawn} >= {
@@ -183,6 +184,7 @@ def test_components_are_told_and_drawn(tmp_path, drawn):
     assert set(drawn) == {"made_scatter", "made_outliers"}
 
 
+@pytest.mark.quick
 def test_the_row_that_made_the_samples_explains_them(tmp_path, drawn):
     names, t, nu, nu_dot, tau = motion()
     made = Samples(names, t, nu, nu_dot, tau, np.zeros_like(nu))
@@ -240,6 +242,7 @@ def test_columns_of_a_run_sum_to_one_for_each_state():
     assert len(np.unique(np.asarray(continuous.get_array()))) > 10
 
 
+@pytest.mark.quick
 def test_shapes_are_those_of_the_regression(tmp_path, drawn):
     s = linear(0.01)
     told(tmp_path, analysis_tables.write_shapes, s, wave())
