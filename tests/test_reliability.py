@@ -392,8 +392,8 @@ def repeat(count):
     return len(gc.get_objects()), int(Path("/proc/self/statm").read_text().split()[1])
 
 repeat(5)
-before, after = repeat(1), repeat(6)
-print((after[0] - before[0]) / 6, (after[1] - before[1]) / 6)
+before, after = repeat(1), repeat(10)
+print((after[0] - before[0]) / 10, (after[1] - before[1]) / 10)
 """
 
 
