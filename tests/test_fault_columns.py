@@ -218,7 +218,7 @@ def test_a_log_whose_clock_runs_ahead_has_seconds_that_never_were():
 @given(st.floats(-3.1, 3.1), st.floats(0.1, 10.0), st.floats(-3.0, 3.0))
 def test_an_arc_is_as_long_as_its_chord_bends(turn, length, course):
     """The chord of an arc that turns by an angle a is sin(a / 2) / (a / 2) of it."""
-    chord = length * (2.0 * np.sin(0.5 * turn) / turn if turn else 1.0)
+    chord = length * (2.0 * np.sin(0.5 * turn) / turn if abs(turn) > 1e-6 else 1.0)
     assert _arc(chord * np.array([np.cos(course), np.sin(course)]), np.asarray(turn)) == pytest.approx(
         length
     )
