@@ -73,7 +73,7 @@ def driven(seed, gains, late=0.0):
     return Run("driven", time, eta + NOISE * rng.standard_normal((N, 3)), tau), eta_dot
 
 
-@pytest.mark.parametrize("late", [0.0, 0.34])
+@pytest.mark.parametrize("late", [0.0, pytest.param(0.34, marks=pytest.mark.quick)])
 def test_motion_by_commands_alone_is_found_again(late):
     run, eta_dot = driven(3, [[0.05, 0.0, 0.0], [0.0, 0.04, 0.01], [0.0, 0.0, 0.0]], late)
     knowing = smooth(clean(run))
@@ -160,6 +160,7 @@ def times_better(run, nu, axis):
     return np.divide(*wrong)
 
 
+@pytest.mark.quick
 def test_a_rudder_acts_by_the_speed_of_the_ship():
     """At rest it has no force, and commands of it would explain nothing."""
     helm = np.repeat(np.random.default_rng(1).uniform(-0.5, 0.5, N // 60), 60)

@@ -161,6 +161,7 @@ def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit(
     assert density((x, 1.0), unit=10.0) == pytest.approx(density((x, 1.0)) - 20.0 * 3.0 * np.log(10.0))
 
 
+@pytest.mark.quick
 def test_the_right_reading_is_the_likeliest_and_one_without_numbers_is_none():
     odds = ReadingOdds(weak_windows(smoothed(base())), Model())
     right = odds.log_density(AS_READ)
@@ -387,6 +388,7 @@ def test_feedback_of_the_motion_tells_no_gain_of_its_own():
     refuse_implausible([w], Model())
 
 
+@pytest.mark.quick
 def test_commands_that_follow_those_of_another_axis_tell_no_gain_of_their_own():
     def one_thruster(tau):
         return np.column_stack([tau[:, :2], -0.5 * tau[:, 1]])
@@ -409,6 +411,7 @@ def of_units(found):
     return all(c == Named(name=s, factor=c.factor) for r in found.readings for s, c in r.changes.items())
 
 
+@pytest.mark.quick
 def test_ship_of_another_size_is_a_unit_alone():
     """By Froude's law 270 times as long, with the model of the small ship: at the most units are doubted."""
     scale, run = 270.0, base()
@@ -515,7 +518,9 @@ class SomeOdds:
         return self.better if reading.mistake == "tau_Y has the wrong sign" else 0.0
 
 
-@pytest.mark.parametrize(("odds", "sure"), [(101.0, False), (1e7, True)])
+@pytest.mark.parametrize(
+    ("odds", "sure"), [pytest.param(101.0, False, marks=pytest.mark.quick), (1e7, True)]
+)
 def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
     odds, sure, monkeypatch, tmp_path
 ):

@@ -155,6 +155,7 @@ def test_model_without_a_stretch_is_fitted_to_the_others():
     assert drags == pytest.approx([fit.estimate.values["delta_X_u"]] * len(drags), rel=0.2)
 
 
+@pytest.mark.quick
 def test_slopes_are_those_of_one_model_after_the_other():
     around = windows().around(Model(), STEPS)
     first = windows().residuals(Model())
@@ -203,6 +204,7 @@ def test_predictions_do_not_depend_on_what_was_predicted_before():
     assert np.abs(first - second).max() > 1e-3
 
 
+@pytest.mark.quick
 def test_coarse_steps_predict_what_fine_ones_do():
     run = smoothed(sail(noise=0.0)[0])
     coarse = Shooting([run], HORIZON).residuals(Model(vessel={"N_r": -0.6}))[:, -1]
@@ -398,6 +400,7 @@ def test_fit_finds_what_was_hidden_within_its_interval():
     assert after < 0.1 * before
 
 
+@pytest.mark.quick
 def test_an_effect_that_predictions_take_back_to_nothing_is_none():
     """Of commands that are logged late, so that the thrusters seem to act before they are told to."""
     run = sail(ship={"delta_X_u": DRAG})[0]
@@ -527,6 +530,7 @@ def test_push_at_a_time_is_told_with_time_axis_and_size(axis, size):
     assert found.size * (found.end - found.start) == pytest.approx(2.0 * size, rel=0.2)
 
 
+@pytest.mark.quick
 def test_blow_that_may_be_a_jump_of_the_pose_is_not_told():
     run = sail(given=partial(pushed, axis=2, size=2.0, seconds=0.3))[0]
     w = weak_windows(smoothed(replace(run, tau_cmd=commands(run.time))))

@@ -53,7 +53,7 @@ def test_kernel_and_threads_do_not_show(tmp_path):
         pytest.skip("no binary for this processor's linear algebra to choose kernels from")
     cases = [(name, threads) for k, name in enumerate(names) for threads in ((1, 2) if k == 0 else (2,))]
     runs = tmp_path / "runs"
-    runs.write_bytes(pickle.dumps([sail(60.0)[0]]))
+    runs.write_bytes(pickle.dumps([sail(40.0)[0]]))
     found = [numbers(runs, *case) for case in cases]
     if len(set().union(*(used for _, used in found))) < 2:
         pytest.skip("no binary of OpenBLAS that heeds OPENBLAS_CORETYPE")

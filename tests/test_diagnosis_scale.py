@@ -69,9 +69,9 @@ def at_size(run, scale):
 
 
 @cache
-def loaded(scale, seconds=64.0):
+def loaded(scale, seconds=48.0):
     """The runs of a ship of a size that lacks something, one to learn from and one to test on."""
-    each = [(seconds, "a", 1), (32.0, "b", 2)]
+    each = [(seconds, "a", 1), (24.0, "b", 2)]
     runs = [replace(sail(t, **HIDDEN, seed=k)[0], name=name) for t, name, k in each]
     return gather([at_size(run, scale) for run in runs], model=of_size(scale))
 

@@ -162,6 +162,7 @@ def test_a_later_ranking_uses_the_columns_of_an_earlier_one():
     assert next(c for c in other.candidates if c.effect.id == "loss_yaw") is not of[0]["loss_yaw"]
 
 
+@pytest.mark.quick
 def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     """A loss of surge force is a straight curve; what needs the yaw moment or the speed is not.
 
@@ -187,7 +188,14 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     assert all(novelty(step.table, k, 0) == 1.0 for k in range(len(new))), "beside nothing all is new"
 
 
-@pytest.mark.parametrize("hidden", [{}, {"delta_X_u": -2.0}, {"delta_X_u": -2.0, "delta_N_r": -1.5}])
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {},
+        pytest.param({"delta_X_u": -2.0}, marks=pytest.mark.quick),
+        {"delta_X_u": -2.0, "delta_N_r": -1.5},
+    ],
+)
 def test_as_many_effects_are_likely_as_there_are(hidden):
     start, windows = Model(), data(64.0, ship=hidden)[0]
     belief = NominalPrior.of(start, None, MEASURED)

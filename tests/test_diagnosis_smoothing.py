@@ -322,7 +322,7 @@ def test_band_of_the_inverse_is_that_of_the_inverse():
 @pytest.mark.slow
 @needs_data
 def test_measured_runs_are_smoothed():
-    for path in sorted((DATA / "cse1").glob("*.mat")):
+    for path in sorted((DATA / "cse1").glob("*.mat"))[::2]:  # the response to the commands has them, too
         s = smoothed(read(path))
         assert s.counts.used > 0.8 * s.counts.samples
         assert (s.noise < (2e-4, 2e-4, 1e-3)).all(), "a tenth of a millimetre"

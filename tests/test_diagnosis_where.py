@@ -47,7 +47,7 @@ def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level, held):
     """
     run, _ = sail(48.0, noise=0.0)
     left, stated = [], []
-    for seed in range(6):
+    for seed in range(4):
         noise = np.multiply(level, NOISE) * np.random.default_rng(seed).standard_normal(run.pose.shape)
         pose = run.pose + noise
         pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
@@ -139,7 +139,7 @@ def test_uncertainty_is_the_error_where_rows_are_missing():
     Of the noise alone the model error is six to nine standard deviations.
     """
     ratio, jumped = [], []
-    for seed in range(6):
+    for seed in range(4):
         run, _ = sail(120.0, h=0.05, noise=0.1, seed=seed, given=jumps)
         w = windows(without_rows(run, seed))
         std = omega_std(w)
@@ -154,7 +154,7 @@ def test_uncertainty_is_the_error_where_rows_are_missing():
 
 
 def test_the_true_model_leaves_nothing_with_or_without_dropouts():
-    run = sail(240.0, h=0.05, noise=0.1, seed=3, given=jumps)[0]
+    run = sail(150.0, h=0.05, noise=0.1, seed=3, given=jumps)[0]
     for each in (run, dropped_out(run, np.s_[:], 0), without_rows(run, 0)):
         w = windows(each)
         left = remaining([w], Model(), Model())

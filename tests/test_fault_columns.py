@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from diagnosis.runs.sensors.evidence import (
     spread_of,
     straight,
 )
-from diagnosis.runs.sensors.gaps import gaps
+from diagnosis.runs.sensors.gaps import _arc, _elsewhere, gaps
 from diagnosis.runs.sensors.repairing import Correction, corrected
 from diagnosis.runs.sensors.unit_faults import units
 from fmus.scale import REFERENCE, Scale
@@ -212,6 +213,74 @@ def test_a_log_whose_clock_runs_ahead_has_seconds_that_never_were():
     (gap,) = gaps(evidence(ahead))
     assert gap.value == pytest.approx(-5.0, abs=0.1)
     assert "were never in the log" in gap.sentence
+
+
+@given(st.floats(-3.1, 3.1), st.floats(0.1, 10.0), st.floats(-3.0, 3.0))
+def test_an_arc_is_as_long_as_its_chord_bends(turn, length, course):
+    """The chord of an arc that turns by an angle a is sin(a / 2) / (a / 2) of it."""
+    chord = length * (2.0 * np.sin(0.5 * turn) / turn if abs(turn) > 1e-6 else 1.0)
+    assert _arc(chord * np.array([np.cos(course), np.sin(course)]), np.asarray(turn)) == pytest.approx(
+        length
+    )
+    assert _arc(np.array([3.0, 4.0]), np.asarray(4.0)) == 5.0, "more than a half turn is no bend"
+
+
+@pytest.mark.parametrize("seconds", [-6.0, 6.0])
+def test_the_interval_of_a_jump_has_the_noise_and_the_change_of_the_speed(seconds):
+    """u is the mean of the speeds at both ends, and half of what they differ by is in doubt."""
+    half = []
+    for faster in (1.0, 1.3):
+        run = without(50.0, seconds) if seconds > 0.0 else without(50.0, 0.0)
+        if seconds < 0.0:
+            run = replace(run, time=np.where(run.time < 50.0, run.time, run.time - seconds))
+        late = run.time > (50.0 if seconds > 0.0 else 52.0)
+        pose, u = run.pose.copy(), run.measured["u"] * np.where(late, faster, 1.0)
+        first = int(np.argmax(late))
+        pose[late, 0] = pose[first, 0] + (pose[late, 0] - pose[first, 0]) * faster
+        (gap,) = gaps(evidence(replace(run, pose=pose, measured=dict(run.measured) | {"u": u})))
+        assert gap.ci95[0] < gap.value < gap.ci95[1]
+        half.append(gap.ci95[1] - gap.value)
+    assert half[1] > half[0]
+    if seconds < 0.0:
+        assert half[0] < 0.2 * abs(seconds)
+
+
+def cruising(speeds, turns=0.0):
+    """Evidence of a ship whose speed (n,) is known, every second, and that turns evenly."""
+    psi = turns * np.arange(speeds.size)
+    step = speeds * np.exp(1j * (psi + 0.5 * turns))
+    place = np.concatenate([[0.0], np.cumsum(step[:-1])])
+    pose = np.column_stack([place.real, place.imag, psi])
+    time = np.arange(float(speeds.size))
+    return SimpleNamespace(
+        rows=np.arange(speeds.size), time=time, psi=psi, run=SimpleNamespace(pose=pose)
+    )
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.02])
+@pytest.mark.parametrize("missing", [9.0, 30.0])
+def test_a_time_is_possible_if_windows_of_that_length_look_like_the_jump(turns, missing):
+    """The speed is nearly even; the jump is one second of the log."""
+    speeds = 2.0 + 0.2 * np.sin(0.1 * np.arange(400))
+    e = cruising(speeds, turns)
+    a, b = 200, 201
+    e.psi = e.psi + turns * (missing - 1.0) * (np.arange(400) > a)
+    found = _elsewhere(e, speeds, (a, b), missing)
+    assert found is not None
+    likeliest, shortest, longest = found
+    assert shortest <= likeliest <= longest
+    assert shortest <= missing <= longest
+    assert likeliest == pytest.approx(missing, abs=1.0 + 0.06 * missing)
+    assert longest - shortest < 4.0 + 0.4 * missing
+
+
+def test_nothing_is_known_elsewhere_if_the_ship_is_never_as_fast_or_turns_as_much():
+    speeds = np.full(400, 2.0)
+    speeds[190:212] = 3.0
+    assert _elsewhere(cruising(speeds), speeds, (200, 201), 9.0) is None
+    turning = cruising(np.full(400, 2.0))
+    turning.psi = turning.psi + 1.0 * (np.arange(400) > 200)
+    assert _elsewhere(turning, np.full(400, 2.0), (200, 201), 9.0) is None
 
 
 @pytest.mark.parametrize("jump", [0.0, 30.0])

@@ -387,7 +387,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.quick) if n == "physics" else n for n in CASES]
+)
 def test_what_is_off_or_missing_is_found_with_its_value(name):
     values, forces, verdict = CASES[name]
     found = judged(values, forces)

@@ -517,7 +517,7 @@ def test_parameters_that_imitate_a_force_do_not_hide_it(work):
         "p[V_x] += h * p[V_v]; p[V_v] += h * rate;"
     )
     path = build_c_fmu(work, "euler", still, euler)
-    s = ForeignSystem("euler", {"f": 0.5}, "x", "c", values, "f", ("v", 2), -0.3, samples=300)
+    s = ForeignSystem("euler", {"f": 0.5}, "x", "c", values, "f", ("v", 2), -0.3, samples=200)
     hidden_causes.measured(path, s, {}, True, 0).to_csv(work / "r0.csv", index=False)
     s.write_inputs(work)
     given = ["--map", "map.json", "--parameters", "parameters.json", "--out", "out"]
@@ -589,7 +589,7 @@ def test_verdict(fmu, work):
 @pytest.mark.slow
 def test_windows_from_measured_states_agree_with_whole_runs(fmu, work):
     values = {"c": 12.0}
-    run = measured(fmu, work, "run", values, seconds=30.0)
+    run = measured(fmu, work, "run", values, seconds=18.0)
     given = written(work / "map.json", {**MAP, "start": START, "window": 6.0})
     own = written(work / "parameters.json", some("c"))
     options = ["--model", str(fmu), "--map", given, "--parameters", own, "--out", "out"]
@@ -681,7 +681,7 @@ def test_interrupted_or_refused_calls_leave_nothing(fmu, work, capsys):
 def test_values_with_which_the_fmu_fails_in_a_fit_are_stated(work, capsys):
     """The truth lies where the FMU fails: nothing is explained, and the report states why."""
     fmu = build_oscillator(work, "fragile", habit="if (p[V_c] > 11.0) return 3;")
-    run = measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0}, seconds=12.0)
+    run = measured(build_oscillator(work, "honest"), work, "run", {"c": 12.0}, seconds=8.0)
     own = written(work / "parameters.json", some("c"))
     options = ["--model", str(fmu), "--map", written(work / "map.json", MAP), "--parameters", own]
     assert learn.main([run, *options, "--out", "out"]) == 0

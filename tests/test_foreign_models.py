@@ -357,7 +357,7 @@ def test_learn_writes_an_fmu_with_what_was_found(vendor, tmp_path, capsys):
     hidden = VENDOR | {"delta_X_u": -2.0}
     runs = [
         str(csv_of(sail(s, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
-        for k, s in enumerate((50.0, 20.0))
+        for k, s in enumerate((50.0, 16.0))
     ]
     out = tmp_path / "out"
     assert learn.main([runs[0], "--test", runs[1], "--model", str(vendor), "--out", str(out)]) == 0
@@ -472,7 +472,7 @@ def test_a_force_in_the_earth_frame_is_found_in_addition_to_parameters(vendor, t
     hidden = VENDOR | {"F_n": 0.25}
     runs = [
         str(csv_of(sail(s, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
-        for k, s in enumerate((40.0, 20.0))
+        for k, s in enumerate((26.0, 16.0))
     ]
     parameters = [{"name": "X_u", "value": VENDOR["X_u"], "prior": {"rel_std": 0.2}}]
     given, out = tmp_path / "parameters.json", tmp_path / "out"

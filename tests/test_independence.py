@@ -78,11 +78,11 @@ def test_another_run_is_another(run):
 @needs_data
 @pytest.mark.slow
 def test_zigzags_of_a_tanker_are_all_others():
-    """Thirteen trials, some of which the basin repeated."""
+    """Seven trials, of which the basin repeated some to either side."""
     model = Model(ship=ship_with((), "kvlcc2"))
-    files = sorted((DATA / "kvlcc2_hsva").glob("z_*.csv"))
+    files = sorted((DATA / "kvlcc2_hsva").glob("z_[12]0_*.csv"))
     prints = [print_of(read(f, COLUMNS, model), model.ship) for f in files]
-    assert len(prints) == 13
+    assert len(prints) == 7
     assert [(a.name, b.name) for a, b in combinations(prints, 2) if a.alike(b)] == []
 
 

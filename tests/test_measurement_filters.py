@@ -225,14 +225,14 @@ def test_a_tracker_is_found_in_addition_to_the_hidden_effect():
 @pytest.mark.slow
 def test_no_filter_is_found_where_none_is():
     """Thrusters that lag are its opposite: the force is late, and not the measurement."""
-    w = weak_windows(smoothed(sail(120.0, h=0.1, thrusters={"lag": 0.5})[0]))
+    w = weak_windows(smoothed(sail(90.0, h=0.1, thrusters={"lag": 0.5})[0]))
     assert {e.id for e in diagnose([w]).content.effects} == {"lag"}
 
 
 @pytest.mark.slow
 def test_a_position_that_is_late_is_no_low_pass():
     """Positions of a receiver that are older than their stamps, as by a slow link; the heading is not."""
-    run = sail(240.0, h=0.1, noise=0.2)[0]
+    run = sail(180.0, h=0.1, noise=0.2)[0]
     late, rows = 0.6, 6  # s; more is easier
     pose = np.array(run.pose)
     pose[rows:, :2] = run.pose[:-rows, :2]

@@ -416,8 +416,8 @@ def test_runs_in_one_process_leave_nothing(ellipse, tmp_path):
 def test_campaign_in_small(tmp_path, monkeypatch):
     monkeypatch.setattr(campaigns, "LONGEST", 3.0)
     nothing = lambda: None  # noqa: E731
-    assert mutations.broken_scenarios(6, 2, tmp_path, nothing) == []
-    assert mutations.broken_files(4, 2, tmp_path, nothing) == []
+    assert mutations.broken_scenarios(3, 2, tmp_path, nothing) == []
+    assert mutations.broken_files(2, 2, tmp_path, nothing) == []
     assert endings.kills(1, 2, tmp_path, nothing) == []
     assert endings.signals(1, 2, tmp_path, nothing) == []
     assert endings.short_of_disk(1, 2, tmp_path, nothing) == []
@@ -439,9 +439,9 @@ def test_killed_commands_in_small(tmp_path, monkeypatch):
     for longest in ("COMPARES", "BUILDS", "CAMPAIGNS"):
         monkeypatch.setattr(killed_commands, longest, 1.5)
     nothing = lambda: None  # noqa: E731
-    assert killed_commands.interrupted_compares(2, 2, tmp_path, nothing) == []
+    assert killed_commands.interrupted_compares(1, 2, tmp_path, nothing) == []
     assert killed_commands.killed_diagnoses(1, 2, tmp_path, nothing) == []
-    assert killed_commands.ended_builds(2, 2, tmp_path, nothing) == []
+    assert killed_commands.ended_builds(1, 2, tmp_path, nothing) == []
     assert killed_commands.killed_campaigns(1, 2, tmp_path, nothing) == []
 
 
@@ -449,4 +449,4 @@ def test_killed_commands_in_small(tmp_path, monkeypatch):
 @linux_only
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 def test_random_calls_under_sanitizers(tmp_path):
-    assert sanitized.sanitized_calls(4, 2, tmp_path, lambda: None) == []
+    assert sanitized.sanitized_calls(2, 2, tmp_path, lambda: None) == []

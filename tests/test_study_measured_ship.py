@@ -502,7 +502,7 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path):
 @pytest.mark.slow
 def test_real_ship_is_explained_where_it_was_not_learned_from(tmp_path):
     """Minutes of two runs; of the pulls only the shape counts, as their propeller speed is not known."""
-    for name, seconds in (("dptest1", 200.0), ("dptest3", 250.0)):
+    for name, seconds in (("dptest1", 150.0), ("dptest3", 180.0)):
         rows = loadmat(DATA / "cse1" / f"{name}.mat")["cse1_data"]
         part = (rows[0] >= 100.0) & (rows[0] < 100.0 + seconds)
         savemat(tmp_path / f"{name}.mat", {"cse1_data": rows[:, part]})

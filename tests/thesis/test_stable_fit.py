@@ -5,9 +5,16 @@ import pytest
 
 from benchmarks.stable_fits import COLUMNS, data_set
 from cosim import InputError
-from diagnosis.assessment import least_dissipation
+from diagnosis.assessment import (
+    OPERATING,
+    dissipation,
+    least_dissipation,
+    mass,
+    sampled_motions,
+)
 from diagnosis.predictors import Model
 from thesis.analysis import as_model, effective_thrust, nearest_stable
+from thesis.analysis.constrained_fit import MARGIN, dissipation_conditions, thrust_cuts
 from thesis.analysis.into_the_plant import EPSILON, force_columns
 
 OTHERS = [c for c in COLUMNS if not c.startswith("tau")]
@@ -71,3 +78,32 @@ def test_columns_that_the_plant_lacks_are_refused():
     X, omega = data_set(2)
     with pytest.raises(InputError, match="no such columns"):
         nearest_stable(X[:, :2], omega, ["u", "|u|tau_X"])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cut_is_a_direction_in_which_a_force_acts_too_little_to_its_side(seed):
+    """Of each one row . vec(B) is v . B_tau v, by which 1 must be no less than EPSILON."""
+    B = 0.8 * np.random.default_rng(seed).standard_normal((3, len(COLUMNS)))
+    cuts = thrust_cuts(B, COLUMNS)
+    B_tau = force_columns(B, COLUMNS)
+    values = np.linalg.eigvalsh(np.eye(3) + 0.5 * (B_tau + B_tau.T))
+    assert 1.0 + cuts.G @ B.ravel() == pytest.approx(values[values < EPSILON])
+    assert 1.0 + cuts.h == pytest.approx(np.full(cuts.h.size, EPSILON + MARGIN))
+    other = B + 0.1 * np.eye(3, len(COLUMNS))
+    off = force_columns(other - B, COLUMNS)
+    for row, v in zip(cuts.G, np.linalg.eigh(0.5 * (B_tau + B_tau.T))[1].T, strict=False):
+        assert row @ (other - B).ravel() == pytest.approx(v @ off @ v)
+    assert thrust_cuts(np.zeros_like(B), COLUMNS).G.shape == (0, B.size)
+
+
+@pytest.mark.quick
+def test_the_conditions_of_the_hull_are_its_dissipation():
+    """G vec(B) is what a map adds to it at each motion, and h what is lacking without the map."""
+    columns = COLUMNS
+    B = 0.3 * np.random.default_rng(1).standard_normal((3, len(columns)))
+    B[:, [k for k, c in enumerate(columns) if c.startswith("tau")]] = 0.0
+    found = dissipation_conditions(tuple(columns), OPERATING)
+    nu, metric = sampled_motions(OPERATING), mass(Model())
+    base, with_map = (dissipation(as_model(np.zeros(3), x, columns), nu, metric) for x in (0.0 * B, B))
+    assert found.G @ B.ravel() == pytest.approx(with_map - base, abs=1e-9)
+    assert found.h == pytest.approx(least_dissipation(Model()) - base + MARGIN)

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.dispatch import FinishedRun
 from diagnosis import Model
-from studies.study_report import Report
+from studies.study_report import Report, Verdict
 from thesis import analysis, chapter7
 from thesis.analysis import NU, TAU, Samples, concurrent_passes
 from thesis.basin_trials import sysid4, trials
@@ -129,6 +129,53 @@ def test_products_are_insignificant_if_no_more_are_significant_than_by_chance(si
     assert (analysis_tables.by_chance(unsure) > analysis_tables.CHANCE) is chance
 
 
+@pytest.mark.parametrize("best", [0.2, 0.8, 0.9])
+def test_factors_suffice_for_95_percent_of_the_best_where_there_is_a_model(best):
+    some = best * np.array([0.951, 0.949, 1.0])
+    found = analysis_tables.suffice(some, np.full(3, best))
+    assert found == {"X": True, "Y": False, "N": True}
+    none = analysis_tables.suffice(np.zeros(3), np.array([0.099, 0.101, -3.0]))
+    assert none == {"X": None, "Y": False, "N": None}
+
+
+@pytest.mark.parametrize(
+    ("q2", "so"),
+    [
+        ((0.8, 0.39, 0.9), True),
+        ((0.8, 0.41, 0.9), False),
+        ((0.9, 0.39, 0.8), True),
+        ((0.09, -1.0, 0.9), False),  # surge has no model either
+        ((0.9, -1.0, 0.11), True),
+    ],
+)
+def test_sway_is_unsystematic_below_half_of_both_others(q2, so):
+    assert analysis_tables.unsystematic(np.array(q2)) is so
+
+
+def test_coefficients_are_insignificant_within_two_deviations_or_of_changing_sign():
+    B, std = np.array([1.9, -1.9, 2.1, -2.1, 9.0]), np.ones(5)
+    found = analysis_tables.insignificant(B, std, np.array([0, 0, 0, 0, 1]))
+    assert found.tolist() == [True, True, False, False, True]
+
+
+def test_the_eight_has_its_components_a_row_for_each_recipe_and_its_findings(
+    found, tmp_path, monkeypatch
+):
+    s = linear(0.01)
+    asked = []
+    monkeypatch.setattr(analysis_tables, "write_components", lambda *given: asked.append(given[1:]))
+    monkeypatch.setattr(analysis_tables, "regressions", lambda given: found if given is s else None)
+    monkeypatch.setattr(
+        analysis_tables, "findings", lambda given: [Verdict("A statement", True, "numbers")]
+    )
+    text = told(tmp_path, analysis_tables.write_eight, s, found)
+    assert asked == [(s, "eight")]
+    assert "A statement: eight" in text
+    for name, r in found.items():
+        assert f"| {name} | {' | '.join(analysis_tables.shares(r))} |" in text
+
+
+@pytest.mark.quick
 def test_pictures_of_the_regressions(found, tmp_path, drawn):
     told(tmp_path, analysis_tables.write_regressions, found, "made")
     assert {name.removeprefix("made_") for name in drawn} >= {
@@ -183,6 +230,7 @@ def test_components_are_told_and_drawn(tmp_path, drawn):
     assert set(drawn) == {"made_scatter", "made_outliers"}
 
 
+@pytest.mark.quick
 def test_the_row_that_made_the_samples_explains_them(tmp_path, drawn):
     names, t, nu, nu_dot, tau = motion()
     made = Samples(names, t, nu, nu_dot, tau, np.zeros_like(nu))
@@ -240,6 +288,7 @@ def test_columns_of_a_run_sum_to_one_for_each_state():
     assert len(np.unique(np.asarray(continuous.get_array()))) > 10
 
 
+@pytest.mark.quick
 def test_shapes_are_those_of_the_regression(tmp_path, drawn):
     s = linear(0.01)
     told(tmp_path, analysis_tables.write_shapes, s, wave())

@@ -97,7 +97,7 @@ def test_improved_controller_loses_its_lag_and_the_originals_do_not(tmp_path, mo
         """All runs but those by the Kalman observer, whose numbers are wanted below."""
         return {
             sense: {
-                c: vary(content, stop=seconds if sense == "kalman" else 5.0)
+                c: vary(content, stop=seconds if sense == "kalman" else 2.0)
                 for c, content in runs.items()
             }
             for sense, runs in variants(seconds).items()

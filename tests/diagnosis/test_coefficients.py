@@ -1,0 +1,145 @@
+"""When other coefficients take the place of effects (diagnosis/verdict/coefficients.py): each condition alone."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from diagnosis import Model
+from diagnosis.runs.run_constants import CHANCE
+from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.gram import WHOLE_RUNS
+from diagnosis.verdict import coefficients
+from diagnosis.verdict.coefficients import (
+    _flows,
+    any_sure,
+    calibrated,
+)
+
+START = Model()
+
+
+def effect(name="X_u", confidence=0.5, interval=(-1.0, 1.0)):
+    return Finding(name, {"delta": 0.3}, {"delta": interval}, confidence, [], 0.5, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("confidences", "sure"),
+    [([], False), ([0.79], False), ([0.8], True), ([0.1, 0.9], True), ([np.nan], True)],
+)
+def test_any_effect_is_sure_with_the_confidence_of_a_finding_or_with_none(confidences, sure):
+    assert any_sure(Findings([effect(confidence=c) for c in confidences])) == sure
+
+
+# Losses by name: the smaller, the better; a model is worse by more than chance if it is by one or more
+
+
+def worse(its, other):
+    return "worse" if its >= other + 1.0 else ""
+
+
+@pytest.fixture
+def by_numbers(monkeypatch):
+    monkeypatch.setattr(coefficients, "harm", worse)
+    monkeypatch.setattr(coefficients, "predicts_worse", lambda its, other: bool(worse(its, other)))
+    monkeypatch.setattr(coefficients, "gain", lambda its, other: its - other)
+
+
+def outcome(name, V=(0.0, 0.0), std=1.0):
+    names = ["vessel.X_u", *(f"vessel.{n}" for n in START.ship.effects["current"].coefficients)]
+    posterior = SimpleNamespace(
+        names=names, mean=np.array([99.0, *V]), covariance=np.diag([1.0, std**2, std**2])
+    )
+    return SimpleNamespace(findings=Findings(moved={name: 0.0}), posterior=posterior)
+
+
+@pytest.mark.parametrize("std", [1.0, 0.1])
+@pytest.mark.parametrize(("size", "flows"), [(0.99, False), (1.01, True)])
+@pytest.mark.parametrize("course", [0.3, 2.0])
+def test_a_current_flows_beyond_the_quantile_of_its_uncertainty(std, size, flows, course):
+    """V^T C^-1 V is chi-square with two degrees of freedom."""
+    V = size * std * np.sqrt(chi2.isf(CHANCE, 2)) * np.array([np.cos(course), np.sin(course)])
+    assert _flows(outcome("", V, std)) == flows
+
+
+def test_without_a_current_nothing_flows():
+    still = outcome("", (9.0, 9.0))
+    still.posterior.names = ["vessel.X_u", "vessel.X_uuu", "vessel.N_r"]
+    assert not _flows(still)
+
+
+CASE = {
+    "runs": WHOLE_RUNS,
+    "std": 0.1,
+    "missing": True,
+    "windows": [1],
+    "effects": [],
+    "first": 10.0,
+    "found": 10.0,
+    "still": 5.0,
+    "flowing": 5.0,
+    "V": (0.0, 0.0),
+    "validate": [],
+    "its": 5.0,
+    "others": 10.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "taken"),
+    [
+        ({}, "still"),
+        ({"runs": WHOLE_RUNS - 1}, None),
+        ({"std": 0.0}, None),
+        ({"missing": False}, None),
+        ({"windows": []}, None),
+        ({"still": 9.5}, "still"),
+        ({"still": 10.0}, None),  # no better than the first
+        ({"still": 11.5}, None),
+        ({"effects": [effect()], "found": 4.5}, "still"),  # effects predict no better, beyond chance
+        ({"effects": [effect()], "found": 3.5}, None),
+        ({"effects": [effect()], "first": 3.5}, None),  # worse than the first
+        ({"flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"flowing": 3.0}, "still"),  # a current that may be none
+        ({"flowing": 4.5, "V": (9.0, 9.0)}, "still"),
+        ({"still": 11.5, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"effects": [effect()], "found": 4.0, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"validate": [1], "its": 10.5}, "still"),
+        ({"validate": [1], "its": 11.5}, None),
+        ({"its": 11.5}, "still"),
+    ],
+)
+def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numbers, monkeypatch):
+    case = CASE | changes
+    found = Findings(case["effects"])
+    still, flowing = outcome("still"), outcome("flowing", case["V"])
+    losses = {
+        id(found): "found",
+        id(START): "first",
+        id(still.findings): "still",
+        id(flowing.findings): "flowing",
+    }
+
+    class Runs:
+        def __init__(self, train, validate, start, sigma):
+            assert list(validate) == []
+            assert start is START
+
+        def losses(self, *models):
+            return [case[losses[id(m)]] for m in models]
+
+    calibrator = SimpleNamespace(
+        windows=case["windows"], still=lambda: still, flowing=lambda near: flowing
+    )
+    monkeypatch.setattr(coefficients, "ValidationData", Runs)
+    monkeypatch.setattr(coefficients, "Calibrator", lambda *_: calibrator)
+    monkeypatch.setattr(coefficients, "remains", lambda *_: case["missing"])
+    data = SimpleNamespace(
+        train=[None] * case["runs"],
+        validate=case["validate"],
+        start=START,
+        losses=lambda model, start: [case["its"], case["others"]],
+    )
+    chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}))
+    assert chosen is {"still": still, "flowing": flowing, None: None}[taken]
