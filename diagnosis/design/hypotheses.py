@@ -12,7 +12,7 @@ from ..execution.short_text import SHOWN
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import independent, omega_std
 from ..predictors.weak_form import OVERLAP
-from ..runs.run_constants import DIGITS
+from ..runs.run_constants import DIGITS, STEPS
 from ..search.candidates import SMALL, CandidateShape, candidate, model_error
 from ..search.nonlinear.multistart import FAR
 from ..search.prior import NominalPrior
@@ -232,10 +232,13 @@ def knowledge(
 
 
 def _weights(k: Knowledge, found: Sequence[Rival]) -> np.ndarray:
-    """(h,), the confidence of each accepted effect, its rest shared among its rivals by evidence."""
+    """(h,), the confidence of each accepted effect, its rest shared among its rivals by evidence.
+
+    By iterative proportional fitting (Deming and Stephan 1940), as what has one effect may lack another.
+    """
     evidence = np.exp(k.log_evidence - k.log_evidence.max())
     weights = evidence / evidence.sum()
-    for r in found:
+    for r in [*found] * STEPS:
         has = np.array([r.ids[0] in h.ids for h in k.hypotheses])
         if np.isfinite(r.confidence) and has.any() and not has.all():
             for part, share in ((has, r.confidence), (~has, 1.0 - r.confidence)):

@@ -210,7 +210,7 @@ def test_commands_before_the_run_are_forgotten_after_the_longest_lag():
 
 
 def silent(held):
-    return track(held=held).silences
+    return track(held=held[:, None]).silences
 
 
 def test_times_without_commands_are_odd_parts_of_the_run():
@@ -237,6 +237,22 @@ def test_nothing_is_known_before_the_first_command_and_behind_the_last():
     assert (part[:30] == 1).all()
     assert (part[30:350] == 2).all()
     assert (part[350:] == 3).all()
+
+
+def test_where_one_command_of_several_is_lost_they_are_not_known():
+    """Parts that overlap are one; each alone may be shorter."""
+    one, other = NOTHING.copy(), NOTHING.copy()
+    one[100:150], other[140:200], other[300:310] = True, True, True
+    both = track(held=np.column_stack([one, other])).silences
+    np.testing.assert_array_equal(both % 2 == 1, one | other)
+    assert both[-1] == 4
+    np.testing.assert_array_equal(both, track(held=np.column_stack([other, one])).silences)
+
+
+def test_commands_in_rows_of_their_own_are_written_when_they_are_there():
+    row = np.arange(NOTHING.size)
+    held = np.column_stack([row % 3 != k for k in range(3)])
+    assert (track(held=held).silences == 0).all()
 
 
 def test_commands_that_are_written_when_they_change_are_held_between():

@@ -91,6 +91,17 @@ def test_two_effects_have_the_confidence_of_each():
     assert found == pytest.approx([0.56, 0.24, 0.14, 0.06])
 
 
+def test_effects_that_hypotheses_share_unevenly_have_the_confidence_of_each():
+    ids = [("a", "x"), ("a",), ("x",), ()]
+    a, x = Rival(("a", ""), 0.7), Rival(("x", ""), 0.8)
+    for first, second in ((a, x), (x, a)):
+        found = weighed([9.0, 1.0, 1.0, 2.0], ids, first, second)
+        assert found[:2].sum() == pytest.approx(0.7, abs=0.01)
+        assert found[[0, 2]].sum() == pytest.approx(0.8, abs=0.01)
+        # The odds ratio is that of the data.
+        assert found[0] * found[3] / (found[1] * found[2]) == pytest.approx(18.0, rel=1e-9)
+
+
 def test_what_all_hypotheses_have_or_none_changes_no_weight():
     ids = [("a", "x"), ("a", "y")]
     assert weighed([1.0, 3.0], ids, Rival(("a",), 0.5)) == pytest.approx([0.25, 0.75])
