@@ -471,8 +471,9 @@ PARTS = re.compile(
     r"(?<![a-z])(vsp\d?|bow(?! to))(?![a-z])|^((matlab_)?five|otter|cse1|kvlcc2|gunnerus)$",
     re.IGNORECASE,
 )
-# The name of the default ship. The parts of a ship are named in its file.
-OF_ONE_SHIP = {"fmus.ships.naming"}
+# The name of the default ship, whose parts are named in its file; and what the bow of any ship is called in
+# other languages.
+OF_ONE_SHIP = {"fmus.ships.naming", "diagnosis.runs.columns.name_words"}
 
 
 def words(path):

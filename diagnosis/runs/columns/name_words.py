@@ -17,7 +17,7 @@ FOREIGN = {
     "angle": "winkel vinkel angulo hoek",
     "rpm": "drehzahl regime toerental turtall omdreiningstall",
     "order": "setpoint soll sollwert consigne orden ordre",
-    "measured": "ist istwert mesure medido gemeten",
+    "measured": "ist istwert mesure medido gemeten",  # codespell:ignore
     "true": "vrai vraie wahr verdadero",
     "time": "zeit uhrzeit temps tiempo tijd tid",
     "timestamp": "zeitstempel horodatage",

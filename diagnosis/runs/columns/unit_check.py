@@ -31,7 +31,7 @@ UNITS: dict[str, dict[str, float]] = {
 # Other spellings of units in files -> the one above.
 SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
-    **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),
+    **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),  # codespell:ignore
     **dict.fromkeys(("degree", "degrees", "grader", "Grad"), "deg"),
     **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
