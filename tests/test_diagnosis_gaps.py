@@ -10,6 +10,7 @@ from support.measured import sail, smoothed
 from diagnosis import Model
 from diagnosis.predictors import omega, weak_windows
 from diagnosis.predictors.weak_form import WIDTH, places
+from fmus.scale import Scale
 
 HALF = 1500
 
@@ -35,3 +36,10 @@ def test_no_window_spans_a_long_gap(gap):
 def test_places_are_all_of_a_run_without_gaps():
     time = np.arange(0.0, 30.0, 0.02)
     np.testing.assert_array_equal(places(time), np.arange(0, 54))
+
+
+@pytest.mark.parametrize("length", [0.2, 4.0, 30.0])
+def test_places_are_the_same_for_a_ship_of_any_size_in_its_own_seconds(length):
+    scale = Scale(length)
+    time = np.concatenate([np.arange(0.0, 30.0, 0.02), np.arange(90.0, 120.0, 0.02)])
+    np.testing.assert_array_equal(places(scale.time * time, scale), places(time))
