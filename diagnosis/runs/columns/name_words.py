@@ -27,7 +27,7 @@ FOREIGN = {
     "easting": "rechtswert",
     "latitude": "breite breitengrad latitud latitudine breedtegraad breddegrad",
     "longitude": "lange langengrad longitud longitudine lengtegraad lengdegrad",
-    "heading": "steuerkurs gierwinkel cap rumbo koers",
+    "heading": "steuerkurs gierwinkel cap",
     "yaw rate": "gierrate wenderate",
     "speed": "geschwindigkeit vitesse velocidad snelheid fart",
 }
