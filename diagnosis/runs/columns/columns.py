@@ -345,7 +345,8 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
         forms = ", or ".join(", ".join(group) for group in every)
         raise InputError(
             f"{where} has no commands: {forms}{nearest(every[0][0], names)}; "
-            "a side-car states other names ('cybership columns FILE --write' writes one)"
+            "a side-car states other names ('cybership columns FILE --write' writes one), and "
+            "'cybership join' adds those of another file"
         )
     power = of.power_settings
     if tuple(of.command_forms[-1]) in groups and any(layout.column(s).name in names for s in power):
