@@ -100,12 +100,6 @@ def pytest_runtest_call(item):
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers():
-    """One worker more than cores: a sixth of the time of tests is waiting for processes that they start."""
-    return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else None
-
-
-@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """A worker that has finished takes tests from another one, unless ``--dist`` says otherwise."""
     if config.getvalue("dist") != "load":
