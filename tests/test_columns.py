@@ -205,6 +205,8 @@ def test_a_column_called_as_an_actuator_is_its_only_command() -> None:
         assert meaning_of_words(name, "", quantity) != "rudder.delta"
     pod = {"pod.n": "shaft speed", "pod.alpha": "angle", "pod.thrust": "force"}
     assert meaning_of_words("pod", "", pod) == ""
+    sides = {"ps.n": "shaft speed", "sb.n": "shaft speed"}
+    assert meaning_of_words("RPM propeller starboard", "rpm", sides) == "sb.n"
     assert meaning_of_words("pod ang", "", pod) == "pod.alpha"
     assert meaning_of_words("pod speed", "", pod) == "pod.n"
     assert meaning_of_words("pod angular speed", "", pod) != "pod.alpha"
@@ -245,6 +247,9 @@ def test_a_heading_in_rows_of_its_own_is_seen_to_be_in_degrees(tmp_path: Path) -
         ("Bugstrahlruder", "%", "bow.u"),
         ("Bug Sollwert", "%", "bow.u"),
         ("Cap vrai", "deg", "psi"),
+        ("Azimut forut vinkel", "deg", "fore.alpha"),
+        ("Azimut akter turtall", "rpm", "aft.n"),
+        ("RPM hélice babor", "rpm", "port_screw.n"),
         ("Shaft RPM", "rpm", ""),
         ("Kurs", "deg", ""),
         ("Heckstrahlruder", "%", ""),
@@ -253,13 +258,16 @@ def test_a_heading_in_rows_of_its_own_is_seen_to_be_in_degrees(tmp_path: Path) -
 def test_words_of_other_languages_and_short_forms(name: str, unit: str, signal: str) -> None:
     screws = {f"{side}_screw.n": "shaft speed" for side in ("port", "starboard")}
     rudders = {f"{side}_rudder.delta": "angle" for side in ("port", "starboard")}
-    quantity = quantities(TANKER) | screws | rudders | {"bow.u": "command"}
+    legs = {
+        f"{end}.{c}": q for end in ("fore", "aft") for c, q in (("alpha", "angle"), ("n", "shaft speed"))
+    }
+    quantity = quantities(TANKER) | screws | rudders | legs | {"bow.u": "command"}
     del quantity["propeller.n"], quantity["rudder.delta"]
     assert meaning_of_words(name, unit, quantity) == signal
 
 
 @pytest.mark.parametrize(
-    ("name", "signal"), [("Hochwert", "x"), ("Zeit", "time"), ("OST", "y"), ("Est", "")]
+    ("name", "signal"), [("Hochwert", "x"), ("Zeit", "time"), ("Øst", "y"), ("Est", "")]
 )
 def test_names_in_other_languages(name: str, signal: str) -> None:
     assert meaning(name, quantities(TANKER)) == (signal, False)

@@ -92,6 +92,11 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
+def is_steering(name: str) -> bool:
+    """Whether a name is that of an angle that steers, of whatever actuator."""
+    return [word for word in words_of(name) if word not in FILLERS] == ["rudder"]
+
+
 def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
     """Whether words tell which command of its actuator a column without a unit holds."""
     actuator, _, command = signal.partition(".")
@@ -124,7 +129,7 @@ def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
         if not same:
             return False
         left.remove(same[0])
-    said = {command} | (REVOLUTIONS if quantity == "shaft speed" else set())
+    said = {command} | (REVOLUTIONS | {"propeller"} if quantity == "shaft speed" else set())
     return not set(left) - said - FILLERS
 
 

@@ -13,6 +13,9 @@ FOREIGN = {
     "rudder angle": "ruderlage ruderwinkel roerhoek rorvinkel",
     "bow": "bowthr bowthruster bug bugstrahl bugstrahler bugstrahlruder boeg baug",
     "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
+    "fore": "fwd forward vorn forut",
+    "aft": "achter akter",
+    "azimuth": "azimut",
     "thruster": "propulseur strahlruder boegschroef",
     "angle": "winkel vinkel angulo hoek",
     "rpm": "drehzahl regime toerental turtall omdreiningstall",
@@ -32,12 +35,14 @@ FOREIGN = {
     "speed": "geschwindigkeit vitesse velocidad snelheid fart",
 }
 ENGLISH = {word: english for english, words in FOREIGN.items() for word in words.split()}
+# Letters that are no other letter with an accent.
+PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l"})
 
 
 def words_of(name: str) -> list[str]:
     """The words of a name, small letters; numbers are words of their own."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    letters = unicodedata.normalize("NFKD", apart).casefold()
+    letters = unicodedata.normalize("NFKD", apart).casefold().translate(PLAIN)
     plain = "".join(c for c in letters if not unicodedata.combining(c))
     found: list[str] = re.findall(r"[a-z]+|\d+", plain)
     return " ".join(ENGLISH.get(word, word) for word in found).split()

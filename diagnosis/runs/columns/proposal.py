@@ -43,6 +43,7 @@ from .geographic import geographic_pair, local_columns, one_origin, refuse_minut
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
+    is_steering,
     likely_columns,
     meaning_of_words,
     motion_of,
@@ -317,7 +318,7 @@ def _by_words(
     The part of a path that all names with a path have in common, as of a device, tells nothing.
     """
     found: dict[str, list[Column]] = {}
-    shafts: list[Column] = []
+    only: dict[str, list[Column]] = {"shaft speed": [], "angle": []}  # of a ship with one of them
     paths = [parts for name, _ in free if (parts := PATH.split(name)[:-1])]
     common = [p[0] for p in takewhile(lambda p: len({*p}) == 1, zip(*paths, strict=False))]
     for name, below in free:
@@ -329,10 +330,13 @@ def _by_words(
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
         elif unit in ("rpm", "rps"):
-            shafts.append(Column(name=name, unit=unit))
-    turning = [s for s, q in quantity.items() if q == "shaft speed" and s not in {*columns, *found}]
-    if len(turning) == len(shafts) == 1:  # one shaft, and one speed of a shaft
-        found[turning[0]] = shafts
+            only["shaft speed"].append(Column(name=name, unit=unit))
+        elif unit in UNITS["angle"] and is_steering(" ".join(own)):
+            only["angle"].append(Column(name=name, unit=unit))
+    for kind, told in only.items():
+        left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]
+        if len(left) == len(told) == 1:
+            found[left[0]] = told
     return {s: each[0] for s, each in found.items() if len(each) == 1 and s not in columns}
 
 
