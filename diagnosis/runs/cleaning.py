@@ -123,11 +123,8 @@ class Track(ShortRepr):
         begun, ended = np.concatenate([self._unstated(rows) for rows in each], axis=1)
         order = np.argsort(begun, kind="stable")
         begun, ended = begun[order], np.maximum.accumulate(ended[order])
-        apart = begun[1:] > ended[:-1]  # of two that overlap one part is made
-        begun, ended = (
-            np.delete(begun, 1 + np.flatnonzero(~apart)),
-            np.delete(ended, np.flatnonzero(~apart)),
-        )
+        meet = np.flatnonzero(begun[1:] <= ended[:-1])  # of two that overlap one part is made
+        begun, ended = np.delete(begun, meet + 1), np.delete(ended, meet)
         return np.searchsorted(begun, time, "left") + np.searchsorted(ended, time, "right")
 
     def _unstated(self, held: np.ndarray) -> np.ndarray:

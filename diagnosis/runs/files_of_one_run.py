@@ -1,6 +1,6 @@
 """Files of one run as one table: a file for each topic, and tables with one value in a row."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,21 +44,20 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
     parts = [_part(path) for path in paths]
     times = _times(parts)
     groups: dict[tuple[str, ...], list[pd.DataFrame]] = {}
-    spans: dict[tuple[str, ...], tuple[float, float, Path]] = {}
+    first: dict[tuple[str, ...], Path] = {}
     for part, time in zip(parts, times, strict=True):
         names = tuple(part.table)
         groups.setdefault(names, []).append(part.table.assign(**{TIME: time}))
-        low, high, path = spans.get(names, (np.inf, -np.inf, part.path))
-        spans[names] = (np.nanmin(time, initial=low), np.nanmax(time, initial=high), path)
-    _refuse_apart(list(spans.values()))
+        first.setdefault(names, part.path)
+    tables = {first[names]: pd.concat(group, ignore_index=True) for names, group in groups.items()}
+    _refuse_apart({path: table[TIME] for path, table in tables.items()})
     taken: set[str] = set()
-    tables = []
-    for names, group in groups.items():
-        stem = spans[names][2].stem
-        own = {name: f"{stem}.{name}" if name in taken else name for name in names}
+    for path, table in tables.items():
+        own = {n: f"{path.stem}.{n}" if n in taken else n for n in table if n != TIME}
         taken |= set(own.values())
-        tables.append(pd.concat(group, ignore_index=True).rename(columns=own))
-    table = pd.concat(tables, ignore_index=True).sort_values(TIME, kind="stable", ignore_index=True)
+        tables[path] = table.rename(columns=own)
+    table = pd.concat([*tables.values()], ignore_index=True)
+    table = table.sort_values(TIME, kind="stable", ignore_index=True)
     return table.filter(items=[TIME, *(name for name in table if name != TIME)])
 
 
@@ -84,9 +83,8 @@ def _part(path: Path) -> _Part:
     told = dict(zip(names, units, strict=True))
     table = table.filter(items=[name for name in columns if name not in {*stamp, found.name}])
     table, cells = _by_names(table, cells)
-    return _Part(
-        table.rename(columns=lambda n: f"{n} [{told[n]}]" if told.get(n) else n), cells, found, path
-    )
+    table = table.rename(columns={n: f"{n} [{told[n]}]" for n in table if told.get(n)})
+    return _Part(table, cells, found, path)
 
 
 def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.Series]:
@@ -97,10 +95,8 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
     called = {name.strip("_").casefold(): name for name in map(str, table)}
     value = next((called[c] for c in called if c in VALUE), None)
     units = [name for c, name in called.items() if c in UNIT]
-    words = [
-        n for n in table if n not in {*units, value} and not pd.api.types.is_numeric_dtype(table[n])
-    ]
-    texts = [n for n in words if table[n].nunique() > 1]
+    changing = [n for n in table if n not in {*units, value} and table[n].nunique() > 1]
+    texts = [n for n in changing if not pd.api.types.is_numeric_dtype(table[n])]
     if value is None or not texts:
         return table, cells
     names = table[texts].astype("string").fillna("").agg(".".join, axis=1)
@@ -118,12 +114,10 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
 
 def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
     """The times of each part, by one clock."""
+    seconds = date_stamps(pd.concat([p.cells for p in parts], ignore_index=True), "the files' times")
+    if seconds is not None:
+        return np.split(seconds, np.cumsum([len(part.cells) for part in parts])[:-1])
     stamps = [date_stamps(part.cells) is not None for part in parts]
-    ends = np.cumsum([len(part.cells) for part in parts])[:-1]
-    if all(stamps):
-        seconds = date_stamps(pd.concat([p.cells for p in parts], ignore_index=True), "the files' times")
-        assert seconds is not None
-        return np.split(seconds, ends)
     if any(stamps):
         dated, other = parts[stamps.index(True)].path, parts[stamps.index(False)].path
         raise InputError(f"'{dated}' has date stamps, '{other}' numbers: they have no clock in common")
@@ -131,10 +125,10 @@ def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
     return [to_si(time, TIME, part.time, TIME) for part, time in zip(parts, read, strict=True)]
 
 
-def _refuse_apart(spans: Sequence[tuple[float, float, Path]]) -> None:
+def _refuse_apart(times: Mapping[Path, pd.Series]) -> None:
     """Refuse files whose times are all before or after those of the first one."""
-    low, high, first = spans[0]
-    for begin, end, path in spans[1:]:
+    (first, low, high), *others = ((path, time.min(), time.max()) for path, time in times.items())
+    for path, begin, end in others:
         if not (begin <= high and low <= end):
             raise InputError(
                 f"'{first}' and '{path}' have no time in common: {low:.10g} to {high:.10g}, "

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...execution.short_text import SHOWN
+from ..files.reading import held_values
 from ..run_constants import EVERY, FEWEST
 from .columns import OUTPUTS, POSE
 from .name_words import words_of
@@ -145,7 +146,9 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     if not {"time", "x", "y"} <= known.keys() or np.isfinite(known["time"]).sum() < FEWEST:
         return {}
     t = known["time"]
-    held = {s: held_values(known[s]) for s in POSE if s in known}  # topics in rows of their own
+    there = [s for s in POSE if s in known]
+    pose = held_values(np.column_stack([known[s] for s in there]))  # topics in rows of their own
+    held = dict(zip(there, pose.T, strict=True))
     apart = float(np.nanmedian(np.diff(t)))
     width = max(int(EVERY / apart), 1) if apart > 0.0 else 1
 
@@ -159,9 +162,8 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         north, east = rate(held["x"]), rate(held["y"])
         found = {"course": _unwrapped(np.arctan2(east, north))}
         if "psi" in held:
-            pose = np.column_stack([held[s] for s in POSE])
             rows = np.isfinite(pose).all(axis=1) & np.isfinite(t)
-            degrees = rows.any() and any("psi" in d.signals for d in doubts(t[rows], pose[rows]))
+            degrees = any("psi" in doubt.signals for doubt in doubts(t[rows], pose[rows]))
             psi = _unwrapped(np.radians(held["psi"]) if degrees else held["psi"])
             cos, sin = np.cos(psi), np.sin(psi)
             speeds = {
@@ -172,12 +174,6 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
             found |= {f"{axis} speed": speed for axis, speed in speeds.items()}
             found |= {f"{axis} acceleration": rate(speed) for axis, speed in speeds.items()}
     return found
-
-
-def held_values(values: np.ndarray) -> np.ndarray:
-    """Values (n,), the last one where one is missing; NaN before the first."""
-    last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(values.size), -1))
-    return np.where(last < 0, np.nan, values[last])
 
 
 def _unwrapped(angle: np.ndarray) -> np.ndarray:

@@ -334,8 +334,12 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
     """Commands that keep their last value where one is missing, zero before the first."""
     if commands is None:
         return None
-    finite = np.where(np.isfinite(commands), commands, np.nan)
-    return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
+    return np.nan_to_num(held_values(commands), nan=0.0)
+
+
+def held_values(values: np.ndarray) -> np.ndarray:
+    """Values (n, k), the last one where one is missing; NaN before the first."""
+    return pd.DataFrame(np.where(np.isfinite(values), values, np.nan)).ffill().to_numpy()
 
 
 def table_of(run: Run) -> pd.DataFrame:
