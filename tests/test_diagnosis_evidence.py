@@ -158,6 +158,12 @@ def repeats(best=None, lasts=10.0, in_part=False):
         (repeats("motion", in_part=True), 1.0, "proportional to the command", "fails and recovers"),
         (repeats("command"), 1.0, "on the commands", "differs from the thruster model"),
         (repeats("time"), 1.0, "since the start of a run", "a drift"),
+        (
+            repeats(in_part=True)._replace(changes=("lap", 71.2)),
+            1.0,
+            "at about 71 s of lap",
+            "that sticks",
+        ),
         (repeats(lasts=3.1), 1.0, "lasts for about 3 s", "gusts"),
         (repeats(lasts=2.9), 1.0, "and is short", "waves"),
         (

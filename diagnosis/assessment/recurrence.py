@@ -15,9 +15,10 @@ from scipy.spatial import KDTree
 
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import correlated_windows
-from ..predictors.weak_form import BLOCK, EVERY
+from ..predictors.weak_form import BLOCK
 from .regions import numbered
 from .settings import SETTINGS
+from .structural_change import STRETCH, moment_of_change
 
 TOGETHER = "place and motion"  # the space of both, where an error repeats in none alone
 
@@ -30,12 +31,14 @@ class Recurrence(NamedTuple):
         lasts: s, how long the error stays correlated; infinite: through whole runs.
         in_part: whether it is in proportion to the command of its axis, at times more and at times less.
         run: the only one of several runs that has it, but for a negligible rest; empty: there is none.
+        changes: name of the run and time [s] at which it changes; None: at no moment.
     """
 
     shares: dict[str, float]
     lasts: float
     in_part: bool
     run: str = ""
+    changes: tuple[str, float] | None = None
 
     @property
     def best(self) -> str | None:
@@ -68,8 +71,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     offsets = rng.integers(least, max(len(left) - least, least + 1), shifts)
     lasts = data[0].every * correlated_windows(data, left)
     lasts[lasts > max(np.ptp(w.middle) for w in data)] = np.inf
-    half_block = round(BLOCK / (2 * EVERY))  # windows of one amplitude of a command
-    stretch = numbered([np.arange(w.middle.size) // half_block for w in data])
+    stretch = numbered([np.arange(w.middle.size) // STRETCH for w in data])
     found = []
     for k in range(3):
         error = left[:, k]
@@ -84,7 +86,10 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
         size = np.bincount(run, error**2) / np.bincount(run)
         one = int(size.argmax())
         alone = len(data) > 1 and size[one] > (1.0 - SETTINGS.negligible) * size.sum()
-        found.append(Recurrence(shares, float(lasts[k]), in_part, data[one].run.name if alone else ""))
+        regressors = _scaled(np.column_stack([*others, command[:, k]]))
+        changes = moment_of_change(data, error, regressors, max(shares.values()))
+        one_run = data[one].run.name if alone else ""
+        found.append(Recurrence(shares, float(lasts[k]), in_part, one_run, changes))
     return found
 
 

@@ -63,6 +63,10 @@ IN_PART = (
     "is proportional to the command of its axis for some time only",
     "a thruster that fails and recovers, or whose power changes",
 )
+CHANGES = (
+    "changes at about {1:.0f} s of {0}, and is another function of speed and command from then on",
+    "an event at that time, such as an actuator that sticks or fails, a change of load, or other water",
+)
 IN_ONE_RUN = (
     "occurs in {0} alone, so that these runs do not show what it depends on",
     "something that differed in that run, such as its place, load, water or weather",
@@ -294,6 +298,8 @@ def _amount(axis: str, r: AxisRemainder) -> str:
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
+    if r.changes:
+        return CHANGES[0].format(*r.changes), CHANGES[1]
     if r.in_part and r.best != "place":
         return IN_PART
     if r.best is not None:
