@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from diagnosis.assessment import recurrence as recurrences
 from diagnosis.assessment.gains import ThrustGains, _own
+from diagnosis.assessment.residual import recurrence as recurrences
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.search.conclusion import interval, laplace_std, suspected
 from diagnosis.search.gram import (

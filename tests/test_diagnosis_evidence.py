@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from diagnosis.assessment import remainder
-from diagnosis.assessment.recurrence import Recurrence
-from diagnosis.assessment.remainder import AxisRemainder
+from diagnosis.assessment.residual import remainder
+from diagnosis.assessment.residual.recurrence import Recurrence
+from diagnosis.assessment.residual.remainder import AxisRemainder
 from diagnosis.predictors import Model
 from diagnosis.predictors.evaluation import Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from diagnosis import Model
-from diagnosis.assessment.remainder import (
+from diagnosis.assessment.residual.remainder import (
     axis_remainders,
     chance,
     level,

@@ -10,9 +10,9 @@ from support.planted import bank, dead_bow, gusts, voyages
 
 import diagnosis
 from diagnosis import Model, Run, omega, weak_windows
-from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
-from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
+from diagnosis.assessment.residual.recurrence import recurrence
+from diagnosis.assessment.residual.remainder import AxisRemainder, Remainder, axis_remainders
 from diagnosis.assessment.stability import OPERATING
 from diagnosis.execution.progress import silent
 from diagnosis.predictors.evaluation import evaluate_run

@@ -11,7 +11,7 @@ from support.measured import NOISE, jumps, sail, smoothed
 from diagnosis import Model, omega_std
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME, YAW_RATE
 from diagnosis.assessment.regions import Region, _Design, cluster_mean, find_regions, welch_p_value
-from diagnosis.assessment.remainder import remaining
+from diagnosis.assessment.residual.remainder import remaining
 from diagnosis.predictors import omega, uncertainty, weak_windows
 from diagnosis.predictors.ship_model import SampledForce
 from diagnosis.predictors.uncertainty import bridged

@@ -137,13 +137,19 @@ def _choose_signals(system: System, unlogged: Collection[str]) -> None:
 
 
 def _compact(system: System, available: Mapping[str, FmuVariable]) -> list[str]:
-    """What metrics, pictures and the diagnosis read: the roles, and what measures the pose."""
+    """What metrics, pictures and the diagnosis read: roles, recordings, commands, measured pose."""
     sources = set(system.scenario.roles.pose)
     measured = [c.target.name for c in system.connections if c.source.name in sources]
     poses = [f"{name}.{axis}_m" for name in system.models for axis in ("x", "y", "psi")]
     wanted = {*system.scenario.roles.columns, *measured, *poses}
-    wanted |= set() if system.trial is None else {system.trial.order}
-    return [name for name in available if name in wanted]
+    wanted |= system.recorded | (set() if system.trial is None else {system.trial.order})
+    # Commands of actuators: what enters the model of the force and is no copy of the above.
+    acting = {name.partition(".")[0] for name in system.scenario.roles.force}
+    copies = {c.target.name for c in system.connections if c.source.name in wanted}
+    inputs = {
+        n for n, v in available.items() if v.causality == "input" and n.partition(".")[0] in acting
+    }
+    return [name for name in available if name in wanted | (inputs - copies)]
 
 
 def _numbers(system: System) -> dict[str, FmuVariable]:

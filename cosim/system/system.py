@@ -67,8 +67,12 @@ class System:
     @property
     def fed(self) -> set[str]:
         """Names of the inputs that get values during the run, from outputs or files."""
-        recorded = {n for parts in self.recordings.values() for part in parts for n in part.names}
-        return recorded | {c.target.name for c in self.connections}
+        return self.recorded | {c.target.name for c in self.connections}
+
+    @property
+    def recorded(self) -> set[str]:
+        """Names of the inputs that get values from files."""
+        return {n for parts in self.recordings.values() for part in parts for n in part.names}
 
     @property
     def own(self) -> list[str]:

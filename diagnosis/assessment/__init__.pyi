@@ -2,8 +2,8 @@ from .regions import ErrorRegions as ErrorRegions
 from .regions import Profile as Profile
 from .regions import Region as Region
 from .regions import find_regions as find_regions
-from .remainder import AxisRemainder as AxisRemainder
-from .remainder import Remainder as Remainder
+from .residual.remainder import AxisRemainder as AxisRemainder
+from .residual.remainder import Remainder as Remainder
 from .stability import OPERATING as OPERATING
 from .stability import OperatingRegion as OperatingRegion
 from .stability import Stability as Stability

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..assessment.remainder import remaining
+from ..assessment.residual.remainder import remaining
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import omega_std
 from ..predictors.weak_form import OVERLAP

@@ -5,10 +5,8 @@ import numpy as np
 from fmus.frames import air_velocity, rotate_to_earth
 
 from .cleaning import between
+from .columns.columns import RELATIVE_WIND, TRUE_WIND
 from .files.reading import Run
-
-TRUE = ("wind_speed", "wind_direction")
-RELATIVE = ("wind_speed_relative", "wind_direction_relative")
 
 
 def air_along(run: Run, psi: np.ndarray, nu: np.ndarray) -> np.ndarray | None:
@@ -21,11 +19,11 @@ def air_along(run: Run, psi: np.ndarray, nu: np.ndarray) -> np.ndarray | None:
         psi: (n,), smoothed heading [rad].
         nu: (n, 3), smoothed velocity [m/s, m/s, rad/s].
     """
-    if all(name in run.measured for name in TRUE):
-        speed, direction = (run.measured[name] for name in TRUE)
+    if all(name in run.measured for name in TRUE_WIND):
+        speed, direction = (run.measured[name] for name in TRUE_WIND)
         air = np.column_stack(air_velocity(speed, direction))
-    elif all(name in run.measured for name in RELATIVE):
-        speed, direction = (run.measured[name] for name in RELATIVE)
+    elif all(name in run.measured for name in RELATIVE_WIND):
+        speed, direction = (run.measured[name] for name in RELATIVE_WIND)
         u, v = air_velocity(speed, direction)
         air = np.column_stack(rotate_to_earth(psi, u + nu[:, 0], v + nu[:, 1]))
     else:

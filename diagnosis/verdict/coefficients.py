@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..assessment.remainder import remains
+from ..assessment.residual.remainder import remains
 from ..predictors import Model
 from ..predictors.evaluation import quantile
 from ..runs.run_constants import CHANCE

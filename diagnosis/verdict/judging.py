@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from ..assessment.recurrence import recurrence
 from ..assessment.regions import find_regions
-from ..assessment.remainder import Remainder, noise_of, remainder_sentence, remaining
+from ..assessment.residual.recurrence import recurrence
+from ..assessment.residual.remainder import Remainder, noise_of, remainder_sentence, remaining
 from ..assessment.stability import OperatingRegion, drives_on
 from ..execution.progress import Advance
 from ..execution.short_text import ShortRepr

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from diagnosis.assessment.residual.structural_change import STRETCH, moment_of_change, most_changed
 from diagnosis.assessment.settings import SETTINGS
-from diagnosis.assessment.structural_change import STRETCH, moment_of_change, most_changed
 
 N, EVERY, AT = 800, 0.5, 170.0  # windows, s, s
 STD = 0.1  # 1, of the noise, of a change by about one

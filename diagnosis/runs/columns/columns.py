@@ -53,6 +53,8 @@ PREAMBLE = 1000  # 1, lines; chosen: far more than any file has before its names
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
+TRUE_WIND = ("wind_speed", "wind_direction")
+RELATIVE_WIND = ("wind_speed_relative", "wind_direction_relative")
 
 # Quantity of a ship's command, by the unit that its law has for it.
 OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}
@@ -236,8 +238,13 @@ def layout_of(
     if log.column("x").name in names:
         return log
     if folder is not None:
-        named = dict(zip((*POSE, *TAU), read_options(folder).roles.of("pose", "force"), strict=True))
+        roles = read_options(folder).roles
+        named = dict(zip((*POSE, *TAU), roles.of("pose", "force"), strict=True))
         if set(named.values()) <= set(names):
+            vessel, thrusters = (role[0].rpartition(".")[0] for role in (roles.pose, roles.force))
+            further = {c: f"{thrusters}.{c.replace('.', '_')}" for c in of.commands}
+            further |= {signal: f"{vessel}.{signal}" for signal in TRUE_WIND}
+            named |= {signal: name for signal, name in further.items() if name in names}
             return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
     return with_units_of_names(Layout(), names, units, where, of)
 

@@ -15,15 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import fdtrc
 
-from ..predictors import WeakWindows
-from ..predictors.weak_form import BLOCK, EVERY
-from .settings import SETTINGS
+from ...predictors import WeakWindows
+from ...predictors.weak_form import BLOCK, EVERY
+from ..settings import SETTINGS
 
 ORDER = 3  # 1, of the polynomial of a drift: the least with a change to and fro
 STRETCH = round(BLOCK / (2 * EVERY))  # windows between moments that are tried, of one amplitude
 
 
-class Change(NamedTuple):
+class StructuralChange(NamedTuple):
     """Where a series changes most.
 
     Attributes:
@@ -99,14 +99,14 @@ def _surrogates(series: np.ndarray) -> Iterator[np.ndarray]:
         yield np.fft.irfft(size * np.exp(2j * np.pi * rng.random(size.size)), series.size)
 
 
-def most_changed(error: np.ndarray, x: np.ndarray) -> Change:
+def most_changed(error: np.ndarray, x: np.ndarray) -> StructuralChange:
     """Where a series (K,) changes most as a function of regressors x (K, p).
 
     At least two stretches lie on both sides.
     """
     rows = np.arange(2 * STRETCH, len(x) - 2 * STRETCH + 1, STRETCH)
     if not rows.size:
-        return Change(0.0, 0, 0)
+        return StructuralChange(0.0, 0, 0)
     squares, products = (
         np.cumsum(x[:, :, None] * x[:, None, :], axis=0),
         np.cumsum(x.T * error, axis=1).T,
@@ -115,7 +115,7 @@ def most_changed(error: np.ndarray, x: np.ndarray) -> Change:
     after = _explained(squares[-1] - squares[rows - 1], products[-1] - products[rows - 1])
     gain = before + after - _explained(squares[-1:], products[-1:])
     top = int(gain.argmax())
-    return Change(float(gain[top]), int(rows[top]), rows.size)
+    return StructuralChange(float(gain[top]), int(rows[top]), rows.size)
 
 
 def _explained(squares: np.ndarray, products: np.ndarray) -> np.ndarray:

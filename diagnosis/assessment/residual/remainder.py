@@ -23,13 +23,13 @@ from scipy.special import chdtrc, fdtrc
 from fmus.effects.text import number
 from fmus.scale import REFERENCE, Scale
 
-from ..predictors import Model, WeakWindows, omega
-from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
-from ..predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
-from .covariates import AXES
+from ...predictors import Model, WeakWindows, omega
+from ...predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
+from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
+from ..covariates import AXES
+from ..regions import NAMES, UNITS, Region, numbered
+from ..settings import SETTINGS
 from .recurrence import TOGETHER, Recurrence
-from .regions import NAMES, UNITS, Region, numbered
-from .settings import SETTINGS
 
 NOTHING_LEFT = "The residual of the model is within the uncertainty of the measurement."
 LITTLE_LEFT = (

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..predictors import WeakWindows
-from ..predictors.uncertainty import correlated_windows
-from ..predictors.weak_form import BLOCK
-from .regions import numbered
-from .settings import SETTINGS
+from ...predictors import WeakWindows
+from ...predictors.uncertainty import correlated_windows
+from ...predictors.weak_form import BLOCK
+from ..regions import numbered
+from ..settings import SETTINGS
 from .structural_change import STRETCH, moment_of_change
 
 TOGETHER = "place and motion"  # the space of both, where an error repeats in none alone
