@@ -11,11 +11,11 @@ from cosim import InputError
 
 from .columns.columns import Column, Layout, stated_layout, to_si
 from .columns.proposal import text_of, time_column, units_below
+from .columns.usual_names import value_column
 from .files.message_fields import message_fields
 from .files.tables import column_names, date_stamps, numbers, table_of_file
 
 TIME = "time"  # the column of the time in the one table
-VALUE = frozenset(("value", "val", "reading", "data"))  # names of the column with all values
 UNIT = frozenset(("unit", "units"))  # of that with their units
 
 
@@ -92,9 +92,8 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
 
     Its values are in a column that is called so; the texts beside them that change make up the name.
     """
-    called = {name.strip("_").casefold(): name for name in map(str, table)}
-    value = next((called[c] for c in called if c in VALUE), None)
-    units = [name for c, name in called.items() if c in UNIT]
+    value = value_column(map(str, table))
+    units = [name for name in map(str, table) if name.strip("_").casefold() in UNIT]
     changing = [n for n in table if n not in {*units, value} and table[n].nunique() > 1]
     texts = [n for n in changing if not pd.api.types.is_numeric_dtype(table[n])]
     if value is None or not texts:

@@ -21,14 +21,21 @@ from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
+NONE_STATED: Mapping[str, str] = {}
+WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
 
-def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
+def geographic_pair(
+    named: Mapping[str, tuple[str, str]], stated: Mapping[str, str] = NONE_STATED
+) -> dict[str, str]:
     """Signals x and y -> names of the columns of latitude and longitude; empty without one of each.
+
+    Of several that one counts which is stated, or whose name has no other word.
 
     Args:
         named: column -> its name without the unit, and its unit (empty if not known).
+        stated: signal -> its column, if that is stated.
     """
     found = {
         signal: [
@@ -38,6 +45,12 @@ def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
         ]
         for signal, words in WORDS.items()
     }
+    for signal, columns in found.items():
+        own = [c for c in columns if WORDS[signal].issuperset(words_of(named[c][0]))]
+        if stated.get(signal) in columns:
+            found[signal] = [stated[signal]]
+        elif len(own) == 1:
+            found[signal] = own
     if any(len(columns) != 1 for columns in found.values()):
         return {}
     return {signal: columns[0] for signal, columns in found.items()}
@@ -53,7 +66,11 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
     there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
     origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
-    largest = {s: np.radians(np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()}
+    scale = WHOLE if _are_whole([values[there] for values in degrees.values()]) else 1.0
+    origin = {s: scale * value for s, value in origin.items()}
+    largest = {
+        s: np.radians(scale * np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()
+    }
     if not origin or largest["x"] > np.pi / 2 or largest["y"] > np.pi:
         return {}
     latitude = np.radians(origin["x"])
@@ -64,9 +81,16 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     }
     columns = {}
     for signal, name in pair.items():
-        factor = round(float(np.radians(radius[signal])), 3)  # m in a degree
-        columns[signal] = Column(name=name, factor=factor, offset=round(-factor * origin[signal], 3))
+        in_degree = round(float(np.radians(radius[signal])), 3)  # m
+        offset = round(-in_degree * origin[signal], 3)
+        columns[signal] = Column(name=name, factor=float(f"{scale * in_degree:.9g}"), offset=offset)
     return columns
+
+
+def _are_whole(degrees: Sequence[np.ndarray]) -> bool:
+    """Whether positions are whole numbers, beyond any angle in degrees or in degrees and minutes."""
+    values = np.concatenate(degrees)
+    return bool((values == np.round(values)).all() and np.abs(values).max(initial=0.0) > 1e6)
 
 
 def is_geographic(signal: str, column: Column) -> bool:

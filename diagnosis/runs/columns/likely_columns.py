@@ -93,9 +93,19 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
+def signal_of_symbol(name: str, unit: str, quantity: Mapping[str, str]) -> str:
+    """The command whose symbol a name is, as ``delta`` of the only rudder; empty if none, or several.
+
+    Args:
+        name, unit, quantity: as of :func:`meaning_of_words`.
+    """
+    found = [s for s in quantity if s.partition(".")[2] == name and name not in OUTPUTS]
+    return found[0] if len(found) == 1 and unit in ("", *UNITS[quantity[found[0]]]) else ""
+
+
 def is_steering(name: str) -> bool:
     """Whether a name is that of an angle that steers, of whatever actuator."""
-    return [word for word in words_of(name) if word not in FILLERS] == ["rudder"]
+    return {word for word in words_of(name) if word not in FILLERS} == {"rudder"}
 
 
 def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
@@ -122,8 +132,8 @@ def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
     A shaft on some side is that of the propeller there.
     """
     actuator, _, command = signal.partition(".")
-    left, own = list(words), words_of(actuator)
-    if quantity == "shaft speed" and len(own) > 1:
+    left, own = list(dict.fromkeys(words)), words_of(actuator)
+    if quantity == "shaft speed" and (len(own) > 1 or "shaft" in left):
         own = [word for word in own if word != "propeller" or "propeller" in left]
     for word in own:
         same = [w for w in left if w == word or (len(w) > 2 and word.startswith(w))]

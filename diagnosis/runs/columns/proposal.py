@@ -16,7 +16,7 @@ from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
 from ..files.matlab_files import fits_matlab
-from ..files.message_fields import message_fields
+from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read
 from ..files.tables import date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
@@ -48,17 +48,30 @@ from .likely_columns import (
     meaning_of_words,
     motion_of,
     signal_of_sign,
+    signal_of_symbol,
     unit_in,
 )
 from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
-from .unit_check import OFTENEST, SI_UNIT, doubts, doubts_of_angles, largest, likely_unit, spelt
-from .usual_names import meaning
+from .unit_check import (
+    HUNDREDTH,
+    OFTENEST,
+    SI_UNIT,
+    doubts,
+    doubts_of_angles,
+    in_hundredths,
+    largest,
+    likely_unit,
+    spelt,
+)
+from .usual_names import meaning, value_column
 
 NO_UNIT = ("", "-")
-# Units that a name may end in; u_1 is the first of several, and not a fraction.
-NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
+# Units that a name may end in; u_1 is the first of several, x_d a desired value.
+NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1", "d"}
 # A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
 TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
+# Behind a name in a log of libcosim: value reference, type and causality.
+OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
 PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
@@ -112,7 +125,8 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         return Proposal(log, [], read(path, log, of))
     units = units_below(path, text, names)
     parts = {name for field in fields.values() for name in field.columns}
-    whole = [k for k, name in enumerate(names) if name not in parts]
+    within = tuple(f"{field}{mark}" for field in fields for mark in "./")  # as the yaw of a quaternion
+    whole = [k for k, name in enumerate(names) if name not in parts and not name.startswith(within)]
     names, units = [names[k] for k in whole], [units[k] for k in whole]
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
@@ -125,6 +139,11 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     if blank := missing(layout, names, of):
+        if {"x", "y"} <= {*blank} and (value := value_column(names)):
+            raise InputError(
+                f"'{path}' has no position; if it has one value in a row, in '{value}', "
+                f"'cybership join {path} --out run.csv' gives each name a column"
+            )
         left = {n: below.get(n, "") for n in unused}
         return _with_blanks(path, layout, kept, left, blank, quantity)
     try:
@@ -136,9 +155,9 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     columns |= _signed(path, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
-    for signal, unit in _seen_units(run):
+    for signal, unit, factor in _seen_units(run):
         if signal not in kept or not _is_told(kept[signal]):
-            columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
+            columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
     return Proposal(layout, unused, read(path, layout, of))
@@ -156,7 +175,10 @@ def text_of(path: Path, stated: Layout) -> Layout:
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)
         if found is None:
-            raise InputError(f"'{path}' has no table of numbers below a line of names")
+            raise InputError(
+                f"'{path}' has no table of numbers below a line of names; if its columns have no names, "
+                "write a line with these above them"
+            )
         text = found.model_copy(update={"encoding": encoding})
     return text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
 
@@ -275,11 +297,13 @@ def _columns(
             signal, flip = meaning(bare, quantity)
             if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
-        if signal in columns:
+        if signal in columns or _is_beside_speed(bare, names):
             continue
         known = UNITS[quantity[signal]]
         if signal == "time" and unit not in known and _is_stamped(path, text, name):
             unit = ""  # a time zone, or the form of the stamps
+        if unit.isdigit() and unit not in known:  # an index
+            continue
         if unit not in NO_UNIT and unit not in known:
             line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
             raise InputError(
@@ -291,6 +315,12 @@ def _columns(
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
     columns |= _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _is_beside_speed(name: str, names: Sequence[str]) -> bool:
+    """Whether a name is ``ax`` beside ``vx``: along the axes of that, which are not known."""
+    low, axis = name.casefold(), name[-1:].casefold()
+    return low.endswith(("ax", "ay")) and f"{low[:-2]}v{axis}" in {n.casefold() for n in names}
 
 
 def _is_told(stated: Column) -> bool:
@@ -326,7 +356,9 @@ def _by_words(
         unit = unit or unit_in(bare)
         parts = PATH.split(bare)
         own = parts[len(common) :] if parts[: len(common)] == common else parts
-        if signal := meaning_of_words(" ".join(own), unit, quantity):
+        if signal := signal_of_symbol(bare, unit, quantity) or meaning_of_words(
+            " ".join(own), unit, quantity
+        ):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
         elif unit in ("rpm", "rps"):
@@ -341,14 +373,14 @@ def _by_words(
 
 
 def _of_message(
-    columns: Mapping[str, Column], fields: Collection[str], kept: Collection[str]
+    columns: Mapping[str, Column], fields: Mapping[str, MessageField], kept: Collection[str]
 ) -> dict[str, Column]:
     """Heading and position by the axes of ROS messages (REP 103): x to east, y to north, z up.
 
     Only a heading by a quaternion is known to be of such a message.
     """
     psi = columns.get("psi")
-    if psi is None or psi.name not in fields or "psi" in kept:
+    if psi is None or "psi" in kept or psi.name not in fields or not fields[psi.name].is_ros:
         return {}
     turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
     known = {"x", "y"} <= columns.keys() - kept
@@ -381,7 +413,7 @@ def _geographic(
     stated = {s: c.name for s in ("x", "y") if (c := layout.columns.get(s)) and not _is_told(c)}
     taken = _names_of(layout.columns) - {*stated.values()}
     free = [pair for pair in zip(names, units, strict=False) if pair[0] not in taken]
-    pair = geographic_pair({name: _bare(name, below) for name, below in free})
+    pair = geographic_pair({name: _bare(name, below) for name, below in free}, stated)
     if not pair or any(stated.get(s) != pair[s] for s in layout.columns.keys() & pair):
         return {}
     table = table_of_file(path, layout, set(pair.values()))
@@ -452,6 +484,7 @@ def _names_of(columns: Mapping[str, Column]) -> set[str]:
 
 def _bare(name: str, below: str) -> tuple[str, str]:
     """A column's name without its unit, and the unit, which may stand below it."""
+    name = OF_LIBCOSIM.sub("", name)
     told = WITH_UNIT.fullmatch(name)
     return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
 
@@ -466,11 +499,13 @@ def _unit_at_the_end(name: str) -> tuple[str, str]:
     """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, x in mm, TimeUS."""
     if stamped := TIME_IN.fullmatch(name):
         return stamped[1], spelt(stamped[2].lower())
-    for mark in (" in ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
+    for mark in (" in ", ", ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
         quantity, _, unit = name.partition(mark)
         if quantity and spelt(unit) in NAMED_UNITS:
             return quantity, spelt(unit)
     words = name.split("_")
+    if (inner := re.fullmatch(r"(\w*[a-z\d])([A-Z][a-z]+)", name)) and "_" not in name:  # headingDeg
+        words = [*inner.groups()]
     for count in (2, 1):
         unit = spelt("/".join(words[-count:]))
         if len(words) > count and unit in NAMED_UNITS:
@@ -502,13 +537,13 @@ def _numbers(cells: pd.Series, signal: str) -> np.ndarray:
     return np.asarray(pd.to_numeric(cells, errors="coerce"), float) if stamps is None else stamps
 
 
-def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
-    """Signals that seem to be in another unit, and in which."""
+def _seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
+    """Signals that seem to be in another unit: which, in which, and by which factor to that."""
     if not np.isfinite(run.time).any():
         return
     unit = _time_unit(run.time)
     if unit:
-        yield "time", unit
+        yield "time", unit, 1.0
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     zeros = (run.pose == 0.0).all(axis=1)
@@ -516,7 +551,8 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     time = UNITS["time"][unit or "s"] * run.time[fresh]
     angles = doubts_of_angles(other_angles(run.measured))
     for doubt in chain(doubts(time, run.pose[fresh]), angles):
-        yield from ((signal, doubt.unit) for signal in doubt.signals)
+        factor = HUNDREDTH if doubt.signals == ("psi",) and in_hundredths(run.pose[fresh]) else 1.0
+        yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
 
 
 def _time_unit(time: np.ndarray) -> str | None:

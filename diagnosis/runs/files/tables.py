@@ -27,7 +27,7 @@ from ..columns.side_car import (
 from ..run_constants import CHANCE, DIGITS
 from .matlab_files import matlab_table
 from .message_fields import message_fields, with_fields
-from .text_layout import STAMP
+from .text_layout import STAMP, is_marked
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
@@ -74,8 +74,11 @@ def _names(path: Path, layout: Layout) -> list[str]:
     if path.suffix == ".mat":
         return list(matlab_table(path))
     refuse_sentences(path)
-    first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
-    names = [name.strip() for name in first.iloc[0]]
+    as_text = {"dtype": str, "keep_default_na": False, "skipinitialspace": True}
+    first = _csv(path, layout, nrows=1, header=None, **as_text)
+    # A column without a name is called as pandas calls it.
+    names = [name.strip() or f"Unnamed: {k}" for k, name in enumerate(first.iloc[0])]
+    names = names[is_marked(path, layout) :]
     refuse_layout(path, layout, names)
     return names
 
@@ -107,24 +110,29 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
     """The columns of some names of a CSV file, those of them that there are."""
+    named: dict[str, Any] = {}
+    if is_marked(path, layout):
+        named = {"header": None, "names": _names(path, layout)}
     return _csv(
         path,
         layout,
         usecols=lambda name: str(name).strip() in wanted,
         decimal=layout.decimal,
         skipinitialspace=True,
+        **named,
     ).rename(columns=str.strip)
 
 
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
     units = [layout.skip + 1] if layout.units_line else []
+    begin = layout.skip + ("names" in options)
     try:
         with open(path, "rb") as content:  # a long log does not fit into memory twice
             return pd.read_csv(
                 content,
                 sep=layout.separator,
                 encoding=layout.encoding,
-                skiprows=[*range(layout.skip), *units],
+                skiprows=[*range(begin), *units],
                 index_col=False,
                 **options,
             )
