@@ -10,6 +10,8 @@ from cosim import InputError
 from diagnosis.predictors import ship_with
 from diagnosis.runs import Run, propose
 from diagnosis.runs.columns.unit_check import likely_unit
+from diagnosis.runs.files.tables import clock_seconds
+from diagnosis.runs.files_of_one_run import one_table
 
 OTTER, TANKER = ship_with((), "otter"), ship_with((), "kvlcc2")
 TIME = np.arange(0.0, 30.0, 0.1)
@@ -95,7 +97,7 @@ def test_an_index_without_a_name_may_be_the_time(tmp_path: Path) -> None:
     """As pandas writes it; another one is not used."""
     stamps = pd.Timestamp("2021-06-01 08:58:07") + pd.to_timedelta(TIME, unit="s")
     table = log(index=stamps).drop(columns="time").rename(columns={"index": ""})
-    is_the_motion(seen(tmp_path / "a.csv", table[["", *table.columns[:-1]]]))
+    is_the_motion(seen(tmp_path / "a.csv", pd.DataFrame(table[["", *table.columns[:-1]]])))
     log().to_csv(tmp_path / "b.csv")
     found = propose(tmp_path / "b.csv", OTTER)
     assert found.unused == ["Unnamed: 0"]
@@ -172,3 +174,60 @@ def test_other_texts_are_named_with_what_to_do(tmp_path: Path, content: str, sai
     (tmp_path / "a.csv").write_text(content)
     with pytest.raises(InputError, match=said):
         propose(tmp_path / "a.csv", OTTER)
+
+
+def test_the_letter_of_a_hemisphere_is_the_sign(tmp_path: Path) -> None:
+    lat, lon = 33.42 + NORTH / 110_915.0, 70.4691 - EAST / 92_981.0  # to the west
+    degrees = {"Latitude": lat, "N/S": "N", "Longitude": lon, "E/W": "W"}
+    is_the_motion(seen(tmp_path / "a.csv", log(**degrees).drop(columns=["x", "y"])))
+
+
+def test_numbers_of_a_clock_are_its_times(tmp_path: Path) -> None:
+    """hhmmss.ss, as of NMEA 0183; seconds, and other numbers, stay."""
+    seconds = 86_390.0 + TIME
+    hours, rest = np.divmod(seconds % 86_400.0, 3600.0)
+    clock = 1e4 * hours + 1e2 * (rest // 60.0) + rest % 60.0
+    is_the_motion(seen(tmp_path / "a.csv", log(utc=clock).drop(columns="time")))
+    is_the_motion(seen(tmp_path / "b.csv", log(time=40.0 + TIME)))
+    for numbers in (0.1 * np.arange(3000), np.arange(0.0, 200.0), 50.0 * np.arange(500), 1e9 + TIME):
+        np.testing.assert_array_equal(clock_seconds(numbers), numbers)
+
+
+@pytest.mark.parametrize("form", ["{:g} sec", "0 days 00:00:{:09.6f}", "2021-06-01 08:58:{:06.3f} UTC"])
+def test_durations_and_zones_are_stamps(tmp_path: Path, form: str) -> None:
+    is_the_motion(seen(tmp_path / "a.csv", log(time=[form.format(t) for t in TIME])))
+
+
+def test_names_of_other_quantities_are_none_of_the_pose(tmp_path: Path) -> None:
+    """q is the pitch rate, or the quality of a position; n in rps is no position to the north."""
+    log(q=0.01 * np.sin(TIME)).drop(columns="psi").to_csv(tmp_path / "a.csv", index=False)
+    assert propose(tmp_path / "a.csv", OTTER).layout.column("psi").name == ""
+    names = [*TANKER_NAMES[:4], "delta [rad]", "n [rps]"]
+    names[1:4] = ["x [m]", "y [m]", "Heading (True)"]
+    is_the_motion(seen(tmp_path / "b.csv", tanker_text(";".join(names), ";"), TANKER))
+
+
+def test_units_of_a_time_may_have_their_epoch(tmp_path: Path) -> None:
+    name = "timestamp (seconds since 01/01/1970)"
+    is_the_motion(seen(tmp_path / "a.csv", log().rename(columns={"time": name})))
+
+
+@pytest.mark.parametrize(("name", "known"), [("left", False), ("left_cmd", False), ("left_n", True)])
+def test_fractions_of_the_full_command_are_no_shaft_speed(
+    tmp_path: Path, name: str, known: bool
+) -> None:
+    """A name that does not say so is that of a shaft speed only beyond -1 to 1."""
+    fraction = log().rename(columns={"port.n": name}).assign(**{name: np.sin(TIME)})
+    fraction.to_csv(tmp_path / "a.csv", index=False)
+    assert propose(tmp_path / "a.csv", OTTER).layout.column("port.n").name == name * known
+    seen(tmp_path / "b.csv", fraction.assign(**{name: 9.0 + np.sin(TIME)}))
+
+
+def test_numbers_of_thrusters_are_names(tmp_path: Path) -> None:
+    """As of messages of LSTS; a number of the row is none."""
+    path = tmp_path / "a.csv"
+    values = {"time": np.repeat(TIME, 2), "id": [0, 1] * TIME.size, "value": np.repeat(TIME, 2)}
+    pd.DataFrame(values).to_csv(path, index=False)
+    assert [*one_table([path])] == ["time", "id 0", "id 1"]
+    pd.DataFrame({"time": TIME, "id": np.arange(TIME.size), "value": TIME}).to_csv(path, index=False)
+    assert [*one_table([path])] == ["time", "id", "value"]

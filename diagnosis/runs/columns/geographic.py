@@ -21,6 +21,7 @@ from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
+SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NONE_STATED: Mapping[str, str] = {}
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
@@ -54,6 +55,12 @@ def geographic_pair(
     if any(len(columns) != 1 for columns in found.values()):
         return {}
     return {signal: columns[0] for signal, columns in found.items()}
+
+
+def is_side(cells: pd.Series, letters: str) -> bool:
+    """Whether cells are the letters of a hemisphere, the negative one among them."""
+    found = {*cells.dropna().astype("string").str.strip()}
+    return letters[1] in found and found <= {*letters}
 
 
 def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) -> dict[str, Column]:

@@ -111,10 +111,15 @@ def is_steering(name: str) -> bool:
 def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
     """Whether words tell which command of its actuator a column without a unit holds."""
     actuator, _, command = signal.partition(".")
-    known = KINDS.get(quantity[signal], frozenset())
     own = {s.partition(".")[2] for s in quantity if s.startswith(f"{actuator}.")}
     only = own - OUTPUTS.keys() == {command}
-    return command in words or not known.isdisjoint(words) or (only and CHANGES.isdisjoint(words))
+    return says_command(" ".join(words), signal, quantity) or (only and CHANGES.isdisjoint(words))
+
+
+def says_command(name: str, signal: str, quantity: Mapping[str, str]) -> bool:
+    """Whether words of a column's name are that of a command, or of its quantity."""
+    words = {*words_of(name)}
+    return not words.isdisjoint({signal.partition(".")[2], *KINDS.get(quantity[signal], ())})
 
 
 def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:

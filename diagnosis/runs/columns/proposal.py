@@ -18,7 +18,7 @@ from ..cleaning import WIDTH, lost
 from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read
-from ..files.tables import date_stamps, table_of_file
+from ..files.tables import clock_seconds, date_stamps, is_cell, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..frozen import repeated
 from ..row_order import in_order
@@ -39,7 +39,7 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import geographic_pair, local_columns, one_origin, refuse_minutes
+from .geographic import SIDES, geographic_pair, is_side, local_columns, one_origin, refuse_minutes
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
@@ -47,6 +47,7 @@ from .likely_columns import (
     likely_columns,
     meaning_of_words,
     motion_of,
+    says_command,
     signal_of_sign,
     signal_of_symbol,
     unit_in,
@@ -63,13 +64,14 @@ from .unit_check import (
     likely_unit,
     spelt,
 )
-from .usual_names import meaning, value_column
+from .usual_names import is_quaternion, meaning, value_column
 
 NO_UNIT = ("", "-")
 # Units that a name may end in; u_1 is the first of several, x_d a desired value.
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1", "d"}
 # A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
 TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
+NORTH = ("true", "magnetic")  # that a heading is from; behind its name it is no unit
 # Behind a name in a log of libcosim: value reference, type and causality.
 OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
 PATH = re.compile(r"[./]")  # between the parts of a name with a path
@@ -131,7 +133,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
-    columns = _columns(path, text, names, units, quantity, kept)
+    columns = _columns(path, text, names, units, quantity, kept, fields)
     columns |= _of_message(columns, fields, kept)
     columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
@@ -281,6 +283,7 @@ def _columns(
     units: Sequence[str],
     quantity: Mapping[str, str],
     kept: Mapping[str, Column],
+    fields: Collection[str] = (),
 ) -> dict[str, Column]:
     """The columns that names and units tell; of two for one signal, that of its own name or the first.
 
@@ -299,11 +302,13 @@ def _columns(
                 continue
         if signal in columns or _is_beside_speed(bare, names):
             continue
+        if is_quaternion(bare) and name not in fields:  # q is the pitch rate as well
+            continue
         known = UNITS[quantity[signal]]
         if signal == "time" and unit not in known and _is_stamped(path, text, name):
             unit = ""  # a time zone, or the form of the stamps
-        if unit.isdigit() and unit not in known:  # an index
-            continue
+        if unit not in known and (unit.isdigit() or (bare != signal and unit in NAMED_UNITS)):
+            continue  # an index, or of another quantity: n in rps is no position to the north
         if unit not in NO_UNIT and unit not in known:
             line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
             raise InputError(
@@ -313,8 +318,19 @@ def _columns(
             )
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
-    columns |= _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
+    found = _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
+    columns |= {s: c for s, c in found.items() if not _is_fraction(path, text, s, c, quantity)}
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _is_fraction(
+    path: Path, text: Layout, signal: str, column: Column, quantity: Mapping[str, str]
+) -> bool:
+    """Whether the column of a shaft is not called a speed, and has fractions of the full command."""
+    if quantity[signal] != "shaft speed" or column.unit or says_command(column.name, signal, quantity):
+        return False
+    values = _numbers(table_of_file(path, text, {column.name})[column.name], "")
+    return float(np.nanmax(np.abs(values), initial=0.0)) <= largest("command")
 
 
 def _is_beside_speed(name: str, names: Sequence[str]) -> bool:
@@ -416,9 +432,17 @@ def _geographic(
     pair = geographic_pair({name: _bare(name, below) for name, below in free}, stated)
     if not pair or any(stated.get(s) != pair[s] for s in layout.columns.keys() & pair):
         return {}
-    table = table_of_file(path, layout, set(pair.values()))
+    after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
+    table = table_of_file(path, layout, {*pair.values(), *after.values()})
+    sides = {s: SIDES[s][1] for s, name in after.items() if is_side(table[name], SIDES[s])}
     degrees = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
+    for signal, negative in sides.items():
+        west = is_cell(table[after[signal]], negative)
+        degrees[signal] = np.where(west, -degrees[signal], degrees[signal])
     columns = local_columns(pair, degrees)
+    for signal in columns.keys() & sides:
+        sign = {"sign": after[signal], "negative": sides[signal]}
+        columns[signal] = columns[signal].model_copy(update=sign)
     if not columns:
         refuse_minutes(pair, {signal: table[name] for signal, name in pair.items()})
     return columns
@@ -486,6 +510,8 @@ def _bare(name: str, below: str) -> tuple[str, str]:
     """A column's name without its unit, and the unit, which may stand below it."""
     name = OF_LIBCOSIM.sub("", name)
     told = WITH_UNIT.fullmatch(name)
+    if told and told[2].casefold() in NORTH:
+        return told[1], bare_unit(below)
     return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
 
 
@@ -534,7 +560,10 @@ def _likely(
 def _numbers(cells: pd.Series, signal: str) -> np.ndarray:
     """A column as floats, NaN where it is none; date stamps as seconds."""
     stamps = date_stamps(cells) if signal == "time" else None
-    return np.asarray(pd.to_numeric(cells, errors="coerce"), float) if stamps is None else stamps
+    if stamps is not None:
+        return stamps
+    found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+    return clock_seconds(found) if signal == "time" else found
 
 
 def _seen_units(run: Run) -> Iterable[tuple[str, str, float]]:

@@ -82,8 +82,9 @@ def largest(quantity: str) -> float:
 def spelt(unit: str) -> str:
     """A unit as this project spells it: ``Nm`` is ``N.m``; one that is not known stays.
 
-    Capitals count in symbols (``mN``) and not in words (``Knots``).
+    Capitals count in symbols (``mN``) and not in words (``Knots``). What follows ``since`` is no unit.
     """
+    unit = unit.partition(" since ")[0]
     word = unit.lower() if unit.lower() in WORDS else unit
     return SPELT.get(word, word)
 

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from .columns import QUANTITY
 from .name_words import words_of
 
+QUATERNION = ("orientation", "quaternion", "quat", "q")  # a heading, if it has four parts
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": (
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
         *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp", "epoch", "unixtime"),
-        *("timesincestart", "xvalue"),
+        *("timesincestart", "xvalue", "gpst", "logtime"),
     ),
     "x": (
         *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
@@ -23,7 +24,7 @@ CALLED: dict[str, tuple[str, ...]] = {
     ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
-        *("hdm", "compass", "gyro", "gyrocompass", "orientation", "quaternion", "quat", "q"),
+        *("hdm", "compass", "gyro", "gyrocompass", *QUATERNION),
         *("compassheading", "gyroheading", "headingtrue", "headingmagnetic"),
     ),
     "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
@@ -63,6 +64,11 @@ MEANT = (
     | {_folded(name): (signal, False) for signal, names in CALLED.items() for name in names}
     | {_folded(signal): (signal, False) for signal in QUANTITY}
 )
+
+
+def is_quaternion(name: str) -> bool:
+    """Whether the last part of a name is that of a quaternion."""
+    return _folded(re.split("[/.]", name)[-1]) in QUATERNION
 
 
 def value_column(names: Iterable[str]) -> str | None:

@@ -32,6 +32,9 @@ from .text_layout import STAMP, is_marked
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60")
+DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
+ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
+FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
 
 @contextmanager
@@ -150,6 +153,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
 
     Stamps are of ISO 8601, or have a date such as 31.12.2026, 12/31/2026 or Dec 31, 2026, or none: then
     a day begins where the time falls by more than half a day. A leap second of UTC is a second.
+    Durations, such as 0.1 sec, are stamps as well.
 
     Args:
         cells: the column.
@@ -170,6 +174,8 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         given = cells.mask(leap, cells.str.replace(LEAP_SECOND, ":59", regex=True))
         iso = given.str.replace(",", ".")
         stamps = pd.to_datetime(iso, errors="coerce", utc=True, format="ISO8601")
+        if stamps.isna().all() and given.dropna().str.fullmatch(DURATION).all():
+            stamps = pd.Timestamp(0, tz="UTC") + pd.to_timedelta(given, errors="coerce")
         if stamps.isna().all():
             stamps, without_date = _other_stamps(given)
     else:
@@ -193,7 +199,8 @@ def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
     Of a date whose day may be its month, the log takes the shorter time.
     """
     parts = cells.astype(object).str.extract(STAMP)
-    dates = parts["date"].str.replace(":", "-").str.cat(parts["rest"], sep=" ").str.strip(" ,")
+    rest = parts["rest"].str.replace(ZONE, "", regex=True)
+    dates = parts["date"].str.replace(":", "-").str.cat(rest, sep=" ").str.strip(" ,")
     half = parts["half"].str.lower().str[0]
     hours = parts["h"].astype(float)
     hours = hours.mask(half.notna(), hours % 12.0 + 12.0 * (half == "p"))
@@ -230,6 +237,24 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
         elif not any(c.isdigit() for c in wrong):
             hint = "; a cell without a measurement must be empty"
         raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
+    return found
+
+
+def clock_seconds(time: np.ndarray) -> np.ndarray:
+    """Times (n,) as seconds, if they are numbers hhmmss.ss, as of NMEA 0183, of more than a minute.
+
+    In such numbers neither the last two digits before the point nor the two before these exceed 59.
+    """
+    there = time[np.isfinite(time)]
+    minutes, seconds = np.divmod(there, 100.0)
+    hours, minutes = np.divmod(minutes, 100.0)
+    is_clock = (
+        there.size and np.ptp(hours + minutes) > 0.0 and (there >= 0.0).all() and hours.max() < 24.0
+    )
+    if not is_clock or max(seconds.max(), minutes.max()) >= FULL or seconds.max() < 0.9 * FULL:
+        return time
+    found = np.full_like(time, np.nan)
+    found[np.isfinite(time)] = np.unwrap(3600.0 * hours + 60.0 * minutes + seconds, period=day)
     return found
 
 
