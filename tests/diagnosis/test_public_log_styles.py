@@ -188,12 +188,21 @@ def test_numbers_of_a_clock_are_its_times(tmp_path: Path) -> None:
     hours, rest = np.divmod(seconds % 86_400.0, 3600.0)
     clock = 1e4 * hours + 1e2 * (rest // 60.0) + rest % 60.0
     is_the_motion(seen(tmp_path / "a.csv", log(utc=clock).drop(columns="time")))
+    date = np.where(hours > 12.0, 20_210_601e6, 20_210_602e6)
+    found = clock_seconds(date + clock)  # to the digits that such a number has
+    np.testing.assert_allclose(found - found[0], TIME, atol=0.005)
     is_the_motion(seen(tmp_path / "b.csv", log(time=40.0 + TIME)))
     for numbers in (0.1 * np.arange(3000), np.arange(0.0, 200.0), 50.0 * np.arange(500), 1e9 + TIME):
         np.testing.assert_array_equal(clock_seconds(numbers), numbers)
 
 
-@pytest.mark.parametrize("form", ["{:g} sec", "0 days 00:00:{:09.6f}", "2021-06-01 08:58:{:06.3f} UTC"])
+@pytest.mark.parametrize(
+    "form",
+    [
+        *("{:g} sec", "0 days 00:00:{:09.6f}", "2021-06-01 08:58:{:06.3f} UTC"),
+        *("2021-06-01_08:58:{:06.3f}", "[2021-06-01 08:58:{:06.3f}]", "20210601_0858{:06.3f}"),
+    ],
+)
 def test_durations_and_zones_are_stamps(tmp_path: Path, form: str) -> None:
     is_the_motion(seen(tmp_path / "a.csv", log(time=[form.format(t) for t in TIME])))
 
@@ -231,3 +240,35 @@ def test_numbers_of_thrusters_are_names(tmp_path: Path) -> None:
     assert [*one_table([path])] == ["time", "id 0", "id 1"]
     pd.DataFrame({"time": TIME, "id": np.arange(TIME.size), "value": TIME}).to_csv(path, index=False)
     assert [*one_table([path])] == ["time", "id", "value"]
+
+
+@pytest.mark.parametrize(
+    ("place", "read_as"),
+    [((59.43, 10.47), "rad"), ((-35.0, 139.0), "rad"), ((0.001, 0.001), "deg"), ((1.0, 10.4), "deg")],
+)
+def test_latitudes_in_rad_are_those_of_no_sea_in_degrees(
+    tmp_path: Path, place: tuple[float, float], read_as: str
+) -> None:
+    radius = 6_371_000.0  # m, of a sphere
+    lat = np.radians(place[0]) + NORTH / radius
+    lon = np.radians(place[1]) + EAST / radius / np.cos(np.radians(place[0]))
+    size = 1.0 if read_as == "rad" else 180.0 / np.pi
+    run = seen(tmp_path / "a.csv", log(lat=size * lat, lon=size * lon).drop(columns=["x", "y"]))
+    way = run.pose[:, :2] - run.pose[0, :2] + [NORTH[0], EAST[0]]
+    np.testing.assert_allclose(way, np.column_stack([NORTH, EAST]), atol=0.2)  # of the ellipsoid
+
+
+def test_x_of_a_grid_is_to_the_east(tmp_path: Path) -> None:
+    grid = {"utm_x [m]": 583_000.0 + EAST, "utm_y [m]": 6_588_000.0 + NORTH}
+    is_the_motion(seen(tmp_path / "a.csv", log(**grid).drop(columns=["x", "y"])))
+
+
+def test_a_heading_of_ais_that_is_not_available_is_missing(tmp_path: Path) -> None:
+    heading = np.degrees(PSI) % 360.0
+    heading[50:80] = 511.0
+    run = seen(tmp_path / "a.csv", log(heading=heading).drop(columns="psi"))
+    assert np.flatnonzero(np.isnan(run.pose[:, 2])).tolist() == [*range(50, 80)]
+
+
+def test_greek_letters_are_symbols(tmp_path: Path) -> None:
+    is_the_motion(seen(tmp_path / "a.csv", tanker_text("t,x,y,ψ,δ,n", ","), TANKER))

@@ -23,6 +23,7 @@ EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NONE_STATED: Mapping[str, str] = {}
+NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
@@ -42,7 +43,7 @@ def geographic_pair(
         signal: [
             column
             for column, (bare, unit) in named.items()
-            if words & {*words_of(bare)} and unit in ("", "-", *UNITS["angle"]) and unit != "rad"
+            if words & {*words_of(bare)} and unit in ("", "-", *UNITS["angle"])
         ]
         for signal, words in WORDS.items()
     }
@@ -73,7 +74,7 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
     there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
     origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
-    scale = WHOLE if _are_whole([values[there] for values in degrees.values()]) else 1.0
+    scale = _scale(*(degrees[signal][there] for signal in ("x", "y")))
     origin = {s: scale * value for s, value in origin.items()}
     largest = {
         s: np.radians(scale * np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()
@@ -94,10 +95,18 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     return columns
 
 
-def _are_whole(degrees: Sequence[np.ndarray]) -> bool:
-    """Whether positions are whole numbers, beyond any angle in degrees or in degrees and minutes."""
-    values = np.concatenate(degrees)
-    return bool((values == np.round(values)).all() and np.abs(values).max(initial=0.0) > 1e6)
+def _scale(latitude: np.ndarray, longitude: np.ndarray) -> float:
+    """The size of the unit of latitudes and longitudes (n,) [degrees].
+
+    Whole numbers beyond degrees and minutes are in 1e-7 degrees. Both within half a turn in rad are rad:
+    in degrees that is the Gulf of Guinea. Next to zero, where simulations start, they are in degrees.
+    """
+    values = np.concatenate([latitude, longitude])
+    if (values == np.round(values)).all() and np.abs(values).max(initial=0.0) > 1e6:
+        return WHOLE
+    reach = [np.abs(angle).max(initial=0.0) for angle in (latitude, longitude)]
+    is_rad = reach[0] <= np.pi / 2 and reach[1] <= np.pi and max(reach) > NEAR_ZERO
+    return float(np.degrees(1.0)) if is_rad else 1.0
 
 
 def is_geographic(signal: str, column: Column) -> bool:

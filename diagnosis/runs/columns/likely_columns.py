@@ -10,7 +10,7 @@ from ...execution.short_text import SHOWN
 from ..files.reading import held_values
 from ..run_constants import EVERY, FEWEST
 from .columns import OUTPUTS, POSE
-from .name_words import words_of
+from .name_words import PLAIN, words_of
 from .unit_check import UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -35,6 +35,8 @@ WORDS = {
     "speed": {"u": "u", "surge": "u", "v": "v", "vm": "v", "sway": "v", "wind": "wind_speed"},
     "rate": dict.fromkeys(("r", "yaw", "psi", "heading"), "r"),
 }
+# Grid coordinates: x to east, y to north.
+OF_UTM = {"length": WORDS["length"] | {"x": "y", "y": "x"}}
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Quantity of a command -> words that tell it; words of a speed, which an angle is not.
 KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
@@ -80,7 +82,7 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     left = [w for w in words if w not in FILLERS]
     found = {
         signals[left[0]]
-        for q, signals in WORDS.items()
+        for q, signals in (WORDS if "utm" not in words else OF_UTM).items()
         if unit in UNITS[q] and len(left) == 1 and signals.get(left[0]) in quantity
     }
     found |= {
@@ -99,7 +101,8 @@ def signal_of_symbol(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     Args:
         name, unit, quantity: as of :func:`meaning_of_words`.
     """
-    found = [s for s in quantity if s.partition(".")[2] == name and name not in OUTPUTS]
+    symbol = name.translate(PLAIN)
+    found = [s for s in quantity if s.partition(".")[2] == symbol and symbol not in OUTPUTS]
     return found[0] if len(found) == 1 and unit in ("", *UNITS[quantity[found[0]]]) else ""
 
 

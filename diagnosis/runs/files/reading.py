@@ -52,6 +52,7 @@ from .tables import (
     table_of_file,
 )
 
+NO_HEADING = 511.0  # degrees, that is not available (ITU-R M.1371, AIS)
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
 
@@ -236,6 +237,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
             read = numbers(cells, path, layout)
             if signal == "time" and column.unit is None:
                 read = clock_seconds(read)
+            if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
+                read = np.where(read == NO_HEADING, np.nan, read)
             if column.sign:
                 read = np.where(is_cell(table[column.sign], column.negative), -read, read)
             values = to_si(read, signal, column, quantity[signal])

@@ -169,7 +169,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
                 return None
         except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
             return None
-        cells = cells.astype("string").str.strip()
+        cells = cells.astype("string").str.strip("[] ").str.replace("_", "T")
         leap = np.asarray(cells.str.contains(LEAP_SECOND).fillna(False), bool)
         given = cells.mask(leap, cells.str.replace(LEAP_SECOND, ":59", regex=True))
         iso = given.str.replace(",", ".")
@@ -243,15 +243,17 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
 def clock_seconds(time: np.ndarray) -> np.ndarray:
     """Times (n,) as seconds, if they are numbers hhmmss.ss, as of NMEA 0183, of more than a minute.
 
-    In such numbers neither the last two digits before the point nor the two before these exceed 59.
+    In such numbers neither the last two digits before the point nor the two before these exceed 59. They
+    may follow a date: 20210601085807.
     """
-    there = time[np.isfinite(time)]
-    minutes, seconds = np.divmod(there, 100.0)
-    hours, minutes = np.divmod(minutes, 100.0)
-    is_clock = (
-        there.size and np.ptp(hours + minutes) > 0.0 and (there >= 0.0).all() and hours.max() < 24.0
-    )
-    if not is_clock or max(seconds.max(), minutes.max()) >= FULL or seconds.max() < 0.9 * FULL:
+    dates, there = np.divmod(time[np.isfinite(time)], 1e6)
+    hours, minutes, seconds = there // 1e4, there // 1e2 % 100.0, there % 100.0
+    months, days = dates // 1e2 % 100.0, dates % 100.0
+    is_date = (dates == 0.0) | ((1.0 <= months) & (months <= 12.0) & (1.0 <= days) & (days <= 31.0))
+    is_clock = is_date & (hours < 24.0) & (minutes < FULL) & (seconds < FULL)
+    if not (there.size and is_clock.all() and np.ptp(minutes) > 0.0):
+        return time
+    if seconds.min() > 0.1 * FULL or seconds.max() < 0.9 * FULL:  # these do not end a minute
         return time
     found = np.full_like(time, np.nan)
     found[np.isfinite(time)] = np.unwrap(3600.0 * hours + 60.0 * minutes + seconds, period=day)
