@@ -272,3 +272,16 @@ def test_a_heading_of_ais_that_is_not_available_is_missing(tmp_path: Path) -> No
 
 def test_greek_letters_are_symbols(tmp_path: Path) -> None:
     is_the_motion(seen(tmp_path / "a.csv", tanker_text("t,x,y,ψ,δ,n", ","), TANKER))
+
+
+@pytest.mark.parametrize("error", [{}, {"e": 0.1 * np.sin(TIME)}])
+def test_letters_that_mean_other_quantities(tmp_path: Path, error: dict[str, np.ndarray]) -> None:
+    """Revolutions, a cross-track error, volts and degrees beside a latitude; n beside e is to the north."""
+    names = ["T", "Timestamp", "lat", "lon", "heading", "delta", "n", "V"]
+    lat, lon = 59.4292 + NORTH / 111_402.0, 10.4691 + EAST / 56_758.0
+    values = [21.0 + 0.01 * TIME, TIME, lat, lon, *TANKER_LOG[3:], 12.0 + 0.0 * TIME]
+    run = seen(tmp_path / "a.csv", pd.DataFrame(dict(zip(names, values, strict=True)) | error), TANKER)
+    is_the_motion(run)
+    np.testing.assert_allclose(run.commanded["propeller.n"], TANKER_LOG[-1])
+    assert not run.measured
+    is_the_motion(seen(tmp_path / "b.csv", log().rename(columns={"x": "n", "y": "e"})))

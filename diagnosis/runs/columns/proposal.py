@@ -39,7 +39,7 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import SIDES, geographic_pair, is_side, local_columns, one_origin, refuse_minutes
+from .geographic import SIDES, WORDS, geographic_pair, is_side, local_columns, one_origin, refuse_minutes
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
@@ -52,6 +52,7 @@ from .likely_columns import (
     signal_of_symbol,
     unit_in,
 )
+from .name_words import words_of
 from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
 from .unit_check import (
     HUNDREDTH,
@@ -74,6 +75,7 @@ TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec
 NORTH = ("true", "magnetic")  # that a heading is from; behind its name it is no unit
 # Behind a name in a log of libcosim: value reference, type and causality.
 OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
+LETTERS = ("R", "T", "U", "V")
 PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
@@ -300,7 +302,7 @@ def _columns(
             signal, flip = meaning(bare, quantity)
             if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
-        if signal in columns or _is_beside_speed(bare, names):
+        if signal in columns or _is_beside_speed(bare, names) or _is_letter(bare, unit, names):
             continue
         if is_quaternion(bare) and name not in fields:  # q is the pitch rate as well
             continue
@@ -337,6 +339,18 @@ def _is_beside_speed(name: str, names: Sequence[str]) -> bool:
     """Whether a name is ``ax`` beside ``vx``: along the axes of that, which are not known."""
     low, axis = name.casefold(), name[-1:].casefold()
     return low.endswith(("ax", "ay")) and f"{low[:-2]}v{axis}" in {n.casefold() for n in names}
+
+
+def _is_letter(name: str, unit: str, names: Sequence[str]) -> bool:
+    """Whether a name is a letter that more often means another quantity than a signal.
+
+    ``n`` and ``e`` alone, or beside a latitude, are revolutions and an error. Capitals without a unit
+    are a voltage (U, V), a temperature (T), a resistance or radius (R).
+    """
+    if name.casefold() not in ("n", "e"):
+        return name in LETTERS and unit in NO_UNIT
+    bare = [_bare(each, "")[0].casefold() for each in names]
+    return not {"n", "e"} <= {*bare} or any(not WORDS["x"].isdisjoint(words_of(each)) for each in bare)
 
 
 def _is_told(stated: Column) -> bool:

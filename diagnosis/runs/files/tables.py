@@ -249,7 +249,7 @@ def clock_seconds(time: np.ndarray) -> np.ndarray:
     dates, there = np.divmod(time[np.isfinite(time)], 1e6)
     hours, minutes, seconds = there // 1e4, there // 1e2 % 100.0, there % 100.0
     months, days = dates // 1e2 % 100.0, dates % 100.0
-    is_date = (dates == 0.0) | ((1.0 <= months) & (months <= 12.0) & (1.0 <= days) & (days <= 31.0))
+    is_date = (dates == 0.0) | ((months >= 1.0) & (months <= 12.0) & (days >= 1.0) & (days <= 31.0))
     is_clock = is_date & (hours < 24.0) & (minutes < FULL) & (seconds < FULL)
     if not (there.size and is_clock.all() and np.ptp(minutes) > 0.0):
         return time
