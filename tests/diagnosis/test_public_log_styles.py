@@ -1,5 +1,6 @@
 """Logs in the styles of widespread tools: PX4, MAVLink, ROS, libcosim, LabVIEW, MOOS, and tables of pandas and numpy."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -285,3 +286,20 @@ def test_letters_that_mean_other_quantities(tmp_path: Path, error: dict[str, np.
     np.testing.assert_allclose(run.commanded["propeller.n"], TANKER_LOG[-1])
     assert not run.measured
     is_the_motion(seen(tmp_path / "b.csv", log().rename(columns={"x": "n", "y": "e"})))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.csv", b"time,x,y\n" + b"0.1,2,3\n" * 9 + b'0.2,"3,4\n'),
+        ("a.txt", b"\xff\xfe" + "time,x\n0.1,2\n0.2,3\n".encode("utf-16-le") + b"4"),
+        ("a.parquet", b"PAR1 and no table"),
+    ],
+)
+@pytest.mark.parametrize("look", [lambda path: propose(path, OTTER), lambda path: one_table([path])])
+def test_a_broken_table_is_named(
+    tmp_path: Path, name: str, content: bytes, look: Callable[[Path], object]
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=rf"{name}' cannot be read as a table"):
+        look(tmp_path / name)

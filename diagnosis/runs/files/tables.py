@@ -71,9 +71,10 @@ def column_names(path: Path, layout: Layout) -> list[str]:
 def _names(path: Path, layout: Layout) -> list[str]:
     """The names of the columns as they stand there, one that is there twice included."""
     if path.suffix == ".parquet":
-        from pyarrow import parquet
+        with as_table(path):
+            from pyarrow import parquet
 
-        return list(parquet.read_schema(path).names)
+            return list(parquet.read_schema(path).names)
     if path.suffix == ".mat":
         return list(matlab_table(path))
     refuse_sentences(path)
@@ -99,7 +100,8 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
     fields = {name: field for name, field in message_fields(names).items() if name not in names}
     own = {c for name in wanted for c in (fields[name].columns if name in fields else (name,))}
     if path.suffix == ".parquet":
-        table = pd.read_parquet(path, columns=list(own))
+        with as_table(path):
+            table = pd.read_parquet(path, columns=list(own))
         index = [name for name in table.index.names if name in own]
         table = table.reset_index(index) if index else table
     elif path.suffix == ".mat":
@@ -139,13 +141,13 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
                 index_col=False,
                 **options,
             )
-    except UnicodeDecodeError:
-        refuse_encoding(path, layout)
-        raise
-    except pd.errors.ParserError as error:
+    except (UnicodeDecodeError, pd.errors.ParserError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            refuse_encoding(path, layout)
         if READ_INTERRUPTED in str(error):
             raise KeyboardInterrupt from error
-        raise
+        with as_table(path):
+            raise
 
 
 def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None:
