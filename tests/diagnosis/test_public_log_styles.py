@@ -294,6 +294,7 @@ def test_letters_that_mean_other_quantities(tmp_path: Path, error: dict[str, np.
         ("a.csv", b"time,x,y\n" + b"0.1,2,3\n" * 9 + b'0.2,"3,4\n'),
         ("a.txt", b"\xff\xfe" + "time,x\n0.1,2\n0.2,3\n".encode("utf-16-le") + b"4"),
         ("a.parquet", b"PAR1 and no table"),
+        ("b.txt", b"# time x x\n" + b"0.1 2 3\n" * 9),
     ],
 )
 @pytest.mark.parametrize("look", [lambda path: propose(path, OTTER), lambda path: one_table([path])])

@@ -75,7 +75,7 @@ TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec
 NORTH = ("true", "magnetic")  # that a heading is from; behind its name it is no unit
 # Behind a name in a log of libcosim: value reference, type and causality.
 OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
-LETTERS = ("R", "T", "U", "V")
+LETTERS = ("R", "T", "U", "V")  # that are no yaw rate, time and velocity without a unit
 PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 

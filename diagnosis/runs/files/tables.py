@@ -141,7 +141,7 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
                 index_col=False,
                 **options,
             )
-    except (UnicodeDecodeError, pd.errors.ParserError) as error:
+    except ValueError as error:  # of the encoding, of the cells, or of names that are there twice
         if isinstance(error, UnicodeDecodeError):
             refuse_encoding(path, layout)
         if READ_INTERRUPTED in str(error):
