@@ -364,7 +364,7 @@ def test_the_motion_of_a_pose_is_that_which_made_it() -> None:
 def test_units_have_their_factors_by_definition() -> None:
     minute, degree, foot = 60.0, np.pi / 180.0, 0.3048
     others = {
-        "time": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": minute},
+        "time": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "d": 86400.0, "min": minute},
         "length": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": foot, "in": foot / 12.0},
         "angle": {"deg": degree, "°": degree},
         "force": {"mN": 1e-3, "kN": 1e3},
@@ -867,10 +867,10 @@ def test_a_shaft_that_turns_evenly_is_likely_by_its_unit(tmp_path: Path) -> None
 
 
 def test_a_shaft_without_a_unit_is_likely_by_its_name(tmp_path: Path) -> None:
-    table = zigzag(**{"propeller.n": "Shaft speed"}).assign(**{"Shaft speed": 105.0})
+    table = zigzag(**{"propeller.n": "Engine revolutions"}).assign(**{"Engine revolutions": 105.0})
     found = propose(written(tmp_path / "a.csv", table), TANKER)
     assert [(c.name, c.reasons) for c in found.likely["propeller.n"]] == [
-        ("Shaft speed", ["by its name"])
+        ("Engine revolutions", ["by its name"])
     ]
 
 

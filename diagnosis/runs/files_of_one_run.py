@@ -11,12 +11,13 @@ from cosim import InputError
 
 from .columns.columns import Column, Layout, stated_layout, to_si
 from .columns.proposal import text_of, time_column, units_below
+from .columns.usual_names import value_column
 from .files.message_fields import message_fields
-from .files.tables import column_names, date_stamps, numbers, table_of_file
+from .files.tables import clock_seconds, column_names, date_stamps, numbers, table_of_file
 
 TIME = "time"  # the column of the time in the one table
-VALUE = frozenset(("value", "val", "reading", "data"))  # names of the column with all values
 UNIT = frozenset(("unit", "units"))  # of that with their units
+NUMBER = frozenset(("id", "index", "channel", "instance"))  # of that with numbers in place of names
 
 
 class _Part(NamedTuple):
@@ -90,16 +91,21 @@ def _part(path: Path) -> _Part:
 def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.Series]:
     """A table with one value in a row, as ``time, name, value``, with a column for each name.
 
-    Its values are in a column that is called so; the texts beside them that change make up the name.
+    Its values are in a column that is called so; the texts beside them that change make up the name, or
+    numbers, as those of thrusters.
     """
-    called = {name.strip("_").casefold(): name for name in map(str, table)}
-    value = next((called[c] for c in called if c in VALUE), None)
-    units = [name for c, name in called.items() if c in UNIT]
+    value = value_column(map(str, table))
+    units = [name for name in map(str, table) if name.strip("_").casefold() in UNIT]
     changing = [n for n in table if n not in {*units, value} and table[n].nunique() > 1]
     texts = [n for n in changing if not pd.api.types.is_numeric_dtype(table[n])]
-    if value is None or not texts:
+    named = {n: table[n].astype("string").fillna("") for n in texts} or {
+        n: f"{n} " + table[n].map("{:g}".format)
+        for n in changing
+        if n.casefold() in NUMBER and 2 * table[n].nunique() < len(table)  # not that of the row
+    }
+    if value is None or not named:
         return table, cells
-    names = table[texts].astype("string").fillna("").agg(".".join, axis=1)
+    names = pd.DataFrame(named).agg(".".join, axis=1)
     for unit in units:
         there = table[unit].notna()
         names = names.mask(there, names + " [" + table[unit].astype("string").fillna("") + "]")
@@ -121,7 +127,7 @@ def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
     if any(stamps):
         dated, other = parts[stamps.index(True)].path, parts[stamps.index(False)].path
         raise InputError(f"'{dated}' has date stamps, '{other}' numbers: they have no clock in common")
-    read = [numbers(part.cells, part.path, Layout()) for part in parts]
+    read = [clock_seconds(numbers(part.cells, part.path, Layout())) for part in parts]
     return [to_si(time, TIME, part.time, TIME) for part, time in zip(parts, read, strict=True)]
 
 

@@ -212,7 +212,7 @@ def log_of(commands: Iterable[str]) -> Layout:
     return Layout(columns={signal: Column(name=name) for signal, name in names.items()})
 
 
-WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+|deg \w+)\s*[\])]")
+WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+|deg \w+|\w+ since [^\])]+)\s*[\])]")
 
 
 def layout_of(

@@ -21,26 +21,47 @@ from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 # Words of a name.
+SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
+NONE_STATED: Mapping[str, str] = {}
+NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
+WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
 
-def geographic_pair(named: Mapping[str, tuple[str, str]]) -> dict[str, str]:
+def geographic_pair(
+    named: Mapping[str, tuple[str, str]], stated: Mapping[str, str] = NONE_STATED
+) -> dict[str, str]:
     """Signals x and y -> names of the columns of latitude and longitude; empty without one of each.
+
+    Of several that one counts which is stated, or whose name has no other word.
 
     Args:
         named: column -> its name without the unit, and its unit (empty if not known).
+        stated: signal -> its column, if that is stated.
     """
     found = {
         signal: [
             column
             for column, (bare, unit) in named.items()
-            if words & {*words_of(bare)} and unit in ("", "-", *UNITS["angle"]) and unit != "rad"
+            if words & {*words_of(bare)} and unit in ("", "-", *UNITS["angle"])
         ]
         for signal, words in WORDS.items()
     }
+    for signal, columns in found.items():
+        own = [c for c in columns if WORDS[signal].issuperset(words_of(named[c][0]))]
+        if stated.get(signal) in columns:
+            found[signal] = [stated[signal]]
+        elif len(own) == 1:
+            found[signal] = own
     if any(len(columns) != 1 for columns in found.values()):
         return {}
     return {signal: columns[0] for signal, columns in found.items()}
+
+
+def is_side(cells: pd.Series, letters: str) -> bool:
+    """Whether cells are the letters of a hemisphere, the negative one among them."""
+    found = {*cells.dropna().astype("string").str.strip()}
+    return letters[1] in found and found <= {*letters}
 
 
 def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) -> dict[str, Column]:
@@ -53,7 +74,11 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
     there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
     origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
-    largest = {s: np.radians(np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()}
+    scale = _scale(*(degrees[signal][there] for signal in ("x", "y")))
+    origin = {s: scale * value for s, value in origin.items()}
+    largest = {
+        s: np.radians(scale * np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()
+    }
     if not origin or largest["x"] > np.pi / 2 or largest["y"] > np.pi:
         return {}
     latitude = np.radians(origin["x"])
@@ -64,9 +89,24 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     }
     columns = {}
     for signal, name in pair.items():
-        factor = round(float(np.radians(radius[signal])), 3)  # m in a degree
-        columns[signal] = Column(name=name, factor=factor, offset=round(-factor * origin[signal], 3))
+        in_degree = round(float(np.radians(radius[signal])), 3)  # m
+        offset = round(-in_degree * origin[signal], 3)
+        columns[signal] = Column(name=name, factor=float(f"{scale * in_degree:.9g}"), offset=offset)
     return columns
+
+
+def _scale(latitude: np.ndarray, longitude: np.ndarray) -> float:
+    """The size of the unit of latitudes and longitudes (n,) [degrees].
+
+    Whole numbers beyond degrees and minutes are in 1e-7 degrees. Both within half a turn in rad are rad:
+    in degrees that is the Gulf of Guinea. Next to zero, where simulations start, they are in degrees.
+    """
+    values = np.concatenate([latitude, longitude])
+    if (values == np.round(values)).all() and np.abs(values).max(initial=0.0) > 1e6:
+        return WHOLE
+    reach = [np.abs(angle).max(initial=0.0) for angle in (latitude, longitude)]
+    is_rad = reach[0] <= np.pi / 2 and reach[1] <= np.pi and max(reach) > NEAR_ZERO
+    return float(np.degrees(1.0)) if is_rad else 1.0
 
 
 def is_geographic(signal: str, column: Column) -> bool:

@@ -10,7 +10,7 @@ from ...execution.short_text import SHOWN
 from ..files.reading import held_values
 from ..run_constants import EVERY, FEWEST
 from .columns import OUTPUTS, POSE
-from .name_words import words_of
+from .name_words import PLAIN, words_of
 from .unit_check import UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
@@ -35,6 +35,8 @@ WORDS = {
     "speed": {"u": "u", "surge": "u", "v": "v", "vm": "v", "sway": "v", "wind": "wind_speed"},
     "rate": dict.fromkeys(("r", "yaw", "psi", "heading"), "r"),
 }
+# Grid coordinates: x to east, y to north.
+OF_UTM = {"length": WORDS["length"] | {"x": "y", "y": "x"}}
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Quantity of a command -> words that tell it; words of a speed, which an angle is not.
 KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
@@ -80,7 +82,7 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     left = [w for w in words if w not in FILLERS]
     found = {
         signals[left[0]]
-        for q, signals in WORDS.items()
+        for q, signals in (WORDS if "utm" not in words else OF_UTM).items()
         if unit in UNITS[q] and len(left) == 1 and signals.get(left[0]) in quantity
     }
     found |= {
@@ -93,18 +95,34 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
+def signal_of_symbol(name: str, unit: str, quantity: Mapping[str, str]) -> str:
+    """The command whose symbol a name is, as ``delta`` of the only rudder; empty if none, or several.
+
+    Args:
+        name, unit, quantity: as of :func:`meaning_of_words`.
+    """
+    symbol = name.translate(PLAIN)
+    found = [s for s in quantity if s.partition(".")[2] == symbol and symbol not in OUTPUTS]
+    return found[0] if len(found) == 1 and unit in ("", *UNITS[quantity[found[0]]]) else ""
+
+
 def is_steering(name: str) -> bool:
     """Whether a name is that of an angle that steers, of whatever actuator."""
-    return [word for word in words_of(name) if word not in FILLERS] == ["rudder"]
+    return {word for word in words_of(name) if word not in FILLERS} == {"rudder"}
 
 
 def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
     """Whether words tell which command of its actuator a column without a unit holds."""
     actuator, _, command = signal.partition(".")
-    known = KINDS.get(quantity[signal], frozenset())
     own = {s.partition(".")[2] for s in quantity if s.startswith(f"{actuator}.")}
     only = own - OUTPUTS.keys() == {command}
-    return command in words or not known.isdisjoint(words) or (only and CHANGES.isdisjoint(words))
+    return says_command(" ".join(words), signal, quantity) or (only and CHANGES.isdisjoint(words))
+
+
+def says_command(name: str, signal: str, quantity: Mapping[str, str]) -> bool:
+    """Whether words of a column's name are that of a command, or of its quantity."""
+    words = {*words_of(name)}
+    return not words.isdisjoint({signal.partition(".")[2], *KINDS.get(quantity[signal], ())})
 
 
 def signal_of_sign(name: str, quantity: Mapping[str, str]) -> str:
@@ -122,8 +140,8 @@ def _is_of_actuator(words: Sequence[str], signal: str, quantity: str) -> bool:
     A shaft on some side is that of the propeller there.
     """
     actuator, _, command = signal.partition(".")
-    left, own = list(words), words_of(actuator)
-    if quantity == "shaft speed" and len(own) > 1:
+    left, own = list(dict.fromkeys(words)), words_of(actuator)
+    if quantity == "shaft speed" and (len(own) > 1 or "shaft" in left):
         own = [word for word in own if word != "propeller" or "propeller" in left]
     for word in own:
         same = [w for w in left if w == word or (len(w) > 2 and word.startswith(w))]

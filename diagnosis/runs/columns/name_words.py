@@ -36,7 +36,7 @@ FOREIGN = {
 }
 ENGLISH = {word: english for english, words in FOREIGN.items() for word in words.split()}
 # Letters that are no other letter with an accent.
-PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l"})
+PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "δ": "delta", "ψ": "psi"})
 
 
 def words_of(name: str) -> list[str]:

@@ -16,9 +16,9 @@ from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
 from ..files.matlab_files import fits_matlab
-from ..files.message_fields import message_fields
+from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read
-from ..files.tables import date_stamps, table_of_file
+from ..files.tables import clock_seconds, date_stamps, is_cell, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..frozen import repeated
 from ..row_order import in_order
@@ -39,7 +39,7 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import geographic_pair, local_columns, one_origin, refuse_minutes
+from .geographic import SIDES, WORDS, geographic_pair, is_side, local_columns, one_origin, refuse_minutes
 from .likely_columns import (
     ASTERN,
     LikelyColumn,
@@ -47,18 +47,35 @@ from .likely_columns import (
     likely_columns,
     meaning_of_words,
     motion_of,
+    says_command,
     signal_of_sign,
+    signal_of_symbol,
     unit_in,
 )
+from .name_words import words_of
 from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
-from .unit_check import OFTENEST, SI_UNIT, doubts, doubts_of_angles, largest, likely_unit, spelt
-from .usual_names import meaning
+from .unit_check import (
+    HUNDREDTH,
+    OFTENEST,
+    SI_UNIT,
+    doubts,
+    doubts_of_angles,
+    in_hundredths,
+    largest,
+    likely_unit,
+    spelt,
+)
+from .usual_names import is_quaternion, meaning, value_column
 
 NO_UNIT = ("", "-")
-# Units that a name may end in; u_1 is the first of several, and not a fraction.
-NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1"}
+# Units that a name may end in; u_1 is the first of several, x_d a desired value.
+NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1", "d"}
 # A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
 TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
+NORTH = ("true", "magnetic")  # that a heading is from; behind its name it is no unit
+# Behind a name in a log of libcosim: value reference, type and causality.
+OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
+LETTERS = ("R", "T", "U", "V")  # that are no yaw rate, time and velocity without a unit
 PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
@@ -112,12 +129,13 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         return Proposal(log, [], read(path, log, of))
     units = units_below(path, text, names)
     parts = {name for field in fields.values() for name in field.columns}
-    whole = [k for k, name in enumerate(names) if name not in parts]
+    within = tuple(f"{field}{mark}" for field in fields for mark in "./")  # as the yaw of a quaternion
+    whole = [k for k, name in enumerate(names) if name not in parts and not name.startswith(within)]
     names, units = [names[k] for k in whole], [units[k] for k in whole]
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
-    columns = _columns(path, text, names, units, quantity, kept)
+    columns = _columns(path, text, names, units, quantity, kept, fields)
     columns |= _of_message(columns, fields, kept)
     columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
@@ -125,6 +143,11 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     if blank := missing(layout, names, of):
+        if {"x", "y"} <= {*blank} and (value := value_column(names)):
+            raise InputError(
+                f"'{path}' has no position; if it has one value in a row, in '{value}', "
+                f"'cybership join {path} --out run.csv' gives each name a column"
+            )
         left = {n: below.get(n, "") for n in unused}
         return _with_blanks(path, layout, kept, left, blank, quantity)
     try:
@@ -136,9 +159,9 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     columns |= _signed(path, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
-    for signal, unit in _seen_units(run):
+    for signal, unit, factor in _seen_units(run):
         if signal not in kept or not _is_told(kept[signal]):
-            columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
+            columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
     return Proposal(layout, unused, read(path, layout, of))
@@ -156,7 +179,10 @@ def text_of(path: Path, stated: Layout) -> Layout:
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)
         if found is None:
-            raise InputError(f"'{path}' has no table of numbers below a line of names")
+            raise InputError(
+                f"'{path}' has no table of numbers below a line of names; if its columns have no names, "
+                "write a line with these above them"
+            )
         text = found.model_copy(update={"encoding": encoding})
     return text.model_copy(update=stated.model_dump(exclude_unset=True, exclude={"columns"}))
 
@@ -259,6 +285,7 @@ def _columns(
     units: Sequence[str],
     quantity: Mapping[str, str],
     kept: Mapping[str, Column],
+    fields: Collection[str] = (),
 ) -> dict[str, Column]:
     """The columns that names and units tell; of two for one signal, that of its own name or the first.
 
@@ -275,11 +302,15 @@ def _columns(
             signal, flip = meaning(bare, quantity)
             if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
-        if signal in columns:
+        if signal in columns or _is_beside_speed(bare, names) or _is_letter(bare, unit, names):
+            continue
+        if is_quaternion(bare) and name not in fields:  # q is the pitch rate as well
             continue
         known = UNITS[quantity[signal]]
         if signal == "time" and unit not in known and _is_stamped(path, text, name):
             unit = ""  # a time zone, or the form of the stamps
+        if unit not in known and (unit.isdigit() or (bare != signal and unit in NAMED_UNITS)):
+            continue  # an index, or of another quantity: n in rps is no position to the north
         if unit not in NO_UNIT and unit not in known:
             line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
             raise InputError(
@@ -289,8 +320,37 @@ def _columns(
             )
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
-    columns |= _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
+    found = _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
+    columns |= {s: c for s, c in found.items() if not _is_fraction(path, text, s, c, quantity)}
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def _is_fraction(
+    path: Path, text: Layout, signal: str, column: Column, quantity: Mapping[str, str]
+) -> bool:
+    """Whether the column of a shaft is not called a speed, and has fractions of the full command."""
+    if quantity[signal] != "shaft speed" or column.unit or says_command(column.name, signal, quantity):
+        return False
+    values = _numbers(table_of_file(path, text, {column.name})[column.name], "")
+    return float(np.nanmax(np.abs(values), initial=0.0)) <= largest("command")
+
+
+def _is_beside_speed(name: str, names: Sequence[str]) -> bool:
+    """Whether a name is ``ax`` beside ``vx``: along the axes of that, which are not known."""
+    low, axis = name.casefold(), name[-1:].casefold()
+    return low.endswith(("ax", "ay")) and f"{low[:-2]}v{axis}" in {n.casefold() for n in names}
+
+
+def _is_letter(name: str, unit: str, names: Sequence[str]) -> bool:
+    """Whether a name is a letter that more often means another quantity than a signal.
+
+    ``n`` and ``e`` alone, or beside a latitude, are revolutions and an error. Capitals without a unit
+    are a voltage (U, V), a temperature (T), a resistance or radius (R).
+    """
+    if name.casefold() not in ("n", "e"):
+        return name in LETTERS and unit in NO_UNIT
+    bare = [_bare(each, "")[0].casefold() for each in names]
+    return not {"n", "e"} <= {*bare} or any(not WORDS["x"].isdisjoint(words_of(each)) for each in bare)
 
 
 def _is_told(stated: Column) -> bool:
@@ -326,7 +386,9 @@ def _by_words(
         unit = unit or unit_in(bare)
         parts = PATH.split(bare)
         own = parts[len(common) :] if parts[: len(common)] == common else parts
-        if signal := meaning_of_words(" ".join(own), unit, quantity):
+        if signal := signal_of_symbol(bare, unit, quantity) or meaning_of_words(
+            " ".join(own), unit, quantity
+        ):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
         elif unit in ("rpm", "rps"):
@@ -341,14 +403,14 @@ def _by_words(
 
 
 def _of_message(
-    columns: Mapping[str, Column], fields: Collection[str], kept: Collection[str]
+    columns: Mapping[str, Column], fields: Mapping[str, MessageField], kept: Collection[str]
 ) -> dict[str, Column]:
     """Heading and position by the axes of ROS messages (REP 103): x to east, y to north, z up.
 
     Only a heading by a quaternion is known to be of such a message.
     """
     psi = columns.get("psi")
-    if psi is None or psi.name not in fields or "psi" in kept:
+    if psi is None or "psi" in kept or psi.name not in fields or not fields[psi.name].is_ros:
         return {}
     turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
     known = {"x", "y"} <= columns.keys() - kept
@@ -381,12 +443,20 @@ def _geographic(
     stated = {s: c.name for s in ("x", "y") if (c := layout.columns.get(s)) and not _is_told(c)}
     taken = _names_of(layout.columns) - {*stated.values()}
     free = [pair for pair in zip(names, units, strict=False) if pair[0] not in taken]
-    pair = geographic_pair({name: _bare(name, below) for name, below in free})
+    pair = geographic_pair({name: _bare(name, below) for name, below in free}, stated)
     if not pair or any(stated.get(s) != pair[s] for s in layout.columns.keys() & pair):
         return {}
-    table = table_of_file(path, layout, set(pair.values()))
+    after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
+    table = table_of_file(path, layout, {*pair.values(), *after.values()})
+    sides = {s: SIDES[s][1] for s, name in after.items() if is_side(table[name], SIDES[s])}
     degrees = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
+    for signal, negative in sides.items():
+        west = is_cell(table[after[signal]], negative)
+        degrees[signal] = np.where(west, -degrees[signal], degrees[signal])
     columns = local_columns(pair, degrees)
+    for signal in columns.keys() & sides:
+        sign = {"sign": after[signal], "negative": sides[signal]}
+        columns[signal] = columns[signal].model_copy(update=sign)
     if not columns:
         refuse_minutes(pair, {signal: table[name] for signal, name in pair.items()})
     return columns
@@ -452,7 +522,10 @@ def _names_of(columns: Mapping[str, Column]) -> set[str]:
 
 def _bare(name: str, below: str) -> tuple[str, str]:
     """A column's name without its unit, and the unit, which may stand below it."""
+    name = OF_LIBCOSIM.sub("", name)
     told = WITH_UNIT.fullmatch(name)
+    if told and told[2].casefold() in NORTH:
+        return told[1], bare_unit(below)
     return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
 
 
@@ -466,11 +539,13 @@ def _unit_at_the_end(name: str) -> tuple[str, str]:
     """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, x in mm, TimeUS."""
     if stamped := TIME_IN.fullmatch(name):
         return stamped[1], spelt(stamped[2].lower())
-    for mark in (" in ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
+    for mark in (" in ", ", ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
         quantity, _, unit = name.partition(mark)
         if quantity and spelt(unit) in NAMED_UNITS:
             return quantity, spelt(unit)
     words = name.split("_")
+    if (inner := re.fullmatch(r"(\w*[a-z\d])([A-Z][a-z]+)", name)) and "_" not in name:  # headingDeg
+        words = [*inner.groups()]
     for count in (2, 1):
         unit = spelt("/".join(words[-count:]))
         if len(words) > count and unit in NAMED_UNITS:
@@ -499,16 +574,19 @@ def _likely(
 def _numbers(cells: pd.Series, signal: str) -> np.ndarray:
     """A column as floats, NaN where it is none; date stamps as seconds."""
     stamps = date_stamps(cells) if signal == "time" else None
-    return np.asarray(pd.to_numeric(cells, errors="coerce"), float) if stamps is None else stamps
+    if stamps is not None:
+        return stamps
+    found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+    return clock_seconds(found) if signal == "time" else found
 
 
-def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
-    """Signals that seem to be in another unit, and in which."""
+def _seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
+    """Signals that seem to be in another unit: which, in which, and by which factor to that."""
     if not np.isfinite(run.time).any():
         return
     unit = _time_unit(run.time)
     if unit:
-        yield "time", unit
+        yield "time", unit, 1.0
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     zeros = (run.pose == 0.0).all(axis=1)
@@ -516,7 +594,8 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     time = UNITS["time"][unit or "s"] * run.time[fresh]
     angles = doubts_of_angles(other_angles(run.measured))
     for doubt in chain(doubts(time, run.pose[fresh]), angles):
-        yield from ((signal, doubt.unit) for signal in doubt.signals)
+        factor = HUNDREDTH if doubt.signals == ("psi",) and in_hundredths(run.pose[fresh]) else 1.0
+        yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
 
 
 def _time_unit(time: np.ndarray) -> str | None:

@@ -22,7 +22,9 @@ THOUSANDS = {  # decimal mark -> numbers with separators of thousands, as 19,800
 }
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 ARCHIVE = b"PK\3\4"  # how a zip file begins
-SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,")  # how one of NMEA 0183 begins
+# How a sentence of NMEA 0183 begins; a stamp or names of columns may be before it.
+SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,|(?s:.*)[\s,;\"'][$!][A-Z]{4}\w,")
+DATAFLASH = b"FMT, "  # how a log of ArduPilot as a text begins
 
 
 def line_beside(
@@ -102,7 +104,7 @@ def refuse_encoding(path: Path, layout: Layout) -> None:
 def refuse_sentences(path: Path) -> None:
     """Refuse a text of NMEA 0183 sentences, and a spreadsheet, neither of which is a table."""
     with path.open("rb") as content:
-        begin = content.read(200)
+        begin = content.read(1000)
         if begin.startswith(ARCHIVE):
             raise InputError(
                 f"'{path}' is an archive, as a spreadsheet is; save its table as a CSV file"
@@ -111,6 +113,11 @@ def refuse_sentences(path: Path) -> None:
             raise InputError(
                 f"'{path}' has NMEA 0183 sentences; a measurement is a table: write a CSV file with a "
                 "row for each time and the columns time, latitude, longitude, heading and commands"
+            )
+        if begin.startswith(DATAFLASH):
+            raise InputError(
+                f"'{path}' has messages of several kinds (a DataFlash log); write a CSV file of each "
+                "(mavlogdump.py --format csv), and put them together by 'cybership join'"
             )
 
 

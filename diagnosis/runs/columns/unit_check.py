@@ -16,7 +16,7 @@ from ..run_constants import NEGLIGIBLE, WIDTH
 
 # Quantity -> its units, that of SI first -> factor to that [1].
 UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": c.milli, "us": c.micro, "ns": c.nano, "min": c.minute},
+    "time": {"s": 1.0, "ms": c.milli, "us": c.micro, "ns": c.nano, "d": c.day, "min": c.minute},
     "length": {"m": 1.0, "mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch},
     "angle": {"rad": 1.0, "deg": c.degree, "°": c.degree},
     "force": {"N": 1.0, "mN": c.milli, "kN": c.kilo},
@@ -35,6 +35,7 @@ SPELT = {
     **dict.fromkeys(("degree", "degrees", "grader", "Grad"), "deg"),
     **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
+    **dict.fromkeys(("day", "days"), "d"),
     **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
@@ -56,6 +57,7 @@ OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 LARGEST = 1e9
 # Beyond these no ship moves, so that the unit must be another one (chosen).
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
+TURN, HUNDREDTH = 360.0, 0.01  # degrees, 1
 AHEAD = 0.5  # 1, of the way that a constant heading does not explain, what one in degrees does (chosen)
 
 
@@ -80,8 +82,9 @@ def largest(quantity: str) -> float:
 def spelt(unit: str) -> str:
     """A unit as this project spells it: ``Nm`` is ``N.m``; one that is not known stays.
 
-    Capitals count in symbols (``mN``) and not in words (``Knots``).
+    Capitals count in symbols (``mN``) and not in words (``Knots``). What follows ``since`` is no unit.
     """
+    unit = unit.partition(" since ")[0]
     word = unit.lower() if unit.lower() in WORDS else unit
     return SPELT.get(word, word)
 
@@ -162,6 +165,17 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     if in_rad < still and in_deg - still > AHEAD * (1.0 - still):
         reason = f"goes where its heading is only in degrees ({in_deg:.0%} of the way): is it in deg?"
         yield Doubt(("psi",), "deg", reason)
+
+
+def in_hundredths(pose: np.ndarray) -> bool:
+    """Whether the heading of a pose (n, 3) is in hundredths of a degree within a turn, as of MAVLink."""
+    there = np.isfinite(pose).all(axis=1)
+    psi = pose[there, 2]
+    if psi.size < 2 or not 2.0 * TURN < np.abs(psi).max() <= TURN / HUNDREDTH:
+        return False
+    way = np.diff(pose[there, 0]) + 1j * np.diff(pose[there, 1])
+    in_deg, in_parts = (follows(way, psi[:-1] * c.degree * size) for size in (1.0, HUNDREDTH))
+    return in_parts > in_deg
 
 
 def doubts_of_angles(angles: Mapping[str, np.ndarray]) -> Iterator[Doubt]:

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from .columns import QUANTITY
 from .name_words import words_of
 
+QUATERNION = ("orientation", "quaternion", "quat", "q")  # a heading, if it has four parts
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": (
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
         *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp", "epoch", "unixtime"),
-        "timesincestart",
+        *("timesincestart", "xvalue", "gpst", "logtime"),
     ),
     "x": (
         *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
@@ -23,8 +24,8 @@ CALLED: dict[str, tuple[str, ...]] = {
     ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
-        *("hdm", "compass", "gyro", "gyrocompass", "orientation", "quaternion", "quat", "q"),
-        *("compassheading", "gyroheading"),
+        *("hdm", "compass", "gyro", "gyrocompass", *QUATERNION),
+        *("compassheading", "gyroheading", "headingtrue", "headingmagnetic"),
     ),
     "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
     "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
@@ -35,7 +36,7 @@ CALLED: dict[str, tuple[str, ...]] = {
     "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
     "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
     "speed": ("sog", "speedoverground"),
-    "course": ("cog", "courseoverground"),
+    "course": ("cog", "courseoverground", "courseovergroundtrue"),
     "u_water": ("stw", "speedthroughwater"),
     "wind_speed": ("truewindspeed", "tws"),
     "wind_direction": ("truewinddirection", "truewinddir", "truewindangle", "twd"),
@@ -48,6 +49,7 @@ CALLED: dict[str, tuple[str, ...]] = {
         *("apparentwindangle", "rwd", "rwa", "awa"),
     ),
 }
+VALUE = frozenset(("value", "val", "reading", "data"))  # of all values, of a table with one in a row
 OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
 
@@ -62,6 +64,16 @@ MEANT = (
     | {_folded(name): (signal, False) for signal, names in CALLED.items() for name in names}
     | {_folded(signal): (signal, False) for signal in QUANTITY}
 )
+
+
+def is_quaternion(name: str) -> bool:
+    """Whether the last part of a name is that of a quaternion."""
+    return _folded(re.split("[/.]", name)[-1]) in QUATERNION
+
+
+def value_column(names: Iterable[str]) -> str | None:
+    """The column that is called as that of a table with one value in a row; None: none is."""
+    return next((name for name in names if name.strip("_").casefold() in VALUE), None)
 
 
 def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:

@@ -1,4 +1,4 @@
-"""Fields of ROS messages that a table has in several columns: the heading of a quaternion, a time stamp.
+"""Fields of messages that a table has in several columns: the heading of a quaternion, a time stamp.
 
 Such a field has the name that its columns begin with: ``pose.orientation`` of ``pose.orientation.x``.
 """
@@ -10,20 +10,34 @@ import numpy as np
 import pandas as pd
 from scipy.constants import nano
 
+from ..columns.name_words import words_of
+
 MARKS = "./_"  # between the name of a field and that of its part, where there is one
 
 
 class MessageField(NamedTuple):
-    """A field of a message: the columns that hold its parts, and its value by them."""
+    """A field of a message.
+
+    Attributes:
+        columns: that hold its parts.
+        value: its value by these.
+        is_ros: whether its axes are those of ROS: east, north and up; north, east and down otherwise.
+    """
 
     columns: Sequence[str]
     value: Callable[..., np.ndarray]
+    is_ros: bool = True
 
 
 def heading(x: np.ndarray, y: np.ndarray, z: np.ndarray, w: np.ndarray) -> np.ndarray:
     """The rotation [rad] about the third axis by a quaternion of any length; NaN where that is zero."""
     about = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return np.where(x * x + y * y + z * z + w * w > 0.0, about, np.nan)
+
+
+def heading_of_array(w: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """The same of a quaternion that is an array, as PX4 logs it: its real part is first."""
+    return heading(x, y, z, w)
 
 
 def stamp(whole: np.ndarray, rest: np.ndarray) -> np.ndarray:
@@ -36,6 +50,8 @@ PARTS: Mapping[tuple[str, ...], Callable[..., np.ndarray]] = {
     ("sec", "nanosec"): stamp,
     ("secs", "nsecs"): stamp,
 }
+ARRAY = ("[0]", "[1]", "[2]", "[3]")
+QUATERNION = frozenset(("q", "quat", "quaternion"))  # last words of the names of such an array
 
 
 def message_fields(names: Collection[str]) -> dict[str, MessageField]:
@@ -47,6 +63,12 @@ def message_fields(names: Collection[str]) -> dict[str, MessageField]:
             columns = [begin + part for part in parts]
             if (field := begin.rstrip(MARKS)) and begin != name and set(columns) <= set(names):
                 found[field] = MessageField(columns, value)
+    for name in names:
+        field = name.removesuffix(ARRAY[-1])
+        columns = [field + part for part in ARRAY]
+        is_called_so = not QUATERNION.isdisjoint(words_of(field)[-1:])
+        if field != name and is_called_so and set(columns) <= set(names):
+            found[field] = MessageField(columns, heading_of_array, is_ros=False)
     return found
 
 

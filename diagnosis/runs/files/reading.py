@@ -41,8 +41,18 @@ from ..columns.columns import (
 from ..columns.unit_check import LARGEST, UNITS, largest, remedy
 from ..run_constants import DIGITS
 from .matlab_files import fits_matlab, read_matlab
-from .tables import as_table, column_names, date_stamps, is_cell, numbers, resolution, table_of_file
+from .tables import (
+    as_table,
+    clock_seconds,
+    column_names,
+    date_stamps,
+    is_cell,
+    numbers,
+    resolution,
+    table_of_file,
+)
 
+NO_HEADING = 511.0  # degrees, that is not available (ITU-R M.1371, AIS)
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
 
@@ -225,6 +235,10 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         values = date_stamps(cells, f"'{path}'") if signal == "time" else None
         if values is None:
             read = numbers(cells, path, layout)
+            if signal == "time" and column.unit is None:
+                read = clock_seconds(read)
+            if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
+                read = np.where(read == NO_HEADING, np.nan, read)
             if column.sign:
                 read = np.where(is_cell(table[column.sign], column.negative), -read, read)
             values = to_si(read, signal, column, quantity[signal])

@@ -27,11 +27,14 @@ from ..columns.side_car import (
 from ..run_constants import CHANCE, DIGITS
 from .matlab_files import matlab_table
 from .message_fields import message_fields, with_fields
-from .text_layout import STAMP
+from .text_layout import STAMP, is_marked
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60")
+DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
+ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
+FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
 
 @contextmanager
@@ -68,14 +71,18 @@ def column_names(path: Path, layout: Layout) -> list[str]:
 def _names(path: Path, layout: Layout) -> list[str]:
     """The names of the columns as they stand there, one that is there twice included."""
     if path.suffix == ".parquet":
-        from pyarrow import parquet
+        with as_table(path):
+            from pyarrow import parquet
 
-        return list(parquet.read_schema(path).names)
+            return list(parquet.read_schema(path).names)
     if path.suffix == ".mat":
         return list(matlab_table(path))
     refuse_sentences(path)
-    first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
-    names = [name.strip() for name in first.iloc[0]]
+    as_text = {"dtype": str, "keep_default_na": False, "skipinitialspace": True}
+    first = _csv(path, layout, nrows=1, header=None, **as_text)
+    # A column without a name is called as pandas calls it.
+    names = [name.strip() or f"Unnamed: {k}" for k, name in enumerate(first.iloc[0])]
+    names = names[is_marked(path, layout) :]
     refuse_layout(path, layout, names)
     return names
 
@@ -93,7 +100,8 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
     fields = {name: field for name, field in message_fields(names).items() if name not in names}
     own = {c for name in wanted for c in (fields[name].columns if name in fields else (name,))}
     if path.suffix == ".parquet":
-        table = pd.read_parquet(path, columns=list(own))
+        with as_table(path):
+            table = pd.read_parquet(path, columns=list(own))
         index = [name for name in table.index.names if name in own]
         table = table.reset_index(index) if index else table
     elif path.suffix == ".mat":
@@ -107,34 +115,39 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
     """The columns of some names of a CSV file, those of them that there are."""
+    named: dict[str, Any] = {}
+    if is_marked(path, layout):
+        named = {"header": None, "names": _names(path, layout)}
     return _csv(
         path,
         layout,
         usecols=lambda name: str(name).strip() in wanted,
         decimal=layout.decimal,
         skipinitialspace=True,
+        **named,
     ).rename(columns=str.strip)
 
 
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
     units = [layout.skip + 1] if layout.units_line else []
+    begin = layout.skip + ("names" in options)
     try:
         with open(path, "rb") as content:  # a long log does not fit into memory twice
             return pd.read_csv(
                 content,
                 sep=layout.separator,
                 encoding=layout.encoding,
-                skiprows=[*range(layout.skip), *units],
+                skiprows=[*range(begin), *units],
                 index_col=False,
                 **options,
             )
-    except UnicodeDecodeError:
-        refuse_encoding(path, layout)
-        raise
-    except pd.errors.ParserError as error:
+    except ValueError as error:  # of the encoding, of the cells, or of names that are there twice
+        if isinstance(error, UnicodeDecodeError):
+            refuse_encoding(path, layout)
         if READ_INTERRUPTED in str(error):
             raise KeyboardInterrupt from error
-        raise
+        with as_table(path):
+            raise
 
 
 def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None:
@@ -142,6 +155,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
 
     Stamps are of ISO 8601, or have a date such as 31.12.2026, 12/31/2026 or Dec 31, 2026, or none: then
     a day begins where the time falls by more than half a day. A leap second of UTC is a second.
+    Durations, such as 0.1 sec, are stamps as well.
 
     Args:
         cells: the column.
@@ -157,11 +171,13 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
                 return None
         except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
             return None
-        cells = cells.astype("string").str.strip()
+        cells = cells.astype("string").str.strip("[] ").str.replace("_", "T")
         leap = np.asarray(cells.str.contains(LEAP_SECOND).fillna(False), bool)
         given = cells.mask(leap, cells.str.replace(LEAP_SECOND, ":59", regex=True))
         iso = given.str.replace(",", ".")
         stamps = pd.to_datetime(iso, errors="coerce", utc=True, format="ISO8601")
+        if stamps.isna().all() and given.dropna().str.fullmatch(DURATION).all():
+            stamps = pd.Timestamp(0, tz="UTC") + pd.to_timedelta(given, errors="coerce")
         if stamps.isna().all():
             stamps, without_date = _other_stamps(given)
     else:
@@ -185,7 +201,8 @@ def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
     Of a date whose day may be its month, the log takes the shorter time.
     """
     parts = cells.astype(object).str.extract(STAMP)
-    dates = parts["date"].str.replace(":", "-").str.cat(parts["rest"], sep=" ").str.strip(" ,")
+    rest = parts["rest"].str.replace(ZONE, "", regex=True)
+    dates = parts["date"].str.replace(":", "-").str.cat(rest, sep=" ").str.strip(" ,")
     half = parts["half"].str.lower().str[0]
     hours = parts["h"].astype(float)
     hours = hours.mask(half.notna(), hours % 12.0 + 12.0 * (half == "p"))
@@ -222,6 +239,26 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
         elif not any(c.isdigit() for c in wrong):
             hint = "; a cell without a measurement must be empty"
         raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
+    return found
+
+
+def clock_seconds(time: np.ndarray) -> np.ndarray:
+    """Times (n,) as seconds, if they are numbers hhmmss.ss, as of NMEA 0183, of more than a minute.
+
+    In such numbers neither the last two digits before the point nor the two before these exceed 59. They
+    may follow a date: 20210601085807.
+    """
+    dates, there = np.divmod(time[np.isfinite(time)], 1e6)
+    hours, minutes, seconds = there // 1e4, there // 1e2 % 100.0, there % 100.0
+    months, days = dates // 1e2 % 100.0, dates % 100.0
+    is_date = (dates == 0.0) | ((months >= 1.0) & (months <= 12.0) & (days >= 1.0) & (days <= 31.0))
+    is_clock = is_date & (hours < 24.0) & (minutes < FULL) & (seconds < FULL)
+    if not (there.size and is_clock.all() and np.ptp(minutes) > 0.0):
+        return time
+    if seconds.min() > 0.1 * FULL or seconds.max() < 0.9 * FULL:  # these do not end a minute
+        return time
+    found = np.full_like(time, np.nan)
+    found[np.isfinite(time)] = np.unwrap(3600.0 * hours + 60.0 * minutes + seconds, period=day)
     return found
 
 

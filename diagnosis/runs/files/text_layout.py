@@ -17,6 +17,7 @@ STAMP = re.compile(
     r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
 )
+MARK = re.compile(r"[#%/!]+")  # of a comment, alone before the names
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
@@ -39,6 +40,16 @@ def table_cells(line: str, separator: str) -> list[str]:
     """The cells of a line, without blanks around them."""
     cells = csv.reader([line], delimiter=separator, skipinitialspace=True)
     return [cell.strip() for cell in next(cells, [])]
+
+
+def is_marked(path: Path, layout: Layout) -> bool:
+    """Whether the line of the names begins with the mark of a comment, no name itself: ``# t x y``."""
+    with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
+        lines = islice(file, layout.skip, layout.skip + 2 + layout.units_line)
+        cells = [table_cells(line.rstrip(), layout.separator) for line in lines]
+    if not cells or not cells[0] or not MARK.fullmatch(cells[0][0]):
+        return False
+    return len(cells[0]) == len(cells[-1]) + 1
 
 
 def bare_unit(text: str) -> str:
@@ -77,7 +88,9 @@ def _with(
         return numbers / len(told) if told and len(cells) == width else math.nan
 
     shares = [share(cells) for _, cells in rows]
-    first = next((k for k, part in enumerate(shares) if part >= 0.5), 0)
+    # Numbers in a line or two before the names are not the table yet.
+    begins = [k for k in range(len(shares)) if all(part >= 0.5 for part in shares[k : k + 3])]
+    first = next(iter(begins), next((k for k, part in enumerate(shares) if part >= 0.5), 0))
     if not first or len(rows[first - 1][1]) < 2:
         return -1.0, None
     told = [part for part in shares[first:] if math.isfinite(part)]
