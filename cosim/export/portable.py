@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..conversion import SAME
 from ..errors import InputError
 from ..files import file_stems
 from ..fmu.fmu_model import FmuModel, FmuVariable, Value
 from ..formats.elements import parameter_set, write_document
 from ..system.own_fmus import builder_options, run_builder
-from ..system.system import Connection, System
+from ..system.system import System
 
 # Characters that XML 1.0 cannot hold, not even as a reference (section 2.2).
 NOT_XML = re.compile(r"[^\t\n\r\x20-\uD7FF\uE000-\uFFFD\U00010000-\U0010FFFF]")
@@ -129,7 +130,7 @@ def _check_shape(system: System, target: Format) -> None:
                 f"{ends}: {kinds[0]} to {kinds[1]}: other tools connect Real, Integer and Boolean "
                 "to the same type only"
             )
-        if converts(c) and not target.conversions:
+        if c.conversion != SAME and not target.conversions:
             units = [v.unit.name if v.unit else "" for v in (c.source.variable, c.target.variable)]
             what = (
                 f"transform values: transformations.{c.target.name}"
@@ -147,11 +148,6 @@ def _check_texts(system: System) -> None:
     for where, text in texts.items():
         if wrong := NOT_XML.search(text):
             raise InputError(f"{where}: XML cannot hold the character {wrong[0]!r} in {text[:100]!r}")
-
-
-def converts(connection: Connection) -> bool:
-    """Whether a connection changes values."""
-    return (connection.conversion.factor, connection.conversion.offset) != (1.0, 0.0)
 
 
 def pack(system: System, folder: Path) -> tuple[list[ExportedInstance], list[str]]:

@@ -1,5 +1,6 @@
 """The log of a run: written during the run, so that the file is readable whatever ends the run."""
 
+import csv
 import errno
 import os
 import re
@@ -204,17 +205,12 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name
 
 
-def _header(line: str) -> list[str]:
-    import csv
-
-    return next(csv.reader([line]))
-
-
 def to_parquet(folder: Path) -> Path:
     """Replace the CSV log of a folder by Parquet; the CSV is removed when the new file is complete."""
-    from pyarrow import csv, parquet, types
+    from pyarrow import parquet, types
+    from pyarrow.csv import read_csv
 
-    table = csv.read_csv(folder / CSV)
+    table = read_csv(folder / CSV)
     # Bytes of equal weight lie together: 12 MB in place of 20 for the ellipse, whose CSV has 45.
     split = {field.name: "BYTE_STREAM_SPLIT" for field in table.schema if types.is_floating(field.type)}
     with atomic_write(folder / PARQUET) as scratch:
@@ -244,7 +240,7 @@ def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[s
     path = folder / CSV
     try:
         with open(path, encoding="utf-8") as file:
-            names = _header(file.readline().rstrip("\n"))
+            names = next(csv.reader([file.readline().rstrip("\n")]))
             if "time" not in names:
                 raise InputError(f"'{path}' is not a log: it has no column 'time'")
             wanted = _wanted(names, columns, path)

@@ -122,7 +122,7 @@ def _group(system: System, output: str, input_: str, where: str) -> list[tuple[S
     """All pairs of output and input whose names agree in the place of *."""
     if output.count("*") != 1 or input_.count("*") != 1:
         raise InputError(f"{where}: a group needs exactly one * on each side")
-    head, tail = _around(output)
+    head, _, tail = output.partition("*")
     source = output.partition(".")[0]
     target = input_.partition(".")[0]
     for name in (source, target):
@@ -141,8 +141,3 @@ def _group(system: System, output: str, input_: str, where: str) -> list[tuple[S
             if other is not None and other.causality == "input":
                 pairs.append((Signal(source, variable), Signal(target, other)))
     return pairs
-
-
-def _around(pattern: str) -> tuple[str, str]:
-    head, _, tail = pattern.partition("*")
-    return head, tail
