@@ -99,11 +99,7 @@ def _left_behind(system: System, target: Format) -> list[str]:
         f"the fault {type(fault).__name__.lower()} of {', '.join(fault.signals)}"
         for fault in system.scenario.faults
     ]
-    left += [
-        f"the isolation of {name}"
-        for name, entry in system.scenario.fmus.items()
-        if getattr(entry, "isolate", False)
-    ]
+    left += [f"the isolation of {name}" for name, entry in system.scenario.fmus.items() if entry.isolate]
     for event in system.scenario.events:
         if not target.events or event.action == "hold":
             left.append(

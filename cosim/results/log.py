@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -85,7 +86,9 @@ class LogWriter:
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
         self._identity = self._identify()
         try:
-            write_all(self._file, (",".join(_quoted(c) for c in columns) + "\n").encode())
+            header = StringIO()  # FMI allows commas in names, as in ``M[1,2]``, and even line breaks
+            csv.writer(header, lineterminator="\n").writerow(" ".join(c.split()) for c in columns)
+            write_all(self._file, header.getvalue().encode())
         except OSError:
             self._file.close()
             path.unlink(missing_ok=True)
@@ -197,12 +200,6 @@ def cut_to_rows(path: Path) -> int:
     if whole < read:
         os.truncate(path, whole)
     return max(0, lines - 1)
-
-
-def _quoted(name: str) -> str:
-    """A column name in CSV: FMI allows commas, as in ``M[1,2]``, and even line breaks."""
-    name = " ".join(name.split())
-    return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name
 
 
 def to_parquet(folder: Path) -> Path:

@@ -25,7 +25,6 @@ from .spread import driven
 # Time (n,) [s], duration [s], numbers from 0 to 1, time scale -> shares (n, 2) of thrust and rudder.
 OrderCourse = Callable[[np.ndarray, float, Sequence[float], float], np.ndarray]
 ORDERS: dict[str, OrderCourse] = {}
-HARD_OVER = np.radians(35.0)  # rad, largest rudder angle of usual trials (IMO MSC/Circ.1053)
 LEAST = 0.3  # 1, share of thrust under way: less hardly steers (chosen)
 order = partial(registered, ORDERS)
 
@@ -126,7 +125,8 @@ class Orders:
         else:
             angle = np.array([u == "rad" for u in ship.commands.values()])
             low, high = np.array(ship.layout.limits(params)).T
-            steer = np.minimum(np.minimum(high, -low), HARD_OVER)
+            # At most the largest rudder angle of usual trials (IMO MSC/Circ.1053).
+            steer = np.minimum(np.minimum(high, -low), np.radians(35.0))
             found = cls(
                 ship.layout.commands,
                 np.where(angle, 0.0, np.maximum(-most, low)),
