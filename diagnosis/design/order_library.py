@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cosim import InputError
+from fmus.guidance.trial_order import HARD_OVER
 from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
@@ -125,8 +126,7 @@ class Orders:
         else:
             angle = np.array([u == "rad" for u in ship.commands.values()])
             low, high = np.array(ship.layout.limits(params)).T
-            # At most the largest rudder angle of usual trials (IMO MSC/Circ.1053).
-            steer = np.minimum(np.minimum(high, -low), np.radians(35.0))
+            steer = np.minimum(np.minimum(high, -low), HARD_OVER)
             found = cls(
                 ship.layout.commands,
                 np.where(angle, 0.0, np.maximum(-most, low)),
