@@ -1,5 +1,4 @@
-"""A document as a PDF in A4: head and verdict on page one, tables, figures with captions, page "
-"numbers."""
+"""A document as a PDF in A4: head and verdict on page one, tables, captioned figures, page numbers."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
