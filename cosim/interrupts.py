@@ -15,12 +15,13 @@ import os
 import signal
 import sys
 import time
+from contextlib import contextmanager
 
 from .process.run_state import HELD, REQUESTS, STATE
 
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from types import FrameType
     from typing import Any, ClassVar
 
@@ -28,12 +29,12 @@ __all__ = [
     "INTERRUPTED",
     "SIGNALS",
     "Held",
-    "UninterruptedProcesses",
     "ignore_interrupts",
     "leave_on_interrupt",
     "on_interrupt",
     "raise_if_interrupted",
     "raise_on_interrupt",
+    "uninterrupted_processes",
 ]
 
 INTERRUPTED = 130  # exit code: 128 + SIGINT, as shells have it
@@ -88,13 +89,15 @@ def on_interrupt(action: Callable[[], object]) -> dict[int, Any]:
             action()
 
     before = {number: signal.getsignal(number) for number in SIGNALS}
-    _install(dict.fromkeys(SIGNALS, handle))
+    restore(dict.fromkeys(SIGNALS, handle))
     return before
 
 
 def restore(handlers: Mapping[int, Any]) -> None:
-    """Have interrupts do again what they did."""
-    _install(handlers)
+    """Have interrupts handled so, but for those that are ignored, as nohup does."""
+    for number, handler in handlers.items():
+        if handler is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 def leave_on_interrupt() -> None:
@@ -201,19 +204,19 @@ class Held:
             self._outer._waiting += self._waiting
             self._outer.hold()
             return
-        _install(self._before)
+        restore(self._before)
         STATE.numbers[HELD] = self._was_held
         if not self._finished and error is None:
             self.act()
 
     def hold(self) -> None:
         """Interrupts wait."""
-        _install(dict.fromkeys(self._before, self._wait))
+        restore(dict.fromkeys(self._before, self._wait))
         STATE.numbers[HELD] = bool(self._before)
 
     def allow(self) -> None:
         """Interrupts act, those that waited at once."""
-        _install(self._acting)
+        restore(self._acting)
         STATE.numbers[HELD] = 0
         self.act()
 
@@ -232,22 +235,17 @@ class Held:
         self._waiting.append(number)
 
 
-def _install(handlers: Mapping[int, Any]) -> None:
-    for number, handler in handlers.items():
-        if handler is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, handler)
-
-
-class UninterruptedProcesses:
+@contextmanager
+def uninterrupted_processes() -> Iterator[None]:
     """Processes that are started inside never see SIGINT, which a terminal sends to all of a command.
 
     They inherit the mask of this thread. Windows has no such masks.
     """
-
-    def __enter__(self) -> None:
-        if hasattr(signal, "pthread_sigmask"):
-            self._mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if hasattr(signal, "pthread_sigmask"):
-            signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

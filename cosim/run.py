@@ -53,8 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             console.print(printable(text), markup=False)
 
     STATE.timeout = options.timeout
+    log = [] if options.log is None else [("log.signals", options.log)]
+    log += [("log.format", "parquet")] if options.parquet else []
     try:
-        scenario = _scenario(options)
+        scenario = chosen_scenario(options, *log)
         if options.ensemble is not None or options.posterior is not None:
             return _ensemble(scenario, options, console, show)
         with ExitStack() as shown:
@@ -85,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.verbose and result.loop:
         why = f": {result.loop_reason}" if result.loop_reason else ""
         show(f"note: the {result.loop} step loop ran{why}")
-    handlers = on_interrupt(_no_interrupt)  # the run has ended, and its log says how
+    handlers = on_interrupt(lambda: None)  # too late: the run has ended, and its log says how
     try:
         with suppress(BrokenPipeError):
             _report(result, options.quiet)
@@ -139,16 +141,6 @@ def _ensemble(
         output.print(spread(made))
         output.print(printable(f"{len(made)} members in {folder}"), soft_wrap=True)
     return 0
-
-
-def _scenario(options: argparse.Namespace) -> Scenario:
-    """The scenario with what the options change of it."""
-    log = [] if options.log is None else [("log.signals", options.log)]
-    return chosen_scenario(options, *log, *([("log.format", "parquet")] if options.parquet else []))
-
-
-def _no_interrupt() -> None:
-    """No-op: an interrupt comes too late."""
 
 
 @contextmanager

@@ -31,6 +31,7 @@ from cosim.fmu.isolation.channel import (
 )
 from cosim.fmu.isolation.confinement import Confinement
 from cosim.fmu.isolation.worker import Worker
+from cosim.process import spawned
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has these calls")
 
@@ -431,11 +432,12 @@ def test_what_a_system_has_of_what_is_asked_for(kernel, monkeypatch, means, vers
 
 
 def test_a_process_ends_with_its_parent(kernel, monkeypatch):
-    monkeypatch.setattr(confinement.sys, "platform", "linux")
-    confinement.die_with_parent()
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: kernel)
+    monkeypatch.setattr(spawned.sys, "platform", "linux")
+    spawned.die_with_parent()
     assert kernel.calls == [("prctl", 1, 9, 0, 0, 0)]
-    monkeypatch.setattr(confinement.sys, "platform", "darwin")
-    confinement.die_with_parent()
+    monkeypatch.setattr(spawned.sys, "platform", "darwin")
+    spawned.die_with_parent()
     assert len(kernel.calls) == 1
 
 

@@ -26,7 +26,7 @@ def log_of(rows=12, seed=0):
 
 
 def drawn(log, **more):
-    return DrawnRun("a", log, NONE, ROLES, **more)
+    return DrawnRun("a", log, NONE, RunOptions(roles=ROLES, **more))
 
 
 def data(panel, k=0):

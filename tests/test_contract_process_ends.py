@@ -10,6 +10,7 @@ import pytest
 from cosim.command import FAILED, INTERRUPTED
 from cosim.fmu.isolation import fork_server
 from cosim.fmu.isolation.confinement import Confinement
+from cosim.process import spawned
 from cosim.process.run_state import (
     CAMPAIGN,
     CODE,
@@ -68,7 +69,7 @@ def died(monkeypatch):
     [(0, "exit code 0"), (7, "exit code 7"), (-11, "signal 11, SIGSEGV"), (-999, "signal 999")],
 )
 def test_an_end_is_said_in_words(code, text):
-    assert post_mortem.ending(code) == text
+    assert spawned.ending(code) == text
 
 
 def test_a_process_that_died_is_named_with_the_call(died):

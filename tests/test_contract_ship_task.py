@@ -60,6 +60,7 @@ class Predictor:
             "start": {"x": line(-10.0), "r": line(1.0), "mass": line(1.0)},
         }  # fmt: skip
         self.processes = SimpleNamespace(inputs=["in.tau_X"])
+        self.given = SimpleNamespace(content=dict)
         self.fmu = SimpleNamespace(fixed_step=None)
         scale = SimpleNamespace(forces=np.array([10.0, 20.0, 30.0]))
         self.ship = SimpleNamespace(ship=SimpleNamespace(scale=scale))

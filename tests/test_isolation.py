@@ -16,7 +16,6 @@ from support.plain import GAIN
 from support.project import ROOT
 
 import cosim
-from cosim.fmu.isolation.isolated import _reason
 
 # A watching thread that dies would be told as a warning only.
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
@@ -324,11 +323,3 @@ def test_compiled_fmu_that_discards_is_done_again_in_its_process_too(tmp_path):
         assert cosim.simulate(cosim.load_scenario(content), tmp_path / "out").status == "done"
         logs.append((tmp_path / "out" / "log.csv").read_bytes())
     assert logs[0] == logs[1]
-
-
-@pytest.mark.parametrize(
-    ("code", "said"),
-    [(0, "exit code 0"), (3, "exit code 3"), (-9, "signal 9, SIGKILL"), (-99, "signal 99")],
-)
-def test_how_a_process_ended_is_told_in_words(code, said):
-    assert _reason(code) == said

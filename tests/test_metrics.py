@@ -374,7 +374,7 @@ class TestPlots:
     def test_lost_thrust_is_part_of_the_model_error(self):
         """(7.7): what was commanded and did not act is missing too; without its columns the hull's stays."""
         log = wild()
-        run = canvas.DrawnRun("a", log, {}, ROLES, None, None)
+        run = canvas.DrawnRun("a", log, {}, RunOptions(roles=ROLES))
         for axis, found in zip("XYN", lines.missing_force(run), strict=True):
             lost = log[f"thrusters.tau_act_{axis}"] - log[f"thrusters.tau_cmd_{axis}"]
             assert found == pytest.approx(log[f"vessel.omega_star_{axis}"] + lost)
@@ -435,7 +435,7 @@ class TestPlots:
             axis, (label, log) = "XYN"[k // 2], [*logs.items()][k % 2]
             true, estimate, *_ = panel.get_lines()
             assert true.get_ydata() == pytest.approx(
-                lines.missing_force(canvas.DrawnRun(label, log, {}, ROLES))[k // 2]
+                lines.missing_force(canvas.DrawnRun(label, log, {}, RunOptions(roles=ROLES)))[k // 2]
             )
             assert estimate.get_ydata() == pytest.approx(log[f"controller.omega_hat_{axis}"])
             assert (true.get_color(), estimate.get_color()) == ("black", ("blue", "green")[k % 2])
@@ -549,7 +549,7 @@ class TestPlots:
     def test_hull_points_where_the_ship_heads(self):
         log = {"time": np.array([0.0, 1.0]), "vessel.x": np.zeros(2), "vessel.y": np.zeros(2)}
         log["vessel.psi"] = np.full(2, np.pi / 2.0)
-        (east,) = track.outlines(canvas.DrawnRun("", log, {}, ROLES), ARROW, 0.5)
+        (east,) = track.outlines(canvas.DrawnRun("", log, {}, RunOptions(roles=ROLES)), ARROW, 0.5)
         assert east[0] == pytest.approx([1.0, 0.0])
         assert east[1, 1] < 0.0  # starboard of a ship to the east is south
 

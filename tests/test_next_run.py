@@ -376,7 +376,9 @@ def test_the_planned_motion_is_what_its_thrust_gives():
     from fmus.vessel import vessel
 
     basin, h, model = Basin((0.0, 9.0), (0.0, 9.0)), 0.01, Model()
-    motion = PlannedMotion.of([PlanStep("zigzag", (0.5,) * NUMBERS, 40.0, 0.4)], 40.0, h, REACH, basin)
+    motion = PlannedMotion.along(
+        poses([PlanStep("zigzag", (0.5,) * NUMBERS, 40.0, 0.4)], 40.0, h, REACH), h, basin
+    )
     tau = motion.thrust(model)
     s = vessel.State._make([*map(float, motion.eta[0]), 0.0, 0.0, 0.0, 0.0])
     for row in tau[:1000]:

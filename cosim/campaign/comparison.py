@@ -42,16 +42,16 @@ def interval(values: Sequence[float]) -> MeanInterval:
     return MeanInterval(float(x.mean()), half)
 
 
-def _demand_axis(axis: str, axes: Sequence[str]) -> None:
+def _demand_axis(axis: str, axes: Sequence[str], where: str = "") -> None:
     if axis not in axes:
-        raise InputError(f"no axis '{axis}'{nearest(axis, axes)}")
+        raise InputError(f"{where}no axis '{axis}'{nearest(axis, axes)}")
 
 
-def _demand_metrics(metrics: Iterable[str]) -> None:
+def _demand_metrics(metrics: Iterable[str], where: str = "") -> None:
     names = [metric.name for metric in EVERY]
     for metric in metrics:
         if metric not in names:
-            raise InputError(f"no metric '{metric}'{nearest(metric, names)}")
+            raise InputError(f"{where}no metric '{metric}'{nearest(metric, names)}")
 
 
 def _blocks(every: Sequence[Case], axis: str) -> list[dict[str, Case]]:
@@ -114,12 +114,8 @@ class StopRule:
                 f"'{text}' is not a rule: it takes the form 'axis metric width', as in 'K e_pos_rms 2%'"
             )
         self.axis, self.metric, width = words
-        axes = list(cases[0].shown)
-        if self.axis not in axes:
-            raise InputError(f"'{text}': no axis '{self.axis}'{nearest(self.axis, axes)}")
-        names = [metric.name for metric in EVERY]
-        if self.metric not in names:
-            raise InputError(f"'{text}': no metric '{self.metric}'{nearest(self.metric, names)}")
+        _demand_axis(self.axis, list(cases[0].shown), f"'{text}': ")
+        _demand_metrics([self.metric], f"'{text}': ")
         self.relative = width.endswith("%")
         try:
             self.width = float(width.removesuffix("%")) / (100.0 if self.relative else 1.0)

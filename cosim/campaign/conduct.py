@@ -8,7 +8,7 @@ import platform
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.util import find_spec
@@ -327,24 +327,21 @@ class _Work:
         ]
 
 
-class _only_one:  # noqa: N801 - used as a function
+@contextmanager
+def _only_one(folder: Path) -> Iterator[None]:
     """A folder in which no other campaign runs."""
-
-    def __init__(self, folder: Path) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = FileLock(folder / LOCK, timeout=0)
-            self._lock.acquire()
-        except Timeout:
-            raise InputError(f"another campaign runs in '{folder}'") from None
-        except OSError as error:
-            raise InputError(not_written(folder, error)) from None
-
-    def __enter__(self) -> None:
-        """Held since it was made."""
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
+    lock = FileLock(folder / LOCK, timeout=0)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock.acquire()
+    except Timeout:
+        raise InputError(f"another campaign runs in '{folder}'") from None
+    except OSError as error:
+        raise InputError(not_written(folder, error)) from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 @cache

@@ -1,6 +1,6 @@
 """The values of every axis in every run: grids, lists, Latin hypercubes and Sobol sequences."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import product
 from math import prod
 from statistics import NormalDist
@@ -37,19 +37,20 @@ def cases(campaign: Campaign) -> list[Case]:
         InputError: too many.
     """
     axes = campaign.axes
-    if campaign.design == "grid":
-        count = prod(len(axis.values or ()) for axis in axes.values())
-        chosen = (dict(zip(axes, row, strict=True)) for row in product(*map(_choices, axes.values())))
-    elif campaign.design == "list":
+    if campaign.design == "list":
         count = len(next(iter(axes.values())).values or ())
-        chosen = (
-            dict(zip(axes, row, strict=True)) for row in zip(*map(_choices, axes.values()), strict=True)
-        )
-    else:
-        crossed = {name: axis for name, axis in axes.items() if axis.cross}
-        size = campaign.design.latin if isinstance(campaign.design, Latin) else campaign.design.sobol
+        rows = zip(*map(_choices, axes.values()), strict=True)
+        chosen = (dict(zip(axes, row, strict=True)) for row in rows)
+    else:  # a grid is crossed as a whole, a sample is drawn
+        design = campaign.design
+        crossed = {name: axis for name, axis in axes.items() if axis.cross or design == "grid"}
+        size = 1 if design == "grid" else design.latin if isinstance(design, Latin) else design.sobol
         count = size * prod(len(axis.values or ()) for axis in crossed.values())
-        chosen = _crossed(_samples(campaign, size), crossed)
+        chosen = (
+            sample | dict(zip(crossed, row, strict=True))
+            for sample in ([{}] if design == "grid" else _samples(campaign, size))
+            for row in product(*map(_choices, crossed.values()))
+        )
     if count > MOST_RUNS:
         raise InputError(f"{count} runs are more than {MOST_RUNS}")
     return [
@@ -62,14 +63,6 @@ def _choices(axis: CampaignAxis) -> list[tuple[Any, Any]]:
     """The values of an axis, each with what the table shows of it."""
     values = axis.values or []
     return list(zip(values, axis.labels or values, strict=True))
-
-
-def _crossed(
-    samples: Iterator[dict[str, Any]], crossed: Mapping[str, CampaignAxis]
-) -> Iterator[dict[str, Any]]:
-    for sample in samples:
-        for row in product(*map(_choices, crossed.values())):
-            yield sample | dict(zip(crossed, row, strict=True))
 
 
 def _samples(campaign: Campaign, size: int) -> Iterator[dict[str, tuple[Any, Any]]]:

@@ -24,7 +24,7 @@ from ..system.preparation import prepare
 from ..trials.measures import EVERY
 from .conduct import Progress, demand_packages, run_campaign
 from .posterior import Posterior, read_posterior
-from .run_table import DIGITS, LOGS
+from .run_table import log_folder
 
 if TYPE_CHECKING:
     import pandas
@@ -110,9 +110,7 @@ def run_ensemble(
     done = table.query("status == 'done'")
     if not len(done):
         raise SimulationError(f"every member failed: {table['message'].iloc[0]}")
-    logs = [
-        read_log(folder / LOGS / name[:DIGITS], scenario.roles.pose) for name in done["hash"].tolist()
-    ]
+    logs = [read_log(log_folder(folder, name), scenario.roles.pose) for name in done["hash"].tolist()]
     poses = np.array([[log[name] for name in scenario.roles.pose] for log in logs])
     poses[:, 2] = np.unwrap(poses[:, 2])
     found = bands(logs[0]["time"], poses)

@@ -22,17 +22,13 @@ def shown_progress(console: Console, quiet: bool) -> Iterator[Told]:
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
     )  # fmt: skip
     with Progress(*columns, console=console, transient=True) as bar:
-        yield _on(bar)
+        task = bar.add_task("runs", total=None)
 
+        def progress(ended: int, failed: int, of: int) -> None:
+            said = f"runs ({failed} failed)" if failed else "runs"
+            bar.update(task, completed=ended, total=of, description=said)
 
-def _on(bar: Progress) -> Told:
-    task = bar.add_task("runs", total=None)
-
-    def progress(ended: int, failed: int, of: int) -> None:
-        said = f"runs ({failed} failed)" if failed else "runs"
-        bar.update(task, completed=ended, total=of, description=said)
-
-    return progress
+        yield progress
 
 
 def _lines(console: Console, quiet: bool) -> Told:

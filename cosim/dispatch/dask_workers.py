@@ -27,7 +27,7 @@ from distributed.deploy.spec import close_clusters
 from cybership.scratch_folder import Scratch
 
 from ..errors import InputError, SimulationError
-from ..interrupts import UninterruptedProcesses
+from ..interrupts import uninterrupted_processes
 from ..process.run_state import STATE
 from ..process.spawned import without_program
 from .dask_task import OneFile, Request, run_on_worker
@@ -101,7 +101,7 @@ class DaskWorkers:
                 self._program.enter_context(without_program())  # also for workers that start again
                 folder = str(self._scratch.path)
                 # A Ctrl-C is for this process alone; the workers end with it.
-                with UninterruptedProcesses(), settings({**LIGHT, "temporary-directory": folder}):
+                with uninterrupted_processes(), settings({**LIGHT, "temporary-directory": folder}):
                     self._cluster = LocalCluster(
                         n_workers=workers or os.cpu_count() or 1,
                         threads_per_worker=1,  # FMUs of one process cannot run side by side

@@ -6,11 +6,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from ..conversion import SAME
 from ..formats.elements import type_name, value_text, write_document
 from ..formats.groups import osp_model_description
 from ..formats.namespaces import OSP_SCENARIOS, OSP_SPACE, OSP_STRUCTURE
 from ..system.system import System
-from .portable import ExportedInstance, converts
+from .portable import ExportedInstance
 
 
 def write_osp(system: System, parts: Sequence[ExportedInstance], folder: Path) -> list[str]:
@@ -66,10 +67,10 @@ def _structure(system: System, parts: Sequence[ExportedInstance]) -> Element:
             for v, value in part.values:
                 entry = SubElement(initial, "InitialValue", variable=v.name)
                 SubElement(entry, type_name(v), value=value_text(v, value))
-    if any(converts(c) for c in system.connections):
+    if any(c.conversion != SAME for c in system.connections):
         functions = SubElement(root, "Functions")
         for k, c in enumerate(system.connections):
-            if converts(c):
+            if c.conversion != SAME:
                 SubElement(
                     functions,
                     "LinearTransformation",
@@ -85,13 +86,13 @@ def _structure(system: System, parts: Sequence[ExportedInstance]) -> Element:
 def _connections(system: System) -> Element:
     listed = Element("Connections")
     for c in system.connections:
-        if not converts(c):
+        if c.conversion == SAME:
             wire = SubElement(listed, "VariableConnection")
             for end in (c.source, c.target):
                 SubElement(wire, "Variable", simulator=end.instance, name=end.variable.name)
     # Older schemas want plain connections first.
     for k, c in enumerate(system.connections):
-        if converts(c):
+        if c.conversion != SAME:
             for end, signal in ((c.source, "in"), (c.target, "out")):
                 wire = SubElement(listed, "SignalConnection")
                 SubElement(wire, "Variable", simulator=end.instance, name=end.variable.name)

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..conversion import SAME
 from ..errors import InputError
 from ..files import file_stems
 from ..fmu.fmu_model import FmuModel, FmuVariable, Value
 from ..formats.elements import parameter_set, write_document
 from ..system.own_fmus import builder_options, run_builder
-from ..system.system import Connection, System
+from ..system.system import System
 
 # Characters that XML 1.0 cannot hold, not even as a reference (section 2.2).
 NOT_XML = re.compile(r"[^\t\n\r\x20-\uD7FF\uE000-\uFFFD\U00010000-\U0010FFFF]")
@@ -98,11 +99,7 @@ def _left_behind(system: System, target: Format) -> list[str]:
         f"the fault {type(fault).__name__.lower()} of {', '.join(fault.signals)}"
         for fault in system.scenario.faults
     ]
-    left += [
-        f"the isolation of {name}"
-        for name, entry in system.scenario.fmus.items()
-        if getattr(entry, "isolate", False)
-    ]
+    left += [f"the isolation of {name}" for name, entry in system.scenario.fmus.items() if entry.isolate]
     for event in system.scenario.events:
         if not target.events or event.action == "hold":
             left.append(
@@ -129,7 +126,7 @@ def _check_shape(system: System, target: Format) -> None:
                 f"{ends}: {kinds[0]} to {kinds[1]}: other tools connect Real, Integer and Boolean "
                 "to the same type only"
             )
-        if converts(c) and not target.conversions:
+        if c.conversion != SAME and not target.conversions:
             units = [v.unit.name if v.unit else "" for v in (c.source.variable, c.target.variable)]
             what = (
                 f"transform values: transformations.{c.target.name}"
@@ -147,11 +144,6 @@ def _check_texts(system: System) -> None:
     for where, text in texts.items():
         if wrong := NOT_XML.search(text):
             raise InputError(f"{where}: XML cannot hold the character {wrong[0]!r} in {text[:100]!r}")
-
-
-def converts(connection: Connection) -> bool:
-    """Whether a connection changes values."""
-    return (connection.conversion.factor, connection.conversion.offset) != (1.0, 0.0)
 
 
 def pack(system: System, folder: Path) -> tuple[list[ExportedInstance], list[str]]:

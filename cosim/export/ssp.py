@@ -13,8 +13,6 @@ from ..formats.namespaces import FMU_TYPE, OSP_ANNOTATION, SSP_RESOURCES, SSP_SP
 from ..system.system import Signal, System
 from .portable import ExportedInstance
 
-# A fixed date makes archives repeatable; this is the earliest that zip files can hold.
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 SET_NAME = "start"
 
 
@@ -31,13 +29,13 @@ def write_ssp(system: System, parts: Sequence[ExportedInstance], folder: Path, a
     files = {SSP_STRUCTURE: SSP_STRUCTURE} | {
         part.file: f"{SSP_RESOURCES}/{part.file}" for part in parts
     }
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as target:
+    with zipfile.ZipFile(archive, "w") as target:
         for file, inside in files.items():
-            info = zipfile.ZipInfo(inside, ZIP_DATE)
-            # FMUs are compressed already.
-            info.compress_type = zipfile.ZIP_DEFLATED if file == SSP_STRUCTURE else zipfile.ZIP_STORED
+            info = zipfile.ZipInfo(inside)  # of the earliest date that there is, so that archives repeat
             info.external_attr = 0o644 << 16
-            target.writestr(info, (folder / file).read_bytes())
+            # FMUs are compressed already.
+            how = zipfile.ZIP_DEFLATED if file == SSP_STRUCTURE else zipfile.ZIP_STORED
+            target.writestr(info, (folder / file).read_bytes(), how)
 
 
 def _structure(system: System, parts: Sequence[ExportedInstance]) -> Element:

@@ -13,7 +13,7 @@ from .component import DISCARD, FmuComponent
 from .fmu_model import INT_LIMIT
 from .instance import Access, DirectCalls, DirectTransfer
 from .memory import DoubleMemory, Port
-from .stepping import Steps, redoing_steps, single_steps
+from .stepping import redoing_steps, single_steps
 
 _SETTERS = {
     "Real": ("fmi2SetReal", "fmi2GetReal", ctypes.c_double),
@@ -91,23 +91,6 @@ class Transfer:
         return status
 
 
-def _direct(
-    component: FmuComponent, sets: Sequence[Transfer], gets: Sequence[Transfer], steps: Steps
-) -> DirectCalls:
-    return DirectCalls(
-        component.pointer,
-        component.is_python,
-        component.address("fmi2DoStep"),
-        component.address("fmi2GetFMUstate") if steps.saves else None,
-        ctypes.addressof(component.saved_state),
-        [transfer.direct for transfer in sets],
-        [transfer.direct for transfer in gets],
-        steps.settle,
-        component.check,
-        [component, *sets, *gets],
-    )
-
-
 def bind(
     component: FmuComponent,
     inputs: Sequence[Port],
@@ -147,7 +130,19 @@ def bind(
             if (status := function(*arguments)) >= DISCARD:
                 check("getting its outputs", status)
 
-    return Access(put, get, step, direct=_direct(component, set_transfers, get_transfers, steps))
+    direct = DirectCalls(
+        component.pointer,
+        component.is_python,
+        component.address("fmi2DoStep"),
+        component.address("fmi2GetFMUstate") if steps.saves else None,
+        ctypes.addressof(component.saved_state),
+        [transfer.direct for transfer in set_transfers],
+        [transfer.direct for transfer in get_transfers],
+        steps.settle,
+        check,
+        [component, *set_transfers, *get_transfers],
+    )
+    return Access(put, get, step, direct=direct)
 
 
 def _transfers(

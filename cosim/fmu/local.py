@@ -1,6 +1,7 @@
 """An FMU that runs in this process."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from fmpy.fmi1 import FMICallException
 
@@ -11,6 +12,14 @@ from .component import ERROR, FmuComponent
 from .fmu_model import FmuModel, FmuVariable, Value
 from .instance import Access, OnMessage
 from .memory import DoubleMemory, Port
+
+# Type of a variable -> how FMPy calls it, and what makes a value of it; an Enumeration is an Integer.
+KINDS: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
+    "Real": ("Real", float),
+    "Integer": ("Integer", int),
+    "Boolean": ("Boolean", bool),
+    "String": ("String", str),
+}
 
 
 class LocalInstance:
@@ -63,32 +72,16 @@ class LocalInstance:
         )
 
     def set_value(self, variable: FmuVariable, value: Value) -> None:
-        def action() -> None:
-            references = [variable.reference]
-            if variable.type == "Real":
-                self._slave.setReal(references, [float(value)])
-            elif variable.type == "Boolean":
-                self._slave.setBoolean(references, [bool(value)])
-            elif variable.type == "String":
-                self._slave.setString(references, [str(value)])
-            else:
-                self._slave.setInteger(references, [int(value)])
-
-        self._call(f"setting {variable.name} = {value}", action)
+        kind, convert = KINDS.get(variable.type, KINDS["Integer"])
+        put = getattr(self._slave, f"set{kind}")
+        self._call(
+            f"setting {variable.name} = {value}", lambda: put([variable.reference], [convert(value)])
+        )
 
     def get_value(self, variable: FmuVariable) -> float:
-        references = [variable.reference]
         values: list[float] = []
-
-        def action() -> None:
-            if variable.type == "Real":
-                values.extend(self._slave.getReal(references))
-            elif variable.type == "Boolean":
-                values.extend(self._slave.getBoolean(references))
-            else:
-                values.extend(self._slave.getInteger(references))
-
-        self._call(f"getting {variable.name}", action)
+        get = getattr(self._slave, f"get{KINDS.get(variable.type, KINDS['Integer'])[0]}")
+        self._call(f"getting {variable.name}", lambda: values.extend(get([variable.reference])))
         return float(values[0])
 
     def directional_derivative(self, unknown: Sequence[int], known: int) -> list[float]:

@@ -62,7 +62,8 @@ class Master:
         self.table = ValueTable(system.signals, system.order, settable)
         try:
             for name in system.order:
-                self._instances[name] = self._instantiate(name)
+                model, entry = system.models[name], system.scenario.fmus[name]
+                self._instances[name] = self._pool.take(name, model, entry, self.messages.add)
                 self._leave_if_interrupted()
             self.steppers = [
                 Stepper(system, k, self._instances[name], self.table, settable)
@@ -74,10 +75,6 @@ class Master:
         except BaseException:
             self.close()
             raise
-
-    def _instantiate(self, name: str) -> Instance:
-        model, entry = self.system.models[name], self.system.scenario.fmus[name]
-        return self._pool.take(name, model, entry, self.messages.add)
 
     def _leave_if_interrupted(self) -> None:
         if self._interrupted():

@@ -13,6 +13,9 @@ class Changes:
     Args:
         values: the table.
         effects: act on these signals in this order; the changes are appended when the first one begins.
+
+    Attributes:
+        operations: what they do until the next event.
     """
 
     def __init__(self, values: memoryview[float], effects: list[Effect]) -> None:
@@ -20,16 +23,12 @@ class Changes:
         self._effects = effects
         self._fixed: dict[int, float] = {}
         self._added: dict[int, float] = {}
-        self._operations: list[Operation] = []
+        self.operations: list[Operation] = []
 
     def __call__(self, values: Values, t: float) -> None:
         """Act on the values of time t [s]."""
-        for operation in self._operations:
+        for operation in self.operations:
             operation(values, t)
-
-    def operations(self) -> list[Operation]:
-        """What they do until the next event."""
-        return self._operations
 
     def begin(self, slot: int, event: Event) -> None:
         """An event begins."""
@@ -43,7 +42,7 @@ class Changes:
         else:
             held = self._values[slot] if event.action == "hold" else float(event.value or 0.0)
             self._fixed[slot] = held
-        self._operations = [
+        self.operations = [
             Add([*self._added], [*self._added.values()]),
             Replace([*self._fixed], [*self._fixed.values()]),
         ]

@@ -1,16 +1,7 @@
 """Log messages of FMUs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-
-
-@dataclass
-class Message:
-    """A log message of an FMU."""
-
-    instance: str
-    status: int
-    text: str
+from typing import Any
 
 
 class Messages:
@@ -18,13 +9,16 @@ class Messages:
 
     Args:
         show: receives each as a line for the user.
+
+    Attributes:
+        kept: each as log.json has it.
     """
 
     KEEP = 200  # messages; chosen: more would fill log.json and the terminal
 
     def __init__(self, show: Callable[[str], None]) -> None:
         self.count = 0
-        self.kept: list[Message] = []
+        self.kept: list[dict[str, Any]] = []
         self._show = show
 
     def add(self, instance: str, status: int, text: str) -> None:
@@ -32,7 +26,7 @@ class Messages:
             return
         self.count += 1
         if self.count <= self.KEEP:
-            self.kept.append(Message(instance, status, text))
+            self.kept.append({"instance": instance, "status": status, "text": text})
             self._show(f"{instance}: {text}")
         elif self.count == self.KEEP + 1:
             self._show(f"FMUs logged more than {self.KEEP} messages; the rest is not shown")

@@ -236,9 +236,7 @@ def _record(
             told["loop_reason"] = result.loop_reason
         if pace is not None:
             result.pace = told["realtime"] = pace.summary()
-        told["messages"] = [
-            {"instance": m.instance, "status": m.status, "text": m.text} for m in master.messages.kept
-        ]
+        told["messages"] = master.messages.kept
         if result.message:
             told["message"] = result.message
         told["status"] = result.status

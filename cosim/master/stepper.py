@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ..conversion import SAME
 from ..fmu.instance import Instance
 from ..fmu.memory import Port
 from ..scenario.faults import Effect
@@ -144,13 +145,9 @@ def _transfers(
     connections: Sequence[Connection], table: ValueTable
 ) -> tuple[list[tuple[int, int, int]], Convert | None]:
     """Connections as copies (first target, first source, how many), and those between units."""
-    converted: list[Connection] = []
-    plain: list[tuple[int, int]] = []
-    for c in connections:
-        if (c.conversion.factor, c.conversion.offset) == (1.0, 0.0):
-            plain.append((table.slots[c.target.name], table.slots[c.source.name]))
-        else:
-            converted.append(c)
+    converted = [c for c in connections if c.conversion != SAME]
+    same = (c for c in connections if c.conversion == SAME)
+    plain = sorted((table.slots[c.target.name], table.slots[c.source.name]) for c in same)
     copies: list[tuple[int, int, int]] = []
     block: list[tuple[int, int]] = []
 
@@ -161,7 +158,7 @@ def _transfers(
             copies.append((*block[0], len(block)))
         block.clear()
 
-    for target, source in sorted(plain):
+    for target, source in plain:
         if block and (target, source) != (block[-1][0] + 1, block[-1][1] + 1):
             finish()
         block.append((target, source))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.machinery import ModuleSpec
 
 TYPE_CHECKING = False  # typing itself takes a while to import
@@ -15,18 +15,28 @@ if TYPE_CHECKING:
 PR_SET_PDEATHSIG = 1  # of Linux' prctl(2)
 
 
-def end_with_parent(parent: int) -> None:
-    """Have this process end when the one that has started it is killed (on Linux).
-
-    Args:
-        parent: that process, which may have ended before.
-    """
+def die_with_parent() -> None:
+    """Have this process killed when the one that has made it ends (on Linux)."""
     if sys.platform == "linux":
         import ctypes
 
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-        if os.getppid() != parent:
-            os._exit(1)
+
+
+def end_with_parent(parent: int) -> None:
+    """The same, also where that process has ended before."""
+    die_with_parent()
+    if sys.platform == "linux" and os.getppid() != parent:
+        os._exit(1)
+
+
+def ending(code: int) -> str:
+    """How a process ended, as text, by its exit code; negative for a signal, as subprocess has it."""
+    if code >= 0:
+        return f"exit code {code}"
+    with suppress(ValueError):
+        return f"signal {-code}, {signal.Signals(-code).name}"
+    return f"signal {-code}"
 
 
 def mute_started_processes() -> None:

@@ -6,7 +6,7 @@ no global state.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -16,14 +16,11 @@ from cybership.scratch_folder import atomic_write
 
 from ..errors import InputError
 from .log import Log
-from .run_options import NO_COMMANDS
+from .run_options import RunOptions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from ..formats.outline import AnnotatedOutline, CommandLimit
-    from ..scenario.roles import Roles
 
 DPI = 120  # chosen
 MOST_PIXELS = 10_000  # of a picture in each direction, chosen: 0.4 GB of memory
@@ -45,20 +42,13 @@ class DrawnRun(NamedTuple):
         label: in legends.
         log: the columns that the picture needs, without rows that cannot be drawn.
         line: matplotlib's properties of its lines.
-        roles: names of the columns.
-        start, stop: the part of the run that metrics cover [s]; None is unbounded.
-        outline: of the ship; None draws none.
-        commands: column of each command of an actuator, and its limit.
+        told: its columns, the part that metrics cover, and its ship, as far as these are known.
     """
 
     label: str
     log: Log
     line: dict[str, Any]
-    roles: Roles
-    start: float | None = None
-    stop: float | None = None
-    outline: AnnotatedOutline | None = None
-    commands: Mapping[str, CommandLimit] = NO_COMMANDS
+    told: RunOptions
 
 
 Runs = Sequence[DrawnRun]

@@ -112,8 +112,7 @@ def figures(
             part = _usable(log, picture.choices, own)
             if part is not None:
                 named = label.replace("$", r"\$")
-                shown = (own.start, own.stop, own.outline, own.commands)
-                able.append(DrawnRun(named, part, _line(k), own.roles, *shown))
+                able.append(DrawnRun(named, part, _line(k), own))
         if not able:
             continue
         try:
@@ -125,14 +124,9 @@ def figures(
 
 def _line(k: int) -> dict[str, Any]:
     """Properties of the lines of the k-th run."""
-    if k < len(LINES):
-        color, style = LINES[k]
-        return {"color": color, "linestyle": style, "linewidth": 1.2}
-    return {
-        "color": MORE_COLORS[(k - len(LINES)) % len(MORE_COLORS)],
-        "linestyle": "-",
-        "linewidth": 1.2,
-    }
+    more = k - len(LINES)
+    color, style = LINES[k] if more < 0 else (MORE_COLORS[more % len(MORE_COLORS)], "-")
+    return {"color": color, "linestyle": style, "linewidth": 1.2}
 
 
 def _usable(log: Log, choices: Sequence[Sequence[str]], own: RunOptions) -> Log | None:

@@ -1,11 +1,13 @@
 """The log of a run: written during the run, so that the file is readable whatever ends the run."""
 
+import csv
 import errno
 import os
 import re
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -84,7 +86,9 @@ class LogWriter:
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
         self._identity = self._identify()
         try:
-            write_all(self._file, (",".join(_quoted(c) for c in columns) + "\n").encode())
+            header = StringIO()  # FMI allows commas in names, as in ``M[1,2]``, and even line breaks
+            csv.writer(header, lineterminator="\n").writerow(" ".join(c.split()) for c in columns)
+            write_all(self._file, header.getvalue().encode())
         except OSError:
             self._file.close()
             path.unlink(missing_ok=True)
@@ -198,23 +202,12 @@ def cut_to_rows(path: Path) -> int:
     return max(0, lines - 1)
 
 
-def _quoted(name: str) -> str:
-    """A column name in CSV: FMI allows commas, as in ``M[1,2]``, and even line breaks."""
-    name = " ".join(name.split())
-    return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name
-
-
-def _header(line: str) -> list[str]:
-    import csv
-
-    return next(csv.reader([line]))
-
-
 def to_parquet(folder: Path) -> Path:
     """Replace the CSV log of a folder by Parquet; the CSV is removed when the new file is complete."""
-    from pyarrow import csv, parquet, types
+    from pyarrow import parquet, types
+    from pyarrow.csv import read_csv
 
-    table = csv.read_csv(folder / CSV)
+    table = read_csv(folder / CSV)
     # Bytes of equal weight lie together: 12 MB in place of 20 for the ellipse, whose CSV has 45.
     split = {field.name: "BYTE_STREAM_SPLIT" for field in table.schema if types.is_floating(field.type)}
     with atomic_write(folder / PARQUET) as scratch:
@@ -244,7 +237,7 @@ def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[s
     path = folder / CSV
     try:
         with open(path, encoding="utf-8") as file:
-            names = _header(file.readline().rstrip("\n"))
+            names = next(csv.reader([file.readline().rstrip("\n")]))
             if "time" not in names:
                 raise InputError(f"'{path}' is not a log: it has no column 'time'")
             wanted = _wanted(names, columns, path)

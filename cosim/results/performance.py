@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.table import Table
 
+from ..scenario.plans import TIME_TOLERANCE
 from ..scenario.roles import DEFAULT_ROLES, Roles
 from .log import Log
 
@@ -41,9 +42,6 @@ METRICS = (
 )
 # Where the scenario states the role power.
 ENERGY = Metric("energy", "J", "energy of the actuators: integral of their power")
-
-# Rounding that the ends of a window may have [s]; steps are at least 1e-6 s.
-WINDOW_TOLERANCE = 1e-9
 
 
 class MetricsError(Exception):
@@ -101,7 +99,7 @@ def _window(log: Log, start: float | None, stop: float | None, roles: Roles) -> 
         raise MetricsError("the log has no rows")
     low = -np.inf if start is None else start
     high = np.inf if stop is None else stop
-    chosen = (time >= low - WINDOW_TOLERANCE) & (time <= high + WINDOW_TOLERANCE)
+    chosen = (time >= low - TIME_TOLERANCE) & (time <= high + TIME_TOLERANCE)
     if np.count_nonzero(chosen) < 2:
         raise MetricsError(
             f"fewer than two rows from {time[0] if start is None else start:g} s"

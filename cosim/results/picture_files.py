@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,20 +39,16 @@ class PictureOptions(NamedTuple):
         Raises:
             InputError: there is no such style.
         """
-        if self.style is None:
-            yield
-            return
-        from matplotlib import style
+        with ExitStack() as stack:
+            if self.style is not None:
+                from matplotlib import style
 
-        try:
-            chosen = style.context(self.style)
-            chosen.__enter__()
-        except OSError:
-            raise InputError(f"no style '{self.style}'{nearest(self.style, style.available)}") from None
-        try:
+                try:
+                    stack.enter_context(style.context(self.style))
+                except OSError:
+                    near = nearest(self.style, style.available)
+                    raise InputError(f"no style '{self.style}'{near}") from None
             yield
-        finally:
-            chosen.__exit__(None, None, None)
 
     def sized(self, figure: Figure) -> Figure:
         """The figure in another size, of the same shape.

@@ -95,7 +95,7 @@ def outlines(run: DrawnRun, outline: AnnotatedOutline, scale: float) -> np.ndarr
     rows = np.searchsorted(time, np.linspace(time[0], time[-1], OUTLINES)).clip(0, time.size - 1)
     drawn: list[np.ndarray] = []
     length = scale * outline.length
-    for pose in np.stack([run.log[name][rows] for name in run.roles.pose], axis=1):
+    for pose in np.stack([run.log[name][rows] for name in run.told.roles.pose], axis=1):
         if not any(np.all(np.abs(pose - other) < (length, length, 1.0)) for other in drawn):
             drawn.append(pose)
     return hulls(np.array(drawn), scale * np.array(outline.corners))
@@ -114,8 +114,8 @@ def trajectory(runs: Runs) -> "Figure":
     """
     from matplotlib.collections import PolyCollection
 
-    paths = [_path(run, run.roles.pose) for run in runs]
-    targets = [_path(run, run.roles.target) for run in runs if run.roles.target[0] in run.log]
+    paths = [_path(run, run.told.roles.pose) for run in runs]
+    targets = [_path(run, run.told.roles.target) for run in runs if run.told.roles.target[0] in run.log]
     norths, easts = zip(*paths, *targets, strict=True)
     (north, tall), (east, wide) = _limits(norths), _limits(easts)
     size = max(tall, wide, STILL)
@@ -139,14 +139,14 @@ def trajectory(runs: Runs) -> "Figure":
         ylim=(north - 0.5 * tall, north + 0.5 * tall),
         aspect="equal",
     )
-    longest = max((run.outline.length for run in runs if run.outline), default=0.0)
+    longest = max((run.told.outline.length for run in runs if run.told.outline), default=0.0)
     scale = next((s for s in SCALES if s * longest < OUTLINE_SHARE * size), SCALES[-1])
     for run, path in zip(runs, paths, strict=True):
         x, y = _along(*path, size / 1000.0)
         panel.plot(y, x, label=run.label, **{**run.line, "linewidth": 1.8})
-        if run.outline is not None:
+        if run.told.outline is not None:
             ships = PolyCollection(
-                list(outlines(run, run.outline, scale)),
+                list(outlines(run, run.told.outline, scale)),
                 facecolors=(run.line["color"], 0.15 / len(runs)),
                 edgecolors=run.line["color"],
                 linewidths=0.7,

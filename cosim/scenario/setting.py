@@ -81,9 +81,11 @@ def set_value(content: dict[str, Any], path: str, value: Any, folder: Path) -> N
         InputError: there is no such place.
     """
     place = place_of(content, path)
+    # Objects on the way to it that a file may leave out: where they are, and their key.
+    optional = {((), key) for key in OBJECTS} | {(("fmus", *place[1:2]), "parameters")}
     node: Any = content
     for depth, key in enumerate(place[:-1]):
-        if isinstance(node, dict) and (place[:depth], key) in _made_at_need(place):
+        if isinstance(node, dict) and (place[:depth], key) in optional:
             node = node.setdefault(key, {})
         else:
             node = node[_known(node, key, path)]
@@ -93,12 +95,6 @@ def set_value(content: dict[str, Any], path: str, value: Any, folder: Path) -> N
     elif not isinstance(node, dict):
         raise InputError(f"'{path}': '{place[-2]}' is a value, and has no member '{last}'")
     node[last] = _located(place, value, folder)
-
-
-def _made_at_need(place: tuple[str, ...]) -> set[tuple[tuple[str, ...], str]]:
-    """Objects on the way to a place that a file may leave out: where they are, and their key."""
-    parameters = {(place[:2], "parameters")} if place[0] == "fmus" else set()
-    return {((), key) for key in OBJECTS} | parameters
 
 
 def _known(node: Any, key: str, path: str) -> Any:

@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import signal
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,22 +14,10 @@ from ..errors import not_written
 from ..files import update_json, write_json
 from ..interrupts import ignore_interrupts
 from ..process.run_state import CAMPAIGN, DESCRIPTION, FOLDER, LATE, LOGGING, STATE, UNFINISHED
+from ..process.spawned import ending
 from ..results.log import CSV, SIDECAR, cut_to_rows
 from ..results.pending_rows import rescue
 from ..results.result_files import clear_results
-
-
-def ending(code: int) -> str:
-    """How a process ended, as text.
-
-    Args:
-        code: its exit code; negative for a signal, as subprocess has it.
-    """
-    if code >= 0:
-        return f"exit code {code}"
-    with suppress(ValueError):
-        return f"signal {-code}, {signal.Signals(-code).name}"
-    return f"signal {-code}"
 
 
 def report(code: int, interrupted: bool) -> int:

@@ -26,7 +26,7 @@ from ..process.spawned import end_with_parent
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import FrameType, TracebackType
+    from types import TracebackType
 
 # Two interrupts within this wall time [s] are one: ``timeout`` sends its signal to a process and to its
 # group. Chosen: longer than that takes, shorter than between two presses of a key.
@@ -52,7 +52,7 @@ def supervised() -> None:
     waited = (*asked, signal.SIGCHLD, signal.SIGALRM)
     signal.pthread_sigmask(signal.SIG_BLOCK, waited)
     for number in waited:
-        signal.signal(number, _no_action)  # what is ignored by default cannot be waited for
+        signal.signal(number, lambda *_: None)  # what is ignored by default cannot be waited for
     STATE.watched = True
     watching = os.getpid()
     child = os.fork()
@@ -82,10 +82,6 @@ def end_without_extra(
     complain(line)
     STATE.end(BAD_INPUT)
     raise SystemExit(BAD_INPUT)
-
-
-def _no_action(number: int, frame: FrameType | None) -> None:
-    """Handler that does nothing."""
 
 
 class _Supervisor:

@@ -90,13 +90,11 @@ class _PlantModel:
             elif estimate is None and name in changing:
                 yield v, self._base(name), [name]
             else:
-                yield v, self._sum(name), [name, ADDITION + name]
+                added = self._given.get(ADDITION + name, 0.0)
+                yield v, self._base(name) + added, [name, ADDITION + name]
 
     def _base(self, name: str) -> float:
         return self._given.get(name, float(self._plant[name].start or 0.0))
-
-    def _sum(self, name: str) -> float:
-        return self._base(name) + self._given.get(ADDITION + name, 0.0)
 
 
 def _coefficient(v: FmuVariable) -> bool:

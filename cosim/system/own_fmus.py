@@ -33,14 +33,9 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, FmuModel]:
             warnings.append(f"'{name}' next to the scenario is not used; './{name}' names that file")
         except InputError:
             paths[name] = scenario.folder / name
-    models: dict[Path, FmuModel] = {}
-    found: dict[str, FmuModel] = {}
-    for instance, entry in scenario.fmus.items():
-        path = paths.get(entry.path) or scenario.folder / entry.path
-        if path not in models:
-            models[path] = FmuModel(path)
-        found[instance] = models[path]
-    return found
+    every = {n: paths.get(e.path) or scenario.folder / e.path for n, e in scenario.fmus.items()}
+    models = {path: FmuModel(path) for path in dict.fromkeys(every.values())}
+    return {instance: models[path] for instance, path in every.items()}
 
 
 def _own_fmus(names: Sequence[str], scenario: Scenario, warnings: list[str]) -> dict[str, Path]:

@@ -2,11 +2,25 @@
 
 import csv
 import math
-from collections.abc import Collection, Mapping
-from contextlib import suppress
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError, nearest
+
+
+@contextmanager
+def opened_table(path: Path, what: str) -> Iterator[Any]:
+    """The reader of a CSV file; errors while it reads are told of the file, by ``what`` that is."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            yield csv.reader(file, skipinitialspace=True)
+    except FileNotFoundError:
+        near = [p.name for p in path.parent.glob("*.csv")]
+        raise InputError(f"no such {what}: '{path}'{nearest(path.name, near)}") from None
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"'{path}' cannot be read as a {what}: {error}") from None
 
 
 def read_table(path: Path) -> dict[str, list[float]]:
@@ -21,15 +35,8 @@ def read_table(path: Path) -> dict[str, list[float]]:
     Raises:
         InputError: missing, unreadable, a name twice, a cell that is no finite number, no rows.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, skipinitialspace=True)
-            lines = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
-    except FileNotFoundError:
-        near = [p.name for p in path.parent.glob("*.csv")]
-        raise InputError(f"no such table: '{path}'{nearest(path.name, near)}") from None
-    except (OSError, ValueError, csv.Error) as error:
-        raise InputError(f"'{path}' cannot be read as a table: {error}") from None
+    with opened_table(path, "table") as reader:
+        lines = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
     if len(lines) < 2:
         raise InputError(f"'{path}' needs a line of names and lines of numbers")
     names = [name.strip() for name in lines[0][1]]

@@ -1,6 +1,5 @@
 """Recordings: inputs that get their values from a file over time, in place of an FMU's output."""
 
-import csv
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
@@ -10,6 +9,7 @@ from pathlib import Path
 from ..errors import InputError, nearest
 from ..scenario.faults import Effect, Values
 from ..scenario.plans import TIME_TOLERANCE
+from .parameter_table import opened_table
 
 
 @dataclass(frozen=True)
@@ -69,27 +69,20 @@ def read_recording(
         InputError: missing, unreadable, a column missing or there twice, a cell that is
             no number, times not growing.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, skipinitialspace=True)
-            names = [name.strip() for name in next(reader, [])]
-            places = _places(names, ("time", *wanted), path)
-            time: list[float] = []
-            columns: dict[str, list[float | None]] = {name: [] for name in wanted}
-            for cells in reader:
-                if not cells:
-                    continue
-                if len(cells) != len(names):
-                    raise ValueError(f"line {reader.line_num} has {len(cells)} cells, not {len(names)}")
-                time.append(float(cells[places["time"]]))
-                for name, column in columns.items():
-                    cell = cells[places[name]]
-                    column.append(float(cell) if cell.strip() else None)
-    except FileNotFoundError:
-        near = [p.name for p in path.parent.glob("*.csv")] if path.parent.is_dir() else []
-        raise InputError(f"no such recording: '{path}'{nearest(path.name, near)}") from None
-    except (OSError, ValueError, csv.Error) as error:
-        raise InputError(f"'{path}' cannot be read as a recording: {error}") from None
+    with opened_table(path, "recording") as reader:
+        names = [name.strip() for name in next(reader, [])]
+        places = _places(names, ("time", *wanted), path)
+        time: list[float] = []
+        columns: dict[str, list[float | None]] = {name: [] for name in wanted}
+        for cells in reader:
+            if not cells:
+                continue
+            if len(cells) != len(names):
+                raise ValueError(f"line {reader.line_num} has {len(cells)} cells, not {len(names)}")
+            time.append(float(cells[places["time"]]))
+            for name, column in columns.items():
+                cell = cells[places[name]]
+                column.append(float(cell) if cell.strip() else None)
     if not time or not all(a < b for a, b in zip(time, [*time[1:], math.inf], strict=True)):
         raise InputError(f"'{path}' cannot be read as a recording: it needs rows with increasing time")
     return time, columns

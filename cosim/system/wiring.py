@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from cybership.message_text import name_of
 
 from ..conversion import SAME, Conversion, conversion
@@ -122,7 +124,7 @@ def _group(system: System, output: str, input_: str, where: str) -> list[tuple[S
     """All pairs of output and input whose names agree in the place of *."""
     if output.count("*") != 1 or input_.count("*") != 1:
         raise InputError(f"{where}: a group needs exactly one * on each side")
-    head, tail = _around(output)
+    shape = re.compile("(.*)".join(map(re.escape, output.split("*"))), re.DOTALL)
     source = output.partition(".")[0]
     target = input_.partition(".")[0]
     for name in (source, target):
@@ -131,18 +133,9 @@ def _group(system: System, output: str, input_: str, where: str) -> list[tuple[S
     pairs: list[tuple[Signal, Signal]] = []
     outputs = [v for v in system.models[source].variables.values() if v.causality == "output"]
     for variable in outputs:
-        name = f"{source}.{variable.name}"
-        if len(name) < len(head) + len(tail):
-            continue
-        if name.startswith(head) and name.endswith(tail):
-            middle = name[len(head) : len(name) - len(tail)]
-            partner = input_.replace("*", middle).partition(".")[2]
+        if named := shape.fullmatch(f"{source}.{variable.name}"):
+            partner = input_.replace("*", named[1]).partition(".")[2]
             other = system.models[target].variables.get(partner)
             if other is not None and other.causality == "input":
                 pairs.append((Signal(source, variable), Signal(target, other)))
     return pairs
-
-
-def _around(pattern: str) -> tuple[str, str]:
-    head, _, tail = pattern.partition("*")
-    return head, tail

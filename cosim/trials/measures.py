@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
 
 from ..errors import InputError, nearest
 from ..results.performance import ENERGY, METRICS, Metric
@@ -60,15 +59,8 @@ KINDS: Mapping[str, Callable[[Passage, float], dict[str, float]]] = {
 }
 # Angles of the zig-zags that the resolution has limits for, and how far one may be off [rad].
 TEN, TWENTY, OFF = math.radians(10.0), math.radians(20.0), math.radians(2.5)
-
-
-class TrialLimits(NamedTuple):
-    """Limits in ship's lengths, and of overshoots in degrees over L/V in seconds (MSC.137(76), 5.3)."""
-
-    advance: float = 4.5
-    tactical_diameter: float = 5.0
-    initial_turning: float = 2.5
-    track_reach: float = 15.0
+# Limits in ship's lengths (MSC.137(76), 5.3).
+LENGTHS = {"advance": 4.5, "tactical_diameter": 5.0, "initial_turning": 2.5, "track_reach": 15.0}
 
 
 def measure(trial: str, p: Passage, length: float) -> dict[str, float]:
@@ -99,12 +91,12 @@ def limits(found: Mapping[str, float], length: float) -> dict[str, float]:
         Name -> largest value, in the unit of the measure, for those with a limit. Those of a zig-zag are
         for 10/10 and 20/20.
     """
-    allowed = {n: share * length for n, share in TrialLimits()._asdict().items() if n in found}
+    allowed = {n: share * length for n, share in LENGTHS.items() if n in found}
     check, speed = found.get("check_angle", 0.0), found.get("approach_speed", 0.0)
     if abs(check - TEN) > OFF:
         allowed.pop("initial_turning", None)
     if abs(check - TEN) < OFF and speed > 0.0:
-        seconds = min(max(length / speed, 10.0), 30.0)
+        seconds = min(max(length / speed, 10.0), 30.0)  # L/V, over which limits of overshoots grow
         first, second = 5.0 + 0.5 * seconds, 17.5 + 0.75 * seconds
         allowed |= {"overshoot_1": math.radians(first), "overshoot_2": math.radians(second)}
     elif abs(check - TWENTY) < OFF:

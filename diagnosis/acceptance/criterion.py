@@ -213,17 +213,13 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     except OSError as error:
         raise InputError(f"no such {what}: '{path}' ({error.strerror})") from None
     content = read_model(path, Criteria, what, _special, renamed="criteria", raw=raw)
-    modified = datetime.fromtimestamp(changed).astimezone()
-    return ReadCriteria(content, str(path), sha256(raw).hexdigest(), _stamp(modified), now())
+    modified = datetime.fromtimestamp(changed).astimezone().isoformat(timespec="seconds")
+    return ReadCriteria(content, str(path), sha256(raw).hexdigest(), modified, now())
 
 
 def now() -> str:
     """The time of this computer with its offset, ISO 8601."""
-    return _stamp(datetime.now().astimezone())
-
-
-def _stamp(time: datetime) -> str:
-    return time.isoformat(timespec="seconds")
+    return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def _special(kind: str, location: Location, value: object) -> str:

@@ -229,14 +229,9 @@ def _why_nothing(c: Criterion, counts: WindowCounts) -> str:
     whys = {*counts.left_out.values()}
     if c.operating_range and any(why.startswith("no window") for why in whys):
         return f"outside the data: no window has {_limits(c)}"
-    return (
-        LEARNED_ONLY
-        if LEARNED in whys
-        else f"no run has a window of {c.horizon:g} s with enough samples"
-    )
-
-
-LEARNED_ONLY = "every run was used to learn the model (training_runs lets such runs count)"
+    if LEARNED in whys:
+        return "every run was used to learn the model (training_runs lets such runs count)"
+    return f"no run has a window of {c.horizon:g} s with enough samples"
 
 
 def _limits(c: Criterion) -> str:

@@ -32,6 +32,7 @@ from .manoeuvre_library import (
     PlanStep,
     Reach,
     UsualRuns,
+    poses,
     sequence,
     usual,
 )
@@ -197,7 +198,7 @@ class Designer:
             return self.orders.motions(plans, T, h, pace, self.model, self.basin)
         r = self.reach
         smaller = r._replace(speed=pace * r.speed, rate=pace * r.rate, room=room * r.room)
-        return [PlannedMotion.of(steps, T, h, smaller, self.basin) for steps in plans]
+        return [PlannedMotion.along(poses(steps, T, h, smaller), h, self.basin) for steps in plans]
 
     def scored(self, k: Knowledge, steps: Sequence[PlanStep]) -> ScoredPlan:
         """A plan, evaluated at the largest speeds at which it keeps the limits."""

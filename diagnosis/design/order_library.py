@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cosim import InputError
+from fmus.guidance.trial_order import HARD_OVER
 from fmus.ship import Ship
 
 from ..predictors import Model, WeakWindows
@@ -25,7 +26,6 @@ from .spread import driven
 # Time (n,) [s], duration [s], numbers from 0 to 1, time scale -> shares (n, 2) of thrust and rudder.
 OrderCourse = Callable[[np.ndarray, float, Sequence[float], float], np.ndarray]
 ORDERS: dict[str, OrderCourse] = {}
-HARD_OVER = np.radians(35.0)  # rad, largest rudder angle of usual trials (IMO MSC/Circ.1053)
 LEAST = 0.3  # 1, share of thrust under way: less hardly steers (chosen)
 order = partial(registered, ORDERS)
 

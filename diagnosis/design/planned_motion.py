@@ -1,6 +1,5 @@
 """The motion of a plan as a run that was never measured, and the thrust that it needs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from fmus.vessel import vessel
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.uncertainty import MEASURED
 from ..runs import Run, Smoothed
-from .manoeuvre_library import PlanStep, Reach, poses
 
 
 def usable_thrust() -> float:
@@ -66,13 +64,6 @@ class PlannedMotion:
     eta_dot: np.ndarray
     eta_ddot: np.ndarray
     orders: np.ndarray | None = None
-
-    @classmethod
-    def of(
-        cls, plan: Sequence[PlanStep], seconds: float, h: float, reach: Reach, basin: Basin
-    ) -> "PlannedMotion":
-        """The target of a plan every h [s], about the middle of the basin."""
-        return cls.along(poses(plan, seconds, h, reach), h, basin)
 
     @classmethod
     def along(

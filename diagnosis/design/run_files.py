@@ -53,7 +53,11 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
     table = np.column_stack([fine.time, fine.eta, *parts])
     header = ",".join(["time", *header])
     np.savetxt(folder / commands_file(number), table, "%.7g", delimiter=",", header=header, comments="")
-    content = _open_loop() if orders is not None else _closed_loop()
+    content = _without_guidance("ellipse" if orders is None else "kvlcc2_zigzag")
+    if orders is None:
+        content["roles"] = {"target": [f"controller.{n}" for n in TARGET[:3]]}
+    else:
+        content["fmus"]["thrusters"]["parameters"] = {}
     x, y, psi = map(float, fine.eta[0])
     noise = [float(s) for s in d.data[0].smoothed.noise]
     content["fmus"]["vessel"]["parameters"] = {"x_0": x, "y_0": y, "psi_0": psi}
@@ -71,23 +75,11 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
     write_json(folder / scenario_file(number), content)
 
 
-def _closed_loop() -> dict[str, Any]:
-    """A scenario in which a controller follows recorded set points."""
-    content = json.loads(find_scenario("ellipse").read_text(encoding="utf-8"))
+def _without_guidance(name: str) -> dict[str, Any]:
+    """A shipped scenario, to which a recording gives the set points or the orders."""
+    content = json.loads(find_scenario(name).read_text(encoding="utf-8"))
     del content["fmus"]["guidance"]
-    connections = [c for c in content["connections"] if not c[0].startswith("guidance.")]
-    return content | {
-        "connections": connections,
-        "roles": {"target": [f"controller.{n}" for n in TARGET[:3]]},
-    }
-
-
-def _open_loop() -> dict[str, Any]:
-    """A scenario in which the thrusters follow recorded orders."""
-    content = json.loads(find_scenario("kvlcc2_zigzag").read_text(encoding="utf-8"))
-    del content["fmus"]["guidance"]
-    content["fmus"]["thrusters"]["parameters"] = {}
-    kept = [c for c in content["connections"] if not any(name.startswith("guidance.") for name in c)]
+    kept = [c for c in content["connections"] if not any(end.startswith("guidance.") for end in c)]
     return content | {"connections": kept}
 
 

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
-from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
+from cosim.interrupts import ignore_interrupts, uninterrupted_processes
 from cosim.process import end_with_parent
 
 Item = TypeVar("Item")
@@ -91,7 +91,7 @@ def for_each(
 
     second = context.Process(target=beside, daemon=True)
     with one_thread():  # or each process would have a thread for each core
-        with UninterruptedProcesses():
+        with uninterrupted_processes():
             second.start()
         sender.close()
         try:

@@ -31,6 +31,8 @@ class CalibrationTask(ABC):
             function of.
         angles: numbers of the measured outputs that are angles [rad].
         lines: (2, m), gain and offset that make of an output what is measured; None: it is that.
+        content: the map, as JSON has it.
+        use: run -> train, validate or test.
     """
 
     names: Sequence[str]
@@ -40,6 +42,8 @@ class CalibrationTask(ABC):
     outputs: Sequence[str]
     angles: Sequence[int] = ()
     lines: np.ndarray | None = None
+    content: Mapping[str, Any]
+    use: Mapping[str, str]
 
     def __init__(self, parameters: list[CalibratedParameter], notes: list[str]) -> None:
         self.parameters, self.notes = parameters, notes
@@ -53,16 +57,6 @@ class CalibrationTask(ABC):
         Raises:
             InputError: there is no process for it.
         """
-
-    @property
-    @abstractmethod
-    def content(self) -> Mapping[str, Any]:
-        """The map, as JSON has it."""
-
-    @property
-    @abstractmethod
-    def use(self) -> dict[str, str]:
-        """Run -> train, validate or test."""
 
     @property
     @abstractmethod

@@ -66,12 +66,12 @@ class Window:
     onto: np.ndarray | None = None
 
 
-def read_runs(paths: Sequence[Path], wanted: Sequence[str] | None) -> list[MeasuredRun]:
+def read_runs(paths: Sequence[Path], wanted: Sequence[str]) -> list[MeasuredRun]:
     """Runs from tables, or from the folders of logs.
 
     Args:
         paths: of the runs.
-        wanted: columns that each must have; None: all that there are.
+        wanted: columns that each must have.
 
     Raises:
         InputError: a file cannot be read, or lacks a column.
@@ -99,10 +99,10 @@ def _table(path: Path) -> Path:
     return next((path / n for n in LOGS if (path / n).is_file()), path) if path.is_dir() else path
 
 
-def _read(path: Path, wanted: Sequence[str] | None) -> MeasuredRun:
+def _read(path: Path, wanted: Sequence[str]) -> MeasuredRun:
     table, there = _table(path), columns_of(path)
     layout = stated_layout(table) or Layout()
-    names = there if wanted is None else [TIME, *wanted]
+    names = [TIME, *wanted]
     for name in names:
         if name not in there:
             raise InputError(f"'{path}' has no column {quoted(name)}{nearest(name, there)}")

@@ -4,7 +4,6 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -52,6 +51,8 @@ class ShipTask(CalibrationTask):
     ) -> None:
         super().__init__(parameters, notes)
         self.predictor, self.runs, told = predictor, runs, predictor.map.told
+        self.content = predictor.given.content()
+        self.use = {w.run.name: use for use, every in runs.items() for w in every}
         self.driven = predictor.processes.inputs
         given = {**told("inputs"), **told(DISTURBANCES)}
         self.forces_on = [c.name for s, c in given.items() if s in BESIDE]
@@ -62,14 +63,6 @@ class ShipTask(CalibrationTask):
     @cached_property
     def confined(self) -> ConfinedFmu:
         return self.predictor.confined
-
-    @property
-    def content(self) -> Mapping[str, Any]:
-        return self.predictor.given.content()
-
-    @property
-    def use(self) -> dict[str, str]:
-        return {w.run.name: use for use, every in self.runs.items() for w in every}
 
     @property
     def usual(self) -> dict[str, float]:

@@ -42,9 +42,14 @@ class SystemRemainder:
     outputs: Sequence[OutputRemainder]
 
     @property
+    def worst(self) -> list[OutputRemainder]:
+        """Outputs of which it is more than chance, and matters."""
+        return [o for o in self.outputs if o.p < CHANCE / len(self.outputs) and o.matters]
+
+    @property
     def significant(self) -> bool:
         """Whether that of some output is more than chance, and matters."""
-        return any(o.p < CHANCE / len(self.outputs) and o.matters for o in self.outputs)
+        return bool(self.worst)
 
     @property
     def by_chance(self) -> bool:
@@ -54,11 +59,11 @@ class SystemRemainder:
     @property
     def sentence(self) -> str:
         """In words."""
-        worst = [o for o in self.outputs if o.p < CHANCE / len(self.outputs) and o.matters]
-        if not worst:
+        if not self.worst:
             return "The residual is not distinguishable from noise, or too small to be relevant."
         each = ", ".join(
-            f"{o.name}: {o.rms:.3g} {o.unit} ({o.share:.0%} of its initial squared error)" for o in worst
+            f"{o.name}: {o.rms:.3g} {o.unit} ({o.share:.0%} of its initial squared error)"
+            for o in self.worst
         )
         return f"A residual above the noise remains in {each}."
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -73,6 +72,8 @@ class SystemTask(CalibrationTask):
     ) -> None:
         super().__init__(parameters, notes)
         self.map, self.runs, self._model, self._execution = map, runs, model, execution
+        self.content = map.model_dump(exclude_none=True)
+        self.use = {r.name: use for use, every in runs.items() for r in every}
         self.length = window or map.window
         self.driven = [c.name for c in map.inputs.values()]
         self.names = [c.name for c in map.outputs.values()]
@@ -84,14 +85,6 @@ class SystemTask(CalibrationTask):
     @cached_property
     def confined(self) -> ConfinedFmu:
         return confined(self._model, self._execution)
-
-    @property
-    def content(self) -> Mapping[str, Any]:
-        return self.map.model_dump(exclude_none=True)
-
-    @property
-    def use(self) -> dict[str, str]:
-        return {r.name: use for use, every in self.runs.items() for r in every}
 
     @property
     def usual(self) -> dict[str, float]:

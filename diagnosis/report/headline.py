@@ -158,20 +158,15 @@ def headline(r: ReportData) -> str:
     if d.verdict == "coefficients":
         names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
         above = f", mainly {listed(names, 'and')}" if names else ""
-        others = _fitted_beside(d)
+        model, known = d.learned.model, d.start.ship.coefficients
+        fitted = (name for name in d.posterior.std if name not in known)
+        others = [name for name in fitted if model.value(name) != d.start.value(name)]
         beside = f" together with {listed(others, 'and')}" if others else ""
         needed = "no other effect is needed" if others else "no effect is needed"
         return f"Other values of the nominal coefficients explain these data{beside}{above}; {needed}."
     if d.verdict == "unexplained":
         return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
-
-
-def _fitted_beside(d: Diagnosis) -> list[str]:
-    """Parameters of effects that were fitted beside the nominal coefficients."""
-    start, model = d.start, d.learned.model
-    fitted = (name for name in d.posterior.std if name not in start.ship.coefficients)
-    return [name for name in fitted if model.value(name) != start.value(name)]
 
 
 def boundedness(s: Stability) -> str:

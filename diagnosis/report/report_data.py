@@ -203,25 +203,20 @@ class ErrorChange(NamedTuple):
 
 
 def error_changes(r: ReportData, k: int) -> list[ErrorChange]:
-    """Position [mm], heading [°] and model error [N, N, N m] of the k-th run."""
-    return [*_of_predictions(r, k), *_of_forces(r, k)]
+    """Position [mm], heading [°] and model error [N, N, N m] of the k-th run.
 
-
-def _of_predictions(r: ReportData, k: int) -> Iterator[ErrorChange]:
-    """A change within two paired standard errors over the windows is noise."""
-    e = r.evaluations[k]
+    A change of predictions within two paired standard errors over the windows is noise, and a model
+    error that stays within its uncertainty.
+    """
+    e, found = r.evaluations[k], []
     for name, factor in (("position", 1e3), ("heading", degrees(1.0))):
         before, after = getattr(e.before, name), getattr(e.after, name)
         errors = [x.errors for x in (e.before, e.after)]
         squares = [np.square(getattr(x, name)) for x in errors if x is not None]
         change = PairedChange.of(squares[0], squares[-1]) if squares else None
         is_noise = change is not None and abs(change.difference) <= Z95 * change.standard_error
-        yield ErrorChange(factor * before, factor * after, is_noise)
-
-
-def _of_forces(r: ReportData, k: int) -> Iterator[ErrorChange]:
-    """A model error that stays within its uncertainty is noise."""
-    e = r.evaluations[k]
+        found.append(ErrorChange(factor * before, factor * after, is_noise))
     noise = NOISE_TOLERANCE * np.sqrt(np.mean(np.square(r.comparison.omega_std[k]), axis=0))
     for before, after, most in zip(e.before.omega_rms, e.after.omega_rms, noise, strict=True):
-        yield ErrorChange(float(before), float(after), bool(after <= most))
+        found.append(ErrorChange(float(before), float(after), bool(after <= most)))
+    return found

@@ -126,7 +126,8 @@ def what_if(r: ReportData) -> WhatIf:
     movable = MovableModel(r)
     if movable.learned.filters:
         return WhatIf(missing="the pose was measured behind a filter, which the page does not have")
-    if len({(e.smoothed.track.run.signals, _settings(e)) for e in movable.runs}) > 1:
+    each = (e.smoothed.track.run for e in movable.runs)
+    if len({(run.signals, 0 if run.power is None else run.power.shape[1]) for run in each}) > 1:
         return WhatIf(missing="the runs have commands of different kinds")
     module = webassembly_of(movable)
     if module is None:
@@ -142,12 +143,6 @@ def webassembly_of(movable: "MovableModel") -> bytes | None:
         return component_module(program(made))
     except TraceError:
         return None
-
-
-def _settings(e: Evaluation) -> int:
-    """Number of power settings of a run."""
-    power = e.smoothed.track.run.power
-    return 0 if power is None else power.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,9 +248,8 @@ class MovableModel:
             note = "found" if e in self.r.effects else "possibility"
             yield self._choice(effects[e.id], note, told, e.in_model)
         prior = NominalPrior.of(self.start, self.diagnosis.prior)
-        for (
-            effect
-        ) in effects.values():  # terms that a calibration fits in addition to the ship's coefficients
+        # Terms that a calibration fits in addition to the ship's coefficients.
+        for effect in effects.values():
             free = [p.name for p in effect.parameters if p.name not in prior.std]
             if effect.id not in done and any(self.learned.value(n) != self.start.value(n) for n in free):
                 done.add(effect.id)

@@ -76,8 +76,7 @@ class Fingerprint:
         return self.period * (len(self.course) - 1)
 
     def alike(self, other: "Fingerprint") -> bool:
-        """Whether two runs are the same one, or nearly: most of the shorter one is found in the "
-        "longer."""
+        """Whether two runs are the same, or nearly: most of the shorter one is found in the longer."""
         if self.sha256 == other.sha256:
             return True
         short, long = sorted((self, other), key=lambda f: f.seconds)
@@ -97,8 +96,7 @@ def fingerprints(told: Iterable[Mapping[str, Any]], where: Path) -> tuple[Finger
 
 
 def _pieces(short: Fingerprint, long: Fingerprint) -> Iterator[float]:
-    """Of each piece of a course, as far as it moves, its best correlation with a part of a longer "
-    "one."""
+    """Of each piece of a course, as far as it moves, its best correlation with a part of a longer."""
     period = long.period
     for begin in short.seconds / PARTS * np.arange(PARTS):
         found = []

@@ -1,8 +1,10 @@
 """What tools from the package index find."""
 
 import logging
+import sys
 import threading
 from collections.abc import Iterator
+from logging.handlers import BufferingHandler
 from pathlib import Path
 from xml.etree.ElementTree import tostring
 
@@ -45,7 +47,9 @@ def fmutool(fmu: FmuArchive) -> Iterator[str]:
         from fmu_manipulation_toolbox.operations import FMU
     except ImportError:
         raise NotInstalledError("fmu-manipulation-toolbox") from None
-    heard = _Ear()
+    heard, here = BufferingHandler(sys.maxsize), threading.get_ident()
+    heard.setLevel(logging.ERROR)
+    heard.addFilter(lambda record: record.thread == here)  # others check other FMUs at the same time
     logger = logging.getLogger("fmu_manipulation_toolbox")
     if not logger.isEnabledFor(logging.ERROR):  # somebody has silenced the toolbox
         logger.setLevel(logging.ERROR)
@@ -58,17 +62,4 @@ def fmutool(fmu: FmuArchive) -> Iterator[str]:
         yield f"it fails: {error!r}"
     finally:
         logger.removeHandler(heard)
-    yield from heard.errors
-
-
-class _Ear(logging.Handler):
-    """Keeps what this thread logs as an error; others check other FMUs at the same time."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.ERROR)
-        self.errors: list[str] = []
-        self.thread = threading.get_ident()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        if record.thread == self.thread:
-            self.errors.append(" ".join(record.getMessage().split()))
+    yield from (" ".join(record.getMessage().split()) for record in heard.buffer)

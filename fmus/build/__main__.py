@@ -45,8 +45,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           %(prog)s --native vessel thrusters --source firmware\n"
         "           %(prog)s --verify fmu/vessel.fmu",
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (default: all)")
-    parser.add_argument("--out", type=folder_name, metavar="DIR", help="copy the FMUs to this folder (default: cache of the user)")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="FMU name or component file (default: all)"
+    )
+    parser.add_argument(
+        "--out",
+        type=folder_name,
+        metavar="DIR",
+        help="copy the FMUs to this folder (default: cache of the user)",
+    )
     parser.add_argument(
         "--overwrite",
         action="store_true",
@@ -69,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         action="append",
         default=[],
         help="a file of your own model effects, or one of an installed package, for vessel and "
-"thrusters; may be repeated",
+        "thrusters; may be repeated",
     )
     parser.add_argument(
         "--ship",
@@ -93,10 +100,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="with --native: linux64, win64, darwin64 (this computer); python: run all others in Python",
     )
     parser.add_argument(
-        "--source", type=folder_name, metavar="DIR", help="with --native: write plain C to this folder, build no FMU"
+        "--source",
+        type=folder_name,
+        metavar="DIR",
+        help="with --native: write plain C to this folder, build no FMU",
     )
     parser.add_argument(
-        "--webassembly", type=folder_name, metavar="DIR", help="write WebAssembly for pages to this folder, build no FMU"
+        "--webassembly",
+        type=folder_name,
+        metavar="DIR",
+        help="write WebAssembly for pages to this folder, build no FMU",
     )
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):

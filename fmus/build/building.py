@@ -143,7 +143,9 @@ def _every(names: Sequence[str], starts: StartValues | None, of: Ship) -> Sequen
     return names or list(of.components)
 
 
-def _tell_unused(starts: StartValues, built: Sequence[str], of: Ship, note: Callable[[str], None]) -> None:
+def _tell_unused(
+    starts: StartValues, built: Sequence[str], of: Ship, note: Callable[[str], None]
+) -> None:
     """Say what of a parameter set went into no FMU.
 
     Raises:
@@ -156,8 +158,7 @@ def _tell_unused(starts: StartValues, built: Sequence[str], of: Ship, note: Call
     for text in starts.beside:
         note(f"'{starts.path}' has values that no FMU can hold, {text}")
     for run in starts.runs[:1]:
-        note(f"'{starts.path}' has times that were found in run '{run}' and are valid for that run "
-"only")
+        note(f"'{starts.path}' has times that were found in run '{run}' and are valid for that run only")
     if not starts.values:
         note(f"'{starts.path}' holds no values, so no FMU is changed")
 
@@ -202,9 +203,8 @@ def _cached(
     except RefusedError as error:
         raise BuildError(str(error)) from None
     except OSError as error:
-        raise BuildError(
-            f"cannot keep FMUs in '{fmu.parent}' ({error.strerror}); set CYBERSHIP_CACHE to another folder"
-        ) from None
+        why = f"cannot keep FMUs in '{fmu.parent}' ({error.strerror})"
+        raise BuildError(f"{why}; set CYBERSHIP_CACHE to another folder") from None
 
 
 def _loaded(
@@ -224,8 +224,6 @@ def fmu_cache() -> Path:
     if (folder := cache_folder()) is None:
         raise BuildError("this user has no home folder: set CYBERSHIP_CACHE to a folder for built FMUs")
     return folder
-
-
 
 
 @contextmanager

@@ -6,9 +6,9 @@ import math
 import traceback
 from pathlib import Path
 
-from ..base_units import base_exponents
 from cybership.message_text import PrintableError
 
+from ..base_units import base_exponents
 from ..declare import Component, DeclarationError, nearest, variables, width
 from ..effects import EffectSet
 from ..fmi.trace import trace_init, trace_step

@@ -10,7 +10,6 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import re
-import shutil
 import sys
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -19,6 +18,7 @@ from functools import cache
 from pathlib import Path
 
 from ..declare import Component
+from ..fmi.repeatable_archive import write_archive
 from ..ship import Ship
 from ..ships.naming import DEFAULT
 from .finding import ROOT
@@ -28,8 +28,6 @@ EFFECTS = "fmus.effects"
 # What an FMU imports in addition to its component, by whether it is made of effects or to scale.
 DESCRIPTION, EXPANSION, SIZING = "fmus.ship_description", "fmus.ships.expansion", "fmus.sizing"
 NAMING, SHIPPED = Path("ships", "naming.py"), Path("shipped", f"{DEFAULT}.toml")
-# Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 SCRIPT = '''"""Entry point of the FMU {name}."""
 
@@ -153,7 +151,9 @@ def pack(
     )
     with _own_imports(package, script.stem):
         raw = FmuBuilder.build_FMU(script, dest=work / "raw", project_files=[work / package])
-    return _repeatable(Path(raw), work / f"{component.name}.fmu")
+    with zipfile.ZipFile(raw) as archive:
+        inside_fmu = {name: archive.read(name) for name in archive.namelist()}
+    return write_archive(work / f"{component.name}.fmu", inside_fmu)
 
 
 def _entry(module: str, package: str, own_file: Path | None, of: Ship) -> tuple[str, str]:
@@ -197,15 +197,3 @@ def _own_imports(*names: str) -> Iterator[None]:
     finally:
         sys.path[:] = path
         forget()
-
-
-def _repeatable(raw: Path, fmu: Path) -> Path:
-    """The same archive with sorted names and without dates."""
-    with zipfile.ZipFile(raw) as source, zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as target:
-        for name in sorted(source.namelist()):
-            info = zipfile.ZipInfo(name, ZIP_DATE)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            info.external_attr = 0o644 << 16
-            with source.open(name) as reader, target.open(info, "w") as writer:
-                shutil.copyfileobj(reader, writer)
-    return fmu

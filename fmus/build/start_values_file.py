@@ -50,7 +50,7 @@ class StartValues:
             if name not in settable:
                 raise DeclarationError(
                     f"{where} is not a parameter{nearest(name, settable)}; one of an effect of "
-"your own needs --effects FILE.py"
+                    "your own needs --effects FILE.py"
                 )
             _check(value, unit, settable[name], where)
         starts = {name: value for name, (value, _) in given.items() if value != settable[name].start}

@@ -14,12 +14,11 @@ from xml.etree import ElementTree
 
 from ..declare import Component
 from ..fmi.model_description import guid_of, model_description
+from ..fmi.repeatable_archive import write_archive
 from .compilers import TARGETS, compiled
 from .model_source import FACE, fmu_source
 from .program import program
 
-# Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 FACE_FILE = Path(__file__).with_name(FACE)
 
 
@@ -59,14 +58,7 @@ def native_fmu(
         files[inside] = compiled(FACE_FILE, target, work)
     if python is not None:
         files = _python_body(python, targets) | files
-    fmu = work / f"{component.name}.fmu"
-    with zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name in sorted(files):
-            info = zipfile.ZipInfo(name, ZIP_DATE)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            info.external_attr = 0o644 << 16
-            archive.writestr(info, files[name])
-    return fmu
+    return write_archive(work / f"{component.name}.fmu", files)
 
 
 def _python_body(python: Path, targets: Sequence[str]) -> dict[str, bytes]:

@@ -48,16 +48,28 @@ def program(component: Component) -> Program:
 
     tape = Tape(kernels)
     prepared = component.prepared(_params(tape, component))
-    kept = _Kept()
-    kept.gather(prepared)
-    prepare = tape.recording(list(kept.values.values()))
+    kept: dict[int, RecordedValue] = {}  # the values that a step needs, each once
+
+    def keep(x: RecordedValue) -> RecordedValue:
+        return x if x.operation == "variable" else kept.setdefault(id(x), x)  # a parameter is at hand
+
+    _mapped(prepared, keep)
+    prepare = tape.recording([*kept.values()])
+    places = {identity: k for k, identity in enumerate(kept)}
 
     tape = Tape(kernels)
+
+    def seen(x: RecordedValue) -> RecordedValue:
+        """A value of ``prepare`` as a step finds it."""
+        if x.operation == "variable":
+            return tape.variable(x.args[0])
+        return tape.variable(f"prepared[{places[id(x)]}]", is_condition(x))
+
     states = len(init.results)
     state, outputs = component.law(
         rebuild(initial, [tape.variable(f"state[{k}]") for k in range(states)]),
         _group(tape, component.inputs, "inputs"),
-        kept.seen_by(tape, prepared),
+        _mapped(prepared, seen),
         cast(Number, tape.variable("h")),
     )
     after, given = flatten(state), flatten(outputs)
@@ -73,34 +85,6 @@ def _group(tape: Tape, cls: type[T], name: str) -> T:
 
 def _params(tape: Tape, component: Component) -> tuple[object, ...]:
     return _group(tape, component.params, "params")
-
-
-class _Kept:
-    """The values that ``prepare`` computes, each once; it gives them in any tuples, lists and dicts."""
-
-    def __init__(self) -> None:
-        self.values: dict[int, RecordedValue] = {}
-
-    def gather(self, prepared: object) -> None:
-        """Collect the values to keep between steps; a parameter is at hand anyway."""
-
-        def keep(x: RecordedValue) -> RecordedValue:
-            if x.operation != "variable":
-                self.values.setdefault(id(x), x)
-            return x
-
-        _mapped(prepared, keep)
-
-    def seen_by(self, tape: Tape, prepared: object) -> Any:
-        """The same, as a step finds it."""
-        places = {identity: k for k, identity in enumerate(self.values)}
-
-        def find(x: RecordedValue) -> RecordedValue:
-            if x.operation == "variable":
-                return tape.variable(x.args[0])
-            return tape.variable(f"prepared[{places[id(x)]}]", is_condition(x))
-
-        return _mapped(prepared, find)
 
 
 def _mapped(part: object, function: Callable[[RecordedValue], RecordedValue]) -> Any:

@@ -141,7 +141,8 @@ class _ModuleWriter:
             frame = self.frames[id(kernel)]
             places = {"given": frame.given, "results": frame.results}
             codes.append(_WasmBody(self, places).code(kernel, [("results", kernel.results)]))
-        types = [bytes([FUNCTION, 0, 1, I32]), *[_math_type(count) for count in (1, 2)]]
+        of_math = [bytes([FUNCTION, count, *[F64] * count, 1, F64]) for count in (1, 2)]
+        types = [bytes([FUNCTION, 0, 1, I32]), *of_math]
         imports = [_name("Math") + _name(name) + bytes([0, count]) for name, count in MATH.items()]
         memory = bytes([0]) + _unsigned(-(-max(self.used, 1) // PAGE))
         places = [bytes([I32, 0]) + _constant(at) + bytes([CODES["end"]]) for at in self.arrays.values()]
@@ -263,10 +264,6 @@ def assembled(text: str) -> bytes:
         elif word in ("call", "local.get", "local.set", "i32.const"):  # constants here are 0 and 1
             code += _unsigned(int(next(words)))
     return bytes(code)
-
-
-def _math_type(arguments: int) -> bytes:
-    return bytes([FUNCTION, arguments, *[F64] * arguments, 1, F64])
 
 
 def _unsigned(value: int) -> bytes:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
-import signal
 import sys
 import sysconfig
 from collections.abc import Callable, Sequence
@@ -32,7 +31,7 @@ INSIDE = 1000  # number of the user in the namespaces, who is not root there; ch
 # Of linux/sched.h, linux/mount.h, linux/prctl.h, linux/securebits.h and linux/capability.h.
 UNSHARED = 0x20000 | 0x8000000 | 0x10000000 | 0x20000000 | 0x40000000  # NS, IPC, USER, PID, NET
 RDONLY, NOSUID, NODEV, NOEXEC, REMOUNT, BIND, REC, PRIVATE = 1, 2, 4, 8, 0x20, 0x1000, 0x4000, 0x40000
-DETACH, SET_PDEATHSIG, SET_SECUREBITS, SET_NO_NEW_PRIVS, NO_ROOT = 2, 1, 28, 38, 3
+DETACH, SET_SECUREBITS, SET_NO_NEW_PRIVS, NO_ROOT = 2, 28, 38, 3
 CAPABILITIES = 0x20080522
 # Numbers of system calls without a function in the C library: of x86_64, and of newer ones anywhere.
 PIVOT_ROOT, CAPSET = (155, 126) if platform.machine() == "x86_64" else (41, 91)
@@ -96,12 +95,6 @@ def needed_folders() -> list[str]:
     packages = [p for p in sys.path if Path(p).name in PACKAGES]
     places = [*SYSTEM, *python, *packages, str(own), str(own.with_name("cybership"))]
     return [p for p in dict.fromkeys(places) if os.path.isdir(p) and p != "/"]
-
-
-def die_with_parent() -> None:
-    """Have this process killed when the one that has forked it ends (on Linux)."""
-    if sys.platform == "linux":
-        _libc().prctl(SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 
 def unshare(readable: Sequence[str], folder: str) -> str:

@@ -15,12 +15,11 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from ...process.spawned import end_with_parent
+from ...process.spawned import die_with_parent, end_with_parent
 from ..fmu_model import FmuModel
 from .confinement import (
     Confinement,
     available,
-    die_with_parent,
     enter_root,
     needed_folders,
     restrict,

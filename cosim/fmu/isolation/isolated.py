@@ -5,7 +5,6 @@ request carries the inputs and one answer the outputs.
 """
 
 import json
-import signal
 import subprocess
 import sys
 import threading
@@ -16,6 +15,7 @@ from typing import Any, NamedTuple, NoReturn
 
 from ...errors import InputError, SimulationError
 from ...process.call_watch import TIMEOUT, TIMES_USUAL
+from ...process.spawned import ending
 from ..component import WARNING
 from ..fmu_model import FmuModel, FmuVariable, Value
 from ..instance import Access, OnMessage
@@ -199,7 +199,7 @@ class IsolatedInstance:
         elif is_garbled:
             how = f"it wrote into the pipe to the master in {self._asked}; its process was ended"
         else:
-            how = f"its process died in {self._asked} ({_reason(code)})"
+            how = f"its process died in {self._asked} ({ending(code)})"
         self._lost = f"{self.name}: {how}"
         raise SimulationError(self._lost)
 
@@ -342,12 +342,3 @@ def _part(ports: Sequence[Port], memory: DoubleMemory) -> memoryview:
     """The part of a memory that holds some variables."""
     first = ports[0].slot if ports else 0
     return memory.octets[8 * first : 8 * (first + len(ports))]
-
-
-def _reason(code: int) -> str:
-    """How a process ended, as text."""
-    if code < 0:
-        with suppress(ValueError):
-            return f"signal {-code}, {signal.Signals(-code).name}"
-        return f"signal {-code}"
-    return f"exit code {code}"

@@ -102,12 +102,10 @@ class OpenedFiles:
     def _look(self, path: str) -> None:
         full = posixpath.normpath(path) if path.startswith("/") else "/"
         of_process = full.startswith("/proc/") and full.split("/")[2].isdigit()
-        if of_process or not (f"{full}/".startswith(self._allowed) or self._leads(full)):
+        folder = f"{full.rstrip('/')}/"  # on the way to what may be opened, too
+        known = folder.startswith(self._allowed) or any(a.startswith(folder) for a in self._allowed)
+        if of_process or not known:
             self._found(full)
-
-    def _leads(self, folder: str) -> bool:
-        """Whether something that may be opened is below a folder."""
-        return any(allowed.startswith(f"{folder.rstrip('/')}/") for allowed in self._allowed)
 
 
 def _ended(listener: int) -> bool:

@@ -45,15 +45,6 @@ class Worker:
         self._known = model
         # Nobody reads what a confined FMU logs, but for the reason of an error, which is part of that.
         self._listener = self._log if model is None else None
-        self._calls = {
-            "start": self._start,
-            "bind": self._bind,
-            "set_value": self._set_value,
-            "get_value": self._get_value,
-            "free": self._free,
-            "reset": self._reset,
-            "whole_runs": self._whole_runs,
-        }
 
     def serve(self) -> None:
         """Answer until the master closes its end."""
@@ -73,7 +64,7 @@ class Worker:
 
     def _call(self, body: bytes) -> bytes:
         name, *arguments = json.loads(body)
-        action = self._calls.get(name) or getattr(self._instance, name)
+        action = getattr(self, f"_{name}", None) or getattr(self._instance, name)
         return json.dumps(action(*arguments)).encode()
 
     def _start(self, name: str, path: str, folder: str) -> None:
@@ -154,9 +145,6 @@ class Worker:
 
     def _reset(self) -> None:
         self._instance.reset(self._listener)
-
-    def _free(self) -> None:
-        self._instance.free()
 
 
 def serve(model: FmuModel | None = None) -> None:

@@ -116,7 +116,7 @@ def operations_of(effects: list[Effect]) -> list[Operation]:
     found: list[Operation] = []
     for effect in effects:
         if isinstance(effect, Changes):
-            found += effect.operations()
+            found += effect.operations
         elif isinstance(effect, Operation):
             found.append(effect)
     return found

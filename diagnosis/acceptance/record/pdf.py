@@ -1,5 +1,4 @@
-"""A document as a PDF in A4: head and verdict on page one, tables, figures with captions, page "
-"numbers."""
+"""A document as a PDF in A4: head and verdict on page one, tables, captioned figures, page numbers."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +16,6 @@ from ...report.pictures.chart import Chart
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"  # those of matplotlib, which have Greek
 SIZE = 8.0  # pt, of letters, and of the margins of a cell together; chosen
-DOTS = 200  # per inch of a figure; chosen
 HIGHEST = 310.0  # pt, of a figure: two to a page of A4; chosen
 SHADES = {
     "met": "#dcefdc",
@@ -180,7 +178,7 @@ def _png(plot: Plot) -> bytes:
     assert isinstance(plot.figure, Chart)
     figure, picture = plot.figure.figure(), BytesIO()
     figure.set_facecolor("white")
-    figure.savefig(picture, dpi=DOTS, format="png")
+    figure.savefig(picture, dpi=200, format="png")
     return picture.getvalue()
 
 

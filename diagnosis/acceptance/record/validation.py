@@ -26,7 +26,7 @@ from ...report.content import Content, fmu_result, part, sensor_results, version
 from ...runs import Fingerprint
 from ...runs.run_constants import IN_A_ROW
 from ...session import Comparison
-from ..budget import Budget, Learned, read_learned, sources_of
+from ..budget import Learned, read_learned, sources_of
 from ..criterion import JUDGED, InputStd, ReadCriteria, now, read_criteria
 from ..judged_criterion import EXPANDED, Judgement, Predicted, judge
 from ..predictions import Predictions, possible
@@ -299,14 +299,10 @@ def _result(j: Judgement) -> dict[str, Any]:
         float(np.sqrt(np.mean(e.errors**2))) / f,
         float(np.max(np.abs(e.errors))) / f,
         *(x / (f if c.statistic == "rms" else 1.0) for x in e.interval),
-        _budget(e.budget, f),
+        {name: None if u is None else u / f for name, u in part(e.budget, BUDGET).items()}
+        | {"unknown": e.budget.unknown},
     )
     return part(j, JUDGEMENT) | dict(zip(NUMBERS, numbers, strict=True))
-
-
-def _budget(b: Budget, factor: float) -> dict[str, Any]:
-    scaled = {name: None if u is None else u / factor for name, u in part(b, BUDGET).items()}
-    return scaled | {"unknown": b.unknown}
 
 
 def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Iterator[str]:

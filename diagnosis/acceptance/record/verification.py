@@ -1,6 +1,6 @@
 """Check a validation record: ``python -m diagnosis.verify validation.json``."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from .signature import is_signed
 FORM = "cybership validation record 2"  # of the records of this version
 # What compare writes next to a record, so that a file of that name is no copy of one that it read.
 OUTPUTS = ("comparison.json", "report.html", "map.json")
+UNKNOWN_OWNER = "key: the owner of the key in the record is not known; --key gives the key of the signer"
 SIGNATURE, KEY, CODE = "signature", "key", "code"  # names that --allow-missing takes besides files
 
 
@@ -91,7 +92,9 @@ def verify_record(
     path = Path(record)
     raw, content = _read(path)
     files = [content.criteria, *content.files, *content.reports]
-    checks = [_signature(path, raw, content, key), *_whose(content, key), _code(content)]
+    checks = [_signature(path, raw, content, key), _code(content)]
+    if content.public_key is not None and key is None:
+        checks.insert(1, Check(None, UNKNOWN_OWNER, KEY))
     checks += [_check(f, path.parent, files) for f in files]
     tables = [s.run for s in content.samples if not s.file]
     checks += [Check(None, f"data: run {run} was a table in memory", run) for run in tables]
@@ -136,15 +139,6 @@ def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) 
         return Check(False, "signature: present, but the record names no key; --key gives one")
     holds = is_signed(raw, beside.read_bytes(), public, where)
     return Check(holds, f"signature: {'' if holds else 'not of this record '}by the key {by}")
-
-
-def _whose(content: Record, key: str | Path | None) -> Iterator[Check]:
-    if content.public_key is not None and key is None:
-        yield Check(
-            None,
-            "key: the owner of the key in the record is not known; --key gives the key of the signer",
-            KEY,
-        )
 
 
 def _code(content: Record) -> Check:

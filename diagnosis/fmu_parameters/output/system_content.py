@@ -18,6 +18,7 @@ from ...report.document import Document, Plot, ReportSection, numbers, write_doc
 from ...report.document import Table as PageTable
 from ...report.formatting import write_json
 from ...report.pictures.chart import AFTER, BEFORE, INK, Chart, ChartAxis, Panel
+from ...report.pictures.figures import interrupted
 from ...report.report_data import USES
 from ...runs.cleaning import Z95
 from ..additional_force import AdditionalForce
@@ -318,26 +319,24 @@ def plots_of(
     for part in parts.values():
         before, after = part.raw([part.start, r.fit.setting if r.changed else part.start])
         for run in dict.fromkeys(w.run for w in part.windows):
+            windows = [w for w in part.windows if w.run == run]
+            group = np.repeat(np.arange(len(windows)), [w.time.size for w in windows])
+            time = interrupted(np.concatenate([w.begin + w.time for w in windows]), group)
+            measured = interrupted(np.concatenate([w.measured for w in windows]), group)
+            left = [
+                interrupted(np.concatenate([x.reshape(w.measured.shape) for w, x in mine]), group)
+                for each in (before, after)
+                for mine in [[(w, x) for w, x in part.parts(each) if w.run == run]]
+            ]
+            changes = ((left[0], BEFORE, "before"), (left[1], AFTER, "after"))
             panels = []
             for k, name in enumerate(names):
                 panel = Panel(ChartAxis("time [s]", shown=k == len(names) - 1), ChartAxis(name))
-                mine = [
-                    (w, rows) for w, rows in zip(part.windows, part.rows, strict=True) if w.run == run
-                ]
-                time = _joined([w.begin + w.time for w, _ in mine])
-                y = _joined([w.measured[:, k] for w, _ in mine])
-                panel.draw(time, y, INK, "measured", faint=True)
-                changes = ((before, BEFORE, "before"), (after, AFTER, "after"))
+                panel.draw(time, measured[:, k], INK, "measured", faint=True)
                 for off, colour, label in changes if r.changed else changes[:1]:
-                    left = [off[rows].reshape(w.measured.shape)[:, k] for w, rows in mine]
-                    panel.draw(time, y - _joined(left) * part.noise[k], colour, label)
+                    panel.draw(time, measured[:, k] - off[:, k] * part.noise[k], colour, label)
                 panels.append(panel)
             found.append(
                 Plot(Chart(60.0 + 110.0 * len(panels), panels), f"{run}: measured and predicted.")
             )
     return found
-
-
-def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Parts one after the other, with NaN in between, at which a line breaks."""
-    return np.concatenate([x for part in parts for x in (part, [np.nan])])[:-1]
