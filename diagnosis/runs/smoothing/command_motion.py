@@ -86,6 +86,11 @@ class Gains(NamedTuple):
     bend: float = 0.0
 
 
+def described_gains(track: Track) -> Gains:
+    """The accelerations by forces that the described ship has at rest, by its inertia alone."""
+    return Gains(np.linalg.inv(ship(description=track.run.ship).mass))
+
+
 class CommandResponse(NamedTuple):
     """The motion that follows from the commands, but for a smooth one.
 
@@ -93,6 +98,7 @@ class CommandResponse(NamedTuple):
         eta, eta_dot, eta_ddot: (n, 3), pose and derivatives [m, m, rad; /s; /s2].
         delay: from a command to its effect [s]; NaN where the commands explain nothing.
         sure: whether the whole run agrees that there is a delay.
+        gains: of the commands; None where they explain nothing.
     """
 
     eta: np.ndarray
@@ -100,6 +106,7 @@ class CommandResponse(NamedTuple):
     eta_ddot: np.ndarray
     delay: float = np.nan
     sure: bool = False
+    gains: Gains | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,4 +213,4 @@ class Commands:
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
         sampled = (between(self.track.run.time, self.even, each).T for each in (x, x_dot, x_ddot))
         eta = [np.column_stack([plane.real, plane.imag, yaw.real]) for plane, yaw in sampled]
-        return CommandResponse(eta[0], eta[1], eta[2], delay)
+        return CommandResponse(eta[0], eta[1], eta[2], delay, gains=gains)

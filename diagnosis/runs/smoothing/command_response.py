@@ -32,7 +32,7 @@ from scipy.special import stdtrit
 
 from ..cleaning import BRIEF, WIDTH, between
 from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
-from .command_motion import FORGETTING, CommandResponse, Commands, Gains
+from .command_motion import FORGETTING, CommandResponse, Commands, Gains, described_gains
 from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
@@ -175,6 +175,8 @@ def with_commands(
 ) -> tuple[Problem, np.ndarray, CommandResponse]:
     """A smoothing spline in addition to the response to the commands, if that is likelier than it alone.
 
+    The gains are those of the described inertia if these are likelier than no response, else fitted.
+
     Returns:
         What is left by the response, its smoothness (3,), and the response.
     """
@@ -183,9 +185,16 @@ def with_commands(
     near = alone.even
     regression = Regression(p, fit, commands, time)
     delay, sure = likeliest_delay(regression)
-    gains = regression.gains(delay)
+    without = deviance(p, weights, near)
+    response = commands.response(described_gains(commands.track), delay)._replace(sure=sure)
+    rest = p._replace(z=p.z - response.eta[p.rows])
+    near = likeliest(rest, weights, near)
     # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
-    least = deviance(p, weights, near) - 2.0 * (gains.force.size + 1)
+    if deviance(rest, weights, near) < without - 2.0:
+        return *adapt(rest, near, weights), response
+    near = alone.even
+    gains = regression.gains(delay)
+    least = without - 2.0 * (gains.force.size + 1)
     found: tuple[Problem, np.ndarray, CommandResponse] | None = None
     for _ in range(ROUNDS):
         response = commands.response(gains, delay)
