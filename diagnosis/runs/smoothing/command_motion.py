@@ -80,13 +80,13 @@ class Gains(NamedTuple):
 
     Attributes:
         force: (3, 3), by a unit of each command.
-        slow: (3, 3), in addition, by a unit of each command behind the lag :data:`SLOW`.
         bend: share of :attr:`Commands.bend` that acts.
+        slow: (3, 3), in addition, by a unit of each command behind the lag :data:`SLOW`.
     """
 
     force: np.ndarray
-    slow: np.ndarray
     bend: float = 0.0
+    slow: np.ndarray = np.zeros((3, 3))
 
 
 def described_gains(of: Ship) -> np.ndarray:

@@ -65,7 +65,7 @@ class Regression:
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
 
-    def gains(self, delay: float, described: np.ndarray | None, bent: bool = False) -> Gains:
+    def gains(self, delay: float, described: np.ndarray | None = None, bent: bool = False) -> Gains:
         """What the commands accelerate, and the bend of the way if that counts, for a delay [s].
 
         Args:
@@ -85,8 +85,7 @@ class Regression:
             least_squares(a, z[:, 0], NEGLIGIBLE**2) for a, z in zip(motions, pose, strict=True)
         )
         fitted, bend = np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum())
-        none = np.zeros((3, 3))
-        return Gains(fitted, none, bend) if described is None else Gains(described, fitted, bend)
+        return Gains(fitted, bend) if described is None else Gains(described, bend, fitted)
 
     @property
     def bend(self) -> np.ndarray:
