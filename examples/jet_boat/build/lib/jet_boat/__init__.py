@@ -1,0 +1,1 @@
+"""A boat with water jets."""
