@@ -627,12 +627,18 @@ def test_waves_are_in_no_model_and_have_no_share_of_the_squared_error(validate):
     assert not replaceable(found, explained, unique)
 
 
-@pytest.mark.slow
-def test_the_judgement_is_sure_only_of_what_nothing_else_explains(monkeypatch):
-    """The same evidence of the same run, once as if coefficients made up for the effect."""
+@pytest.fixture(scope="module")
+def searched():
+    """A session with a run of a ship with drag, and what forward selection finds in it."""
     runs = diagnosis.gather([sail(64.0, 0.1, {"delta_X_u": -2.0})[0]])
     session = begin(runs)
-    found = session.method.fit(runs, session.start, session.prior, silent, 0)
+    return session, session.method.fit(runs, session.start, session.prior, silent, 0)
+
+
+@pytest.mark.slow
+def test_the_judgement_is_sure_only_of_what_nothing_else_explains(searched, monkeypatch):
+    """The same evidence of the same run, once as if coefficients made up for the effect."""
+    session, found = searched
     data, region = session.data(found.sigma), OPERATING
 
     def seen():
@@ -648,11 +654,9 @@ def test_the_judgement_is_sure_only_of_what_nothing_else_explains(monkeypatch):
 
 
 @pytest.mark.slow
-def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(monkeypatch):
+def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(searched, monkeypatch):
     """Calibrated coefficients, or the initial model where each effect may be none and predicts no better."""
-    runs = diagnosis.gather([sail(64.0, 0.1, {"delta_X_u": -2.0})[0]])
-    session = begin(runs)
-    found = session.method.fit(runs, session.start, session.prior, silent, 0)
+    session, found = searched
     data, calibration = session.data(found.sigma), session.calibration
     for name, value in (("any_sure", False), ("needless", True), ("predicts_worse", False)):
         monkeypatch.setattr(judging, name, lambda *_, value=value: value)

@@ -384,31 +384,25 @@ def test_a_library_that_others_may_write_is_not_loaded(own_cache):
     assert loop_library() == ""
 
 
-def builder(cache, *arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "fmus.build", *map(str, arguments)], capture_output=True, text=True,
-        cwd=ROOT, check=False, env={**os.environ, "CYBERSHIP_CACHE": str(cache)},
-    )  # fmt: skip
-
-
 @pytest.mark.slow
 @linux_only
-def test_a_damaged_fmu_is_built_again_and_foreign_ones_are_not_used(tmp_path):
+def test_a_damaged_fmu_is_built_again_and_foreign_ones_are_not_used(tmp_path, monkeypatch):
     cache = tmp_path / "cache"
-    fmu = cache / builder(cache, "guidance_setpoint").stdout.strip()
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(cache))
+    fmu = cache / command(build_main, "guidance_setpoint").stdout.strip()
     whole = fmu.read_bytes()
     fmu.write_bytes(whole[:1000])
-    done = builder(cache, "guidance_setpoint")
+    done = command(build_main, "guidance_setpoint")
     assert done.returncode == 0
     assert "was damaged, and is built again" in done.stderr
     assert fmu.read_bytes() == whole
     for place in (fmu, fmu.parent, cache):
         mode = place.stat().st_mode
         place.chmod(mode | 0o002)
-        done = builder(cache, "guidance_setpoint")
+        done = command(build_main, "guidance_setpoint")
         assert (done.returncode, "other users may write to" in done.stderr) == (2, True)
         place.chmod(mode)
-    assert builder(cache, "guidance_setpoint").stderr == ""
+    assert command(build_main, "guidance_setpoint").stderr == ""
 
 
 def test_built_fmus_replace_no_other_file(fmus, tmp_path):

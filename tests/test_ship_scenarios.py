@@ -24,10 +24,10 @@ OTTER = read_ship("otter")
 
 
 def short(stop=4.0, **changes):
-    """The shipped scenario of the Otter, not so long."""
+    """The shipped scenario of the Otter, not so long: to compile its FMUs would take longer than to run."""
     content = json.loads((ROOT / "scenarios" / "otter_waypoints.json").read_text())
     content["fmus"]["guidance"]["table"] = str(ROOT / "scenarios" / "otter_route.csv")
-    return content | {"stop": stop, "metrics": {}} | changes
+    return content | {"stop": stop, "metrics": {}, "native": False} | changes
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,7 @@ def test_an_axis_of_ships_runs_each(tmp_path):
 
 @pytest.mark.slow
 def test_the_diagnosis_takes_the_ship_from_the_log(tmp_path):
-    cosim.simulate(short(60.0), tmp_path / "run")
+    cosim.simulate(short(60.0, native="auto"), tmp_path / "run")
     done = command(compare_main, tmp_path / "run", "--out", tmp_path / "found")
     assert done.returncode == 0, done.stderr
     assert "the ship is otter" in done.stderr

@@ -4,12 +4,11 @@ import ast
 import json
 import os
 import stat
-import subprocess
-import sys
 import zipfile
 from dataclasses import replace
 
 import pytest
+from support.command import command
 from support.plain import GAIN
 from support.project import ROOT
 
@@ -17,6 +16,8 @@ import cosim
 from cosim.errors import InputError
 from cosim.fmu.archive_check import ArchiveLimits, check_archive, unpack
 from cosim.formats.ssv import read_parameters
+from cosim.run import main as run_main
+from fmus.build.__main__ import main as build_main
 
 MODEL = '<fmiModelDescription fmiVersion="2.0"/>'
 
@@ -209,10 +210,7 @@ def only_own(tmp_path, *paths):
     scenario = tmp_path / "scenario.json"
     fmus = {f"m{k}": {"path": str(path)} for k, path in enumerate(paths)}
     scenario.write_text(json.dumps({"name": "s", "step": 0.1, "stop": 0.2, "fmus": fmus}))
-    return subprocess.run(
-        [sys.executable, "-m", "cosim.run", str(scenario), "--out", str(tmp_path / "out"), "--no-plots", "--only-own"],
-        capture_output=True, text=True, cwd=ROOT, check=False,
-    )  # fmt: skip
+    return command(run_main, scenario, "--out", tmp_path / "out", "--no-plots", "--only-own")
 
 
 def edited(source, target, edit):
@@ -273,10 +271,7 @@ def test_only_own_refuses_a_python_fmu_of_others(plain_fmu, tmp_path):
 
 def test_builder_verifies_files(fmus, tmp_path):
     def verify(path):
-        return subprocess.run(
-            [sys.executable, "-m", "fmus.build", "--verify", str(path)],
-            capture_output=True, text=True, cwd=ROOT, check=False,
-        )  # fmt: skip
+        return command(build_main, "--verify", path)
 
     done = verify(fmus["vessel"])
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
