@@ -414,7 +414,7 @@ def test_runs_in_one_process_leave_nothing(ellipse, tmp_path):
 @pytest.mark.slow
 @linux_only
 def test_campaign_in_small(tmp_path, monkeypatch):
-    monkeypatch.setattr(campaigns, "LONGEST", 3.0)
+    monkeypatch.setattr(campaigns, "LONGEST", 1.5)
     nothing = lambda: None  # noqa: E731
     assert mutations.broken_scenarios(3, 2, tmp_path, nothing) == []
     assert mutations.broken_files(2, 2, tmp_path, nothing) == []

@@ -107,9 +107,9 @@ def deaths_elsewhere(count: int, seed: int, work: Path, advance: Callable[[], No
 def spoilt_cache(count: int, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
     """Cut, change or empty a file of the cache: the next run makes it again, and says so."""
     rng, wrong, cache = random.Random(seed), [], work / "cache"
-    content = json.loads((ROOT / "scenarios" / "setpoint.json").read_text())
-    path = work / "short.json"
-    path.write_text(json.dumps(content | {"stop": 0.1, "metrics": {}, "native": True}))
+    path = work / "short.json"  # a path alone: more FMUs would be more files of the same kinds
+    content = {"name": "short", "step": 0.01, "stop": 0.1, "native": True}
+    path.write_text(json.dumps(content | {"fmus": {"guidance": {"path": "guidance_ellipse.fmu"}}}))
 
     def run() -> subprocess.CompletedProcess[str]:
         return subprocess.run(
