@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from support.chromium import Tab
+from support.chromium import BROWSER, NO_BROWSER, Tab
 from support.command import command
 from support.project import ROOT
 from support.shared import kept
@@ -38,6 +38,8 @@ def made(content):
 @pytest.fixture
 def tab(tmp_path):
     """Opens the page of a scenario."""
+    if BROWSER is None:  # before a page is made, which takes seconds
+        pytest.skip(NO_BROWSER)
     opened = []
 
     def of(content):
