@@ -143,13 +143,14 @@ def _compact(system: System, available: Mapping[str, FmuVariable]) -> list[str]:
     poses = [f"{name}.{axis}_m" for name in system.models for axis in ("x", "y", "psi")]
     wanted = {*system.scenario.roles.columns, *measured, *poses}
     wanted |= system.recorded | (set() if system.trial is None else {system.trial.order})
-    # Commands of actuators: what enters the model of the force and is no copy of the above.
+    # Commands of actuators have limits, or enter the model of the force from elsewhere, as an angle does.
     acting = {name.partition(".")[0] for name in system.scenario.roles.force}
-    copies = {c.target.name for c in system.connections if c.source.name in wanted}
     inputs = {
         n for n, v in available.items() if v.causality == "input" and n.partition(".")[0] in acting
     }
-    return [name for name in available if name in wanted | (inputs - copies)]
+    inputs -= {c.target.name for c in system.connections if c.source.name in wanted}
+    wanted |= system.limited.keys() | inputs
+    return [name for name in available if name in wanted]
 
 
 def _numbers(system: System) -> dict[str, FmuVariable]:

@@ -103,7 +103,12 @@ class System:
 
     @property
     def commands(self) -> dict[str, CommandLimit]:
-        """Logged commands of actuators, with their limits: of ``X`` these are ``X_max``, ``X_min``."""
+        """Logged commands of actuators, with their limits."""
+        return {name: limit for name, limit in self.limited.items() if name in self.logged}
+
+    @property
+    def limited(self) -> dict[str, CommandLimit]:
+        """Commands of actuators, with their limits: of ``X`` these are ``X_max``, ``X_min``."""
         found = {}
         for part, model in self.models.items():
             numbers = {n: v.start for n, v in model.variables.items() if v.type == "Real" and v.start}
@@ -111,7 +116,7 @@ class System:
             values = {n: float(x) for n, x in numbers.items() if n.endswith(("_max", "_min"))}
             for name, variable in model.variables.items():
                 high = values.get(f"{name}_max")
-                if high is not None and f"{part}.{name}" in self.logged:
+                if high is not None and variable.causality in ("input", "output"):
                     low, unit = values.get(f"{name}_min", -high), variable.unit
                     found[f"{part}.{name}"] = CommandLimit(low, high, unit.name if unit else "")
         return found
