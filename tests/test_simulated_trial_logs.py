@@ -42,9 +42,9 @@ def test_a_compact_log_holds_the_commands_and_the_wind(runs):
 
 @pytest.mark.slow
 def test_the_model_that_made_a_log_leaves_no_error(runs):
-    """Without its wind, the tanker Esso Osaka has a model error of 0.64 N in sway."""
+    """In the median of windows; without its wind, the tanker Esso Osaka has 0.6 N in sway."""
     w = runs[1]
     model = Model(ship=ship(description=w.run.ship))
     parts = omega(w, model), omega_std(w, model), commanded([w], model)
-    left, noise, command = (np.sqrt(np.mean(x**2, axis=0)) for x in parts)
+    left, noise, command = (np.median(np.abs(x), axis=0) for x in parts)
     assert (left < 2.0 * noise + 0.002 * command).all()

@@ -143,11 +143,10 @@ def _compact(system: System, available: Mapping[str, FmuVariable]) -> list[str]:
     poses = [f"{name}.{axis}_m" for name in system.models for axis in ("x", "y", "psi")]
     wanted = {*system.scenario.roles.columns, *measured, *poses}
     wanted |= system.recorded | (set() if system.trial is None else {system.trial.order})
-    # Commands of actuators have limits, or enter the model of the force from elsewhere, as an angle does.
+    # Commands of actuators have limits, or enter the model of the force from elsewhere, as an angle.
     acting = {name.partition(".")[0] for name in system.scenario.roles.force}
-    inputs = {
-        n for n, v in available.items() if v.causality == "input" and n.partition(".")[0] in acting
-    }
+    inputs = {name for name, v in available.items() if v.causality == "input"}
+    inputs = {name for name in inputs if name.partition(".")[0] in acting}
     inputs -= {c.target.name for c in system.connections if c.source.name in wanted}
     wanted |= system.limited.keys() | inputs
     return [name for name in available if name in wanted]
