@@ -14,7 +14,6 @@ from .actuators.response import CommandLayout, PreparedThrusters, layouts
 from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, discover, variables
 from .effects import STANDARD, EffectSet
-from .hull import Triple, mass_matrix
 from .hull_functions import FUNCTIONS
 from .scale import Scale
 from .ship_description import Description
@@ -79,11 +78,6 @@ class Ship:
     def nominal_drive(self) -> PreparedThrusters:
         """The thrusters, nothing wrong with them."""
         return self.thrusters.prepared(self.thrusters.params())
-
-    @cached_property
-    def mass(self) -> tuple[Triple, Triple, Triple]:
-        """The mass matrix M, nothing wrong with it [kg, kg m, kg m2]."""
-        return mass_matrix(self.vessel.prepared(self.vessel.params()).hull.inertia)
 
     @property
     def layout(self) -> CommandLayout:

@@ -117,15 +117,10 @@ def test_commands_that_differ_for_a_moment_are_not_told_apart():
     assert least_squares(a, z, NEGLIGIBLE**2) == pytest.approx([0.5, 0.5], abs=0.02)
 
 
-@pytest.mark.parametrize("unit", [1e-6, 1e3])
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_unit_of_the_commands_does_not_matter(unit):
-    """Where it is far off, gains are fitted; those of the described inertia are those of N and N m."""
-    fitted, other = (
-        smooth(clean(replace(base(), tau_cmd=u * base().tau_cmd))).nu for u in (unit, 1e3 * unit)
-    )
-    np.testing.assert_allclose(fitted, other, atol=1e-4)
-    right = smooth(clean(base())).nu
-    assert (rms(right - true_nu()) < rms(fitted - true_nu())).all()
+    scaled = replace(base(), tau_cmd=unit * base().tau_cmd)
+    np.testing.assert_allclose(smooth(clean(scaled)).nu, smooth(clean(base())).nu, atol=1e-4)
 
 
 def test_parts_far_apart_are_smoothed_each_by_itself():

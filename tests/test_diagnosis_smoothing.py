@@ -158,8 +158,7 @@ def test_channel_that_rests_is_no_trouble():
     pose[:, 1] = 2.0
     s = smooth(clean(replace(base(), pose=pose)))
     assert np.abs(s.eta_dot[:, 1]).max() < 5e-8
-    # No ship rests so under its commands: their gains are fitted then, those of the yaw rate, too.
-    assert np.abs(s.nu - smooth_base().nu)[INNER, 2].max() < 1e-3
+    assert np.abs(s.nu - smooth_base().nu)[INNER, 2].max() < 5e-4
 
 
 def test_same_ship_elsewhere_and_later_gives_the_same_velocity():

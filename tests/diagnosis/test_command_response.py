@@ -15,7 +15,6 @@ from diagnosis.runs.cleaning import BRIEF
 from diagnosis.runs.smoothing.command_motion import (
     FORGETTING,
     IDLE,
-    SLOW,
     Commands,
     Gains,
     acting,
@@ -312,24 +311,3 @@ def test_a_delay_that_one_block_alone_shows_is_not_sure():
     found, sure = likeliest_delay(r)
     assert found == pytest.approx(0.4)
     assert not sure
-
-
-def test_slow_gains_are_found_again_beside_those_of_the_described_inertia():
-    G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
-    slow = np.array([[-0.4, 0.1, 0.2], [0.0, -0.9, 0.3], [-0.2, 0.3, -1.5]])
-    r = regression(psi=0.1 * TIME)
-    p = r.problem._replace(z=r.commands.response(Gains(G, 0.4, slow), 0.2).eta)
-    again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(0.2, G, bent=True)
-    assert (found.force == G).all()
-    assert found.slow == pytest.approx(slow, abs=1e-5)
-    assert found.bend == pytest.approx(0.4, abs=1e-5)
-
-
-def test_slow_forces_come_behind_a_lag_at_any_size_of_ship():
-    """A step rises to 1 - 1 / e of itself in the lag."""
-    for scale in (REFERENCE, Scale(4.0)):
-        c = commands(np.ones((N, 3)), scale=scale)
-        step = np.ones((c.even.size, 3))
-        at = np.searchsorted(c.even - c.even[0], SLOW * scale.time)
-        assert c.slow(step)[at - 1] == pytest.approx(1.0 - np.exp(-1.0), abs=0.05)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fmus.scale import Scale
-from fmus.ship import Ship, ship
+from fmus.ship import ship
 
 from ..cleaning import Track, between, impulse
 from ..linear_filter import filtered
@@ -23,7 +23,6 @@ from .spline import Knots
 # [m/s, m/s, rad/s] a ship slower than that at a run's start had no thrusters at work before. Chosen; of
 # a turn at 0.035 rad/s at the start, by noise alone, a run of the Otter was predicted nine times worse.
 IDLE = (0.02, 0.02, 0.05)
-SLOW = 1.0  # s, lag; slower forces are partly those of the hull, which answers the motion (chosen)
 FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
 
 
@@ -81,17 +80,10 @@ class Gains(NamedTuple):
     Attributes:
         force: (3, 3), by a unit of each command.
         bend: share of :attr:`Commands.bend` that acts.
-        slow: (3, 3), in addition, by a unit of each command behind the lag :data:`SLOW`.
     """
 
     force: np.ndarray
     bend: float = 0.0
-    slow: np.ndarray = np.zeros((3, 3))
-
-
-def described_gains(of: Ship) -> np.ndarray:
-    """(3, 3), accelerations by the force of a ship's thrusters as long as it hardly moves by it."""
-    return np.linalg.inv(of.mass)
 
 
 class CommandResponse(NamedTuple):
@@ -101,7 +93,6 @@ class CommandResponse(NamedTuple):
         eta, eta_dot, eta_ddot: (n, 3), pose and derivatives [m, m, rad; /s; /s2].
         delay: from a command to its effect [s]; NaN where the commands explain nothing.
         sure: whether the whole run agrees that there is a delay.
-        described: (3, 3), gains of quick forces, if they are those of the described inertia.
     """
 
     eta: np.ndarray
@@ -109,7 +100,6 @@ class CommandResponse(NamedTuple):
     eta_ddot: np.ndarray
     delay: float = np.nan
     sure: bool = False
-    described: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,10 +160,6 @@ class Commands:
         swing = np.interp(middle, self.track.run.time[known], self.swing[known])
         return 1j * self.rotation * swing
 
-    def slow(self, tau: np.ndarray) -> np.ndarray:
-        """Commands (m, 3) without what is quick."""
-        return self.lagging(tau, SLOW * self.track.scale.time)
-
     def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
         """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
         kept = np.exp(-self.track.period / lag)
@@ -211,8 +197,7 @@ class Commands:
 
     def response(self, gains: Gains, delay: float) -> CommandResponse:
         """The motion by the commands, a delay [s] late, and by the bend of the way."""
-        quick = self.delayed(delay)
-        surge, sway, yaw = (quick @ gains.force.T + self.slow(quick) @ gains.slow.T).T
+        surge, sway, yaw = (self.delayed(delay) @ gains.force.T).T
         plane = self.rotation * (surge + 1j * sway)
         if gains.bend:
             plane = plane + gains.bend * self.bend

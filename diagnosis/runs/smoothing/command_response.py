@@ -3,18 +3,13 @@
 A thruster's force jumps with its command, and a smoother that does not know it takes every jump for
 noise or noise for a jump. The pose is therefore modelled as
 
-    eta(t) = f(t) + x(t),    (d/dt + 1/T)^2 x = R(psi) [G tau(t - delay) + H tau_slow(t - delay)],
+    eta(t) = f(t) + x(t),    (d/dt + 1/T)^2 x = R(psi) G tau(t - delay),
 
-f a smoothing spline (:mod:`.penalised`), G and H constant gains from the commanded force to a body-fixed
+f a smoothing spline (:mod:`.penalised`), G constant gains from the commanded force to a body-fixed
 acceleration, one 2 x 3 block for the plane and one row for yaw. tau is that of the described actuators
-at the ship's speed, behind their lags (:func:`.command_motion.acting`), tau_slow the same behind a lag.
-
-A force accelerates the described inertia: G = M^-1, and H is what the hull makes of slower ones. From a
-closed loop G cannot be had: its controller answers the noise of the measurement, so that one would be
-taken for the effect of the other. If the description is so wrong that G alone, fitted, is likelier, H is
-zero. Fitted gains and the delay have the largest likelihood with f integrated out, which is generalised
-least squares: with A the motions for unit gains, P the hat matrix of the spline, and r(a) the residuals
-[sqrt(W) (a - P a), sqrt(s) roughness of P a],
+at the ship's speed, behind their lags (:func:`.command_motion.acting`). Gains and delay have the largest
+likelihood with f integrated out, which is generalised least squares: with A the motions for unit gains,
+P the hat matrix of the spline, and r(a) the residuals [sqrt(W) (a - P a), sqrt(s) roughness of P a],
 
     g = argmin |r(z) - r(A) g|^2,    taken = r(z)^T r(A) g / sigma^2.
 
@@ -35,11 +30,9 @@ import numpy as np
 from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
-from fmus.ship import ship
-
 from ..cleaning import BRIEF, WIDTH, between
 from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
-from .command_motion import FORGETTING, CommandResponse, Commands, Gains, described_gains
+from .command_motion import FORGETTING, CommandResponse, Commands, Gains
 from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
@@ -65,27 +58,16 @@ class Regression:
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
 
-    def gains(self, delay: float, described: np.ndarray | None = None, bent: bool = False) -> Gains:
-        """What the commands accelerate, and the bend of the way if that counts, for a delay [s].
-
-        Args:
-            delay: from a command to its effect [s].
-            described: (3, 3), gains of quick forces; None: gains of all forces are fitted.
-            bent: whether the way bends where the heading turns.
-        """
-        tau, pose = self.commands.delayed(delay), self.pose
-        plane, yaw = self.motions(tau)
-        if described is not None:
-            pose = pose[0] - plane @ described[:2].reshape(-1, 1), pose[1] - yaw @ described[2:].T
-            plane, yaw = self.motions(self.commands.slow(tau))
+    def gains(self, delay: float, bent: bool = False) -> Gains:
+        """What the commands accelerate, and the bend of the way if that counts, for a delay [s]."""
+        plane, yaw = self.motions(self.commands.delayed(delay))
         motions = np.hstack([plane, *([self.bend] if bent else [])]), yaw
         # Side force and yaw moment of a rudder go together; where they differ for once, gains of their
         # difference, by which nothing else is explained, would be anything.
         flat, turn = (
-            least_squares(a, z[:, 0], NEGLIGIBLE**2) for a, z in zip(motions, pose, strict=True)
+            least_squares(a, z[:, 0], NEGLIGIBLE**2) for a, z in zip(motions, self.pose, strict=True)
         )
-        fitted, bend = np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum())
-        return Gains(fitted, bend) if described is None else Gains(described, bend, fitted)
+        return Gains(np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum()))
 
     @property
     def bend(self) -> np.ndarray:
@@ -198,22 +180,22 @@ def with_commands(
     """
     weights, run = alone.weights, commands.track.run
     time = run.time[p.rows] - run.time[0]
+    near = alone.even
     regression = Regression(p, fit, commands, time)
     delay, sure = likeliest_delay(regression)
+    gains = regression.gains(delay)
     # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
-    least = deviance(p, weights, alone.even) - 2.0 * (3 * 3 + 1)
+    least = deviance(p, weights, near) - 2.0 * (gains.force.size + 1)
     found: tuple[Problem, np.ndarray, CommandResponse] | None = None
-    for described in (described_gains(ship(description=run.ship)), None):
-        near, beside = alone.even, regression
-        for _ in range(ROUNDS):
-            response = commands.response(beside.gains(delay, described), delay)
-            rest = p._replace(z=p.z - response.eta[p.rows])
-            near = likeliest(rest, weights, near)
-            cost = deviance(rest, weights, near)
-            if cost >= least:
-                break
-            found, least = (rest, near, response._replace(sure=sure, described=described)), cost
-            beside = Regression(p, solve(rest, near, weights), commands, time)
+    for _ in range(ROUNDS):
+        response = commands.response(gains, delay)
+        rest = p._replace(z=p.z - response.eta[p.rows])
+        near = likeliest(rest, weights, near)
+        cost = deviance(rest, weights, near)
+        if cost >= least:
+            break
+        found, least = (rest, near, response._replace(sure=sure)), cost
+        gains = Regression(p, solve(rest, near, weights), commands, time).gains(delay)
     if found is None:
         still = np.zeros((commands.psi.size, 3))
         return alone.problem, alone.smoothness, CommandResponse(still, still, still)
@@ -228,6 +210,5 @@ def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandRespons
     of the turn, m u r, the other way. Gains alone would be those of the sum of both.
     """
     time = commands.track.run.time[p.rows] - commands.track.run.time[0]
-    beside = Regression(p, fit, commands, time)
-    bent = commands.response(beside.gains(response.delay, response.described, bent=True), response.delay)
-    return bent._replace(sure=response.sure, described=response.described)
+    gains = Regression(p, fit, commands, time).gains(response.delay, bent=True)
+    return commands.response(gains, response.delay)._replace(sure=response.sure)
