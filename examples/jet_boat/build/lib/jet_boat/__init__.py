@@ -1,1 +1,0 @@
-"""A boat with water jets."""
