@@ -145,10 +145,10 @@ def _compact(system: System, available: Mapping[str, FmuVariable]) -> list[str]:
     wanted |= system.recorded | (set() if system.trial is None else {system.trial.order})
     # Commands of actuators have limits, or enter the model of the force from elsewhere, as an angle.
     acting = {name.partition(".")[0] for name in system.scenario.roles.force}
-    inputs = {name for name, v in available.items() if v.causality == "input"}
-    inputs = {name for name in inputs if name.partition(".")[0] in acting}
-    inputs -= {c.target.name for c in system.connections if c.source.name in wanted}
-    wanted |= system.limited.keys() | inputs
+    parts = [(m, v) for m in acting & system.models.keys() for v in system.models[m].variables.values()]
+    entering = {f"{m}.{v.name}" for m, v in parts if v.causality == "input"}
+    copied = {c.target.name for c in system.connections if c.source.name in wanted}
+    wanted |= system.limited.keys() | (entering - copied)
     return [name for name in available if name in wanted]
 
 

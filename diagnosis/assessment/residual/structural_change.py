@@ -56,7 +56,7 @@ def moment_of_change(
     if not 3 * STRETCH <= found.row <= len(x) - 3 * STRETCH:
         return None  # at an edge of what is tried: what lies beyond may be the start of a run
     drift = np.hstack([x * (np.linspace(-1.0, 1.0, len(x)) ** k)[:, None] for k in range(ORDER + 1)])
-    halves = [(own[: found.row], x[: found.row]), (own[found.row :], x[found.row :])]
+    halves = _halves(own, x, found.row)
     rest = sum(float(np.sum(_rest(*half) ** 2)) for half in halves)
     changes_once = (
         found.gain >= SETTINGS.repeats * (error @ error)
@@ -75,13 +75,17 @@ def moment_of_change(
 def _chance(error: np.ndarray, x: np.ndarray) -> float:
     """Chance of so large a change of a series of independent samples, of all moments that are tried."""
     found = most_changed(error, x)
-    halves = slice(None, found.row), slice(found.row, None)
-    rest = np.concatenate([_rest(error[half], x[half]) for half in halves])
+    rest = np.concatenate([_rest(*half) for half in _halves(error, x, found.row)])
     count, free = x.shape[1], len(rest) / _correlated(rest) - 2 * x.shape[1]
     if free <= 0.0:
         return 1.0
     variance = max(float(rest @ rest) / free, np.finfo(float).tiny)
     return found.tried * float(fdtrc(count, free, found.gain / count / variance))
+
+
+def _halves(error: np.ndarray, x: np.ndarray, row: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """A series (K,) and its regressors (K, p) before a row, and from it on."""
+    return [(error[:row], x[:row]), (error[row:], x[row:])]
 
 
 def _correlated(series: np.ndarray) -> float:

@@ -20,11 +20,11 @@ from .name_words import words_of
 from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
-# Words of a name.
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NONE_STATED: Mapping[str, str] = {}
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
+# Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
 
