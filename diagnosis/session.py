@@ -279,14 +279,22 @@ class Session(ShortRepr):
 
         Commands stay of which files state what they are, and those of a log of this project, orders.
         """
-        given = self.train, self.validate, self.test
-        train, validate, test = ([with_measured_commands(w) for w in part] for part in given)
-        decide = zip([*train, *validate], self.runs, strict=False)
+        measured = self._with_commands(0.5)
+        decide = zip([*measured.train, *measured.validate], self.runs, strict=False)
         if all(a is b for a, b in decide):
             return self
-        measured = replace(self, train=train, validate=validate, test=test, measured=True)
-        orders, others = self._losses, measured._losses
-        return measured if orders and others and are_measured(orders, others) else self
+        means = measured._losses
+        for other in (self, self._with_commands(1.0)):
+            losses = other._losses
+            if not (means and losses and are_measured(losses, means)):
+                return self
+        return measured
+
+    def _with_commands(self, rows: float) -> "Session":
+        """The session with commands as measured values, some rows later than orders."""
+        given = self.train, self.validate, self.test
+        train, validate, test = ([with_measured_commands(w, rows) for w in part] for part in given)
+        return replace(self, train=train, validate=validate, test=test, measured=True)
 
     @property
     def _losses(self) -> list[Losses]:

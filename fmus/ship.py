@@ -14,6 +14,7 @@ from .actuators.response import CommandLayout, PreparedThrusters, layouts
 from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, discover, variables
 from .effects import STANDARD, EffectSet
+from .hull import mass_matrix
 from .hull_functions import FUNCTIONS
 from .scale import Scale
 from .ship_description import Description
@@ -78,6 +79,13 @@ class Ship:
     def nominal_drive(self) -> PreparedThrusters:
         """The thrusters, nothing wrong with them."""
         return self.thrusters.prepared(self.thrusters.params())
+
+    @cached_property
+    def mass(self) -> "np.ndarray":
+        """(3, 3), mass matrix M of the nominal model [kg, kg m, kg m2], (2.4)-(2.5)."""
+        import numpy as np
+
+        return np.array(mass_matrix(self.vessel.prepared(self.vessel.params()).hull.inertia))
 
     @property
     def layout(self) -> CommandLayout:

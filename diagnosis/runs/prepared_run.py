@@ -101,6 +101,7 @@ def prepare(
     """
     of = of or ship()
     raw = source if isinstance(source, Run) else read(source, of=of, also=also)
+    raw = raw if raw.ship else replace(raw, ship=of.description)
     sensors = examine(raw, of.scale)
     unrepaired = [finding for finding in sensors.findings if not finding.repaired]
     in_doubt = next((finding for finding in unrepaired if not finding.aside), None)

@@ -8,7 +8,9 @@ standard deviation, the likelihood
     2 log L = -n (2 log mean e_position^2 + log mean e_heading^2).
 
 Accelerations do not show it: a controller commands what its ship has just done, so that earlier commands
-seem to explain them better.
+seem to explain them better. What the model lacks may do the same: half a row looks like too little drag.
+Such a model is better still with commands of a whole row later. Commands are measured values only if
+their means predict better than that, too.
 """
 
 from collections.abc import Sequence
@@ -26,10 +28,14 @@ from ..runs.run_constants import NEGLIGIBLE
 from ..search.significance import Losses
 
 
-def with_measured_commands(w: WeakWindows) -> WeakWindows:
+def with_measured_commands(w: WeakWindows, rows: float = 0.5) -> WeakWindows:
     """The windows of a run whose commands are measured values, but for those of which more is stated.
 
     The commands of a log of this project are orders.
+
+    Args:
+        w: windows in which commands are orders.
+        rows: how much later commands are than orders, 1; half a row for means between samples.
     """
     run, of = w.run, ship(description=w.run.ship)
     if run.layout == log_of(of.commands):
@@ -40,7 +46,8 @@ def with_measured_commands(w: WeakWindows) -> WeakWindows:
     for k, (name, unit) in enumerate(units.items()):
         column = run.layout.column(name)
         if column.measured is None and not column.late and np.ptp(means[:, k]) > 0.0:
-            means[:, k] = row_means(means[:, k], run.time, unit == "rad", logged)
+            mean = row_means(means[:, k], run.time, unit == "rad", logged)
+            means[:, k] += 2.0 * rows * (mean - means[:, k])
             names.append(name)
     if not names:
         return w
@@ -67,11 +74,11 @@ def log_odds(orders: Losses, measured: Losses) -> float:
     return total
 
 
-def are_measured(orders: Sequence[Losses], measured: Sequence[Losses]) -> bool:
+def are_measured(others: Sequence[Losses], measured: Sequence[Losses]) -> bool:
     """Whether commands are measured values, by losses of the initial and of the calibrated model.
 
     Coefficients may make up for half a row, and effects that are not known yet may look like it. So both
     models have to predict better, and one of them so that less than NEGLIGIBLE is left to orders.
     """
-    initial, calibrated = map(log_odds, orders, measured)
+    initial, calibrated = map(log_odds, others, measured)
     return bool(min(initial, calibrated) > 0.0 and max(initial, calibrated) > -np.log(NEGLIGIBLE))

@@ -15,6 +15,7 @@ from diagnosis.runs.cleaning import BRIEF
 from diagnosis.runs.smoothing.command_motion import (
     FORGETTING,
     IDLE,
+    SLOW,
     Commands,
     Gains,
     acting,
@@ -253,6 +254,25 @@ def test_gains_are_found_again_where_the_pose_is_the_response_alone():
     found = again.gains(0.2)
     assert found.force == pytest.approx(G, abs=1e-5)
     assert found.bend == 0.0
+
+
+def test_slow_gains_are_found_beside_gains_that_are_described():
+    """The response is that of the commands, and of the commands behind a lag of a second."""
+    G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
+    H_slow = np.array([[-0.3, 0.0, 0.1], [0.2, -0.9, 0.0], [0.0, 0.3, -1.5]])
+    r = regression(psi=0.1 * TIME)
+    response = r.commands.response(Gains(G, 0.4, H_slow), 0.2)
+    tau, slow = r.commands.delayed(0.2), r.commands.slow(0.2)
+    by_hand = r.commands.motion((tau @ G[2] + slow @ H_slow[2])[:, None])[0][:N, 0]
+    assert response.eta[:, 2] == pytest.approx(by_hand, abs=1e-9)
+    rise = slow[1:] - slow[:-1] * np.exp(-H / SLOW)
+    assert rise == pytest.approx((1.0 - np.exp(-H / SLOW)) * tau[:-1])
+    p = r.problem._replace(z=response.eta)
+    again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
+    found = again.gains(0.2, described=G, bent=True)
+    assert found.force.tolist() == G.tolist()
+    assert found.slow == pytest.approx(H_slow, abs=1e-5)
+    assert found.bend == pytest.approx(0.4, abs=1e-5)
 
 
 def test_a_response_that_is_not_finite_is_refused():

@@ -149,32 +149,42 @@ def test_the_second_answer_is_the_calibrated_model_with_its_gain(monkeypatch):
 # Commands as measured values
 
 
-def likelier(monkeypatch, changed=("a",), better=True):
-    """The session after the question, where the commands of some runs are not stated."""
-    others = {name: run(name) for name in "abcde"}
+def likelier(monkeypatch, changed=("a",), worse=()):
+    """The session after the question, where the commands of some runs are not stated.
+
+    ``worse`` are the readings that predict worse than measured values: orders, and rows that follow.
+    """
+    later = {rows: {name: run(name) for name in "abcde"} for rows in (0.5, 1.0)}
     monkeypatch.setattr(
-        session, "with_measured_commands", lambda w: others[w.run.name] if w.run.name in changed else w
+        session,
+        "with_measured_commands",
+        lambda w, rows: later[rows][w.run.name] if w.run.name in changed else w,
     )
     asked = []
 
-    def measured(orders, losses):
-        asked.append((orders, losses))
-        return better
+    def measured(others, losses):
+        asked.append((others, losses))
+        return others[0] in worse
+
+    def losses(s):
+        of = {k: [w is later[k][w.run.name] for w in s.runs] for k in later}
+        return ["measured" if any(of[0.5]) else "following" if any(of[1.0]) else "orders"]
 
     monkeypatch.setattr(session, "are_measured", measured)
-    monkeypatch.setattr(Session, "_losses", property(lambda s: ["measured" if s.measured else "orders"]))
+    monkeypatch.setattr(Session, "_losses", property(losses))
     s = made()
-    return s, s.with_likelier_commands(), others, asked
+    return s, s.with_likelier_commands(), later[0.5], asked
 
 
 @pytest.mark.parametrize("changed", ["a", "c", "abcde"])
 def test_commands_are_measured_values_if_the_runs_that_decide_are_predicted_better(monkeypatch, changed):
-    _, found, others, asked = likelier(monkeypatch, changed)
-    assert asked == [(["orders"], ["measured"])]
+    _, found, others, asked = likelier(monkeypatch, changed, ("orders", "following"))
+    assert asked == [(["orders"], ["measured"]), (["following"], ["measured"])]
     assert found.measured
     assert [w is others[w.run.name] for w in found.runs] == [n in changed for n in "abcde"]
     assert [len(part) for part in (found.train, found.validate, found.test)] == [2, 1, 2]
-    assert likelier(monkeypatch, changed, better=False)[1].measured is False
+    for worse in ((), ("orders",), ("following",)):
+        assert likelier(monkeypatch, changed, worse)[1].measured is False
 
 
 @pytest.mark.parametrize("changed", ["", "d", "de"])

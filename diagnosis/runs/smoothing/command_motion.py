@@ -1,8 +1,8 @@
 """The motion that commands would give a ship that is nothing but a mass, and how late they act.
 
-    x(t):  (d/dt + 1/T)^2 x = R(psi) G tau(t - delay),
+    x(t):  (d/dt + 1/T)^2 x = R(psi) [G tau(t - delay) + H tau_slow(t - delay)],
 
-on evenly spaced times, of commands that are held from row to row.
+on evenly spaced times, of commands that are held from row to row. tau_slow is tau behind a lag.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,6 +24,9 @@ from .spline import Knots
 # a turn at 0.035 rad/s at the start, by noise alone, a run of the Otter was predicted nine times worse.
 IDLE = (0.02, 0.02, 0.05)
 FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
+# s, lag of tau_slow (chosen): above the noise of a measurement that a controller answers, and below the
+# time in which a ship gets under way, so that what the hull makes of its speed is in it.
+SLOW = 1.0
 
 
 def idle(scale: Scale) -> np.ndarray:
@@ -78,12 +81,14 @@ class Gains(NamedTuple):
     """Accelerations in the body frame.
 
     Attributes:
-        force: (3, 3), by a unit of each command.
+        force: G (3, 3), by a unit of each command.
         bend: share of :attr:`Commands.bend` that acts.
+        slow: H (3, 3), by a unit of each command behind a lag.
     """
 
     force: np.ndarray
     bend: float = 0.0
+    slow: np.ndarray = np.zeros((3, 3))
 
 
 class CommandResponse(NamedTuple):
@@ -93,6 +98,7 @@ class CommandResponse(NamedTuple):
         eta, eta_dot, eta_ddot: (n, 3), pose and derivatives [m, m, rad; /s; /s2].
         delay: from a command to its effect [s]; NaN where the commands explain nothing.
         sure: whether the whole run agrees that there is a delay.
+        described: whether G is that of the ship's description.
     """
 
     eta: np.ndarray
@@ -100,6 +106,7 @@ class CommandResponse(NamedTuple):
     eta_ddot: np.ndarray
     delay: float = np.nan
     sure: bool = False
+    described: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +167,10 @@ class Commands:
         swing = np.interp(middle, self.track.run.time[known], self.swing[known])
         return 1j * self.rotation * swing
 
+    def slow(self, delay: float) -> np.ndarray:
+        """tau_slow (m, 3), a delay [s] late [N, N, N m]."""
+        return self.lagging(self.delayed(delay), SLOW * self.track.scale.time)
+
     def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
         """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
         kept = np.exp(-self.track.period / lag)
@@ -197,7 +208,10 @@ class Commands:
 
     def response(self, gains: Gains, delay: float) -> CommandResponse:
         """The motion by the commands, a delay [s] late, and by the bend of the way."""
-        surge, sway, yaw = (self.delayed(delay) @ gains.force.T).T
+        accelerations = self.delayed(delay) @ gains.force.T
+        if gains.slow.any():
+            accelerations = accelerations + self.slow(delay) @ gains.slow.T
+        surge, sway, yaw = accelerations.T
         plane = self.rotation * (surge + 1j * sway)
         if gains.bend:
             plane = plane + gains.bend * self.bend
