@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from fmus.ship import Ship
 
 from ..predictors.uncertainty import SHARE_OF_COMMAND
 from ..runs.run_constants import NEGLIGIBLE
+from ..runs.smoothing.command_response import surely_positive
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
 
@@ -148,6 +150,19 @@ def predicts_worse(its: Losses, others: Losses) -> bool:
     if any(worse(b, a) for a, b in pairs):
         return gain_of_predictions(its, others) > 0.0
     return True
+
+
+def fits_predict_worse(its: Sequence[Losses], others: Sequence[Losses]) -> bool:
+    """Whether a way to fit predicts worse than another one, by the losses of folds.
+
+    All windows of a fold are predicted by one fit. What varies by chance is the fit, so that the
+    logarithms of the ratios of the mean squares count once a fold (Student's test).
+    """
+    lost = [[np.isinf(np.hstack(fold[1:])).any() for fold in each] for each in (its, others)]
+    if any(a and not b for a, b in zip(*lost, strict=True)):
+        return True
+    rises = [gain_of_predictions(a, b) for a, b in zip(its, others, strict=True) if a.position.size]
+    return surely_positive(np.array(rises), float(ndtr(-TIE)))
 
 
 def gain(its: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> float:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ..predictors import Model
 from ..search.findings import Finding, Findings
 from ..search.refinement import at_limit
-from ..search.significance import gain, lower_throughout, predicts_worse
+from ..search.significance import fits_predict_worse, gain, lower_throughout
 from ..search.significance import harm as paired_harm
 from .confidence import confidence_of
 from .pruning_criteria import Harm
@@ -207,5 +207,5 @@ def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) 
     data = data.of_other_runs
     if not (data.judges(fit) and data.judges(before)):
         return False
-    its, others, first = data.losses(fit, before, data.start)
-    return predicts_worse(its, others) or bool(harm(its, first, 0))
+    its, others = data.losses_of_folds(fit, before)
+    return fits_predict_worse(its, others) or bool(harm(*data.losses(fit, data.start), 0))

@@ -90,7 +90,7 @@ class ValidationData:
         self.train, self.validate, self.start, self.sigma = train, validate, start, sigma
         self.least = least
         self.where = "validation runs" if validate else "data left out of the fit"
-        self._known: dict[int, tuple[Findings | Model, Losses]] = {}
+        self._known: dict[int, tuple[Findings | Model, list[Losses]]] = {}
 
     @cached_property
     def _folds(self) -> list[Fold]:
@@ -119,6 +119,11 @@ class ValidationData:
 
     def losses(self, *found: Findings | Model) -> list[Losses]:
         """Losses of models, each fitted without the fold that it is judged on."""
+        of_folds = self.losses_of_folds(*found)
+        return [Losses(*map(np.concatenate, zip(*folds, strict=True))) for folds in of_folds]
+
+    def losses_of_folds(self, *found: Findings | Model) -> list[list[Losses]]:
+        """The same of each fold."""
         # The first model, which comes up again, takes hardly longer together with others.
         due = {id(f): f for f in (*found, self.start) if id(f) not in self._known}
         if any(id(f) in due for f in found):
@@ -133,7 +138,7 @@ class ValidationData:
 
             by_fold = in_halves(of_some, range(len(self._folds)))
             for f, parts in zip(due.values(), zip(*by_fold, strict=True), strict=True):
-                self._known[id(f)] = f, Losses(*map(np.concatenate, zip(*parts, strict=True)))
+                self._known[id(f)] = f, list(parts)
         return [self._known[id(f)][1] for f in found]
 
     def _models(self, found: Findings | Model) -> Sequence[Model]:
