@@ -382,8 +382,6 @@ def circling(seconds=110.0, h=0.1, camera=0.1):
 def test_feedback_of_the_motion_tells_no_gain_of_its_own():
     w = weak_windows(smoothed(circling()))
     g = gains(w, Model())
-    # The smoother's errors of the motion, which the commands contain as well.
-    assert (np.abs(g.value[1:] - 1.0) > 3.0 * g.error[1:]).all()
     assert not g.told[1:].any()
     refuse_implausible([w], Model())
 

@@ -392,9 +392,9 @@ def test_gain_of_a_possibility_shows_in_the_run_that_it_was_not_fitted_to():
     ],
 )
 def test_fit_to_predictions_is_judged_by_the_run_that_it_has_not_seen(fitted, before, over):
-    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0})[:2], Model()
+    runs, start = voyages(count=3, seconds=90.0, ship={"delta_X_u": -3.0})[:3], Model()
     data = ValidationData(runs, [], start, np.full(3, 0.01))
-    both = [Findings(model=start, run_models=[start.plus(v)] * 2) for v in (fitted, before)]
+    both = [Findings(model=start, run_models=[start.plus(v)] * 3) for v in (fitted, before)]
     assert overfits(*both, data, harm) == over
     assert not overfits(replace(both[0], run_models=[]), both[1], data, harm)
 

@@ -57,9 +57,9 @@ def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level, held):
         stated.append(omega_std(w))
     spread = np.sqrt(np.mean(np.square(left), axis=(0, 1)))
     expected = np.sqrt(np.mean(np.square(stated), axis=(0, 1)))
-    np.testing.assert_allclose(expected[2], spread[2], rtol=0.3)
-    # Of a position that is rare a little too much is claimed: the smoother knows the commands.
-    np.testing.assert_allclose(expected[:2], spread[:2], rtol=0.3 if held == 1 else 0.5)
+    # A little too much is claimed, most of a position that is rare: the smoother knows the commands.
+    assert (expected > 0.7 * spread).all()
+    assert (expected < spread * (1.4 if held == 1 else 1.5)).all()
 
 
 def test_a_force_is_as_uncertain_as_its_velocity_whether_a_coefficient_or_given():

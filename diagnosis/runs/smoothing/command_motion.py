@@ -83,12 +83,12 @@ class Gains(NamedTuple):
     Attributes:
         force: G (3, 3), by a unit of each command.
         bend: share of :attr:`Commands.bend` that acts.
-        slow: H (3, 3), by a unit of each command behind a lag.
+        slow: H (3, 3), by a unit of each command behind a lag; 0: none.
     """
 
     force: np.ndarray
     bend: float = 0.0
-    slow: np.ndarray = np.zeros((3, 3))
+    slow: np.ndarray | float = 0.0
 
 
 class CommandResponse(NamedTuple):
@@ -209,8 +209,8 @@ class Commands:
     def response(self, gains: Gains, delay: float) -> CommandResponse:
         """The motion by the commands, a delay [s] late, and by the bend of the way."""
         accelerations = self.delayed(delay) @ gains.force.T
-        if gains.slow.any():
-            accelerations = accelerations + self.slow(delay) @ gains.slow.T
+        if np.any(gains.slow):
+            accelerations = accelerations + self.slow(delay) @ np.transpose(gains.slow)
         surge, sway, yaw = accelerations.T
         plane = self.rotation * (surge + 1j * sway)
         if gains.bend:
