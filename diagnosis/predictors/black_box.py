@@ -33,7 +33,7 @@ from fmus.ops import wrap
 
 from ..runs import Fingerprint, Run, Smoothed
 from ..runs.cleaning import between
-from ..runs.columns.columns import POSE, TAU
+from ..runs.columns.columns import TAU
 from ..runs.run_constants import DIGITS
 from .described_ship import DescribedShip, windows_of
 from .prediction import WindowStarts, at_rest
@@ -43,7 +43,7 @@ from .thrust import FORGOTTEN
 from .weak_form import SMALL, WeakWindows, acceleration, inflow_along, thrust_along
 from .windows import Windows, between_steps, first_row, first_time, free_runs, step_of
 
-VELOCITY = ("u", "v", "r")
+POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
 
 # Name of a pose, velocity, force or command -> values (n,) [SI].

@@ -207,5 +207,5 @@ def overfits(fit: Findings, before: Findings, data: ValidationData, harm: Harm) 
     data = data.of_other_runs
     if not (data.judges(fit) and data.judges(before)):
         return False
-    its, others = data.losses_of_folds(fit, before)
-    return fits_predict_worse(its, others) or bool(harm(*data.losses(fit, data.start), 0))
+    its, first = data.losses(fit, data.start)
+    return fits_predict_worse(*data.losses_of_folds(fit, before)) or bool(harm(its, first, 0))
