@@ -24,8 +24,8 @@ from .spline import Knots
 # a turn at 0.035 rad/s at the start, by noise alone, a run of the Otter was predicted nine times worse.
 IDLE = (0.02, 0.02, 0.05)
 FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
-# s, lag of tau_slow (chosen): above the noise of a measurement that a controller answers, and below the
-# time in which a ship gets under way, so that what the hull makes of its speed is in it.
+# s, lag of tau_slow. Chosen: above the periods in which a controller answers noise, and below the time
+# in which a ship gets under way, so that damping is in it.
 SLOW = 1.0
 
 
