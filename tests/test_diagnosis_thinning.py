@@ -142,3 +142,29 @@ def test_rare_rows_are_filled_up_between_but_not_over_a_gap():
         assert parts == pytest.approx(np.arange(many) * step / many)
     quick = replace(track, run=replace(run, time=0.5 * np.arange(n)))
     assert thinning.filled_up(quick) is quick
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_shaft_speed_that_changes_with_each_row_keeps_its_mean_thrust(sign):
+    """A controller answers noise: the mean of n has less thrust than the mean of n |n|."""
+    of, t = ship_with((), "kvlcc2"), np.arange(400) * 0.01
+    n = sign * (8.0 + 3.0 * (np.arange(400) % 2))
+    helm = 0.1 * np.sin(t)
+    given = np.column_stack([n, helm])
+    run = Run("quick", t, np.zeros((400, 3)), of.commanded_force(given), given, ship=of.description)
+    edges = t[::20]
+    mean = thinning._mean_commands(run, edges)
+    thrust = [of.commanded_force(c)[:, 0].mean() for c in (given[:380], mean["commands"][:-1])]
+    assert thrust[1] == pytest.approx(thrust[0], rel=1e-4)  # the rudder is in the race
+    assert mean["tau_cmd"][:-1, 0].mean() == pytest.approx(thrust[0], rel=1e-9)
+    helms = helm[:380].reshape(-1, 20).mean(axis=1)
+    np.testing.assert_allclose(mean["commands"][:-1, 1], helms, rtol=1e-9, atol=1e-9)
+
+
+def test_a_shaft_behind_a_lag_has_the_mean_of_its_speed():
+    of, t = ship_with((), "otter"), np.arange(400) * 0.01
+    n = 20.0 + 8.0 * (np.arange(400) % 2)
+    given = np.column_stack([n, n])
+    run = Run("quick", t, np.zeros((400, 3)), of.commanded_force(given), given, ship=of.description)
+    mean = thinning._mean_commands(run, t[::20])["commands"]
+    np.testing.assert_allclose(mean[:-1], 24.0, rtol=1e-9)

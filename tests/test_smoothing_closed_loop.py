@@ -20,7 +20,7 @@ from cosim.scenario import find_scenario
 from diagnosis import Model, omega, smooth
 from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.runs.prepared_run import prepare
-from diagnosis.runs.smoothing import command_response
+from diagnosis.runs.smoothing import command_response, smoother
 from diagnosis.runs.smoothing.command_motion import Commands
 from diagnosis.runs.smoothing.command_response import described_gains
 from diagnosis.runs.smoothing.spline import knots
@@ -75,3 +75,14 @@ def test_a_description_of_another_ship_gives_way_to_fitted_gains(monkeypatch):
     monkeypatch.setattr(command_response, "described_gains", lambda commands: None)
     fitted = smooth(prepare(run).track)
     np.testing.assert_allclose(strong.nu, fitted.nu, atol=1e-6)
+
+
+@pytest.mark.parametrize("described", [True, False])
+def test_beside_described_gains_the_way_bends(described, monkeypatch):
+    """The spline is stiffer there: without the bend, the sway of an Otter that turns was smoothed away."""
+    asked = []
+    monkeypatch.setattr(smoother, "with_bend", lambda *given: asked.append(given) or given[-1])
+    if not described:
+        monkeypatch.setattr(command_response, "described_gains", lambda commands: None)
+    smooth(prepare(under_control(1)).track)
+    assert bool(asked) == described

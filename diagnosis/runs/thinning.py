@@ -127,17 +127,31 @@ def thinned_motion(smoothed: Smoothed) -> Smoothed:
 
 
 def _mean_commands(run: Run, edges: np.ndarray) -> dict[str, np.ndarray]:
-    """What a run has of commands, each the mean from an edge (m,) to the next; the last as it is."""
+    """What a run has of commands, each the mean from an edge (m,) to the next; the last as it is.
+
+    A propeller's thrust follows the square of its shaft speed, so that the mean of n |n| counts: a
+    controller that answers noise changes n with each sample, and the mean of n has less thrust. A shaft
+    behind a lag does not follow, and has the mean of n.
+    """
     found = {
         name: c for name in ("tau_cmd", "commands", "power") if (c := getattr(run, name)) is not None
     }
     turns = {name: np.zeros_like(c) for name, c in found.items()}
     if run.commands is not None:
-        units = ship(description=run.ship).form_of(run.commands)
+        of = ship(description=run.ship)
+        units = of.form_of(run.commands)
         angle = [unit == "rad" for unit in units.values()]
         turns["commands"][:, angle] = np.unwrap(run.commands[:, angle], axis=0) - run.commands[:, angle]
     row = np.searchsorted(run.time, edges, side="right") - 1
-    return {n: _mean(run.time, c + turns[n], edges) - turns[n][row] for n, c in found.items()}
+    means = {n: _mean(run.time, c + turns[n], edges) - turns[n][row] for n, c in found.items()}
+    if run.commands is not None:
+        lags = of.layout_of(run.commands).lags
+        prompt = [unit == "1/s" and lag == 0.0 for unit, lag in zip(units.values(), lags, strict=True)]
+        if any(prompt):
+            n = run.commands[:, prompt]
+            squares = _mean(run.time, n * np.abs(n), edges)
+            means["commands"][:, prompt] = np.sign(squares) * np.sqrt(np.abs(squares))
+    return means
 
 
 def _by(part: np.ndarray, values: np.ndarray) -> Any:

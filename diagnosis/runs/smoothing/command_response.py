@@ -133,7 +133,8 @@ def least_squares(a: np.ndarray, z: np.ndarray, apart: float = DIGITS) -> np.nda
         apart: share of the largest squared singular value, of columns of length one, below which they
             do not differ.
     """
-    size = np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
+    size = np.linalg.norm(a, axis=0)
+    size[size == 0.0] = np.inf  # what never acts has no effect
     scaled = a / size
     return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=apart)[0] / size
 

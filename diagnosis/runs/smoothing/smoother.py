@@ -296,7 +296,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     commands = Commands(late, psi, grid, bool(slow), swing)
     p, smoothness, by_commands = with_commands(even, alone, fit, commands)
     response = by_commands
-    if steered and not np.isnan(by_commands.delay):
+    if (steered or by_commands.described) and not np.isnan(by_commands.delay):
         response = with_bend(even, solve(p, smoothness, weights), commands, by_commands)
     rates = measured_rates(track, dense, psi, agreeing, grid)
 
