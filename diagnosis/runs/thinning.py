@@ -127,30 +127,34 @@ def thinned_motion(smoothed: Smoothed) -> Smoothed:
 
 
 def _mean_commands(run: Run, edges: np.ndarray) -> dict[str, np.ndarray]:
-    """What a run has of commands, each the mean from an edge (m,) to the next; the last as it is.
+    """What a run has of commands, each the mean from an edge (m,) to the next; the last as it is."""
+    means = {"tau_cmd": _mean(run.time, run.tau_cmd, edges)}
+    if run.power is not None:
+        means["power"] = _mean(run.time, run.power, edges)
+    if run.commands is not None:
+        means["commands"] = _mean_actuators(run, run.commands, edges)
+    return means
+
+
+def _mean_actuators(run: Run, commands: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """The same of the commands (n, k) of a run's actuators.
 
     A propeller's thrust follows the square of its shaft speed, so that the mean of n |n| counts: a
     controller that answers noise changes n with each sample, and the mean of n has less thrust. A shaft
     behind a lag does not follow, and has the mean of n.
     """
-    found = {
-        name: c for name in ("tau_cmd", "commands", "power") if (c := getattr(run, name)) is not None
-    }
-    turns = {name: np.zeros_like(c) for name, c in found.items()}
-    if run.commands is not None:
-        of = ship(description=run.ship)
-        units = of.form_of(run.commands)
-        angle = [unit == "rad" for unit in units.values()]
-        turns["commands"][:, angle] = np.unwrap(run.commands[:, angle], axis=0) - run.commands[:, angle]
+    of = ship(description=run.ship)
+    units, lags = of.form_of(commands).values(), of.layout_of(commands).lags
+    angle = [unit == "rad" for unit in units]
+    prompt = [unit == "1/s" and lag == 0.0 for unit, lag in zip(units, lags, strict=True)]
+    turns = np.zeros_like(commands)
+    turns[:, angle] = np.unwrap(commands[:, angle], axis=0) - commands[:, angle]
     row = np.searchsorted(run.time, edges, side="right") - 1
-    means = {n: _mean(run.time, c + turns[n], edges) - turns[n][row] for n, c in found.items()}
-    if run.commands is not None:
-        lags = of.layout_of(run.commands).lags
-        prompt = [unit == "1/s" and lag == 0.0 for unit, lag in zip(units.values(), lags, strict=True)]
-        if any(prompt):
-            n = run.commands[:, prompt]
-            squares = _mean(run.time, n * np.abs(n), edges)
-            means["commands"][:, prompt] = np.sign(squares) * np.sqrt(np.abs(squares))
+    means = _mean(run.time, commands + turns, edges) - turns[row]
+    if any(prompt):
+        n = commands[:, prompt]
+        squares = _mean(run.time, n * np.abs(n), edges)
+        means[:, prompt] = np.sign(squares) * np.sqrt(np.abs(squares))
     return means
 
 
