@@ -118,13 +118,15 @@ def test_the_share_of_a_finding_says_what_it_is_of(by_power, of):
 
 
 def test_headline_of_each_verdict():
-    def said(verdict, possibilities=(), suspects=(), something=False, calibrated=False, shared=None):
+    def said(
+        verdict, possibilities=(), suspects=(), something=False, calibrated=False, shared=None, left=True
+    ):
         start = Model()
         model = start.plus({"m": 0.1} | (shared or {}))
         d = diagnosis(
             verdict=verdict,
             calibrated=calibrated,
-            remainder=SimpleNamespace(beyond_chance=something),
+            remainder=SimpleNamespace(beyond_chance=something, significant=left),
             start=start,
             learned=SimpleNamespace(model=model),
             posterior=SimpleNamespace(std=dict.fromkeys(["m", "body_bias_N", *(shared or {})], 0.1)),
@@ -136,6 +138,8 @@ def test_headline_of_each_verdict():
     assert said("none", something=True) == headline.TOO_LITTLE
     assert said("unexplained") == headline.UNEXPLAINED
     assert said("unexplained", calibrated=True) != headline.UNEXPLAINED
+    calibrated = said("unexplained", calibrated=True, left=False)
+    assert calibrated == headline.NOT_BELIEVED + headline.CALIBRATED, "no error remains"
     assert said("unexplained", [effect("lag", 0.1)]) == headline.NOT_BELIEVED
     assert ", mainly a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
     assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])

@@ -45,7 +45,7 @@ VERDICTS = {
     "found": "An effect is missing and was identified",
     "ambiguous": "An effect is missing, and several candidates explain it",
     "coefficients": "Coefficients differ from their nominal values; no effect is needed",
-    "unexplained": "A model error remains that no known effect explains",
+    "unexplained": "The model has an error that no known effect explains",
     "none": "These data show no missing effect",
 }
 # Headings where one cause fits and is not sure, and where effects are possible and none is believed.
@@ -165,7 +165,8 @@ def headline(r: ReportData) -> str:
         needed = "no other effect is needed" if others else "no effect is needed"
         return f"Other values of the nominal coefficients explain these data{beside}{above}; {needed}."
     if d.verdict == "unexplained":
-        return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated
+        remains = d.remainder.significant and not r.possibilities
+        return (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
 
 
