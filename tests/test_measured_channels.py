@@ -123,7 +123,7 @@ def test_start_of_time_and_scale_of_the_place_do_not_matter():
     larger = prepare(replace(run, pose=run.pose * [2.0, 2.0, 1.0])).smoothed
     # Twice the way by the same commands is not that of the described ship: their gains are fitted.
     assert larger.noise == pytest.approx(first.noise * [2.0, 2.0, 1.0], rel=5e-3)
-    assert larger.noise_rel_std == pytest.approx(first.noise_rel_std, rel=0.05)
+    assert larger.noise_rel_std == pytest.approx(first.noise_rel_std, rel=0.2)
 
 
 def test_added_noise_is_found_beside_that_which_is_there():
