@@ -284,11 +284,12 @@ class Session(ShortRepr):
         if all(a is b for a, b in decide):
             return self
         means = measured._losses
-        for other in (self, self._with_commands(1.0)):
+
+        def worse(other: Session) -> bool:
             losses = other._losses
-            if not (means and losses and are_measured(losses, means)):
-                return self
-        return measured
+            return bool(means and losses and are_measured(losses, means))
+
+        return measured if worse(self) and worse(self._with_commands(1.0)) else self
 
     def _with_commands(self, rows: float) -> "Session":
         """The session with commands as measured values, some rows later than orders."""

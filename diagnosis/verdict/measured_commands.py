@@ -35,7 +35,7 @@ def with_measured_commands(w: WeakWindows, rows: float = 0.5) -> WeakWindows:
 
     Args:
         w: windows in which commands are orders.
-        rows: how much later commands are than orders, 1; half a row for means between samples.
+        rows: from how many rows later commands are taken, 1; half a row for means between samples.
     """
     run, of = w.run, ship(description=w.run.ship)
     if run.layout == log_of(of.commands):

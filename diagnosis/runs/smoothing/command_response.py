@@ -233,7 +233,8 @@ def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandRespons
     """The response to the commands and the bend of the way, beside a spline as smooth as that of a fit.
 
     A force to the side that turns the ship as well, as a rudder's, is soon followed by the larger force
-    of the turn, m u r, the other way. Gains alone would be those of the sum of both.
+    of the turn, m u r, the other way. Gains alone would be those of the sum of both. Beside described
+    gains the spline is stiffer, and would smooth the force of the turn away.
     """
     time = commands.track.run.time[p.rows] - commands.track.run.time[0]
     described = described_gains(commands) if response.described else None
