@@ -31,24 +31,33 @@ NOISE = {"kind": "noise", "signals": MEASURED, "std": [0.002, 0.002, 0.0035]}  #
 
 
 @cache
-def under_control(seed):
+def under_control(seed, **thrusters):
     """A run of 100 s on an ellipse, the controller of which knows the noisy measurement alone."""
     content = json.loads(find_scenario("ellipse").read_text(encoding="utf-8"))
     content |= {"stop": 100.0, "metrics": {}, "faults": [NOISE]}
+    content["fmus"]["thrusters"]["parameters"] = thrusters
     with TemporaryDirectory() as folder:
         cosim.simulate(content, Path(folder) / "run", seed=seed, log="compact", pictures=False)
         return diagnosis.read(Path(folder) / "run")
 
 
-def chi_squares(run):
+def chi_squares(run, **true):
     """(3,), mean square of the model error of the true model, in units of its standard deviation."""
-    (w,) = diagnosis.gather([run])
-    return np.mean((omega(w, Model()) / omega_std(w, Model())) ** 2, axis=0)
+    (w,), model = diagnosis.gather([run]), Model().plus(true)
+    return np.mean((omega(w, model) / omega_std(w, model)) ** 2, axis=0)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_under_control_the_true_model_leaves_what_the_noise_explains(seed):
     assert (chi_squares(under_control(seed)) < 1.0).all()
+
+
+@pytest.mark.parametrize("late", [{"delay": 0.3}, {"lag": 0.4}])
+def test_commands_that_act_late_are_smoothed_as_such(late):
+    """Taken for prompt ones, they shifted the motion to the front, and a delay was found too short."""
+    run = under_control(4, **late)
+    assert (chi_squares(run, **late) < 1.0).all()
+    assert (chi_squares(run) > 3.0).all()
 
 
 def test_fitted_gains_under_control_are_too_small(monkeypatch):

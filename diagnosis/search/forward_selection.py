@@ -3,7 +3,8 @@
 Each step scores every effect by block-cross-validated MAP regression, refines the best by Gauss-Newton,
 and accepts the first if it is beyond chance and does no harm in runs that it was not fitted to. The
 model then takes the effect in, so that the next step starts from a model that is right so far; what was
-found is refined along with each candidate. With a second effect in, each effect is searched again.
+found is refined along with each candidate. With a second effect in, each effect is searched again, and
+removed if nothing brings in its place what an effect must bring.
 
 One of two causes, alone, may well do harm where the other acts most: an effect that explains much and
 harms is kept on trial for one step, and stays if it and the next do no harm together.
@@ -101,6 +102,7 @@ def search(
     likely = likely_effects(ranking, start, shows)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
+    gone: set[str] = set()  # effects that others have made superfluous
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
     turn = "effect 1"
     while len(accepted) < MOST_REPORTED:
@@ -128,10 +130,11 @@ def search(
         at = best.winner
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
-            at, accepted = searched_again(t, at, accepted, made, advance, rng)
+            at, accepted, removed = searched_again(t, at, accepted, made, advance, rng)
+            gone |= removed
         turn = f"effect {len(accepted) + 1}"
         advance(f"{turn}: every effect as a candidate")
-        ranking = rank(t, at, {p.id for p in accepted}, made)
+        ranking = rank(t, at, gone | {p.id for p in accepted}, made)
         if likely > len(accepted):
             likely = min(likely, len(accepted) + likely_effects(ranking, start, shows))
         turn = f"{turn}, about {likely} likely"
@@ -152,16 +155,18 @@ def searched_again(
     made: MadeCandidates,
     advance: Advance,
     rng: np.random.Generator,
-) -> tuple[RefinedModel, list[AcceptedEffect]]:
-    """Each effect but the last found is taken out, and its place searched again beside the others.
+) -> tuple[RefinedModel, list[AcceptedEffect], set[str]]:
+    """Each effect is taken out, and its place searched again beside the others that have changed.
 
     What came first had to stand for all that was missing: a wrong one, or a free curve where a simple
-    law does, gives way to what is better beside the others.
+    law does, gives way to what is better beside the others, or to nothing where that does as well.
+
+    Returns:
+        The model, the effects in it, and the ids of those that gave way to nothing.
     """
-    found = list(accepted)
-    count = len(found) - 1
-    due = [*range(count)]  # effects of which something beside them has changed
-    for _ in range(STEPS * count):
+    found, gone = list(accepted), set[str]()
+    due = [*range(len(found) - 1)]  # effects of which something beside them has changed
+    for _ in range(STEPS * len(due)):
         if not due:
             break
         k = due.pop(0)
@@ -176,14 +181,23 @@ def searched_again(
         if leads(t, ranking, found[k].id):
             continue
         weighed = reweighted(t, beside, ranking)
-        chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
-        if weighed is not None and chosen is not None:
-            t, _, best = weighed
+        if weighed is None:
+            continue
+        again, ranking, best = weighed
+        beside = refit(again, beside, ranking.nuisance).estimate
+        if scored_alone(again, beside).score - best.scored[0].score < NEW:
+            gone.add(found.pop(k).id)
+            t, at, due = again, beside, [*range(len(found))]
+            continue
+        chosen = better(found[k].id, best, at.start.ship)
+        if chosen is not None:
             taken = taken_over(accepted_effect(best, rng, chosen), found[k], at.start.ship)
             found[k] = replace(taken, beside=[p.id for p in others])
-            at = best.of(chosen)
-            due = [(k + j) % count for j in range(1, count)]
-    return at, found
+            t, at = again, best.of(chosen)
+            due = [(k + j) % len(found) for j in range(1, len(found))]
+        elif found[k].id in (weights := accepted_effect(best, rng).weights):
+            found[k] = replace(found[k], weights=weights)
+    return at, found, gone
 
 
 def taken_over(new: AcceptedEffect, old: AcceptedEffect, ship: Ship) -> AcceptedEffect:

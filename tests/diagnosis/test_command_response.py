@@ -18,14 +18,19 @@ from diagnosis.runs.smoothing.command_motion import (
     SLOW,
     Commands,
     Gains,
+    Late,
     acting,
     idle,
     lagged,
 )
 from diagnosis.runs.smoothing.command_response import (
     Regression,
+    delayed,
+    lagging,
     least_squares,
     likeliest_delay,
+    likeliest_late,
+    searched,
     surely_positive,
 )
 from diagnosis.runs.smoothing.penalised import Problem, Rates, Spline, solve
@@ -108,6 +113,16 @@ def test_a_lag_forgets_exponentially(lag):
     assert found[:, 0] == pytest.approx(1.0 - np.exp(-H * np.arange(N) / lag))
 
 
+def test_commands_behind_a_lag_are_their_means_over_each_step():
+    """As of the lags that a ship's file describes, but from rest."""
+    tau = jumping()
+    c = commands(np.vstack([np.zeros((1, 3)), tau[1:]]))
+    steps = np.full(c.even.size, H)
+    expected = np.column_stack([lagged(x, steps, 0.7) for x in c.delayed(0.0).T])
+    np.testing.assert_allclose(c.acting(Late(lag=0.7)), expected, atol=1e-12)
+    np.testing.assert_array_equal(c.acting(Late(0.3)), c.delayed(0.3))
+
+
 @pytest.mark.parametrize("size", [1.0, 4.0])
 def test_motion_is_that_of_a_mass_that_forgets(size):
     """x'' + 2 x' / T + x / T^2 = a, of an acceleration that is held for a step; times grow as sqrt(L)."""
@@ -152,12 +167,12 @@ def test_the_response_is_the_motion_of_gains_turned_into_the_plane(bend):
     G = np.array([[1.0, 0.2, 0.0], [0.1, 2.0, -0.3], [0.4, 0.0, 3.0]])
     psi, swing = 0.05 * TIME, np.cos(TIME)
     c = commands(jumping(), psi, swing=swing)
-    found = c.response(Gains(G, bend), 0.3)
+    found = c.response(Gains(G, bend), Late(0.3))
     surge, sway, yaw = (c.delayed(0.3) @ G.T).T
     plane = c.rotation * (surge + 1j * sway) + bend * c.bend
     north, east, turn = (c.motion(a[:, None])[0][:, 0] for a in (plane.real, plane.imag, yaw))
     assert found.eta == pytest.approx(np.column_stack([north, east, turn])[:N], abs=1e-9)
-    assert found.delay == 0.3
+    assert found.delay == found.late.delay == 0.3
     T = c.forgetting
     whole = found.eta_ddot + 2.0 * found.eta_dot / T + found.eta / T**2
     assert whole[:, 2] == pytest.approx(yaw[:N], abs=1e-9)
@@ -242,16 +257,16 @@ def test_gains_are_found_again_where_the_pose_is_the_response_alone():
     psi = 0.1 * TIME
     G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
     r = regression(psi=psi)
-    response = r.commands.response(Gains(G, 0.4), 0.2)
+    response = r.commands.response(Gains(G, 0.4), Late(0.2))
     p = r.problem._replace(z=response.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(0.2, bent=True)
+    found = again.gains(Late(0.2), bent=True)
     assert found.force == pytest.approx(G, abs=1e-5)
     assert found.bend == pytest.approx(0.4, abs=1e-5)
-    straight = r.commands.response(Gains(G), 0.2)
+    straight = r.commands.response(Gains(G), Late(0.2))
     p = r.problem._replace(z=straight.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(0.2)
+    found = again.gains(Late(0.2))
     assert found.force == pytest.approx(G, abs=1e-5)
     assert found.bend == 0.0
 
@@ -261,15 +276,15 @@ def test_slow_gains_are_found_beside_gains_that_are_described():
     G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
     H_slow = np.array([[-0.3, 0.0, 0.1], [0.2, -0.9, 0.0], [0.0, 0.3, -1.5]])
     r = regression(psi=0.1 * TIME)
-    response = r.commands.response(Gains(G, 0.4, H_slow), 0.2)
-    tau, slow = r.commands.delayed(0.2), r.commands.slow(0.2)
+    response = r.commands.response(Gains(G, 0.4, H_slow), Late(0.2))
+    tau, slow = r.commands.delayed(0.2), r.commands.slow(Late(0.2))
     by_hand = r.commands.motion((tau @ G[2] + slow @ H_slow[2])[:, None])[0][:N, 0]
     assert response.eta[:, 2] == pytest.approx(by_hand, abs=1e-9)
     rise = slow[1:] - slow[:-1] * np.exp(-H / SLOW)
     assert rise == pytest.approx((1.0 - np.exp(-H / SLOW)) * tau[:-1])
     p = r.problem._replace(z=response.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(0.2, described=G, bent=True)
+    found = again.gains(Late(0.2), described=G, bent=True)
     assert found.force.tolist() == G.tolist()
     assert found.slow == pytest.approx(H_slow, abs=1e-5)
     assert found.bend == pytest.approx(0.4, abs=1e-5)
@@ -331,3 +346,33 @@ def test_a_delay_that_one_block_alone_shows_is_not_sure():
     found, sure = likeliest_delay(r)
     assert found == pytest.approx(0.4)
     assert not sure
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 10), st.floats(0.0, 100.0), st.sampled_from([1.0, 2.5]))
+def test_a_search_ends_where_least_is_left_unless_chance_gives_as_much(best, height, size):
+    """Of a valley: its lowest place, or 0 where that is hardly lower than no delay."""
+    c = commands(jumping(), scale=Scale(size * REFERENCE.length))
+    asked = []
+
+    def left(k):
+        asked.append(k)
+        return height * abs(k - best) / max(best, 1)
+
+    found = searched(left, c)
+    assert found.tried == set(asked)
+    enough = 2.0 + 2.0 * np.log(len(found.tried))
+    assert found.best == (best if best and height >= enough else 0)
+
+
+@pytest.mark.parametrize("way", [delayed, lagging])
+@pytest.mark.parametrize("time", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("size", [0.8, 1.0])
+def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, time, size):
+    """Each by its own way; fitted is how late, and gains too large as a whole do not hide it."""
+    G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
+    r = regression(jumping(hold=20, seed=4), psi=0.1 * TIME)
+    p = r.problem._replace(z=r.commands.response(Gains(size * G), way(time)).eta)
+    p = p._replace(sigma=np.full(3, 1e-3))
+    again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
+    assert likeliest_late(again, way, G) == pytest.approx(way(time))

@@ -12,6 +12,7 @@ from diagnosis import Model
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search import forward_selection
 from diagnosis.search.candidates import Candidate, CandidateShape
+from diagnosis.search.conclusion import AcceptedEffect
 from diagnosis.search.findings import MOST_REPORTED, Finding, Findings, Ranked
 from diagnosis.search.forward_selection import (
     ForwardSelection,
@@ -21,6 +22,7 @@ from diagnosis.search.forward_selection import (
     accepted_effect,
     in_one_order,
     likely_effects,
+    searched_again,
 )
 from diagnosis.search.gram import Nuisance, gram_table
 from diagnosis.search.map_regression import REPLICATES, Scored, first_share, score
@@ -303,3 +305,81 @@ def test_without_waves_the_findings_are_those_of_the_search(monkeypatch):
     _, found, _ = with_waves(monkeypatch, ["X_u"], None)
     assert [f.id for f in found.effects] == ["X_u"]
     assert [r.id for r in found.ranking] == ["X_u"]
+
+
+class FakeModel:
+    """A model that is the set of effects in it."""
+
+    def __init__(self, effects):
+        self.effects = frozenset(effects)
+        laws = {i: SimpleNamespace(search=SimpleNamespace(smooth=False)) for i in "abcd"}
+        self.start = SimpleNamespace(ship=SimpleNamespace(effects=laws))
+        self.values, self.fitted, self.offset = {}, (), np.zeros(0)
+
+    def without(self, names):
+        return FakeModel(self.effects - set(names))
+
+
+def search_places(monkeypatch, scores, accepted):
+    """The places searched again of single-letter effects, where scores tell how good each set of them is."""
+
+    def rank(t, beside, others, made, nuisance):
+        assert others == beside.effects
+        return SimpleNamespace(nuisance=nuisance, beside=beside)
+
+    def reweighted(t, beside, ranking):
+        ids = sorted("abcd", key=lambda i: scores(beside.effects | {i}))
+        ids = [i for i in ids if i not in beside.effects]
+        found = [
+            Scored(k, 0, np.full(4, 0.25 * scores(beside.effects | {i})), np.zeros(4), 0.0, 0.0)
+            for k, i in enumerate(ids)
+        ]
+        best = SimpleNamespace(
+            ids=ids,
+            scored=found,
+            starts=[SimpleNamespace(values={i: 1.0}) for i in ids],
+            refined=[SimpleNamespace(intervals={})] * len(ids),
+            of=lambda k: FakeModel(beside.effects | {ids[k]}),
+        )
+        return t, ranking, best
+
+    def alone(t, at):
+        return Scored(-1, 0, np.full(4, 0.25 * scores(at.effects)), np.zeros(4), 0.0, 0.0)
+
+    monkeypatch.setattr(forward_selection, "rank", rank)
+    monkeypatch.setattr(forward_selection, "reweighted", reweighted)
+    monkeypatch.setattr(forward_selection, "scored_alone", alone)
+    monkeypatch.setattr(forward_selection, "leads", lambda *given: False)
+    monkeypatch.setattr(forward_selection, "nuisance_of", lambda *given: NUISANCE)
+    monkeypatch.setattr(forward_selection, "refit", lambda t, at, nuisance: SimpleNamespace(estimate=at))
+    found = [AcceptedEffect(i, (i,), {}, {i: 1.0}) for i in accepted]
+    t = SimpleNamespace(error=lambda at: None)
+    rng = np.random.default_rng(0)
+    at, kept, gone = searched_again(t, FakeModel(accepted), found, {}, lambda text: None, rng)
+    assert at.effects == {p.id for p in kept}
+    return {p.id: p for p in kept}, gone
+
+
+def by(values, default=1000.0):
+    """Scores of sets of effects, told as words of letters in order."""
+    return lambda effects: values.get("".join(sorted(effects)), default)
+
+
+def test_an_effect_that_another_made_superfluous_gives_way_to_nothing(monkeypatch):
+    """Of a that stood for b, once b is in; one that still brings something stays."""
+    needless = by({"a": 500.0, "b": 100.0, "ab": 95.0})
+    kept, gone = search_places(monkeypatch, needless, "ab")
+    assert (set(kept), gone) == ({"b"}, {"a"})
+    needed = by({"a": 500.0, "b": 120.0, "ab": 95.0})
+    kept, gone = search_places(monkeypatch, needed, "ab")
+    assert (set(kept), gone) == ({"a", "b"}, set())
+
+
+def test_after_a_replacement_the_last_effect_is_compared_with_its_rivals_again(monkeypatch):
+    """c takes the place of a; beside it b is no better than d, which no one had asked beside a."""
+    scores = by({"a": 500.0, "b": 400.0, "c": 450.0, "ab": 300.0, "bc": 100.0, "cd": 101.0})
+    kept, gone = search_places(monkeypatch, scores, "ab")
+    assert (set(kept), gone) == ({"b", "c"}, set())
+    assert kept["c"].instead_of == ("a",)
+    assert kept["b"].weights["b"] == pytest.approx(0.6, abs=0.1)
+    assert kept["b"].weights["d"] == pytest.approx(0.4, abs=0.1)

@@ -1,8 +1,9 @@
 """The motion that commands would give a ship that is nothing but a mass, and how late they act.
 
-    x(t):  (d/dt + 1/T)^2 x = R(psi) [G tau(t - delay) + H tau_slow(t - delay)],
+    x(t):  (d/dt + 1/T)^2 x = R(psi) [G tau_late + H tau_slow],
 
-on evenly spaced times, of commands that are held from row to row. tau_slow is tau behind a lag.
+on evenly spaced times, of commands that are held from row to row. tau_late is tau behind a delay or a
+lag, tau_slow the same behind a lag of a second.
 """
 
 from dataclasses import dataclass, field, replace
@@ -77,6 +78,21 @@ def lagged(x: np.ndarray, steps: np.ndarray, lag: float) -> np.ndarray:
     return x + (begin - x) * (1.0 - kept) * lag / steps
 
 
+class Late(NamedTuple):
+    """How late commands act.
+
+    Attributes:
+        delay: from a command to its effect [s].
+        lag: time constant of first order, behind the delay [s].
+    """
+
+    delay: float = 0.0
+    lag: float = 0.0
+
+
+PROMPT = Late()
+
+
 class Gains(NamedTuple):
     """Accelerations in the body frame.
 
@@ -99,6 +115,7 @@ class CommandResponse(NamedTuple):
         delay: from a command to its effect [s]; NaN where the commands explain nothing.
         sure: whether the whole run agrees that there is a delay.
         described: whether G is that of the ship's description.
+        late: how late the commands act in this motion.
     """
 
     eta: np.ndarray
@@ -107,6 +124,7 @@ class CommandResponse(NamedTuple):
     delay: float = np.nan
     sure: bool = False
     described: bool = False
+    late: Late = PROMPT
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +185,16 @@ class Commands:
         swing = np.interp(middle, self.track.run.time[known], self.swing[known])
         return 1j * self.rotation * swing
 
-    def slow(self, delay: float) -> np.ndarray:
-        """tau_slow (m, 3), a delay [s] late [N, N, N m]."""
-        return self.lagging(self.delayed(delay), SLOW * self.track.scale.time)
+    def acting(self, late: Late) -> np.ndarray:
+        """tau_late (m, 3), means over the even steps [N, N, N m]."""
+        tau, h = self.delayed(late.delay), self.track.period
+        if late.lag == 0.0:
+            return tau
+        return tau + (self.lagging(tau, late.lag) - tau) * late.lag / h * (1.0 - np.exp(-h / late.lag))
+
+    def slow(self, late: Late) -> np.ndarray:
+        """tau_slow (m, 3) [N, N, N m]."""
+        return self.lagging(self.acting(late), SLOW * self.track.scale.time)
 
     def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
         """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
@@ -206,11 +231,11 @@ class Commands:
         parts = np.split(x, np.cumsum([part.size for part in self.parts])[:-1])
         return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
-    def response(self, gains: Gains, delay: float) -> CommandResponse:
-        """The motion by the commands, a delay [s] late, and by the bend of the way."""
-        accelerations = self.delayed(delay) @ gains.force.T
+    def response(self, gains: Gains, late: Late = PROMPT) -> CommandResponse:
+        """The motion by the commands, and by the bend of the way."""
+        accelerations = self.acting(late) @ gains.force.T
         if np.any(gains.slow):
-            accelerations = accelerations + self.slow(delay) @ np.transpose(gains.slow)
+            accelerations = accelerations + self.slow(late) @ np.transpose(gains.slow)
         surge, sway, yaw = accelerations.T
         plane = self.rotation * (surge + 1j * sway)
         if gains.bend:
@@ -220,4 +245,4 @@ class Commands:
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
         sampled = (between(self.track.run.time, self.even, each).T for each in (x, x_dot, x_ddot))
         eta = [np.column_stack([plane.real, plane.imag, yaw.real]) for plane, yaw in sampled]
-        return CommandResponse(eta[0], eta[1], eta[2], delay)
+        return CommandResponse(eta[0], eta[1], eta[2], late.delay, late=late)

@@ -27,10 +27,14 @@ slow command cannot tell those from a delay, a jump can.
 
 The likelihood ratio of two delays is a sum over blocks of time. A delay is sure if it is above zero by
 Student's test over the blocks, which needs no assumption on how residuals are correlated within one.
+
+The motion has the delay or the lag that is likeliest beside described gains, sure or not: commands
+that act too early shift the smoothed motion to the front.
 """
 
+from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, orth
@@ -40,8 +44,8 @@ from fmus.ship import ship
 
 from ..cleaning import BRIEF, WIDTH, between
 from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
-from .command_motion import FORGETTING, CommandResponse, Commands, Gains
-from .likelihood import ROUNDS, adapt, deviance, likeliest
+from .command_motion import FORGETTING, CommandResponse, Commands, Gains, Late
+from .likelihood import adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
 from .spline import middles
@@ -66,27 +70,33 @@ class Regression:
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
 
-    def gains(self, delay: float, described: np.ndarray | None = None, bent: bool = False) -> Gains:
+    def gains(self, late: Late, described: np.ndarray | None = None, bent: bool = False) -> Gains:
         """What the commands accelerate.
 
         Args:
-            delay: from a command to its effect [s].
+            late: how late they act.
             described: G (3, 3), as the ship's description has it, by which H is fitted; None: G is, and
                 H is zero.
             bent: whether the bend of the way counts.
         """
-        plane, yaw = self.motions(self.commands.delayed(delay))
-        (north_east, heading), bend = self.pose, [self.bend] if bent else []
+        (plane, north_east), turned = self._equations(late, described)
+        if bent:
+            plane = np.hstack([plane, self.bend])
+        flat, turn = (unlike(a, z) for a, z in ((plane, north_east), turned))
+        fitted, share = np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum())
+        return Gains(fitted, share) if described is None else Gains(described, share, fitted)
+
+    def _equations(
+        self, late: Late, described: np.ndarray | None
+    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """r(A) and r(z) for the gains that are fitted, of the plane and of yaw."""
+        plane, yaw = self.motions(self.commands.acting(late))
+        north_east, heading = self.pose[0], self.pose[1]
         if described is not None:
             north_east = north_east - plane @ described[:2].reshape(6, 1)
             heading = heading - yaw @ described[2:].T
-            plane, yaw = self.motions(self.commands.slow(delay))
-        # Side force and yaw moment of a rudder go together; where they differ for once, gains of their
-        # difference, by which nothing else is explained, would be anything.
-        pairs = (np.hstack([plane, *bend]), north_east), (yaw, heading)
-        flat, turn = (least_squares(a, z[:, 0], NEGLIGIBLE**2) for a, z in pairs)
-        fitted, share = np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum())
-        return Gains(fitted, share) if described is None else Gains(described, share, fitted)
+            plane, yaw = self.motions(self.commands.slow(late))
+        return (plane, north_east), (yaw, heading)
 
     @property
     def bend(self) -> np.ndarray:
@@ -104,6 +114,12 @@ class Regression:
         if not all(np.isfinite(part).all() for part in found):  # LAPACK may not end
             raise LinAlgError("the response to its commands is not finite")
         return found
+
+    def motion(self, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r(a) for accelerations in the body frame (m, 3): of the plane (2 n, 1), and of yaw (n, 1)."""
+        plane = self._sampled((self.commands.rotation * (body[:, 0] + 1j * body[:, 1]))[:, None])
+        flat = [self._residual(0, plane.real), self._residual(1, plane.imag)]
+        return np.vstack(flat), self._residual(2, self._sampled(body[:, [2]]))
 
     def _sampled(self, a: np.ndarray) -> np.ndarray:
         """Positions (n, k) in the rows of the pose, by accelerations (m, k) of even steps."""
@@ -139,15 +155,53 @@ def least_squares(a: np.ndarray, z: np.ndarray, apart: float = DIGITS) -> np.nda
     return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=apart)[0] / size
 
 
-def likeliest_delay(regression: Regression) -> tuple[float, bool]:
-    """From a command to its effect [s], and whether the blocks of the run agree that there is a delay.
+def unlike(a: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """x of least |z - a x| of z (n, 1), where motions (n, k) that hardly differ share their effect.
 
-    The search is over whole sampling periods: coarse at first, then downhill with halved steps. A delay
-    that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
-    logarithm of their number) is zero.
+    Side force and yaw moment of a rudder go together; where they differ for once, gains of their
+    difference, by which nothing else is explained, would be anything.
     """
+    return least_squares(a, z[:, 0], NEGLIGIBLE**2)
+
+
+class Searched(NamedTuple):
+    """A delay found by search, in sampling periods.
+
+    Attributes:
+        best: the likeliest, or 0: that is likelier than none by less than chance finds among so many,
+            by Akaike's criterion, and twice the logarithm of their number.
+        tried: all that were tried.
+    """
+
+    best: int
+    tried: set[int]
+
+
+def searched(left: Callable[[int], float], commands: Commands) -> Searched:
+    """The delay that leaves least of -2 log L: coarse at first, then downhill with halved steps.
+
+    Args:
+        left: -2 log L by a delay in sampling periods.
+        commands: whose delay it is.
+    """
+    period, time_scale = commands.track.period, commands.track.scale.time
+    noticed = BRIEF * time_scale
+    step = 2.0 * noticed / period  # between the delays that are tried first
+    tried = {round(k * step) for k in range(round(LONGEST / (2.0 * BRIEF)) + 1)}
+    best = min(sorted(tried), key=left)
+    while step > 1:
+        step = np.ceil(step / 2.0)
+        near = {max(best - int(step), 0), best + int(step)}
+        tried |= near
+        best = min((best, *sorted(near)), key=left)
+    chance = left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried))
+    return Searched(0 if chance else best, tried)
+
+
+def likeliest_delay(regression: Regression) -> tuple[float, bool]:
+    """From a command to its effect [s], and whether the blocks of the run agree on a delay."""
     commands, block, time_scale = regression.commands, regression.block, regression.time_scale
-    period, longest, noticed = commands.track.period, LONGEST * time_scale, BRIEF * time_scale
+    period, noticed = commands.track.period, BRIEF * time_scale
     # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
     lags = np.geomspace(LONGEST, FORGETTING, 3) * time_scale
     prompt = commands.delayed(0.0)
@@ -169,19 +223,42 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     def left(periods: int) -> float:
         return float(blocks(periods).sum())
 
-    step = 2.0 * noticed / period  # between the delays that are tried first
-    tried = {round(k * step) for k in range(round(longest / (2.0 * noticed)) + 1)}
-    best = min(sorted(tried), key=left)
-    while step > 1:
-        step = np.ceil(step / 2.0)
-        near = {max(best - int(step), 0), best + int(step)}
-        tried |= near
-        best = min((best, *sorted(near)), key=left)
-    if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
+    best, tried = searched(left, commands)
+    if not best:
         return 0.0, False
     short = min((k for k in tried if k * period < noticed), key=left)
     sure = best != short and surely_positive(blocks(short) - blocks(best), CHANCE / len(tried))
     return best * period, sure
+
+
+def delayed(time: float) -> Late:
+    """Commands act a time [s] later."""
+    return Late(delay=time)
+
+
+def lagging(time: float) -> Late:
+    """Commands act behind a lag [s]."""
+    return Late(lag=time)
+
+
+def likeliest_late(regression: Regression, way: Callable[[float], Late], described: np.ndarray) -> Late:
+    """How late commands act, in one way, whose gains (3, 3) are those of the ship's description.
+
+    Fitted beside are H, and the size of the described gains: too large ones would pass for late ones.
+    """
+    commands = regression.commands
+    period = commands.track.period
+
+    @cache
+    def left(periods: int) -> float:
+        """-2 log L, but for a constant."""
+        late = way(periods * period)
+        quick = regression.motion(commands.acting(late) @ described.T)
+        slow = regression.motions(commands.slow(late))
+        each = zip(map(np.hstack, zip(quick, slow, strict=True)), regression.pose, strict=True)
+        return sum(float(np.square(z[:, 0] - a @ unlike(a, z)).sum()) for a, z in each)
+
+    return way(searched(left, commands).best * period)
 
 
 def surely_positive(values: np.ndarray, chance: float) -> bool:
@@ -195,6 +272,53 @@ def described_gains(commands: Commands) -> np.ndarray:
     return np.linalg.inv(ship(description=commands.track.run.ship).mass)
 
 
+class Explained(NamedTuple):
+    """A pose less its response to the commands, as one round of fits has it.
+
+    Attributes:
+        cost: -2 log L.
+        rest: the problem that is left.
+        smoothness: (3,), the likeliest.
+        response: the motion by the commands.
+    """
+
+    cost: float
+    rest: Problem
+    smoothness: np.ndarray
+    response: CommandResponse
+
+
+def rounds(
+    first: Regression,
+    alone: Inliers,
+    late: Late,
+    way: Callable[[float], Late],
+    described: np.ndarray | None,
+) -> Iterator[Explained]:
+    """Gains, smoothness and lateness in turn, as long as the pose becomes likelier.
+
+    Args:
+        first: the pose beside the spline through it alone.
+        alone: that spline.
+        late: how late the commands act at first.
+        way: in which they may act later beside described gains.
+        described: G (3, 3), or None where it is fitted.
+    """
+    p, commands, time, weights = first.problem, first.commands, first.time, alone.weights
+    smoothness, by, last = alone.even, first, np.inf
+    while True:
+        response = commands.response(by.gains(late, described), late)
+        rest = p._replace(z=p.z - response.eta[p.rows])
+        smoothness = likeliest(rest, weights, smoothness)
+        cost = deviance(rest, weights, smoothness)
+        if cost >= last - 2.0:  # less than a parameter that explains nothing is expected to take
+            return
+        yield Explained(cost, rest, smoothness, response._replace(described=described is not None))
+        last, by = cost, Regression(p, solve(rest, smoothness, weights), commands, time)
+        if described is not None:
+            late = likeliest_late(by, way, described)
+
+
 def with_commands(
     p: Problem, alone: Inliers, fit: Fit, commands: Commands
 ) -> tuple[Problem, np.ndarray, CommandResponse]:
@@ -203,30 +327,18 @@ def with_commands(
     Returns:
         What is left by the response, its smoothness (3,), and the response.
     """
-    weights, run = alone.weights, commands.track.run
-    time = run.time[p.rows] - run.time[0]
-    first = Regression(p, fit, commands, time)
+    time = commands.track.run.time
+    first = Regression(p, fit, commands, time[p.rows] - time[0])
     delay, sure = likeliest_delay(first)
+    G = described_gains(commands)
+    ways = (G, delayed), (G, lagging), (None, delayed)
+    tried = [one for G, way in ways for one in rounds(first, alone, Late(delay), way, G)]
+    cost, rest, smoothness, response = min(tried, key=lambda one: one.cost)
     # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
-    least = deviance(p, weights, alone.even) - 2.0 * (9 + 1)
-    found: tuple[Problem, np.ndarray, CommandResponse] | None = None
-    for described in (described_gains(commands), None):
-        near, gains = alone.even, first.gains(delay, described)
-        for _ in range(ROUNDS):
-            response = commands.response(gains, delay)
-            rest = p._replace(z=p.z - response.eta[p.rows])
-            near = likeliest(rest, weights, near)
-            cost = deviance(rest, weights, near)
-            if cost >= least:
-                break
-            response = response._replace(sure=sure, described=described is not None)
-            found, least = (rest, near, response), cost
-            gains = Regression(p, solve(rest, near, weights), commands, time).gains(delay, described)
-    if found is None:
+    if not cost < deviance(p, alone.weights, alone.even) - 2.0 * (9 + 1):
         still = np.zeros((commands.psi.size, 3))
         return alone.problem, alone.smoothness, CommandResponse(still, still, still)
-    rest, near, response = found
-    return *adapt(rest, near, weights), response
+    return *adapt(rest, smoothness, alone.weights), response._replace(delay=delay, sure=sure)
 
 
 def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandResponse) -> CommandResponse:
@@ -238,6 +350,6 @@ def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandRespons
     """
     time = commands.track.run.time[p.rows] - commands.track.run.time[0]
     described = described_gains(commands) if response.described else None
-    gains = Regression(p, fit, commands, time).gains(response.delay, described, bent=True)
-    bent = commands.response(gains, response.delay)
-    return bent._replace(sure=response.sure, described=response.described)
+    gains = Regression(p, fit, commands, time).gains(response.late, described, bent=True)
+    bent = commands.response(gains, response.late)
+    return bent._replace(delay=response.delay, sure=response.sure, described=response.described)
