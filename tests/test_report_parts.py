@@ -119,7 +119,14 @@ def test_the_share_of_a_finding_says_what_it_is_of(by_power, of):
 
 def test_headline_of_each_verdict():
     def said(
-        verdict, possibilities=(), suspects=(), something=False, calibrated=False, shared=None, left=True
+        verdict,
+        possibilities=(),
+        suspects=(),
+        something=False,
+        calibrated=False,
+        shared=None,
+        left=True,
+        moved=(),
     ):
         start = Model()
         model = start.plus({"m": 0.1} | (shared or {}))
@@ -128,7 +135,8 @@ def test_headline_of_each_verdict():
             calibrated=calibrated,
             remainder=SimpleNamespace(beyond_chance=something, significant=left),
             start=start,
-            learned=SimpleNamespace(model=model),
+            learned=SimpleNamespace(model=model, moved=dict(moved)),
+            refitted=calibrated,
             posterior=SimpleNamespace(std=dict.fromkeys(["m", "body_bias_N", *(shared or {})], 0.1)),
         )
         return headline.headline(report_data(None, d, [], possibilities, suspects=dict(suspects)))
@@ -141,6 +149,13 @@ def test_headline_of_each_verdict():
     calibrated = said("unexplained", calibrated=True, left=False)
     assert calibrated == headline.NOT_BELIEVED + headline.CALIBRATED, "no error remains"
     assert said("unexplained", [effect("lag", 0.1)]) == headline.NOT_BELIEVED
+    near, far = [("m", 2.9)], [("m", 2.9), ("X_u", -3.24), ("N_r", 5.0)]
+    assert said("unexplained", calibrated=True, left=False, moved=near) == calibrated
+    beyond = said("unexplained", calibrated=True, left=False, moved=far)
+    assert "explain these data" in beyond
+    assert "X_u by −3.2 and N_r by 5." in beyond
+    assert said("unexplained", calibrated=True, moved=far) == headline.UNEXPLAINED + headline.CALIBRATED
+    assert said("unexplained", left=False, moved=far) == headline.NOT_BELIEVED
     assert ", mainly a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
     assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])
     assert "a (mass), b, c, d and 2 others; no" in said("coefficients", suspects=suspects)

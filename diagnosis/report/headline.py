@@ -7,6 +7,7 @@ import numpy as np
 
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
+from ..runs.run_constants import FAR_OFF
 from ..session import CalibratedModel, Diagnosis
 from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
@@ -40,6 +41,11 @@ NOT_BELIEVED = "The model has an error that no known effect explains with suffic
 CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
     "and predict data left out of the fit no worse. This does not identify a cause."
+)
+FAR = (
+    "Other values of the nominal coefficients explain these data, but beyond {far:g} standard "
+    "deviations of their priors: {names}. Either these priors are wrong, or an effect acts like a "
+    "change of them."
 )
 VERDICTS = {
     "found": "An effect is missing and was identified",
@@ -166,6 +172,10 @@ def headline(r: ReportData) -> str:
         return f"Other values of the nominal coefficients explain these data{beside}{above}; {needed}."
     if d.verdict == "unexplained":
         remains = d.remainder.significant and not r.possibilities
+        moved = d.learned.moved if d.refitted else {}
+        far = [f"{name} by {number(z, 2)}" for name, z in moved.items() if abs(z) > FAR_OFF]
+        if far and not d.remainder.significant:
+            return FAR.format(far=FAR_OFF, names=listed(far, "and"))
         return (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
 

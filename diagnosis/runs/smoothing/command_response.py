@@ -118,7 +118,7 @@ class Regression:
     def motion(self, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(a) for accelerations in the body frame (m, 3): of the plane (2 n, 1), and of yaw (n, 1)."""
         plane = self._sampled((self.commands.rotation * (body[:, 0] + 1j * body[:, 1]))[:, None])
-        flat = [self._residual(0, plane.real), self._residual(1, plane.imag)]
+        flat = [self._residual(0, np.real(plane)), self._residual(1, np.imag(plane))]
         return np.vstack(flat), self._residual(2, self._sampled(body[:, [2]]))
 
     def _sampled(self, a: np.ndarray) -> np.ndarray:
