@@ -814,3 +814,10 @@ def test_correlation_is_that_of_an_autoregression(lap):
             x[k] += a * x[k - 1]
         found.append(correlated_windows([w] * 20, x))
     assert np.mean(found) == pytest.approx((1 + a) / (1 - a), rel=0.25)
+
+
+@pytest.mark.parametrize(("own", "finding"), [(0.32, False), (0.5, True), (0.9, True), (np.nan, True)])
+def test_a_method_that_tells_no_set_has_findings_by_their_own_confidence(own, finding):
+    """Waves of 32 % were one, as if their method gave no confidence."""
+    waves = Finding("waves", {"wave_peak": 1.0}, {}, own, [], 0.9, 0.9)
+    assert confidence_of(waves, Model()).is_finding == finding

@@ -47,6 +47,12 @@ def chi_squares(run, **true):
     return np.mean((omega(w, model) / omega_std(w, model)) ** 2, axis=0)
 
 
+def without_description(monkeypatch):
+    """Let gains be fitted in any case."""
+    monkeypatch.setattr(command_response, "described_gains", lambda commands: None)
+    monkeypatch.setattr(command_response, "explained_late", lambda prompt, *others: prompt)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_under_control_the_true_model_leaves_what_the_noise_explains(seed):
     assert (chi_squares(under_control(seed)) < 1.0).all()
@@ -62,7 +68,7 @@ def test_commands_that_act_late_are_smoothed_as_such(late):
 
 def test_fitted_gains_under_control_are_too_small(monkeypatch):
     """With them the true model leaves a force in sway and in yaw, which the cure is for."""
-    monkeypatch.setattr(command_response, "described_gains", lambda commands: None)
+    without_description(monkeypatch)
     assert (chi_squares(under_control(3))[1:] > 1.2).all()
 
 
@@ -81,7 +87,7 @@ def test_a_description_of_another_ship_gives_way_to_fitted_gains(monkeypatch):
     """Forces six times as large as those that act are smoothed as the true ones by fitted gains."""
     run = replace(under_control(1), commands=None, signals=())
     strong = smooth(prepare(replace(run, tau_cmd=6.0 * run.tau_cmd)).track)
-    monkeypatch.setattr(command_response, "described_gains", lambda commands: None)
+    without_description(monkeypatch)
     fitted = smooth(prepare(run).track)
     np.testing.assert_allclose(strong.nu, fitted.nu, atol=1e-6)
 
@@ -92,6 +98,6 @@ def test_beside_described_gains_the_way_bends(described, monkeypatch):
     asked = []
     monkeypatch.setattr(smoother, "with_bend", lambda *given: asked.append(given) or given[-1])
     if not described:
-        monkeypatch.setattr(command_response, "described_gains", lambda commands: None)
+        without_description(monkeypatch)
     smooth(prepare(under_control(1)).track)
     assert bool(asked) == described

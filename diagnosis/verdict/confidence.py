@@ -10,6 +10,7 @@ smoothing that is slower than a filter.
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
+import numpy as np
 from scipy.special import expit
 
 from ..predictors import Model, WeakWindows
@@ -104,7 +105,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         start: the initial model.
         doubts: of the model with it.
     """
-    own, of_set = f.confidence, f.together
+    own = f.confidence
+    of_set = own if np.isnan(f.together) else f.together
     if f.evidence is not None and f.set_evidence is not None:
         own, of_set = probability(f.evidence), probability(f.set_evidence)
     if limits := at_limit(start, f.id, f.values):

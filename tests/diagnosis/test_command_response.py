@@ -12,6 +12,7 @@ from scipy.stats import ttest_1samp
 from diagnosis import Run, clean
 from diagnosis.predictors import ship_with
 from diagnosis.runs.cleaning import BRIEF
+from diagnosis.runs.smoothing import command_response
 from diagnosis.runs.smoothing.command_motion import (
     FORGETTING,
     IDLE,
@@ -376,3 +377,31 @@ def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, tim
     p = p._replace(sigma=np.full(3, 1e-3))
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
     assert likeliest_late(again, way, G) == pytest.approx(way(time))
+
+
+@pytest.mark.parametrize(
+    ("before", "by_delay", "by_lag", "late"),
+    [
+        (0.0, 49.0, 48.0, Late()),  # less than a twentieth of what the commands explain
+        (0.0, 51.0, 52.0, Late(lag=0.4)),
+        (0.0, 53.0, 52.0, Late(0.4)),
+        (0.2, 1.0, 0.5, Late(0.4)),  # late in any case
+        (0.2, -1.0, -0.5, Late(0.2)),
+        (0.4, 9.0, -0.5, Late(0.4)),  # the delay that it has: nothing to compare
+    ],
+)
+def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
+    before, by_delay, by_lag, late, monkeypatch
+):
+    def one(cost, late):
+        return SimpleNamespace(
+            cost=cost, again=None, smoothness=None, response=SimpleNamespace(late=late)
+        )
+
+    def explained(by, smoothness, weights, late, described, way):
+        return one(-1000.0 - (by_delay if way is delayed else by_lag), late)
+
+    monkeypatch.setattr(command_response, "likeliest_late", lambda by, way, described: way(0.4))
+    monkeypatch.setattr(command_response, "explained", explained)
+    found = command_response.explained_late(one(-1000.0, Late(before)), None, None, 0.0)
+    assert found.response.late == late

@@ -190,7 +190,14 @@ class Commands:
         tau, h = self.delayed(late.delay), self.track.period
         if late.lag == 0.0:
             return tau
-        return tau + (self.lagging(tau, late.lag) - tau) * late.lag / h * (1.0 - np.exp(-h / late.lag))
+        # Before a stretch the command was its first, of a ship at rest none.
+        first = np.concatenate([[0], np.cumsum([part.size for part in self.parts])[:-1]])
+        before = tau[first]
+        if self.at_rest:
+            before[0] = 0.0
+        before = before.repeat([part.size for part in self.parts], axis=0)
+        behind = before + self.lagging(tau - before, late.lag)
+        return tau + (behind - tau) * late.lag / h * (1.0 - np.exp(-h / late.lag))
 
     def slow(self, late: Late) -> np.ndarray:
         """tau_slow (m, 3) [N, N, N m]."""

@@ -32,7 +32,7 @@ The motion has the delay or the lag that is likeliest beside described gains, su
 that act too early shift the smoothed motion to the front.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -273,50 +273,80 @@ def described_gains(commands: Commands) -> np.ndarray:
 
 
 class Explained(NamedTuple):
-    """A pose less its response to the commands, as one round of fits has it.
+    """A pose less its response to the commands.
 
     Attributes:
         cost: -2 log L.
         rest: the problem that is left.
         smoothness: (3,), the likeliest.
         response: the motion by the commands.
+        again: the pose beside the spline that is left.
     """
 
     cost: float
     rest: Problem
     smoothness: np.ndarray
     response: CommandResponse
+    again: Regression
 
 
-def rounds(
-    first: Regression,
-    alone: Inliers,
+def explained(
+    by: Regression,
+    smoothness: np.ndarray,
+    weights: np.ndarray,
     late: Late,
-    way: Callable[[float], Late],
     described: np.ndarray | None,
-) -> Iterator[Explained]:
+    way: Callable[[float], Late] | None = None,
+) -> Explained:
     """Gains, smoothness and lateness in turn, as long as the pose becomes likelier.
 
     Args:
-        first: the pose beside the spline through it alone.
-        alone: that spline.
+        by: the pose beside a spline.
+        smoothness: (3,), of a spline, from which the search begins.
+        weights: (n, 3), of the samples.
         late: how late the commands act at first.
-        way: in which they may act later beside described gains.
         described: G (3, 3), or None where it is fitted.
+        way: in which they may act later, beside described gains; None: as at first.
     """
-    p, commands, time, weights = first.problem, first.commands, first.time, alone.weights
-    smoothness, by, last = alone.even, first, np.inf
+    p, commands, found = by.problem, by.commands, None
     while True:
         response = commands.response(by.gains(late, described), late)
+        response = response._replace(described=described is not None)
         rest = p._replace(z=p.z - response.eta[p.rows])
         smoothness = likeliest(rest, weights, smoothness)
         cost = deviance(rest, weights, smoothness)
-        if cost >= last - 2.0:  # less than a parameter that explains nothing is expected to take
-            return
-        yield Explained(cost, rest, smoothness, response._replace(described=described is not None))
-        last, by = cost, Regression(p, solve(rest, smoothness, weights), commands, time)
-        if described is not None:
+        # Less than a parameter that explains nothing is expected to take.
+        if found is not None and not cost < found.cost - 2.0:
+            return found
+        by = Regression(p, solve(rest, smoothness, weights), commands, by.time)
+        found = Explained(cost, rest, smoothness, response, by)
+        if described is not None and way is not None:
             late = likeliest_late(by, way, described)
+
+
+def explained_late(
+    prompt: Explained, weights: np.ndarray, described: np.ndarray, base: float
+) -> Explained:
+    """The same with commands that act later, if they do.
+
+    What commands do is described but for a share. A fall of -2 log L by less than that share of what
+    they explain proves no lateness, if there was none before.
+
+    Args:
+        prompt: as late as they were before.
+        weights: (n, 3), of the samples.
+        described: G (3, 3).
+        base: -2 log L without any command.
+    """
+    found, before = prompt, prompt.response.late
+    least = 0.0 if before.delay else NEGLIGIBLE * (base - prompt.cost)
+    for way in (delayed, lagging):
+        late = likeliest_late(prompt.again, way, described)
+        if late != before:
+            one = explained(prompt.again, prompt.smoothness, weights, late, described, way)
+            if one.cost < min(found.cost, prompt.cost - least):
+                found = one
+    return found
 
 
 def with_commands(
@@ -327,18 +357,21 @@ def with_commands(
     Returns:
         What is left by the response, its smoothness (3,), and the response.
     """
-    time = commands.track.run.time
+    time, weights = commands.track.run.time, alone.weights
     first = Regression(p, fit, commands, time[p.rows] - time[0])
     delay, sure = likeliest_delay(first)
-    G = described_gains(commands)
-    ways = (G, delayed), (G, lagging), (None, delayed)
-    tried = [one for G, way in ways for one in rounds(first, alone, Late(delay), way, G)]
-    cost, rest, smoothness, response = min(tried, key=lambda one: one.cost)
+    base, G = deviance(p, weights, alone.even), described_gains(commands)
+    by_description, by_fit = (
+        explained(first, alone.even, weights, Late(delay), gains) for gains in (G, None)
+    )
+    by_description = explained_late(by_description, weights, G, base)
+    found = min(by_description, by_fit, key=lambda one: one.cost)
     # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
-    if not cost < deviance(p, alone.weights, alone.even) - 2.0 * (9 + 1):
+    if not found.cost < base - 2.0 * (9 + 1):
         still = np.zeros((commands.psi.size, 3))
         return alone.problem, alone.smoothness, CommandResponse(still, still, still)
-    return *adapt(rest, smoothness, alone.weights), response._replace(delay=delay, sure=sure)
+    response = found.response._replace(delay=delay, sure=sure)
+    return *adapt(found.rest, found.smoothness, weights), response
 
 
 def with_bend(p: Problem, fit: Fit, commands: Commands, response: CommandResponse) -> CommandResponse:
