@@ -10,8 +10,8 @@ from diagnosis import Run, clean, read, smooth
 from diagnosis.predictors import ship_with
 from diagnosis.runs import without_commands
 from diagnosis.runs.run_constants import NEGLIGIBLE
-from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, Late, acting, lagged
-from diagnosis.runs.smoothing.command_response import least_squares
+from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands, Gains, Lateness, acting, lagged
+from diagnosis.runs.smoothing.command_regression import least_squares
 from diagnosis.runs.smoothing.spline import knots
 from fmus.ops import wrap
 
@@ -58,7 +58,9 @@ def test_heading_turns_the_response():
 
 def test_delayed_commands_have_a_delayed_response():
     track = clean(base())
-    now, late = (commands(track, np.zeros(N)).response(Gains(np.eye(3)), Late(by)) for by in (0.0, 0.5))
+    now, late = (
+        commands(track, np.zeros(N)).response(Gains(np.eye(3)), Lateness(by)) for by in (0.0, 0.5)
+    )
     np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
 
 

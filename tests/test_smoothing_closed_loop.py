@@ -22,7 +22,7 @@ from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.runs.prepared_run import prepare
 from diagnosis.runs.smoothing import command_response, smoother
 from diagnosis.runs.smoothing.command_motion import Commands
-from diagnosis.runs.smoothing.command_response import described_gains
+from diagnosis.runs.smoothing.command_regression import described_gains
 from diagnosis.runs.smoothing.spline import knots
 from fmus.hull import inertia_force
 from fmus.ship import ship

@@ -27,8 +27,10 @@ from ..predictors.weak_form import OVERLAP, needed_force
 from ..runs import Run
 from ..runs.cleaning import BRIEF
 from ..runs.columns.columns import TAU
+from ..runs.paired_test import surely_positive
 from ..runs.run_constants import CHANCE, PARTS
-from ..runs.smoothing.command_response import LONGEST, least_squares, surely_positive
+from ..runs.smoothing.command_regression import least_squares
+from ..runs.smoothing.lateness import LONGEST
 from .gains import other_forces
 from .readings import inertial
 from .settings import SETTINGS

@@ -12,8 +12,8 @@ from scipy.special import ndtr
 from fmus.ship import Ship
 
 from ..predictors.uncertainty import SHARE_OF_COMMAND
+from ..runs.paired_test import surely_positive
 from ..runs.run_constants import NEGLIGIBLE
-from ..runs.smoothing.command_response import surely_positive
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
 

@@ -12,6 +12,7 @@ from scipy.stats import ttest_1samp
 from diagnosis import Run, clean
 from diagnosis.predictors import ship_with
 from diagnosis.runs.cleaning import BRIEF
+from diagnosis.runs.paired_test import surely_positive
 from diagnosis.runs.smoothing import command_response
 from diagnosis.runs.smoothing.command_motion import (
     FORGETTING,
@@ -19,20 +20,18 @@ from diagnosis.runs.smoothing.command_motion import (
     SLOW,
     Commands,
     Gains,
-    Late,
+    Lateness,
     acting,
     idle,
     lagged,
 )
-from diagnosis.runs.smoothing.command_response import (
-    Regression,
+from diagnosis.runs.smoothing.command_regression import Regression, least_squares
+from diagnosis.runs.smoothing.lateness import (
     delayed,
     lagging,
-    least_squares,
     likeliest_delay,
     likeliest_late,
     searched,
-    surely_positive,
 )
 from diagnosis.runs.smoothing.penalised import Problem, Rates, Spline, solve
 from diagnosis.runs.smoothing.spline import basis, knots
@@ -120,8 +119,8 @@ def test_commands_behind_a_lag_are_their_means_over_each_step():
     c = commands(np.vstack([np.zeros((1, 3)), tau[1:]]))
     steps = np.full(c.even.size, H)
     expected = np.column_stack([lagged(x, steps, 0.7) for x in c.delayed(0.0).T])
-    np.testing.assert_allclose(c.acting(Late(lag=0.7)), expected, atol=1e-12)
-    np.testing.assert_array_equal(c.acting(Late(0.3)), c.delayed(0.3))
+    np.testing.assert_allclose(c.acting(Lateness(lag=0.7)), expected, atol=1e-12)
+    np.testing.assert_array_equal(c.acting(Lateness(0.3)), c.delayed(0.3))
 
 
 @pytest.mark.parametrize("size", [1.0, 4.0])
@@ -168,7 +167,7 @@ def test_the_response_is_the_motion_of_gains_turned_into_the_plane(bend):
     G = np.array([[1.0, 0.2, 0.0], [0.1, 2.0, -0.3], [0.4, 0.0, 3.0]])
     psi, swing = 0.05 * TIME, np.cos(TIME)
     c = commands(jumping(), psi, swing=swing)
-    found = c.response(Gains(G, bend), Late(0.3))
+    found = c.response(Gains(G, bend), Lateness(0.3))
     surge, sway, yaw = (c.delayed(0.3) @ G.T).T
     plane = c.rotation * (surge + 1j * sway) + bend * c.bend
     north, east, turn = (c.motion(a[:, None])[0][:, 0] for a in (plane.real, plane.imag, yaw))
@@ -258,16 +257,16 @@ def test_gains_are_found_again_where_the_pose_is_the_response_alone():
     psi = 0.1 * TIME
     G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
     r = regression(psi=psi)
-    response = r.commands.response(Gains(G, 0.4), Late(0.2))
+    response = r.commands.response(Gains(G, 0.4), Lateness(0.2))
     p = r.problem._replace(z=response.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(Late(0.2), bent=True)
+    found = again.gains(Lateness(0.2), bent=True)
     assert found.force == pytest.approx(G, abs=1e-5)
     assert found.bend == pytest.approx(0.4, abs=1e-5)
-    straight = r.commands.response(Gains(G), Late(0.2))
+    straight = r.commands.response(Gains(G), Lateness(0.2))
     p = r.problem._replace(z=straight.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(Late(0.2))
+    found = again.gains(Lateness(0.2))
     assert found.force == pytest.approx(G, abs=1e-5)
     assert found.bend == 0.0
 
@@ -277,15 +276,15 @@ def test_slow_gains_are_found_beside_gains_that_are_described():
     G = np.array([[1.0, 0.2, -0.5], [0.1, 2.0, -0.3], [0.4, -0.7, 3.0]])
     H_slow = np.array([[-0.3, 0.0, 0.1], [0.2, -0.9, 0.0], [0.0, 0.3, -1.5]])
     r = regression(psi=0.1 * TIME)
-    response = r.commands.response(Gains(G, 0.4, H_slow), Late(0.2))
-    tau, slow = r.commands.delayed(0.2), r.commands.slow(Late(0.2))
+    response = r.commands.response(Gains(G, 0.4, H_slow), Lateness(0.2))
+    tau, slow = r.commands.delayed(0.2), r.commands.slow(Lateness(0.2))
     by_hand = r.commands.motion((tau @ G[2] + slow @ H_slow[2])[:, None])[0][:N, 0]
     assert response.eta[:, 2] == pytest.approx(by_hand, abs=1e-9)
     rise = slow[1:] - slow[:-1] * np.exp(-H / SLOW)
     assert rise == pytest.approx((1.0 - np.exp(-H / SLOW)) * tau[:-1])
     p = r.problem._replace(z=response.eta)
     again = Regression(p, solve(p, np.full(3, 10.0), np.ones((N, 3))), r.commands, r.time)
-    found = again.gains(Late(0.2), described=G, bent=True)
+    found = again.gains(Lateness(0.2), described=G, bent=True)
     assert found.force.tolist() == G.tolist()
     assert found.slow == pytest.approx(H_slow, abs=1e-5)
     assert found.bend == pytest.approx(0.4, abs=1e-5)
@@ -382,12 +381,12 @@ def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, tim
 @pytest.mark.parametrize(
     ("before", "by_delay", "by_lag", "late"),
     [
-        (0.0, 49.0, 48.0, Late()),  # less than a twentieth of what the commands explain
-        (0.0, 51.0, 52.0, Late(lag=0.4)),
-        (0.0, 53.0, 52.0, Late(0.4)),
-        (0.2, 1.0, 0.5, Late(0.4)),  # late in any case
-        (0.2, -1.0, -0.5, Late(0.2)),
-        (0.4, 9.0, -0.5, Late(0.4)),  # the delay that it has: nothing to compare
+        (0.0, 49.0, 48.0, Lateness()),  # less than a twentieth of what the commands explain
+        (0.0, 51.0, 52.0, Lateness(lag=0.4)),
+        (0.0, 53.0, 52.0, Lateness(0.4)),
+        (0.2, 1.0, 0.5, Lateness(0.4)),  # late in any case
+        (0.2, -1.0, -0.5, Lateness(0.2)),
+        (0.4, 9.0, -0.5, Lateness(0.4)),  # the delay that it has: nothing to compare
     ],
 )
 def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
@@ -403,5 +402,5 @@ def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
 
     monkeypatch.setattr(command_response, "likeliest_late", lambda by, way, described: way(0.4))
     monkeypatch.setattr(command_response, "explained", explained)
-    found = command_response.explained_late(one(-1000.0, Late(before)), None, None, 0.0)
+    found = command_response.explained_late(one(-1000.0, Lateness(before)), None, None, 0.0)
     assert found.response.late == late

@@ -15,7 +15,7 @@ from diagnosis.predictors.uncertainty import MEASURED
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.runs.cleaning import BRIEF
 from diagnosis.runs.run_constants import CHANCE
-from diagnosis.runs.smoothing.command_response import LONGEST
+from diagnosis.runs.smoothing.lateness import LONGEST
 
 N = 60
 TIMES = BRIEF * np.arange(1, round(LONGEST / BRIEF) + 1)

@@ -78,7 +78,7 @@ def lagged(x: np.ndarray, steps: np.ndarray, lag: float) -> np.ndarray:
     return x + (begin - x) * (1.0 - kept) * lag / steps
 
 
-class Late(NamedTuple):
+class Lateness(NamedTuple):
     """How late commands act.
 
     Attributes:
@@ -90,7 +90,7 @@ class Late(NamedTuple):
     lag: float = 0.0
 
 
-PROMPT = Late()
+PROMPT = Lateness()
 
 
 class Gains(NamedTuple):
@@ -124,7 +124,7 @@ class CommandResponse(NamedTuple):
     delay: float = np.nan
     sure: bool = False
     described: bool = False
-    late: Late = PROMPT
+    late: Lateness = PROMPT
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +185,7 @@ class Commands:
         swing = np.interp(middle, self.track.run.time[known], self.swing[known])
         return 1j * self.rotation * swing
 
-    def acting(self, late: Late) -> np.ndarray:
+    def acting(self, late: Lateness) -> np.ndarray:
         """tau_late (m, 3), means over the even steps [N, N, N m]."""
         tau, h = self.delayed(late.delay), self.track.period
         if late.lag == 0.0:
@@ -199,7 +199,7 @@ class Commands:
         behind = before + self.lagging(tau - before, late.lag)
         return tau + (behind - tau) * late.lag / h * (1.0 - np.exp(-h / late.lag))
 
-    def slow(self, late: Late) -> np.ndarray:
+    def slow(self, late: Lateness) -> np.ndarray:
         """tau_slow (m, 3) [N, N, N m]."""
         return self.lagging(self.acting(late), SLOW * self.track.scale.time)
 
@@ -238,7 +238,7 @@ class Commands:
         parts = np.split(x, np.cumsum([part.size for part in self.parts])[:-1])
         return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
-    def response(self, gains: Gains, late: Late = PROMPT) -> CommandResponse:
+    def response(self, gains: Gains, late: Lateness = PROMPT) -> CommandResponse:
         """The motion by the commands, and by the bend of the way."""
         accelerations = self.acting(late) @ gains.force.T
         if np.any(gains.slow):
