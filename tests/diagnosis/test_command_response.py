@@ -13,7 +13,7 @@ from diagnosis import Run, clean
 from diagnosis.predictors import ship_with
 from diagnosis.runs.cleaning import BRIEF
 from diagnosis.runs.paired_test import surely_positive
-from diagnosis.runs.smoothing import command_response
+from diagnosis.runs.smoothing import command_response, lateness
 from diagnosis.runs.smoothing.command_motion import (
     FORGETTING,
     IDLE,
@@ -27,6 +27,7 @@ from diagnosis.runs.smoothing.command_motion import (
 )
 from diagnosis.runs.smoothing.command_regression import Regression, least_squares
 from diagnosis.runs.smoothing.lateness import (
+    Searched,
     delayed,
     lagging,
     likeliest_delay,
@@ -366,7 +367,7 @@ def test_a_search_ends_where_least_is_left_unless_chance_gives_as_much(best, hei
 
 
 @pytest.mark.parametrize("way", [delayed, lagging])
-@pytest.mark.parametrize("time", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("time", [0.0, 0.1, 0.3, 0.6])
 @pytest.mark.parametrize("size", [0.8, 1.0])
 def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, time, size):
     """Each by its own way; fitted is how late, and gains too large as a whole do not hide it."""
@@ -404,3 +405,14 @@ def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
     monkeypatch.setattr(command_response, "explained", explained)
     found = command_response.explained_late(one(-1000.0, Lateness(before)), None, None, 0.0)
     assert found.response.late == late
+
+
+def test_lateness_that_makes_no_difference_to_a_motion_is_none(monkeypatch):
+    r = regression(jumping(hold=20, seed=4))
+    noticed = round(BRIEF / H)
+    for best, late in ((0, 0.0), (noticed, BRIEF), (noticed + 2, BRIEF + 2 * H)):
+        monkeypatch.setattr(lateness, "searched", lambda left, c, best=best: Searched(best, {0, best}))
+        assert likeliest_late(r, delayed, np.eye(3)) == pytest.approx(delayed(late))
+    monkeypatch.setattr(lateness, "BRIEF", 2.0 * BRIEF)
+    monkeypatch.setattr(lateness, "searched", lambda left, c: Searched(noticed, {0, noticed}))
+    assert likeliest_late(r, delayed, np.eye(3)) == delayed(0.0)

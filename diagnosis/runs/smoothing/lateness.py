@@ -112,6 +112,7 @@ def likeliest_late(
     """How late commands act, in one way, whose gains (3, 3) are those of the ship's description.
 
     Fitted beside are H, and the size of the described gains: too large ones would pass for late ones.
+    Where there is hardly noise, what is not described is likelier with some lateness, which is brief.
     """
     commands = regression.commands
     period = commands.track.period
@@ -125,4 +126,5 @@ def likeliest_late(
         each = zip(map(np.hstack, zip(quick, slow, strict=True)), regression.pose, strict=True)
         return sum(float(np.square(z[:, 0] - a @ unlike(a, z)).sum()) for a, z in each)
 
-    return way(searched(left, commands).best * period)
+    found = searched(left, commands).best * period
+    return way(found if found >= BRIEF * commands.track.scale.time else 0.0)
