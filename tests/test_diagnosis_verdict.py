@@ -32,7 +32,7 @@ from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging
-from diagnosis.verdict.confidence import Doubts, confidence_of
+from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
 from diagnosis.verdict.judging import (
     faster_than_smoothing,
     judge,
@@ -41,7 +41,7 @@ from diagnosis.verdict.judging import (
     verdict_name,
     with_confidence,
 )
-from diagnosis.verdict.law_in_parts import on_one_line
+from diagnosis.verdict.law_in_parts import mended, on_one_line
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
@@ -821,3 +821,42 @@ def test_a_method_that_tells_no_set_has_findings_by_their_own_confidence(own, fi
     """Waves of 32 % were one, as if their method gave no confidence."""
     waves = Finding("waves", {"wave_peak": 1.0}, {}, own, [], 0.9, 0.9)
     assert confidence_of(waves, Model()).is_finding == finding
+
+
+@pytest.mark.parametrize(
+    ("effects", "doubted"),
+    [
+        ({"bias_rudder": 0.9, "inflow_rudder": 0.03}, {"bias_rudder", "inflow_rudder"}),
+        ({"bias_rudder": 0.9, "inflow_rudder": 0.06}, set()),  # two causes
+        ({"bias_rudder": 0.04, "inflow_rudder": 0.04}, set()),  # neither mends the other
+        ({"X_u": 0.9, "N_r": 0.03}, set()),  # of another axis
+        ({"X_u": 0.9, "heading_offset": 0.03}, {"heading_offset"}),  # of the measurement
+        ({"heading_offset": 0.9, "X_u": 0.03}, {"heading_offset", "X_u"}),
+        ({"X_u": 0.9, "X_vv": 0.03}, {"X_u", "X_vv"}),
+    ],
+)
+def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger(effects, doubted):
+    """A moment by u |u| was a biased rudder with 0.99, and a rudder in a stream that is askew beside it."""
+    start = Model(ship=ship_with((), "kvlcc2"))
+    values = {i: dict.fromkeys(start.ship.effects[i].coefficients, 0.1) for i in effects}
+    made = [
+        Finding(i, v, dict.fromkeys(v, (0.05, 0.15)), 0.99, [], 0.9, 0.9, together=0.99)
+        for i, v in values.items()
+    ]
+    sure = [Confidence(0.99, 0.99)] * len(made)
+    assert mended(Findings(made), start, [*effects.values()], sure) == doubted
+    none = [replace(f, ci95=dict.fromkeys(f.values, (-0.05, 0.25))) for f in made]
+    assert not mended(Findings(none), start, [*effects.values()], sure)
+    possible = [Confidence(0.3, 0.3)] * len(made)
+    assert not mended(Findings(made), start, [*effects.values()], possible)
+    seen = confidence_of(made[0], start, Doubts(mended=doubted))
+    assert seen.own == (0.5 if made[0].id in doubted else 0.99)
+
+
+def test_beside_coefficients_beyond_their_priors_nothing_is_sure():
+    made, start = Finding("X_u", {"delta_X_u": -1.0}, {}, 0.99, [], 0.9, 0.9, together=0.99), Model()
+    near, far = (Findings([made], moved={"N_r": z}) for z in (-2.9, 3.1))
+    for found, own in ((near, 0.99), (far, 0.5)):
+        seen = confidence_of(made, start, Doubts(implausible=not found.plausible))
+        assert seen.own == own
+        assert ("beyond their priors" in seen.doubt) == (own < 0.99)

@@ -22,7 +22,6 @@ from fmus.ship import Ship
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import commanded
-from ..runs.run_constants import STEPS
 from .candidates import CandidateShape
 from .conclusion import AcceptedEffect, Selection
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
@@ -166,7 +165,7 @@ def searched_again(
     """
     found, gone = list(accepted), set[str]()
     due = [*range(len(found) - 1)]  # effects of which something beside them has changed
-    for _ in range(STEPS * len(due)):
+    for _ in range(2 * len(due)):  # more often, effects that are all wrong only change places
         if not due:
             break
         k = due.pop(0)

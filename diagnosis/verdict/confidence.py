@@ -3,8 +3,8 @@
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
 the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
-the same axes, laws that make up another one, effects and coefficients that explain as much without it, a
-smoothing that is slower than a filter.
+the same axes, laws that make up another one, effects and coefficients that explain as much without it,
+coefficients beyond their priors, a smoothing that is slower than a filter.
 """
 
 from collections.abc import Collection, Sequence
@@ -40,6 +40,8 @@ RIVAL = "it explains the same as another finding that is not sure"
 SMOOTHED = "the noise is smoothed over a longer time than that of the filter, with the same effect"
 OUSTED = "without the findings that are not sure, another effect explains as much"
 NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
+IMPLAUSIBLE = "other coefficients are beyond their priors in the model with it"
+MENDED = "it and a far smaller effect on the same axes make up a force of another shape as well"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -56,6 +58,8 @@ class Doubts(NamedTuple):
         smoothed: ids of the filters that are faster than the smoothing.
         without_gain: ids of the effects that predictions do not show, as calibration predicts as well.
         unsettled: ids of the effects that took the place of another beside findings that are not sure.
+        implausible: whether nominal coefficients are beyond their priors.
+        mended: ids of the findings of which one is far smaller than the other on the same axes.
     """
 
     residual: Collection[str] = ()
@@ -67,6 +71,8 @@ class Doubts(NamedTuple):
     smoothed: Collection[str] = ()
     without_gain: Collection[str] = ()
     unsettled: Collection[str] = ()
+    implausible: bool = False
+    mended: Collection[str] = ()
 
 
 NO_DOUBTS = Doubts()
@@ -123,6 +129,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         RIVAL: f.id in doubts.rivals,
         IN_PARTS: effect.kind == "force" and not axes.isdisjoint(doubts.of_parts),
         ON_ONE_LINE: f.id in doubts.on_one_line,
+        IMPLAUSIBLE: doubts.implausible,
+        MENDED: f.id in doubts.mended,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
         OUSTED: f.id in doubts.unsettled,

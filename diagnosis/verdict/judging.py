@@ -35,7 +35,7 @@ from .coefficients import (
     needless,
 )
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
-from .law_in_parts import in_parts, on_one_line
+from .law_in_parts import in_parts, mended, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
@@ -220,7 +220,10 @@ def _in_doubt(
         on_one_line=on_one_line(found, start, train),
         smoothed=faster_than_smoothing(found, start, train),
         without_gain=unshown,
+        implausible=not found.plausible,
     )
+    each = [confidence_of(f, start, doubts) for f in found.effects]
+    doubts = doubts._replace(mended=mended(found, start, explained, each))
     return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
 
 

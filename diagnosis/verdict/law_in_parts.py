@@ -11,7 +11,7 @@ from fmus.effects.effect import Effect
 from ..predictors import Model, WeakWindows, omega
 from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
 from ..search.findings import Finding, Findings
-from .confidence import Confidence
+from .confidence import Confidence, may_be_none
 
 
 def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[str]:
@@ -46,6 +46,35 @@ def _all_of(effect: Effect, moved: Collection[str]) -> bool:
 def _family(law: Effect) -> tuple[str, str]:
     """The axes of a law, and the manoeuvres that bring it out."""
     return law.axis, law.wording.family.name
+
+
+def mended(
+    found: Findings, start: Model, shares: Sequence[float], alone: Sequence[Confidence]
+) -> set[str]:
+    """Ids of the findings on one axis of which one explains next to nothing, and the other more.
+
+    Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
+    mend its shape, until no residual is left to speak against it. A small effect on the measurement is
+    in doubt itself, and says nothing of a force.
+
+    Args:
+        found: the findings.
+        start: the initial model.
+        shares: of the error's sum of squares, that each explains.
+        alone: the confidence of each, all others left out of account.
+    """
+    effects, ids = start.ship.effects, set[str]()
+    judged = [
+        (f, share)
+        for f, share, c in zip(found.effects, shares, alone, strict=True)
+        if c.is_finding and effects[f.id].search.by == "regression"
+    ]
+    for small, share in judged:
+        axes = set(effects[small.id].axis)
+        larger = {f.id for f, more in judged if more > share and axes & set(effects[f.id].axis)}
+        if larger and share < NEGLIGIBLE and not may_be_none(small):
+            ids |= {small.id} | (larger if effects[small.id].kind != "measurement" else set())
+    return ids
 
 
 def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
