@@ -34,6 +34,7 @@ from diagnosis.session import begin
 from diagnosis.verdict import judging
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
 from diagnosis.verdict.judging import (
+    falls_by_axis,
     faster_than_smoothing,
     judge,
     replaceable,
@@ -824,33 +825,49 @@ def test_a_method_that_tells_no_set_has_findings_by_their_own_confidence(own, fi
 
 
 @pytest.mark.parametrize(
-    ("effects", "doubted"),
+    ("falls", "doubted"),
     [
-        ({"bias_rudder": 0.9, "inflow_rudder": 0.03}, {"bias_rudder", "inflow_rudder"}),
-        ({"bias_rudder": 0.9, "inflow_rudder": 0.06}, set()),  # two causes
-        ({"bias_rudder": 0.04, "inflow_rudder": 0.04}, set()),  # neither mends the other
-        ({"X_u": 0.9, "N_r": 0.03}, set()),  # of another axis
-        ({"X_u": 0.9, "heading_offset": 0.03}, {"heading_offset"}),  # of the measurement
-        ({"heading_offset": 0.9, "X_u": 0.03}, {"heading_offset", "X_u"}),
-        ({"X_u": 0.9, "X_vv": 0.03}, {"X_u", "X_vv"}),
+        (
+            {"bias_rudder": (0, 0.7, 0.9), "inflow_rudder": (0, 0, 0.03)},
+            {"bias_rudder", "inflow_rudder"},
+        ),
+        ({"bias_rudder": (0, 0.7, 0.9), "inflow_rudder": (0, 0, 0.06)}, set()),  # two causes
+        ({"bias_rudder": (0, 0.04, 0.04), "inflow_rudder": (0, 0.04, 0.04)}, set()),
+        ({"X_u": (0.9, 0, 0), "N_r": (0, 0, 0.9)}, set()),
+        ({"mass": (0, 0.5, 0.5), "X_u": (0.9, 0, 0)}, set()),  # each explains an axis of its own
+        ({"mass": (0.9, 0.5, 0.5), "X_u": (0.04, 0, 0)}, {"mass", "X_u"}),
+        ({"X_u": (0.9, 0, 0), "heading_offset": (0.03, 0, 0.01)}, {"heading_offset"}),
+        ({"heading_offset": (0.9, 0.5, 0), "X_u": (0.03, 0, 0)}, {"heading_offset", "X_u"}),
     ],
 )
-def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger(effects, doubted):
+def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger(falls, doubted):
     """A moment by u |u| was a biased rudder with 0.99, and a rudder in a stream that is askew beside it."""
     start = Model(ship=ship_with((), "kvlcc2"))
-    values = {i: dict.fromkeys(start.ship.effects[i].coefficients, 0.1) for i in effects}
+    values = {i: dict.fromkeys(start.ship.effects[i].coefficients, 0.1) for i in falls}
     made = [
         Finding(i, v, dict.fromkeys(v, (0.05, 0.15)), 0.99, [], 0.9, 0.9, together=0.99)
         for i, v in values.items()
     ]
-    sure = [Confidence(0.99, 0.99)] * len(made)
-    assert mended(Findings(made), start, [*effects.values()], sure) == doubted
+    by_axis, sure = np.array([*falls.values()], float), [Confidence(0.99, 0.99)] * len(made)
+    assert mended(Findings(made), start, by_axis, sure) == doubted
     none = [replace(f, ci95=dict.fromkeys(f.values, (-0.05, 0.25))) for f in made]
-    assert not mended(Findings(none), start, [*effects.values()], sure)
+    assert not mended(Findings(none), start, by_axis, sure)
     possible = [Confidence(0.3, 0.3)] * len(made)
-    assert not mended(Findings(made), start, [*effects.values()], possible)
+    assert not mended(Findings(made), start, by_axis, possible)
     seen = confidence_of(made[0], start, Doubts(mended=doubted))
     assert seen.own == (0.5 if made[0].id in doubted else 0.99)
+
+
+def test_the_error_of_an_axis_falls_with_the_finding_that_acts_there():
+    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0})[:1], Model()
+    model = start.plus({"delta_X_u": -3.0})
+    found = Findings(
+        [finding(start, delta_X_u=-3.0), replace(finding(start, delta_N_uv=1e-9), model=model)]
+    )
+    X, Y, N = falls_by_axis(found, start, runs).T
+    assert X[0] > 0.9
+    assert abs(X[1]) < 1e-6
+    assert max(*abs(Y), *abs(N)) < 0.1
 
 
 def test_beside_coefficients_beyond_their_priors_nothing_is_sure():

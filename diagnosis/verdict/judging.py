@@ -223,7 +223,7 @@ def _in_doubt(
         implausible=not found.plausible,
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
-    doubts = doubts._replace(mended=mended(found, start, explained, each))
+    doubts = doubts._replace(mended=mended(found, start, falls_by_axis(found, start, train), each))
     return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
 
 
@@ -308,6 +308,13 @@ def remainder_of(
 
 def _squares(runs: Sequence[WeakWindows], model: Model, sigma: np.ndarray) -> float:
     return sum(float(np.sum((omega(w, model) / sigma) ** 2)) for w in runs)
+
+
+def falls_by_axis(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> np.ndarray:
+    """(findings, 3), shares of the error's sum of squares of each axis, by which it falls with each."""
+    models = [start, *(f.model for f in found.effects)]
+    sums = np.array([sum(np.square(omega(w, model)).sum(axis=0) for w in runs) for model in models])
+    return np.divide(-np.diff(sums, axis=0), sums[0], out=np.zeros_like(sums[1:]), where=sums[0] > 0.0)
 
 
 def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> list[float]:

@@ -48,10 +48,8 @@ def _family(law: Effect) -> tuple[str, str]:
     return law.axis, law.wording.family.name
 
 
-def mended(
-    found: Findings, start: Model, shares: Sequence[float], alone: Sequence[Confidence]
-) -> set[str]:
-    """Ids of the findings on one axis of which one explains next to nothing, and the other more.
+def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Confidence]) -> set[str]:
+    """Ids of the findings on one axis of which one explains next to nothing there, and the other more.
 
     Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
     mend its shape, until no residual is left to speak against it. A small effect on the measurement is
@@ -60,19 +58,20 @@ def mended(
     Args:
         found: the findings.
         start: the initial model.
-        shares: of the error's sum of squares, that each explains.
+        falls: (findings, 3), shares of the error's sum of squares of each axis, by which it falls with
+            each finding.
         alone: the confidence of each, all others left out of account.
     """
     effects, ids = start.ship.effects, set[str]()
     judged = [
-        (f, share)
-        for f, share, c in zip(found.effects, shares, alone, strict=True)
+        (f, fall)
+        for f, fall, c in zip(found.effects, falls, alone, strict=True)
         if c.is_finding and effects[f.id].search.by == "regression"
     ]
-    for small, share in judged:
-        axes = set(effects[small.id].axis)
-        larger = {f.id for f, more in judged if more > share and axes & set(effects[f.id].axis)}
-        if larger and share < NEGLIGIBLE and not may_be_none(small):
+    for small, fall in judged:
+        axes = ["XYN".index(axis) for axis in effects[small.id].axis]
+        larger = {f.id for f, more in judged if (more - fall)[axes].max() > NEGLIGIBLE}
+        if larger and fall[axes].max() < NEGLIGIBLE and not may_be_none(small):
             ids |= {small.id} | (larger if effects[small.id].kind != "measurement" else set())
     return ids
 
