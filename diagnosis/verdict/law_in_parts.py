@@ -53,7 +53,7 @@ def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Con
 
     Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
     mend its shape, until no residual is left to speak against it. A small effect on the measurement is
-    in doubt itself, and says nothing of a force.
+    in doubt itself, and says nothing of a force; a large one hides forces that are smaller.
 
     Args:
         found: the findings.
@@ -70,7 +70,11 @@ def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Con
     ]
     for small, fall in judged:
         axes = ["XYN".index(axis) for axis in effects[small.id].axis]
-        larger = {f.id for f, more in judged if (more - fall)[axes].max() > NEGLIGIBLE}
+        larger = {
+            f.id
+            for f, more in judged
+            if (more - fall)[axes].max() > NEGLIGIBLE and effects[f.id].kind != "measurement"
+        }
         if larger and fall[axes].max() < NEGLIGIBLE and not may_be_none(small):
             ids |= {small.id} | (larger if effects[small.id].kind != "measurement" else set())
     return ids
