@@ -306,14 +306,14 @@ def remainder_of(
     return Remainder(axes, remainder_sentence(axes, how, regions, waves, runs[0].scale))
 
 
-def _squares(runs: Sequence[WeakWindows], model: Model, sigma: np.ndarray) -> float:
-    return sum(float(np.sum((omega(w, model) / sigma) ** 2)) for w in runs)
+def _squares(runs: Sequence[WeakWindows], model: Model) -> np.ndarray:
+    """(3,), sum of squares of a model's error on each axis."""
+    return np.sum([np.square(omega(w, model)).sum(axis=0) for w in runs], axis=0)
 
 
 def falls_by_axis(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> np.ndarray:
     """(findings, 3), shares of the error's sum of squares of each axis, by which it falls with each."""
-    models = [start, *(f.model for f in found.effects)]
-    sums = np.array([sum(np.square(omega(w, model)).sum(axis=0) for w in runs) for model in models])
+    sums = np.array([_squares(runs, model) for model in (start, *(f.model for f in found.effects))])
     return np.divide(-np.diff(sums, axis=0), sums[0], out=np.zeros_like(sums[1:]), where=sums[0] > 0.0)
 
 
@@ -330,7 +330,7 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
     found = [f.share for f in learned.effects]
     if validate and found:
         models = [start, *(f.model for f in learned.effects)]
-        sums = np.array([_squares(validate, model, learned.sigma) for model in models])
+        sums = np.array([_squares(validate, model) for model in models]) @ learned.sigma**-2.0
         unseen = (-np.diff(sums) / sums[0]).tolist()
         pairs = zip(learned.effects, unseen, strict=True)
         found = [f.share if f.of_runs or _is_random(f, start) else share for f, share in pairs]
@@ -369,7 +369,8 @@ def unique_shares(
         fitted = learned.model.ship.effects[finding.id].search.by == "regression"
         if fitted and not others.plausible:
             without = learned.model.plus({name: -value for name, value in finding.values.items()})
-        left, now, first = (_squares(runs, m, learned.sigma) for m in (without, learned.model, start))
+        models = without, learned.model, start
+        left, now, first = (float(_squares(runs, m) @ learned.sigma**-2.0) for m in models)
         return float(np.clip((left - now) / first, 0.0, 1.0))
 
     found: list[float | None] = []

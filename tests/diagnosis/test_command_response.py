@@ -28,8 +28,8 @@ from diagnosis.runs.smoothing.command_motion import (
 from diagnosis.runs.smoothing.command_regression import Regression, least_squares
 from diagnosis.runs.smoothing.lateness import (
     Searched,
-    delayed,
-    lagging,
+    by_delay,
+    by_lag,
     likeliest_delay,
     likeliest_late,
     searched,
@@ -120,8 +120,8 @@ def test_commands_behind_a_lag_are_their_means_over_each_step():
     c = commands(np.vstack([np.zeros((1, 3)), tau[1:]]))
     steps = np.full(c.even.size, H)
     expected = np.column_stack([lagged(x, steps, 0.7) for x in c.delayed(0.0).T])
-    np.testing.assert_allclose(c.acting(Lateness(lag=0.7)), expected, atol=1e-12)
-    np.testing.assert_array_equal(c.acting(Lateness(0.3)), c.delayed(0.3))
+    np.testing.assert_allclose(c.tau_late(Lateness(lag=0.7)), expected, atol=1e-12)
+    np.testing.assert_array_equal(c.tau_late(Lateness(0.3)), c.delayed(0.3))
 
 
 @pytest.mark.parametrize("size", [1.0, 4.0])
@@ -366,7 +366,7 @@ def test_a_search_ends_where_least_is_left_unless_chance_gives_as_much(best, hei
     assert found.best == (best if best and height >= enough else 0)
 
 
-@pytest.mark.parametrize("way", [delayed, lagging])
+@pytest.mark.parametrize("way", [by_delay, by_lag])
 @pytest.mark.parametrize("time", [0.0, 0.1, 0.3, 0.6])
 @pytest.mark.parametrize("size", [0.8, 1.0])
 def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, time, size):
@@ -380,7 +380,7 @@ def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, tim
 
 
 @pytest.mark.parametrize(
-    ("before", "by_delay", "by_lag", "late"),
+    ("before", "with_delay", "with_lag", "late"),
     [
         (0.0, 49.0, 48.0, Lateness()),  # less than a twentieth of what the commands explain
         (0.0, 51.0, 52.0, Lateness(lag=0.4)),
@@ -391,7 +391,7 @@ def test_a_delay_and_a_lag_are_found_beside_described_gains_of_any_size(way, tim
     ],
 )
 def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
-    before, by_delay, by_lag, late, monkeypatch
+    before, with_delay, with_lag, late, monkeypatch
 ):
     def one(cost, late):
         return SimpleNamespace(
@@ -399,7 +399,7 @@ def test_commands_act_later_if_that_explains_a_share_of_what_they_do(
         )
 
     def explained(by, smoothness, weights, late, described, way):
-        return one(-1000.0 - (by_delay if way is delayed else by_lag), late)
+        return one(-1000.0 - (with_delay if way is by_delay else with_lag), late)
 
     monkeypatch.setattr(command_response, "likeliest_late", lambda by, way, described: way(0.4))
     monkeypatch.setattr(command_response, "explained", explained)
@@ -412,7 +412,7 @@ def test_lateness_that_makes_no_difference_to_a_motion_is_none(monkeypatch):
     noticed = round(BRIEF / H)
     for best, late in ((0, 0.0), (noticed, BRIEF), (noticed + 2, BRIEF + 2 * H)):
         monkeypatch.setattr(lateness, "searched", lambda left, c, best=best: Searched(best, {0, best}))
-        assert likeliest_late(r, delayed, np.eye(3)) == pytest.approx(delayed(late))
+        assert likeliest_late(r, by_delay, np.eye(3)) == pytest.approx(by_delay(late))
     monkeypatch.setattr(lateness, "BRIEF", 2.0 * BRIEF)
     monkeypatch.setattr(lateness, "searched", lambda left, c: Searched(noticed, {0, noticed}))
-    assert likeliest_late(r, delayed, np.eye(3)) == delayed(0.0)
+    assert likeliest_late(r, by_delay, np.eye(3)) == by_delay(0.0)

@@ -185,23 +185,23 @@ class Commands:
         swing = np.interp(middle, self.track.run.time[known], self.swing[known])
         return 1j * self.rotation * swing
 
-    def acting(self, late: Lateness) -> np.ndarray:
+    def tau_late(self, late: Lateness) -> np.ndarray:
         """tau_late (m, 3), means over the even steps [N, N, N m]."""
         tau, h = self.delayed(late.delay), self.track.period
         if late.lag == 0.0:
             return tau
         # Before a stretch the command was its first, of a ship at rest none.
-        first = np.concatenate([[0], np.cumsum([part.size for part in self.parts])[:-1]])
-        before = tau[first]
+        sizes = [part.size for part in self.parts]
+        before = tau[np.cumsum([0, *sizes[:-1]])]
         if self.at_rest:
             before[0] = 0.0
-        before = before.repeat([part.size for part in self.parts], axis=0)
+        before = before.repeat(sizes, axis=0)
         behind = before + self.lagging(tau - before, late.lag)
         return tau + (behind - tau) * late.lag / h * (1.0 - np.exp(-h / late.lag))
 
     def slow(self, late: Lateness) -> np.ndarray:
         """tau_slow (m, 3) [N, N, N m]."""
-        return self.lagging(self.acting(late), SLOW * self.track.scale.time)
+        return self.lagging(self.tau_late(late), SLOW * self.track.scale.time)
 
     def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
         """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
@@ -240,7 +240,7 @@ class Commands:
 
     def response(self, gains: Gains, late: Lateness = PROMPT) -> CommandResponse:
         """The motion by the commands, and by the bend of the way."""
-        accelerations = self.acting(late) @ gains.force.T
+        accelerations = self.tau_late(late) @ gains.force.T
         if np.any(gains.slow):
             accelerations = accelerations + self.slow(late) @ np.transpose(gains.slow)
         surge, sway, yaw = accelerations.T

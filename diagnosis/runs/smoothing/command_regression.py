@@ -44,30 +44,17 @@ class Regression:
                 H is zero.
             bent: whether the bend of the way counts.
         """
-        (plane, north_east), turned = self._equations(late, described)
+        force, pose = self.commands.tau_late(late), self.pose
+        if described is not None:
+            known = self.motion(force @ described.T)
+            pose = pose[0] - known[0], pose[1] - known[1]
+            force = self.commands.slow(late)
+        plane, yaw = self.motions(force)
         if bent:
-            plane = np.hstack([plane, self.bend])
-        flat, turn = (unlike(a, z) for a, z in ((plane, north_east), turned))
+            plane = np.hstack([plane, self._in_plane(self.commands.bend)])
+        flat, turn = unlike(plane, pose[0]), unlike(yaw, pose[1])
         fitted, share = np.vstack([flat[:6].reshape(2, 3), turn]), float(flat[6:].sum())
         return Gains(fitted, share) if described is None else Gains(described, share, fitted)
-
-    def _equations(
-        self, late: Lateness, described: np.ndarray | None
-    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """r(A) and r(z) for the gains that are fitted, of the plane and of yaw."""
-        plane, yaw = self.motions(self.commands.acting(late))
-        north_east, heading = self.pose[0], self.pose[1]
-        if described is not None:
-            north_east = north_east - plane @ described[:2].reshape(6, 1)
-            heading = heading - yaw @ described[2:].T
-            plane, yaw = self.motions(self.commands.slow(late))
-        return (plane, north_east), (yaw, heading)
-
-    @property
-    def bend(self) -> np.ndarray:
-        """r(A) of the plane for the bend of the way, in one column."""
-        x = self._sampled(self.commands.bend[:, None])
-        return np.vstack([self._residual(0, np.real(x)), self._residual(1, np.imag(x))])
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
@@ -82,9 +69,14 @@ class Regression:
 
     def motion(self, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(a) for accelerations in the body frame (m, 3): of the plane (2 n, 1), and of yaw (n, 1)."""
-        plane = self._sampled((self.commands.rotation * (body[:, 0] + 1j * body[:, 1]))[:, None])
-        flat = [self._residual(0, np.real(plane)), self._residual(1, np.imag(plane))]
-        return np.vstack(flat), self._residual(2, self._sampled(body[:, [2]]))
+        ahead, starboard, yaw = body.T
+        plane = self.commands.rotation * (ahead + 1j * starboard)
+        return self._in_plane(plane), self._residual(2, self._sampled(yaw[:, None]))
+
+    def _in_plane(self, a: np.ndarray) -> np.ndarray:
+        """r(a) (2 n, 1) for accelerations (m,) in the plane, north its real axis."""
+        x = self._sampled(a[:, None])
+        return np.vstack([self._residual(0, np.real(x)), self._residual(1, np.imag(x))])
 
     def _sampled(self, a: np.ndarray) -> np.ndarray:
         """Positions (n, k) in the rows of the pose, by accelerations (m, k) of even steps."""

@@ -26,7 +26,7 @@ import numpy as np
 from ..run_constants import NEGLIGIBLE
 from .command_motion import CommandResponse, Commands, Lateness
 from .command_regression import Regression, described_gains
-from .lateness import delayed, lagging, likeliest_delay, likeliest_late
+from .lateness import by_delay, by_lag, likeliest_delay, likeliest_late
 from .likelihood import adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
@@ -100,7 +100,7 @@ def explained_late(
     """
     found, before = prompt, prompt.response.late
     least = 0.0 if before.delay else NEGLIGIBLE * (base - prompt.cost)
-    for way in (delayed, lagging):
+    for way in (by_delay, by_lag):
         late = likeliest_late(prompt.again, way, described)
         if late != before:
             one = explained(prompt.again, prompt.smoothness, weights, late, described, way)

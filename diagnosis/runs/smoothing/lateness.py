@@ -96,12 +96,12 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     return best * period, sure
 
 
-def delayed(time: float) -> Lateness:
+def by_delay(time: float) -> Lateness:
     """Commands act a time [s] later."""
     return Lateness(delay=time)
 
 
-def lagging(time: float) -> Lateness:
+def by_lag(time: float) -> Lateness:
     """Commands act behind a lag [s]."""
     return Lateness(lag=time)
 
@@ -121,7 +121,7 @@ def likeliest_late(
     def left(periods: int) -> float:
         """-2 log L, but for a constant."""
         late = way(periods * period)
-        quick = regression.motion(commands.acting(late) @ described.T)
+        quick = regression.motion(commands.tau_late(late) @ described.T)
         slow = regression.motions(commands.slow(late))
         each = zip(map(np.hstack, zip(quick, slow, strict=True)), regression.pose, strict=True)
         return sum(float(np.square(z[:, 0] - a @ unlike(a, z)).sum()) for a, z in each)

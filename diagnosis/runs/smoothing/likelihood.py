@@ -38,8 +38,7 @@ from ..run_constants import CHANCE, DIGITS, ORDER
 from .penalised import JERK, POSE, Equations, Fit, LinearSystem, Problem, solve
 from .spline import third
 
-# 1, of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise
-# (chosen).
+# 1, of adapting the penalty to the jerk; a third changes less than noise (chosen).
 ROUNDS = 2
 LEAST_JERK = 0.2  # 1, of the mean square: where there is none, it may yet begin (chosen)
 # 1, decades of the smoothness, to both sides of 1: from none at all to motions slower than 7 s at knots
