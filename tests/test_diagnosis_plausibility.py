@@ -4,7 +4,7 @@ import json
 import re
 from dataclasses import replace
 from functools import cache
-from itertools import count, repeat
+from itertools import count, cycle, repeat
 
 import numpy as np
 import pandas as pd
@@ -306,6 +306,25 @@ def test_hidden_cause_of_a_described_ship_is_no_mistake(cause):
     ship = ship_with((), "otter")
     table = sail_of(ship, causes(ship)[cause], np.random.default_rng(1), 1, seconds=120.0)
     assert len(diagnosis.load(table, ship="otter")) == 1
+
+
+def steps_of_thrust():
+    """Commands that change every twelve seconds."""
+    for pair in cycle([(12.0, 0.2), (0.2, 12.0), (9.0, 3.0), (3.0, 9.0)]):
+        yield from repeat(pair, 60)
+
+
+@pytest.mark.parametrize("lag", [2.5, 3.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_propellers_that_are_slower_than_described_are_no_mistake(lag, seed, monkeypatch):
+    """Their thrust follows so late that it looks too small for the clock; it is described with 1 s."""
+    ship = ship_with((), "otter")
+    slow = causes(ship)["none"]._replace(thrusters={"lag_port": lag, "lag_starboard": lag})
+    rng = np.random.default_rng(seed)
+    table = sail_of(ship, slow, rng, None, steps_of_thrust(), seconds=160.0)
+    assert len(diagnosis.load(table, ship="otter")) == 1
+    monkeypatch.setattr(plausibility, "slower", lambda w, model: [])
+    assert "s passed in each second of its time" in doubt(table)
 
 
 @pytest.mark.parametrize("cause", ["none", "wind", "lag"])

@@ -15,12 +15,14 @@ and all of them the first is reported, unless all are far likelier.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
-from ..predictors import Model, WeakWindows, omega
+from ..predictors import Model, WeakWindows, omega, weak_windows
 from ..predictors.thrust import Integral
 from ..predictors.uncertainty import MEASURED, correlated_windows, omega_std
 from ..predictors.weak_form import OVERLAP, needed_force
@@ -31,6 +33,7 @@ from ..runs.paired_test import surely_positive
 from ..runs.run_constants import CHANCE, PARTS
 from ..runs.smoothing.command_regression import least_squares
 from ..runs.smoothing.lateness import LONGEST
+from ..runs.smoothing.smoother import without_commands
 from .gains import other_forces
 from .readings import inertial
 from .settings import SETTINGS
@@ -134,12 +137,30 @@ class Timing:
         """Commands as they are, later by some times [s], or of actuators that follow faster."""
         yield self.score(self.as_logged)
         yield self.likeliest(columns, -times)[1]
-        model = self.model
-        lags = {n: model.value(n) for n in model.ship.coefficients if model.declared(n).unit == "s"}
-        if any(lags.values()):
-            for share in np.arange(1, PARTS + 1) / PARTS:
-                faster = model.plus({n: -share * lag for n, lag in lags.items()})
-                yield self.score(self.force((), 0.0, faster))
+        lags = described_lags(self.model)
+        for share in np.arange(1, PARTS + 1) / PARTS if lags else ():
+            faster = self.model.plus({n: -share * lag for n, lag in lags.items()})
+            yield self.score(self.force((), 0.0, faster))
+
+
+def described_lags(model: Model) -> dict[str, float]:
+    """Lags of the actuators [s], by name, of a ship that has any."""
+    lags = {n: model.value(n) for n in model.ship.coefficients if model.declared(n).unit == "s"}
+    return lags if any(lags.values()) else {}
+
+
+def slower(w: WeakWindows, model: Model) -> list[Model]:
+    """A model with slower actuators, for each lag that is as likely as any by a run's motion."""
+    # Smoothed beside commands that act as described, the motion would follow these.
+    s, lags = w.smoothed, described_lags(model) or {"lag": 0.0}
+    eta, eta_dot, eta_ddot, nu = without_commands(s)
+    alone = replace(s, eta=eta, eta_dot=eta_dot, eta_ddot=eta_ddot, nu=nu)
+    timing = Timing(weak_windows(alone), model)
+    times = BRIEF * w.scale.time * np.arange(2, 2 * round(LONGEST / BRIEF) + 1, 2)
+    models = [model, *(model.plus(dict.fromkeys(lags, time)) for time in times.tolist())]
+    scores = np.array([timing.score(timing.force((), 0.0, each)).total for each in models])
+    likely = scores[1:] > np.nanmax(scores) + np.log(CHANCE)
+    return [*compress(models[1:], likely)]
 
 
 def late_commands(w: WeakWindows, model: Model) -> Late | None:

@@ -26,7 +26,7 @@ from ..runs.sensors.evidence import ALIKE, VELOCITIES
 from ..runs.sensors.sensor_finding import Examined
 from .command_check import beyond_thrusters, constant_commands, contradicted_commands
 from .gains import gains, varying
-from .late_commands import late_commands
+from .late_commands import late_commands, slower
 from .reading_odds import ReadingOdds, most_thrust
 from .readings import AS_READ, Reading, other_factors, readings, reread
 from .settings import SETTINGS
@@ -59,7 +59,9 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWi
     found = []
     for w in runs:
         with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
-            doubt = _doubt(w, model) or _late(w, model)
+            doubt = _doubt(w, model)
+            if not (doubt and all(_doubt(w, each) for each in slower(w, model))):
+                doubt = _late(w, model)  # actuators that are slower than described are no mistake
         if doubt:
             remedy = line_beside(w.run.file, w.run.layout, doubt.changes, doubt.name)
             if doubt.sure:
