@@ -157,7 +157,7 @@ def slower(w: WeakWindows, model: Model) -> list[Model]:
     alone = replace(s, eta=eta, eta_dot=eta_dot, eta_ddot=eta_ddot, nu=nu)
     timing = Timing(weak_windows(alone), model)
     times = BRIEF * w.scale.time * np.arange(2, 2 * round(LONGEST / BRIEF) + 1, 2)
-    models = [model, *(model.plus(dict.fromkeys(lags, time)) for time in times.tolist())]
+    models = [model, *(model.plus(dict.fromkeys(lags, float(time))) for time in times)]
     scores = np.array([timing.score(timing.force((), 0.0, each)).total for each in models])
     likely = scores[1:] > np.nanmax(scores) + np.log(CHANCE)
     return [*compress(models[1:], likely)]

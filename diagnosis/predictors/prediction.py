@@ -254,7 +254,7 @@ def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
 
 def by_measurement(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:
     """Models of one ship that are predicted at once, those measured alike; which, and in one."""
-    measurements = [(m.clock, m.filters) for m in models]
+    measurements = [(m.logging, m.filters) for m in models]
     for measurement in sorted({*measurements}):
         chosen = [k for k, m in enumerate(measurements) if m == measurement]
         yield chosen, stacked([models[k] for k in chosen])

@@ -11,7 +11,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
 from fmus.effects.linear_map import AXES, parameter
-from fmus.effects.measurement import CLOCK_OFFSET, MEASURED_BEHIND
+from fmus.effects.measurement import CLOCK_OFFSET, COMMAND_LAG, MEASURED_BEHIND
 from fmus.fmi.trace import Symbol
 from fmus.hull import mass_matrix, without_zeros
 from fmus.ship import Ship, ship
@@ -24,6 +24,18 @@ if TYPE_CHECKING:  # at run time it takes a while to import
 
 Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
+
+
+class Logging(NamedTuple):
+    """How commands are logged.
+
+    Attributes:
+        clock: time [s] by which a pose is older than its stamp, and a command is not.
+        lag: time constant [s] of a low-pass filter of the commands; 0: none.
+    """
+
+    clock: float
+    lag: float
 
 
 class SampledForce(NamedTuple):
@@ -192,6 +204,11 @@ class Model:
     def clock(self) -> float:
         """Time [s] by which a pose is older than its stamp."""
         return self.measurement.get(CLOCK_OFFSET.id, 0.0)
+
+    @property
+    def logging(self) -> Logging:
+        """How the commands are logged."""
+        return Logging(self.clock, self.measurement.get(COMMAND_LAG.id, 0.0))
 
     @cached_property
     def filters(self) -> Filters:

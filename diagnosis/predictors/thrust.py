@@ -43,11 +43,25 @@ def drive_of(run: Run, model: Model) -> PreparedThrusters:
 
 def commanded_shares(run: Run, model: Model) -> np.ndarray:
     """(n, k), what the thrusters are commanded, as shares of full force or as it is."""
+    given = before_low_pass(run, model)
     if run.commands is not None:
-        return run.commands
-    X, Y, N = run.tau_cmd.T
+        return given
+    X, Y, N = given.T
     shares = model.drive.effects.layout.allocate((X, Y, N), model.drive.params)
     return np.column_stack(np.broadcast_arrays(*shares))
+
+
+def before_low_pass(run: Run, model: Model) -> np.ndarray:
+    """Commands (n, k) as they were before the filter behind which a model has them logged."""
+    logged, lag = run.given, model.logging.lag
+    if lag == 0.0:
+        return logged
+    if run.commands is not None:
+        turns = np.flatnonzero(model.ship.layout_of(run.commands).round)
+        logged = logged.copy()
+        logged[:, turns] = np.unwrap(logged[:, turns], axis=0)
+    reached = -np.expm1(-np.diff(run.time) / lag)
+    return np.vstack([logged[:1], logged[:-1] + np.diff(logged, axis=0) / reached[:, None]])
 
 
 def full_thrust(model: Model) -> np.ndarray:
@@ -114,7 +128,7 @@ class Response:
     def key(model: Model) -> tuple[Any, ...]:
         """What the response depends on, to be kept while it stays the same."""
         p = model.drive.params
-        return model.ship, p.dynamics, p.rate, p.allocation, model.clock
+        return model.ship, p.dynamics, p.rate, p.allocation, model.logging
 
     @property
     def between_samples(self) -> np.ndarray:

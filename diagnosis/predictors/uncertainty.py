@@ -243,7 +243,7 @@ def _slope(w: WeakWindows, model: Model) -> np.ndarray:
     if model.given or model.runs:
         return _by_steps(w, model)
     values = (tuple(sorted(part.items())) for part in (model.vessel, model.thrusters))
-    return w.recall("slope", (model.ship, *values, model.clock), lambda: _by_steps(w, model))
+    return w.recall("slope", (model.ship, *values, model.logging), lambda: _by_steps(w, model))
 
 
 def _by_steps(w: WeakWindows, model: Model) -> np.ndarray:

@@ -251,7 +251,7 @@ def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     measured = (model.ship, values)
     ship = (measured, tuple(sorted(model.vessel.items())))
     water = model.hull.params.water
-    drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
+    drive = (measured, water, tuple(sorted(model.thrusters.items())), model.logging)
     eta, nu = w.recall("motion", measured, lambda: _motion(w, model))
     change = w.recall("change", measured, lambda: w.slope @ nu)
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.smoothed, eta, nu))

@@ -164,6 +164,7 @@ def may_be_none(f: Finding) -> bool:
 
 
 def _may_be_lags(f: Finding, start: Model) -> bool:
-    """Whether a clock that is ahead would make up for lags of the actuators that are too long."""
+    """Whether commands that are logged late or filtered would make up for lags that are too long."""
     lags = [start.value(n) for n in start.ship.coefficients if start.declared(n).unit == "s"]
-    return -max(lags, default=0.0) <= f.values.get("clock_offset", 0.0) < 0.0
+    late = f.values.get("command_lag", -f.values.get("clock_offset", 0.0))
+    return 0.0 < late <= max(lags, default=0.0)

@@ -50,7 +50,7 @@ def fold_losses(folds: Sequence[Fold], models: Sequence[Model], sigma: np.ndarra
     squares = [(np.zeros(0), np.zeros(0))] * len(folds)
     together: dict[tuple[Any, ...], list[int]] = {}
     for k, (fold, model) in enumerate(zip(folds, models, strict=True)):
-        alike = model.clock, model.filters, id(model.given), fold.data.horizon
+        alike = model.logging, model.filters, id(model.given), fold.data.horizon
         together.setdefault(alike, []).append(k)
     for (*_, horizon), places in together.items():
         runs, spans = [folds[k].data.smoothed for k in places], [folds[k].span for k in places]

@@ -71,8 +71,11 @@ def heading_offset(
 
 
 def clock_sentence(f: Found) -> str:
-    sense = "older" if f["clock_offset"] > 0.0 else "younger"
-    return f"The measured pose is {number(f['clock_offset'])} s {sense} than its time stamp."
+    time = number(f["clock_offset"])
+    if f["clock_offset"] > 0.0:
+        return f"The measured pose is {time} s older than its time stamp."
+    late = f"or the commands are logged {time} s late"
+    return f"The measured pose is {time} s younger than its time stamp, {late}."
 
 
 # No FMU has the clock of the measurement system: in a scenario it is the fault 'delay'.
@@ -92,6 +95,33 @@ CLOCK_OFFSET = Effect(
     function=None,
     search=Search(tries=[{"clock_offset": d} for d in OFFSETS]),
     wording=Wording(clock_sentence, CLOCK),
+)
+
+# An FMU of the thrusters has the commands themselves.
+COMMAND_LAG = Effect(
+    id="command_lag",
+    kind="measurement",
+    axis="XYN",
+    description="the logged commands are low-pass filtered (first order)",
+    formula="T dc_m/dt = c - c_m",
+    symbol="T_c",
+    sign="0: none",
+    source="first-order lag of a display or a logger",
+    linear=False,
+    parameters=(
+        Variable(
+            "command_lag", "s", "time constant of the low-pass filter of the commands", 0.0, LAGS, False
+        ),
+    ),
+    function=None,
+    search=Search(tries=[{"command_lag": T} for T in TRACKERS]),
+    wording=Wording(
+        lambda f: (
+            "The commands are logged through a low-pass filter with a time constant of "
+            f"{number(f['command_lag'])} s."
+        ),
+        FILTER,
+    ),
 )
 
 
