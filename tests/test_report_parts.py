@@ -13,6 +13,8 @@ from diagnosis import Model
 from diagnosis.assessment.covariates import HEADING, SPEED
 from diagnosis.assessment.regions import Profile
 from diagnosis.assessment.settings import SETTINGS
+from diagnosis.predictors.evaluation import PredictionError
+from diagnosis.predictors.windows import WindowErrors
 from diagnosis.report import finding_text, formatting, headline, terminal
 from diagnosis.report.pictures import chart, figures, shape, tracks
 from diagnosis.report.pictures.shape import Curve
@@ -43,6 +45,45 @@ from fmus.ship import ship
 )
 def test_numbers_are_written_out_unless_very_large_or_small(value, text):
     assert formatting.number(value) == text
+
+
+def evaluation(name, before, after, held_out):
+    """A run whose errors in ten windows are about these [m] and [rad]."""
+
+    def error(size):
+        position = np.linspace(0.9, 1.1, 10) * size
+        errors = WindowErrors(np.zeros(10, int), np.arange(10.0), np.ones(10), position, position)
+        return PredictionError(np.zeros((1, 3)), np.zeros((0, 3)), errors)
+
+    return SimpleNamespace(name=name, before=error(before), after=error(after), held_out=held_out)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "learned", "said"),
+    [
+        (0.05, 0.02, True, ""),
+        (0.05, 0.029, True, ""),  # another manoeuvre may well be harder to predict
+        (0.05, 0.031, True, "is predicted worse than all other runs (position 31 against 10 mm"),
+        (0.01, 0.02, True, "worse than the initial model: position 10 → 20 mm and heading"),
+        (0.01, 0.02, False, ""),
+        (0.05, 0.05, True, "is predicted worse than all other runs"),
+    ],
+)
+def test_test_runs_that_contradict_the_learned_model_are_told(before, after, learned, said):
+    trained = evaluation("a", 0.05, 0.01, held_out=False)
+    tested = evaluation("b", before, after, held_out=True)
+    r = SimpleNamespace(evaluations=[trained, tested], learned=learned)
+    told = [*headline.contradicted_by_tests(r)]
+    assert bool(told) == bool(said)
+    assert all("test run b" in sentence for sentence in told)
+    assert said in " ".join(told)
+    # The same errors on a run that was learned from say nothing, nor does a test run alone.
+    trained_too = SimpleNamespace(**{**vars(tested), "held_out": False})
+    assert not [
+        *headline.contradicted_by_tests(
+            SimpleNamespace(evaluations=[trained, trained_too], learned=learned)
+        )
+    ]
 
 
 def test_numbers_have_their_digits_and_factor():

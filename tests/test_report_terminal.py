@@ -35,7 +35,7 @@ def run(name, use, size=1.0, notes=(), faults=(), learned=True):
     """Evaluation of a run, as far as the terminal asks."""
 
     def errors(position, heading, omega_rms):
-        return SimpleNamespace(position=position, heading=heading, omega_rms=omega_rms)
+        return SimpleNamespace(position=position, heading=heading, omega_rms=omega_rms, errors=None)
 
     before = errors(0.126 * size, 0.0047 * size, [0.24, 0.005 * size, 0.001])
     after = errors(0.00073 * size, np.nan, [0.0029, 0.0049, 0.0012])

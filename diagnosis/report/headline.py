@@ -1,6 +1,6 @@
 """The result in a few sentences: what is sure first, what is only possible below it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import degrees
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
 from ..runs.run_constants import FAR_OFF
+from ..search.significance import lower_throughout
 from ..session import CalibratedModel, Diagnosis
 from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
@@ -124,15 +125,47 @@ def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]
     return gain_sentences(calibrated.gain, CALIBRATION_GAINED, CALIBRATION_GAINED_NOTHING, r.lengths[0])
 
 
+def contradicted_by_tests(r: ReportData) -> Iterator[str]:
+    """What test runs say against the learned model, a sentence each; they decide nothing.
+
+    A run may be predicted worse than by the initial model, beyond chance. Or it may be predicted so much
+    worse than all others that the difference is no chance: by more than three times.
+    """
+    of_both = (("position", "mm", 1e3), ("heading", "°", degrees(1.0)))
+    others = [e.after for e in r.evaluations if not e.held_out]
+    for e in (e for e in r.evaluations if e.held_out and e.after.errors is not None):
+        worse, far = [], []
+        for name, unit, factor in of_both:
+            before, after = getattr(e.before, name), getattr(e.after, name)
+            first, its = (np.square(getattr(of.errors, name)) for of in (e.before, e.after))
+            if r.learned and lower_throughout(first, its):
+                by = " → ".join(number(x, 2, factor) for x in (before, after))
+                worse.append(f"{name} {by} {unit}")
+            most = max((getattr(of, name) for of in others if of.errors is not None), default=np.inf)
+            if after > FAR_OFF * most:
+                far.append(f"{name} {number(after, 2, factor)} against {number(most, 2, factor)} {unit}")
+        if worse:
+            yield (
+                f"The learned model predicts the test run {e.name} worse than the initial model: "
+                f"{listed(worse, 'and')}."
+            )
+        if far:
+            yield (
+                f"The test run {e.name} is predicted worse than all other runs ({', '.join(far)}): "
+                "something acts in it that the others do not show, or it is another manoeuvre."
+            )
+
+
 def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
     """How commands are read, where that is not as the files state; else empty."""
     return [MEASURED_COMMANDS] if found.measured else []
 
 
 def first_sentences(r: ReportData) -> str:
-    """The headline, after the sentence that the search gained nothing where that is so."""
+    """The headline, after a search that gained nothing, before what test runs contradict."""
     gain = gain_of_search(r)
-    return " ".join([*(s for s in gain if s == SEARCH_GAINED_NOTHING), headline(r)])
+    nothing = [s for s in gain if s == SEARCH_GAINED_NOTHING]
+    return " ".join([*nothing, headline(r), *contradicted_by_tests(r)])
 
 
 def verdict_title(r: ReportData) -> str:

@@ -17,6 +17,7 @@ from ..session import CalibratedModel
 from .formatting import number, percent
 from .headline import (
     boundedness,
+    contradicted_by_tests,
     finding_sentence,
     gain_of_calibration,
     gain_of_search,
@@ -233,6 +234,8 @@ def _errors(r: ReportData) -> Iterator[RenderableType]:
     ):
         if table.row_count:
             yield from _titled(f"{title}{when}", table)
+    if against := [*contradicted_by_tests(r)]:
+        yield from _lines("Test runs", map(_plain, against))
 
 
 def _stability(s: Stability) -> Iterator[str]:
