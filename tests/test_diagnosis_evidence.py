@@ -145,7 +145,7 @@ NOTHING = replace(SLIGHT, p_value=0.5)
 
 
 def repeats(best=None, lasts=10.0, in_part=False):
-    shares = dict.fromkeys(("place", "motion", "command", "time"), 0.0)
+    shares = dict.fromkeys(("place", "heading", "motion", "command", "time"), 0.0)
     return Recurrence(shares | ({best: 0.6} if best else {}), lasts, in_part)
 
 
@@ -154,6 +154,7 @@ def repeats(best=None, lasts=10.0, in_part=False):
     [
         (repeats("place"), 1.0, "depends on the position", "a bank"),
         (repeats("place", in_part=True), 1.0, "depends on the position", "a bank"),
+        (repeats("heading"), 1.0, "depends on the heading", "error of the compass"),
         (repeats("motion"), 1.0, "speed, drift and yaw rate", "a force on the hull"),
         (repeats("motion", in_part=True), 1.0, "proportional to the command", "fails and recovers"),
         (repeats("command"), 1.0, "on the commands", "differs from the thruster model"),

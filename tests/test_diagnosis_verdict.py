@@ -93,13 +93,14 @@ def lap():
     return [weak_windows(smoothed(Run("lap", t, pose, commands(t))))]
 
 
-@pytest.mark.parametrize("space", ["place", "motion", "command", None])
+@pytest.mark.parametrize("space", ["place", "heading", "motion", "command", None])
 def test_remainder_repeats_with_what_it_was_made_of(lap, space):
     (w,) = lap
     s = w.smoothed
     slow = np.random.default_rng(1).standard_normal(s.time.size // 40 + 2)
     force = {
         "place": np.sin(2.0 * s.eta[:, 0]) * np.cos(1.5 * s.eta[:, 1]),
+        "heading": np.sin(2.0 * s.eta[:, 2]),
         "motion": s.nu[:, 0] * np.abs(s.nu[:, 0]),
         "command": np.maximum(w.run.tau_cmd[:, 0], 0.2),
         None: np.interp(s.time, 4.0 * np.arange(slow.size), slow),

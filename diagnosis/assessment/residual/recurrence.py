@@ -1,10 +1,10 @@
-"""With what a model error repeats: with place, motion, commands or time, or with none of them.
+"""With what a model error repeats: with place, heading, motion, commands or time, or none of them.
 
-A window's error is predicted by the mean over its neighbours in a space (place, motion, commands), of
-windows that are two blocks from it in time or in another run. The squared correlation of prediction and
-error is the share that repeats there. At a place surge and sway may repeat in the body frame, as drag
-does, or to north and east, as the pull of a cable. By chance it is as in series that are shifted in time
-against that space, which keeps how long an error lasts.
+A window's error is predicted by the mean over its neighbours in a space (place, heading, motion,
+commands), of windows that are two blocks from it in time or in another run. The squared correlation of
+prediction and error is the share that repeats there. At a place surge and sway may repeat in the body
+frame, as drag does, or to north and east, as the pull of a cable. By chance it is as in series that are
+shifted in time against that space, which keeps how long an error lasts.
 """
 
 from collections.abc import Callable, Sequence
@@ -62,6 +62,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     least = round(apart / data[0].every) + 1  # windows, of a shift after which none is its own neighbour
     count = SETTINGS.neighbours + 2 * least  # a pass of so long to both sides has fewer windows
     spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
+    spaces["heading"] = np.column_stack([turn.real, turn.imag])
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
     at_a_place = np.hstack([_scaled(place), spaces["motion"]])

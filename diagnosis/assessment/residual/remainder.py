@@ -42,13 +42,18 @@ REPEATS = {
         "depends on the position",
         "a cause that is fixed in the basin, such as a bank, shallow water or a current",
     ),
+    "heading": (
+        "depends on the heading",
+        "wind or current, or an error of the compass that varies with the heading",
+    ),
     "motion": (
         "depends on speed, drift and yaw rate",
         "a force on the hull whose shape no known effect has",
     ),
     "command": (
         "depends on the commands",
-        "a thruster force that differs from the thruster model in a shape that no effect has",
+        "a thruster force that differs from the thruster model in a shape that no effect has, or one "
+        "to which a controller reacts",
     ),
     TOGETHER: (
         "depends on position and motion together",
@@ -71,19 +76,19 @@ IN_ONE_RUN = (
     "occurs in {0} alone, so that these runs do not show what it depends on",
     "something that differed in that run, such as its place, load, water or weather",
 )
+OF_NONE = "does not follow from position, heading, motion, command or time alone, and "
 LASTS = (
-    "shows no dependence on position, motion, command or time alone, and lasts for about {0:.0f} s at "
-    "a time",
-    "an intermittent disturbance, such as gusts, a changing current or a towed cable, or a force that "
-    "depends on several of these together",
+    OF_NONE + "lasts for about {0:.0f} s at a time",
+    "a disturbance, such as gusts or a towed cable, an error of the measurement or of logged commands "
+    "that lasts so long, or a force that depends on several of these together",
 )
 THROUGHOUT = (
-    "shows no dependence on position, motion, command or time alone, and lasts through whole runs",
+    OF_NONE + "lasts through whole runs",
     "a force that differs from run to run, such as that of wind or current, or one that is commanded "
     "otherwise than recorded",
 )
 BRIEF = (
-    "shows no dependence on position, motion, command or time alone, and is short",
+    OF_NONE + "is short",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 
