@@ -214,7 +214,14 @@ def test_a_column_called_as_an_actuator_is_its_only_command() -> None:
 
 @pytest.mark.parametrize(
     ("name", "unit"),
-    [("TimeUS", "us"), ("time_boot_ms", "ms"), ("timestamp_usec", "us"), ("TIMEMS", "ms")],
+    [
+        ("TimeUS", "us"),
+        ("time_boot_ms", "ms"),
+        ("timestamp_usec", "us"),
+        ("TIMEMS", "ms"),
+        ("ms", "ms"),
+        ("millis", "ms"),
+    ],
 )
 def test_the_unit_at_the_end_of_the_name_of_a_time(tmp_path: Path, name: str, unit: str) -> None:
     table = zigzag(time=name)
@@ -465,6 +472,17 @@ def test_coordinates_of_utm_are_known_by_their_usual_names(tmp_path: Path) -> No
     table = zigzag(x="utm_n [m]", y="UTM E [m]")
     found = propose(written(tmp_path / "a.csv", table), TANKER).layout
     assert [found.column(signal).name for signal in ("x", "y")] == ["utm_n [m]", "UTM E [m]"]
+
+
+@pytest.mark.parametrize(
+    ("north", "east"),
+    [("pos_y_north", "pos_x_east"), ("Nordwert", "Ostwert"), ("N_m", "E_m"), ("x_north", "y_east")],
+)
+def test_a_direction_in_a_name_goes_before_the_letter_of_an_axis(
+    tmp_path: Path, north: str, east: str
+) -> None:
+    found = propose(written(tmp_path / "a.csv", zigzag(x=north, y=east)), TANKER).layout
+    assert [found.column(signal).name for signal in ("x", "y")] == [north, east]
 
 
 @pytest.mark.parametrize("start", [200.0, 1.0], ids=["beyond a turn", "jumps over north"])

@@ -239,6 +239,11 @@ def test_another_reading_changes_motion_and_density_by_its_factors(pace):
 
 MISTAKES = [
     ("heading is mirrored", {"psi": {"name": "psi", "flip": True}}, {"pose": flipped(1, 1, -1)}),
+    (
+        "heading counts from east, counter-clockwise",
+        {"psi": {"name": "psi", "offset": 1.571, "flip": True}},
+        {"pose": lambda pose: pose * [1, 1, -1] + [0.0, 0.0, 0.5 * np.pi]},
+    ),
     ("y points west", {"y": {"name": "y", "flip": True}}, {"pose": flipped(1, -1, 1)}),
     ("x points south", {"x": {"name": "x", "flip": True}}, {"pose": flipped(-1, 1, 1)}),
     (
@@ -255,7 +260,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(
-    ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[0], MISTAKES[3]])
+    ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[1], MISTAKES[4]])
 )
 def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_path):
     w = weak_windows(smoothed(replace(edited(**edits), file=tmp_path / "a.csv")))
@@ -297,6 +302,14 @@ def test_mistakes_of_a_described_ship_are_told_with_odds(columns, read_from, fac
     said = doubt(table)
     assert mistake in said
     assert "(odds " in said
+
+
+def test_axes_that_are_mirrored_stand_before_actuators_that_are_swapped():
+    """Of a ship that is the same on both sides nothing tells one from the other; files have the first."""
+    said = doubt(otter().assign(y=-otter()["y"], psi=-otter()["psi"]))
+    first, _, rest = said.partition(", or ")
+    assert "y points west and its heading is mirrored" in first
+    assert "port.n and starboard.n are swapped" in rest
 
 
 @pytest.mark.slow

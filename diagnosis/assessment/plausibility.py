@@ -226,7 +226,17 @@ def likeliest_mistake(
     if better < asked:
         return None
     near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
-    order = sorted(near, key=lambda k: (k >= named, len(possible[k].changes), -found[k]))
+    # Of a ship that is the same on both sides, axes that are mirrored are as well commands that are
+    # swapped, which is a rarer mistake.
+    order = sorted(
+        near,
+        key=lambda k: (
+            k >= named,
+            possible[k].commands is not None,
+            len(possible[k].changes),
+            -found[k],
+        ),
+    )
     if order[0] < named:  # a unit with a name is as good as a number
         order = [k for k in order if k < named]
     return Mistake([possible[k] for k in order], better, bool(better >= needed))

@@ -212,6 +212,7 @@ def log_of(commands: Iterable[str]) -> Layout:
     return Layout(columns={signal: Column(name=name) for signal, name in names.items()})
 
 
+PROPOSE = "a side-car states other names ('cybership columns FILE --write' writes one)"
 WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+|deg \w+|\w+ since [^\])]+)\s*[\])]")
 
 
@@ -352,8 +353,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
         forms = ", or ".join(", ".join(group) for group in every)
         raise InputError(
             f"{where} has no commands: {forms}{nearest(every[0][0], names)}; "
-            "a side-car states other names ('cybership columns FILE --write' writes one), and "
-            "'cybership join' adds those of another file"
+            f"{PROPOSE}, and 'cybership join' adds those of another file"
         )
     power = of.power_settings
     if tuple(of.command_forms[-1]) in groups and any(layout.column(s).name in names for s in power):
@@ -375,7 +375,9 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
             del wanted[signal]
         elif name not in names:
             meant = f" (for {signal})" if name != signal else ""
-            raise InputError(f"{where} has no column '{name}'{meant}{nearest(name, names)}")
+            known = nearest(name, names)
+            propose = "" if signal in named else f"; {PROPOSE}"
+            raise InputError(f"{where} has no column '{name}'{meant}{known}{propose}")
     return list(wanted)
 
 

@@ -72,6 +72,7 @@ NO_UNIT = ("", "-")
 NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1", "d"}
 # A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
 TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
+CALLED_AS_UNIT = ("ms", "us", "ns")  # a time may be called so
 NORTH = ("true", "magnetic")  # that a heading is from; behind its name it is no unit
 # Behind a name in a log of libcosim: value reference, type and causality.
 OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
@@ -349,7 +350,7 @@ def _is_letter(name: str, unit: str, names: Sequence[str]) -> bool:
     """
     if name.casefold() not in ("n", "e"):
         return name in LETTERS and unit in NO_UNIT
-    bare = [_bare(each, "")[0].casefold() for each in names]
+    bare = [_without_unit(each, "")[0].casefold() for each in names]
     return not {"n", "e"} <= {*bare} or any(not WORDS["x"].isdisjoint(words_of(each)) for each in bare)
 
 
@@ -539,6 +540,8 @@ def _unit_at_the_end(name: str) -> tuple[str, str]:
     """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, x in mm, TimeUS."""
     if stamped := TIME_IN.fullmatch(name):
         return stamped[1], spelt(stamped[2].lower())
+    if (unit := spelt(name.lower())) in CALLED_AS_UNIT:
+        return "time", unit
     for mark in (" in ", ", ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
         quantity, _, unit = name.partition(mark)
         if quantity and spelt(unit) in NAMED_UNITS:

@@ -37,6 +37,8 @@ SPELT = {
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("day", "days"), "d"),
     **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
+    **dict.fromkeys(("millis", "milliseconds"), "ms"),
+    **dict.fromkeys(("micros", "microseconds"), "us"),
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
     **dict.fromkeys(("1/min", "r/min", "rev/min", "U/min", "tr/min", "o/min", "omdr/min"), "rpm"),

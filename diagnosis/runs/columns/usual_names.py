@@ -12,15 +12,16 @@ CALLED: dict[str, tuple[str, ...]] = {
     "time": (
         *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
         *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp", "epoch", "unixtime"),
-        *("timesincestart", "xvalue", "gpst", "logtime"),
+        *("timesincestart", "xvalue", "gpst", "logtime", "timeofweek", "gpstimeofweek", "tow"),
+        *("gpstow", "itow", "secondsofweek"),
     ),
     "x": (
         *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
-        *("utmn", "northings"),
+        *("utmn", "northings", "xnorth", "ynorth", "posxnorth", "posynorth"),
     ),
     "y": (
         *("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
-        *("utme", "eastings"),
+        *("utme", "eastings", "xeast", "yeast", "posxeast", "posyeast"),
     ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
