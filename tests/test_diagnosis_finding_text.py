@@ -123,6 +123,17 @@ def test_a_coefficient_whose_force_others_take_away_says_so(effect, others, said
     assert bool(told) is bool(said)
 
 
+def test_of_a_finding_that_is_not_in_the_model_no_force_is_told():
+    finding = Finding("X_uuu", {"delta_X_uuu": -200.0}, {}, 0.9, [], 0.9, 0.9)
+    assert of_whole_hull(finding, Model(), Model(), (0.2, 0.1, 0.1)) == ""
+
+
+def test_values_of_an_equation_are_written_out_with_their_sign():
+    found = equation(EFFECTS["X_uuu"], {"delta_X_uuu": -2740.0}, {"delta_X_uuu": (-5070.0, -414.0)})
+    assert found.endswith("= -2740 N.s3/m3 (-5070 to -414)")
+    assert equation(EFFECTS["loss_surge"], {"loss_surge": 0.3}, {}).endswith("= 0.3")
+
+
 def test_an_effect_of_a_user_says_what_it_says_of_itself():
     mine = Effect("mine", "force", "N", "A moment that I suspect.", "N = k", "k", "", "", True, (), None)
     assert (

@@ -6,7 +6,7 @@ import numpy as np
 
 from cybership.message_text import counted
 from fmus.effects import Effect, EffectSet
-from fmus.effects.text import Found
+from fmus.effects.text import Found, number
 
 from ..execution.short_text import SHOWN
 from ..predictors.ship_model import parameter_and_run
@@ -32,8 +32,8 @@ def equation(
     formula = effect.formula or effect.id
     shown = [name for name in values if values[name] or name in ci95]
     if len(shown) > 2 * SHOWN:
-        nodes = ", ".join(f"{values[name]:.2g}" for name in shown)
-        return f"{formula}; {shown[0]} ... {shown[-1]} = {nodes} {unit(effect, shown[0])}"
+        nodes = ", ".join(_signed(values[name], 2) for name in shown)
+        return f"{formula}; {shown[0]} ... {shown[-1]} = {nodes}{_behind(unit(effect, shown[0]))}"
     symbols = [s.strip() for s in effect.symbol.split(",")]
     names = symbols if len(symbols) == len(effect.coefficients) else effect.coefficients
     called = dict(zip(effect.coefficients, names, strict=True))
@@ -48,8 +48,17 @@ def equation(
 def _coefficient(symbol: str, value: float, unit: str, interval: tuple[float, float] | None) -> str:
     """Such as ``δ = 0.3 m (0.29 to 0.31)``."""
     digits = 3 if interval is None else _digits(*interval)
-    text = f"{symbol} = {value:.{digits}g}" + (f" {unit}" if unit != "1" else "")
-    return text if interval is None else f"{text} ({interval[0]:.{digits}g} to {interval[1]:.{digits}g})"
+    text = f"{symbol} = {_signed(value, digits)}{_behind(unit)}"
+    return text if interval is None else f"{text} ({' to '.join(_signed(x, digits) for x in interval)})"
+
+
+def _signed(x: float, digits: int) -> str:
+    return "-" * (x < 0.0) + number(x, digits)
+
+
+def _behind(unit: str) -> str:
+    """A unit behind a number; nothing for ``1``."""
+    return f" {unit}" if unit != "1" else ""
 
 
 def _digits(low: float, high: float) -> int:

@@ -12,6 +12,7 @@ from fmus.effects.text import Found, towards
 from ..assessment.stability import force
 from ..predictors import Model
 from ..predictors.ship_model import of_one_run, parameter_and_run
+from ..runs.run_constants import DIGITS
 from ..search.findings import Finding
 from ..session import Diagnosis
 from .finding_text import advice, equation, sentence, separation_note, unit
@@ -144,6 +145,8 @@ def of_whole_hull(f: Finding, start: Model, learned: Model, speeds: tuple[float,
         for model in (start.plus(f.values), learned)
     )
     if whole * own > 0.0 and 1.0 / OTHERWISE < whole / own < OTHERWISE:
+        return ""
+    if abs(whole) < DIGITS * abs(own):  # a finding that is not in the learned model
         return ""
     size = towards(whole, "N m" if axis == "N" else "N", axis)
     return f" With all coefficients that are fitted, the force of the hull there differs by {size}."

@@ -62,7 +62,7 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     least = round(apart / data[0].every) + 1  # windows, of a shift after which none is its own neighbour
     count = SETTINGS.neighbours + 2 * least  # a pass of so long to both sides has fewer windows
     spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
-    spaces["heading"] = np.column_stack([turn.real, turn.imag])
+    spaces["heading"] = np.column_stack([np.real(turn), np.imag(turn)])
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
     at_a_place = np.hstack([_scaled(place), spaces["motion"]])

@@ -72,7 +72,10 @@ class Unrecorded:
         """The pushes at a time; empty where there are none."""
         named = {axis: f"{unit} in {name}" for axis, unit, name in zip(AXES, UNITS, NAMES, strict=True)}
         times = ((s, f"{s.run} {s.start:.1f} to {s.end:.1f} s") for s in self.stretches)
-        each = [f"{time}, {s.size:+.2g} {named[s.axis]}" for s, time in times]
+        each = [
+            f"{time}, {'-' if s.size < 0.0 else '+'}{number(s.size, 2)} {named[s.axis]}"
+            for s, time in times
+        ]
         return f"Disturbances at single times: {'; '.join(each)}." if each else ""
 
 
