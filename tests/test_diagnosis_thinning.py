@@ -1,11 +1,15 @@
 """Thinning of long runs: what it keeps, what it says, and when it leaves a run alone."""
 
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
 from support.measured import lacking_at_all_rows, sail, smoothed
 
+from benchmarks.ship_effects import causes
+from benchmarks.ship_effects import sail as sail_of
+from diagnosis import load
 from diagnosis.predictors import Model, omega, ship_with, weak_windows
 from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.runs import Run, clean, thinned, thinning
@@ -83,6 +87,42 @@ def test_model_errors_by_fewer_rows_are_those_by_all(w):
     by_all = lacking_at_all_rows(w, model)
     assert omega(w, model) == pytest.approx(by_all, abs=1e-3 * np.abs(by_all).max())
     assert np.abs(by_all).max() > omega_std(w).max()
+
+
+def answering_noise():
+    """Commands of a tanker under control: a slow rudder, with noise that the controller answers."""
+    rng = np.random.default_rng(3)
+    for k in count():
+        slow = 0.2 * np.sin(0.02 * k)
+        yield 10.0 + rng.normal(0.0, 2.0), slow + rng.normal(0.0, 0.05)
+
+
+@pytest.fixture(scope="module")
+def controlled():
+    """Windows of a run of that tanker, whose rows are merged by two."""
+    ship = ship_with((), "kvlcc2")
+    none, rng = causes(ship)["none"], np.random.default_rng(0)
+    (w,) = load(
+        sail_of(ship, none, rng, None, answering_noise(), 60.0, 0.04), ship="kvlcc2", anyway=True
+    )
+    assert w.thinned.run.time.size < 0.7 * w.run.time.size
+    return w
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [{"play_rudder": 0.1}, {"rate_rudder": 0.03}, {"lag_rudder": 0.5}, {"delay": 0.7}, {"lag": 0.5}],
+    ids=lambda effect: next(iter(effect)),
+)
+def test_an_actuator_with_a_memory_follows_the_commands_of_all_rows(controlled, effect):
+    """Play and a limited rate make another angle of a mean command than of the commands."""
+    start = Model(ship=ship_with((), "kvlcc2"))
+    model = start.plus(effect)
+    by_all = lacking_at_all_rows(controlled, model)
+    changed = by_all - lacking_at_all_rows(controlled, start)
+    off, size = (np.sqrt(np.mean(x**2, axis=0)) for x in (omega(controlled, model) - by_all, changed))
+    assert (off[1:] < 0.06 * size[1:]).all()
+    assert off[0] < 0.15 * size[0] + 0.002 * np.abs(controlled.run.tau_cmd[:, 0]).max()
 
 
 def test_the_mean_of_an_angle_goes_the_short_way_round():

@@ -194,7 +194,7 @@ def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
         eta=s.eta @ reading.motion.T + [0.0, 0.0, reading.turn],
         eta_dot=s.eta_dot @ reading.motion.T / reading.pace,
     )
-    return replace(w, smoothed=meant, slope=w.slope / reading.pace, memory=memory)
+    return replace(w, smoothed=meant, slope=w.slope / reading.pace, whole=None, memory=memory)
 
 
 def inertial(w: WeakWindows, model: Model) -> np.ndarray:

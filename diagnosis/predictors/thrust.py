@@ -56,12 +56,18 @@ def before_low_pass(run: Run, model: Model) -> np.ndarray:
     logged, lag = run.given, model.logging.lag
     if lag == 0.0:
         return logged
-    if run.commands is not None:
-        turns = np.flatnonzero(model.ship.layout_of(run.commands).round)
-        logged = logged.copy()
-        logged[:, turns] = np.unwrap(logged[:, turns], axis=0)
+    logged = unwrapped(logged, run, model)
     reached = -np.expm1(-np.diff(run.time) / lag)
     return np.vstack([logged[:1], logged[:-1] + np.diff(logged, axis=0) / reached[:, None]])
+
+
+def unwrapped(commands: np.ndarray, run: Run, model: Model) -> np.ndarray:
+    """Commands (n, k) of a run with angles that go round as continuous ones."""
+    turns = np.flatnonzero(model.ship.layout_of(run.commands).round if run.commands is not None else ())
+    if turns.size:
+        commands = commands.copy()
+        commands[:, turns] = np.unwrap(commands[:, turns], axis=0)
+    return commands
 
 
 def full_thrust(model: Model) -> np.ndarray:
@@ -132,21 +138,34 @@ class Response:
 
     @property
     def between_samples(self) -> np.ndarray:
+        """Means from each sample of the run to the next, see :meth:`between`."""
+        return self.between(self.run)
+
+    def between(self, rows: Run) -> np.ndarray:
         """Means (2, k, n) from each sample to the next: commands that arrive, shares that act.
 
         Where these are the same there is one of them. Where forces are not in proportion to what acts,
-        and that changes from sample to sample, it is told at the two points of Gauss' rule.
+        and that changes from sample to sample, it is told at the two points of Gauss' rule. In fewer rows
+        those of a shaft have the mean squares of both halves.
+
+        Args:
+            rows: the run, or the same with fewer rows (n,) and their mean commands, which act where
+                nothing depends on what was commanded before.
         """
-        if not self.slow and self.model.clock == 0.0:
-            means = np.array([commanded_shares(self.run, self.model)])
+        if not self.slow and not any(self.model.logging):
+            means = np.array([commanded_shares(rows, self.model)])
         else:
-            ends = np.append(self.run.time, self.run.time[-1] + self._period)
+            ends = np.append(rows.time, rows.time[-1] + float(np.median(np.diff(rows.time))))
             curved = self.slow and self.drive.effects.layout.curved
             edges = np.sort(np.append(ends, 0.5 * (ends[:-1] + ends[1:]))) if curved else ends
             means = np.array(self.means(edges))
+            apart = np.full(means.shape[-1], np.sqrt(3.0))
+            if rows is not self.run:
+                shafts = self._shafts
+                means[..., shafts], apart[shafts] = self._means_of_squares(edges)[..., shafts], 2.0
             if curved:
                 given, acting = 0.5 * (means[:, ::2] + means[:, 1::2])
-                off = (means[1, ::2] - means[1, 1::2]) / np.sqrt(3.0)
+                off = (means[1, ::2] - means[1, 1::2]) / apart
                 means = np.array([given, acting + off, acting - off])
         lasting = means[:1] if (means[0] == means[-1]).all() else means
         return np.ascontiguousarray(np.moveaxis(lasting, 1, -1))
@@ -163,6 +182,19 @@ class Response:
         time = self._elapsed(edges)
         both = np.diff(self._integral(time), axis=0) / like(np.diff(time, axis=0), 2)
         return both[..., 0, :], both[..., -1, :]
+
+    def _means_of_squares(self, edges: np.ndarray) -> np.ndarray:
+        """Roots of the means of x |x| (2, m, k): thrust goes with n |n|, also of a shaft in noise."""
+        time, of = self._elapsed(edges), self._integral
+        x, before = of.values * np.abs(of.values), of.before * np.abs(of.before)
+        squares = np.diff(Integral(of.edges, x, before)(time), axis=0) / like(np.diff(time, axis=0), 2)
+        return np.moveaxis(np.sign(squares) * np.sqrt(np.abs(squares)), 1, 0)
+
+    @cached_property
+    def _shafts(self) -> np.ndarray:
+        """(k,), which commands are speeds of shafts."""
+        units = self.model.ship.form_of(self.run.commands).values()
+        return np.array([self.run.commands is not None and unit == "1/s" for unit in units])
 
     @cached_property
     def _period(self) -> float:
@@ -183,7 +215,7 @@ class Response:
     @cached_property
     def _commands(self) -> "Integral":
         """Integral of the commands as they were given; the clock of the pose is late."""
-        shares = commanded_shares(self.run, self.model)
+        shares = unwrapped(commanded_shares(self.run, self.model), self.run, self.model)
         before = shares[0] if self.moving else 0.0 * shares[0]
         edges = np.append(self._clock, self._clock[-1] + self._period) + self.model.clock
         return Integral(edges, shares, before)

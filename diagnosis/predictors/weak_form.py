@@ -65,6 +65,7 @@ class WeakWindows:
             times one that is held from each sample to the next. They are exact for signals that are
             straight between samples, however far apart these are.
         horizon: length of the windows in which models predict the run [s].
+        whole: the run with all of its rows, where these are fewer; None: it has all.
         memory: parts of the model error that were computed lately.
     """
 
@@ -75,6 +76,7 @@ class WeakWindows:
     slope: csr_matrix
     held: csr_matrix
     horizon: float
+    whole: Run | None = None
     memory: dict[str, dict[Any, Any]] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -93,7 +95,7 @@ class WeakWindows:
         """
         memory = {part: self.memory.setdefault(part, {}) for part in OF_MOTION}
         track = replace(self.smoothed.track, run=run)
-        return replace(self, smoothed=replace(self.smoothed, track=track), memory=memory)
+        return replace(self, smoothed=replace(self.smoothed, track=track), whole=None, memory=memory)
 
     @property
     def scale(self) -> Scale:
@@ -128,7 +130,8 @@ class WeakWindows:
         if smoothed is self.smoothed:
             return self
         smooth, slope, held = _integrals(smoothed.time, self.middle, 0.5 * self.width)
-        return replace(self, smoothed=smoothed, smooth=smooth, slope=slope, held=held, memory={})
+        rows = {"smooth": smooth, "slope": slope, "held": held}
+        return replace(self, smoothed=smoothed, whole=self.run, **rows, memory={})
 
     def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.
@@ -312,7 +315,7 @@ def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> 
     model = model.during(w.run.name)
     if nu is None:
         nu = halfway(w, inflow_along(w, model, *w.motion))
-    return thrust(w.run, model, _response(w, model), nu)
+    return thrust(w.run, model, response(w, model), nu)
 
 
 def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
@@ -328,16 +331,16 @@ def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
 
 def arriving(w: WeakWindows, model: Model) -> np.ndarray:
     """Commands (k, n) that reach the model's thrusters, mean from each sample to the next."""
-    return _response(w, model)[0]
+    return response(w, model)[0]
 
 
-def _response(w: WeakWindows, model: Model) -> np.ndarray:
-    key = Response.key(model)
+def response(w: WeakWindows, model: Model) -> np.ndarray:
+    """What becomes of the commands of all rows, see :meth:`.thrust.Response.between`."""
 
     def between() -> np.ndarray:
-        return Response(w.run, model, not at_rest(w.smoothed)).between_samples
+        return Response(w.whole or w.run, model, not at_rest(w.smoothed)).between(w.run)
 
-    return w.recall("response", key, between)
+    return w.recall("response", Response.key(model), between)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:

@@ -28,11 +28,12 @@ from fmus.native.webassembly import component_module
 
 from ..execution.short_text import SHOWN
 from ..predictors import Evaluation, Model, Response, write_model
-from ..predictors.prediction import FAR_OFF, at_rest
+from ..predictors.prediction import FAR_OFF
 from ..predictors.ship_model import of_run, parameter_and_run
 from ..predictors.thrust import LONGEST_STEP
 from ..predictors.traced.balance_component import balance_component
 from ..predictors.traced.prediction_component import START, allocation_component, prediction_component
+from ..predictors.weak_form import response
 from ..predictors.windows import WindowStarts
 from ..runs.cleaning import WIDTH, Z95
 from ..search.prior import NominalPrior
@@ -381,7 +382,7 @@ class MovableModel:
     def _between(self, e: Evaluation) -> np.ndarray:
         """(points, k, n): commands that arrive, then shares that act; or one for both."""
         w = e.weak_windows.thinned
-        return Response(w.run, self.learned.during(e.name), not at_rest(w.smoothed)).between_samples
+        return response(w, self.learned.during(e.name))
 
     @property
     def _balance(self) -> Component:
