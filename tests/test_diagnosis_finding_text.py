@@ -4,6 +4,7 @@ import re
 from itertools import combinations
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from support.cse1 import EFFECTS
 
@@ -129,7 +130,8 @@ def test_of_a_finding_that_is_not_in_the_model_no_force_is_told():
 
 
 def test_values_of_an_equation_are_written_out_with_their_sign():
-    found = equation(EFFECTS["X_uuu"], {"delta_X_uuu": -2740.0}, {"delta_X_uuu": (-5070.0, -414.0)})
+    value, interval = np.float64(-2740.0), (np.float64(-5070.0), np.float64(-414.0))
+    found = equation(EFFECTS["X_uuu"], {"delta_X_uuu": value}, {"delta_X_uuu": interval})
     assert found.endswith("= -2740 N.s3/m3 (-5070 to -414)")
     assert equation(EFFECTS["loss_surge"], {"loss_surge": 0.3}, {}).endswith("= 0.3")
 

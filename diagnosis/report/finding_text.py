@@ -53,7 +53,7 @@ def _coefficient(symbol: str, value: float, unit: str, interval: tuple[float, fl
 
 
 def _signed(x: float, digits: int) -> str:
-    return "-" * (x < 0.0) + number(x, digits)
+    return f"{'-' if x < 0.0 else ''}{number(x, digits)}"
 
 
 def _behind(unit: str) -> str:
