@@ -51,11 +51,6 @@ class Reading:
 
 
 AS_READ = Reading("nothing")
-FROM_EAST = Reading(
-    "its heading counts from east, counter-clockwise",
-    {"psi": Named(name="psi", factor=-1.0, offset=0.5 * np.pi)},
-    motion=np.diag([1.0, 1.0, -1.0]),
-)
 
 
 def of_pose(mistake: str, factors: Sequence[float]) -> Reading:
@@ -103,7 +98,9 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
             "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
         )
     yield swapped(POSE, 0, 1)
-    yield FROM_EAST
+    from_east = {"psi": Named(name="psi", factor=-1.0, offset=0.5 * np.pi)}
+    mirrored = np.diag([1.0, 1.0, -1.0])
+    yield Reading("its heading counts from east, counter-clockwise", from_east, motion=mirrored)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
     for degrees in (180, 90, -90):
         back = Named(name="psi", offset=float(-np.radians(degrees) % (2.0 * np.pi)))

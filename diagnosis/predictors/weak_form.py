@@ -65,8 +65,8 @@ class WeakWindows:
             times one that is held from each sample to the next. They are exact for signals that are
             straight between samples, however far apart these are.
         horizon: length of the windows in which models predict the run [s].
-        whole: the run with all of its rows, where these are fewer; None: it has all.
         memory: parts of the model error that were computed lately.
+        whole: the run with all of its rows, where these are fewer; None: it has all.
     """
 
     smoothed: Smoothed
@@ -76,8 +76,8 @@ class WeakWindows:
     slope: csr_matrix
     held: csr_matrix
     horizon: float
-    whole: Run | None = None
     memory: dict[str, dict[Any, Any]] = field(default_factory=dict, repr=False)
+    whole: Run | None = None
 
     def __repr__(self) -> str:
         time = self.run.time
