@@ -104,7 +104,7 @@ def search(
     gone: set[str] = set()  # effects that others have made superfluous
     before: tuple[TrainingSet, RefinedModel] | None = None  # an effect that is on trial
     turn = "effect 1"
-    while len(accepted) < MOST_REPORTED:
+    for _ in range(MOST_REPORTED):  # those that give way count, else all come and go where none explains
         advance(f"{turn}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:

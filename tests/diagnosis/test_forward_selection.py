@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.measured import sail, smoothed
 
 from diagnosis import Model
-from diagnosis.predictors.weak_form import OVERLAP
+from diagnosis.predictors.weak_form import OVERLAP, weak_windows
 from diagnosis.search import forward_selection
 from diagnosis.search.candidates import Candidate, CandidateShape
 from diagnosis.search.conclusion import AcceptedEffect
@@ -383,3 +384,22 @@ def test_after_a_replacement_the_last_effect_is_compared_with_its_rivals_again(m
     assert kept["c"].instead_of == ("a",)
     assert kept["b"].weights["b"] == pytest.approx(0.6, abs=0.1)
     assert kept["b"].weights["d"] == pytest.approx(0.4, abs=0.1)
+
+
+def test_a_search_ends_though_what_is_found_gives_way_again_and_again(monkeypatch):
+    """As where a cause that no candidate has is made up of any of them."""
+    found = []
+
+    def gives_way(t, at, accepted, *more):
+        found.append(accepted[-1].id)
+        return at.without(accepted[-1].names), list(accepted[:1]), set()
+
+    monkeypatch.setattr(forward_selection, "searched_again", gives_way)
+    monkeypatch.setattr(forward_selection, "beyond_chance", lambda *them: True)
+    monkeypatch.setattr(forward_selection, "matters", lambda *them, **command: True)
+    monkeypatch.setattr(forward_selection, "harmful", lambda *them: False)
+    w = weak_windows(smoothed(sail(60.0, 0.1, ship={"delta_X_u": -2.0})[0]))
+    rng = np.random.default_rng(0)
+    selection = forward_selection.search([w], None, Model(), lambda step: None, rng)
+    assert len(found) == MOST_REPORTED - 1
+    assert len(selection.findings().effects) == 1
