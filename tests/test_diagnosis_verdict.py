@@ -42,7 +42,7 @@ from diagnosis.verdict.judging import (
     verdict_name,
     with_confidence,
 )
-from diagnosis.verdict.law_in_parts import mended, on_one_line
+from diagnosis.verdict.law_in_parts import beside_unbelieved, mended, of_several, on_one_line
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
@@ -857,6 +857,39 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
     assert not mended(Findings(made), start, by_axis, possible)
     seen = confidence_of(made[0], start, Doubts(mended=doubted))
     assert seen.own == (0.5 if made[0].id in doubted else 0.99)
+
+
+@pytest.mark.parametrize(
+    ("explained", "believed", "doubted"),
+    [
+        ((0.94, 0.02), (False, True), {"loss_surge"}),
+        ((0.94, 0.02), (True, True), set()),
+        ((0.94, 0.06), (False, True), set()),  # not next to nothing
+        ((0.01, 0.02), (False, True), set()),  # more than what is not believed
+    ],
+)
+def test_a_small_finding_is_no_surer_than_what_explains_most(explained, believed, doubted):
+    """Of a towed body `Y_uv` took the most with no confidence, and `loss_surge` the rest with 0.98."""
+    made = [Finding(i, {}, {}, 0.99, [], 0.9, 0.9) for i in ("Y_uv", "loss_surge")]
+    sure = [Confidence(*[0.99 if each else 0.01] * 2) for each in believed]
+    assert beside_unbelieved(Findings(made), explained, sure) == doubted
+    of_a_run = replace(made[1], values={"loss_surge@a": 0.1})
+    assert of_a_run.of_runs
+    assert not beside_unbelieved(Findings([made[0], of_a_run]), explained, sure)
+
+
+@pytest.mark.parametrize(("other", "doubted"), [(1.1, True), (0.5, False), (-1.1, False)])
+def test_a_lag_of_one_propeller_is_in_doubt_if_the_other_one_has_it_too(other, doubted):
+    """Both propellers of the Otter were slower; one was found with 0.99, the other a coefficient."""
+    start = Model(ship=ship_with((), "otter"))
+    values = {"lag_port": 1.2}
+    model = start.plus(values | {"lag_starboard": other})
+    made = [Finding("lag_port", values, {"lag_port": (1.1, 1.3)}, 0.99, [], 0.9, 0.9, together=0.99)]
+    found = Findings(made, model=model, moved={"lag_starboard": other / 0.5})
+    assert of_several(found, start) == ({"lag_port"} if doubted else set())
+    assert of_several(replace(found, moved={}), start) == set()
+    seen = confidence_of(made[0], start, Doubts(of_several=of_several(found, start)))
+    assert seen.own == (0.5 if doubted else 0.99)
 
 
 def test_the_error_of_an_axis_falls_with_the_finding_that_acts_there():

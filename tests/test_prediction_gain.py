@@ -149,6 +149,18 @@ def test_the_standard_error_is_paired_and_covers_the_difference():
     assert np.mean(gained) < 0.1
 
 
+@pytest.mark.parametrize(("better", "gained"), [(9, True), (4, False)])
+def test_predictions_that_are_better_in_most_windows_are_better(better, gained):
+    """One window with nearly all of the error makes the standard error as large as the mean."""
+    before = np.append(1.0, np.full(9, 0.01))
+    after = np.where(np.arange(10) <= better, 0.1, 1.1) * before
+    data = Data({})
+    data.losses = lambda *_: [Losses(np.ones(4), x, x) for x in (after, before)]
+    gain = prediction_gain(data, START, BETTER)
+    assert gain.position.difference < 2.0 * gain.position.standard_error
+    assert gain.gained == gained
+
+
 def test_it_is_not_known_without_folds_or_windows():
     sizes = {id(START): 1.0, id(BETTER): 1.0}
     nothing = Findings()

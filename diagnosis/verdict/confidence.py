@@ -42,6 +42,8 @@ OUSTED = "without the findings that are not sure, another effect explains as muc
 NO_GAIN = "without it, calibrated coefficients predict data left out of the fit as well"
 IMPLAUSIBLE = "other coefficients are beyond their priors in the model with it"
 MENDED = "it and a far smaller effect on the same axes make up a force of another shape as well"
+OF_SEVERAL = "the same of another actuator changes by half as much or more in the model with it"
+UNBELIEVED = "what explains more of the error, in the model with it, is not sure"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -60,6 +62,8 @@ class Doubts(NamedTuple):
         unsettled: ids of the effects that took the place of another beside findings that are not sure.
         implausible: whether nominal coefficients are beyond their priors.
         mended: ids of the findings of which one is far smaller than the other on the same axes.
+        of_several: ids of the changes of one actuator that another one shares.
+        beside_unbelieved: ids of the findings that explain little beside one that is not believed.
     """
 
     residual: Collection[str] = ()
@@ -73,6 +77,8 @@ class Doubts(NamedTuple):
     unsettled: Collection[str] = ()
     implausible: bool = False
     mended: Collection[str] = ()
+    of_several: Collection[str] = ()
+    beside_unbelieved: Collection[str] = ()
 
 
 NO_DOUBTS = Doubts()
@@ -131,6 +137,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         ON_ONE_LINE: f.id in doubts.on_one_line,
         IMPLAUSIBLE: doubts.implausible,
         MENDED: f.id in doubts.mended,
+        OF_SEVERAL: f.id in doubts.of_several,
+        UNBELIEVED: f.id in doubts.beside_unbelieved,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
         OUSTED: f.id in doubts.unsettled,

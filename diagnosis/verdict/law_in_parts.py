@@ -80,6 +80,24 @@ def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Con
     return ids
 
 
+def beside_unbelieved(
+    found: Findings, explained: Sequence[float], alone: Sequence[Confidence]
+) -> set[str]:
+    """Ids of the findings that explain next to nothing, and less than one that is not believed.
+
+    Of a cause that no candidate has, the nearest candidates take the most. What is found in the rest is
+    what these have left, and another explanation of the most would leave something else.
+
+    Args:
+        found: the findings.
+        explained: share of the error that each explains.
+        alone: the confidence of each, all others left out of account.
+    """
+    each = [*zip(found.effects, explained, alone, strict=True)]
+    most = max((share for _, share, c in each if not c.is_finding), default=0.0)
+    return {f.id for f, share, _ in each if share < min(NEGLIGIBLE, most) and not f.of_runs}
+
+
 def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
     """Ids of the changes of actuators whose forces act on one line, two or more.
 
@@ -104,6 +122,25 @@ def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> s
     pairs = combinations(lines, 2)
     on_line = [(a, b) for a, b in pairs if np.linalg.norm(np.cross(lines[a], lines[b])) <= NEGLIGIBLE]
     return {i for pair in on_line for i in pair}
+
+
+def of_several(found: Findings, start: Model) -> set[str]:
+    """Ids of the changes of one actuator, of which another one's coefficient has changed half as much.
+
+    Lags of two propellers are longer, and one is a finding: the other is only a coefficient.
+
+    Args:
+        found: the findings, and the model with them.
+        start: the initial model.
+    """
+    names = [a.name for a in start.ship.description.actuators]
+
+    def is_shared(name: str, change: float) -> bool:
+        own = next((n for n in names if name.endswith(f"_{n}")), "")
+        others = {f"{name.removesuffix(own)}{n}" for n in names if own and n != own} & found.moved.keys()
+        return any((found.model.value(n) - start.value(n)) / change >= 0.5 for n in others)
+
+    return {f.id for f in found.effects if any(x and is_shared(n, x) for n, x in f.values.items())}
 
 
 def _line(f: Finding, model: Model, runs: Sequence[WeakWindows]) -> np.ndarray:

@@ -11,7 +11,7 @@ from ..predictors.weak_form import SMALL
 from ..search.candidates import model_error, shape
 from ..search.findings import Finding, Findings
 from ..search.shortlist import TIE
-from ..search.significance import predicts_worse
+from ..search.significance import lower_throughout, predicts_worse
 from .validation_data import ValidationData
 
 # Group of coefficients -> the kind of force that they make up with others.
@@ -58,7 +58,8 @@ class PredictionGain:
         where: these data, in words.
         windows: their number.
         position, heading: errors of both models.
-        gained: whether the predictions are better by more than twice their paired standard error.
+        gained: whether the predictions are better, by more than twice their paired standard error or in
+            most windows by a test of ranks.
         over: the model with which it is compared: "initial" or "calibrated".
     """
 
@@ -85,7 +86,10 @@ def prediction_gain(
     if its.position.size < 2:
         return None
     position, heading = (PairedChange.of(*pair) for pair in zip(others[1:], its[1:], strict=True))
-    return PredictionGain(data.where, its.position.size, position, heading, predicts_worse(others, its))
+    # A window with most of the error makes the standard error of the mean as large as the mean.
+    in_most = all(lower_throughout(*pair) for pair in zip(its[1:], others[1:], strict=True))
+    gained = predicts_worse(others, its) or in_most
+    return PredictionGain(data.where, its.position.size, position, heading, gained)
 
 
 def gain_of_search(
