@@ -18,7 +18,17 @@ SECONDS = 60.0  # at the size of CyberShip Enterprise 1: a few blocks
 DRAG = {"delta_X_absu_u": -6.0}  # for a ship of unit scale
 OFF = 0.15  # rad, that the heading is off
 # What a test run may change in diagnosis.json: what is told of the runs themselves.
-OF_RUNS = {"data", "runs", "errors", "windows", "where", "where_after", "sensors", "inseparable"}
+OF_RUNS = {
+    "data",
+    "runs",
+    "errors",
+    "windows",
+    "where",
+    "where_after",
+    "sensors",
+    "inseparable",
+    "test_runs",
+}
 
 
 def measured(seed, vessel=None, thrusters=None, off=0.0):

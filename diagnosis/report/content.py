@@ -21,7 +21,13 @@ from ..runs.cleaning import Z95
 from ..session import CalibratedModel, Comparison, Diagnosis
 from ..verdict.prediction_gain import PredictionGain
 from .formatting import as_json, finite
-from .headline import first_sentences, gain_of_calibration, gain_of_search, reading_of_commands
+from .headline import (
+    contradicted_by_tests,
+    first_sentences,
+    gain_of_calibration,
+    gain_of_search,
+    reading_of_commands,
+)
 from .report_data import ReportData, seconds
 
 LIBRARIES = ("cybership", "numpy", "scipy")
@@ -128,6 +134,7 @@ def file_content(r: ReportData) -> Content:
         "verdict": d.verdict,
         "sentence": first_sentences(r),
         "commands": " ".join(reading_of_commands(d)),
+        "test_runs": " ".join(contradicted_by_tests(r)),
         "gain": gain_content(d.gain, gain_of_search(r)),
         "remainder": {
             "significant": d.remainder.significant,

@@ -162,10 +162,9 @@ def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
 
 
 def first_sentences(r: ReportData) -> str:
-    """The headline, after a search that gained nothing, before what test runs contradict."""
+    """The headline, after the sentence that the search gained nothing where that is so."""
     gain = gain_of_search(r)
-    nothing = [s for s in gain if s == SEARCH_GAINED_NOTHING]
-    return " ".join([*nothing, headline(r), *contradicted_by_tests(r)])
+    return " ".join([*(s for s in gain if s == SEARCH_GAINED_NOTHING), headline(r)])
 
 
 def verdict_title(r: ReportData) -> str:

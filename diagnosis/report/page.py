@@ -16,7 +16,15 @@ from ..predictors.evaluation import Evaluation
 from . import formatting
 from .content import coefficients, versions
 from .glossary import linked
-from .headline import boundedness, cause, finding_sentence, first_sentences, gain_of_search, page_title
+from .headline import (
+    boundedness,
+    cause,
+    contradicted_by_tests,
+    finding_sentence,
+    first_sentences,
+    gain_of_search,
+    page_title,
+)
 from .pictures import figures, tracks
 from .pictures.chart import data_uri, themed
 from .pictures.shape import curves
@@ -92,6 +100,7 @@ def write_report(
         title=page_title(data, date.today().isoformat()),
         sentence=first_sentences(data),
         gain=gain_of_search(data),
+        against=[*contradicted_by_tests(data)],
         pictures=drawn,
         of_runs=of_runs,
         changes=[error_changes(data, k) for k in range(len(data.evaluations))],
