@@ -915,6 +915,22 @@ def test_commands_in_percent_are_proposed_so(tmp_path: Path) -> None:
     assert "columns" not in propose(written(tmp_path / "b.csv", table)).needed
 
 
+@pytest.mark.parametrize(
+    ("port", "starboard"), [("PORT", "STBD"), ("P", "S"), ("Backbord", "Steuerbord")]
+)
+def test_the_side_of_a_rudder_may_have_a_column_of_its_own(
+    tmp_path: Path, port: str, starboard: str
+) -> None:
+    table = zigzag(**{"rudder.delta": "rudder_deg"})
+    angle = np.degrees(table["rudder_deg"])
+    table = table.assign(rudder_deg=angle.abs(), rudder_dir=np.where(angle < 0.0, port, starboard))
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    told = found.layout.column("rudder.delta")
+    assert (told.name, told.unit, told.sign, told.negative) == ("rudder_deg", "deg", "rudder_dir", port)
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.commands[:, 1], np.radians(angle), atol=1e-9)
+
+
 @pytest.mark.parametrize(("astern", "ahead"), [("R", "F"), (-1, 1), ("astern", "ahead")])
 def test_the_sign_of_a_command_may_have_a_column_of_its_own(
     tmp_path: Path, astern: object, ahead: object

@@ -42,6 +42,7 @@ from .columns import (
 from .geographic import SIDES, WORDS, geographic_pair, is_side, local_columns, one_origin, refuse_minutes
 from .likely_columns import (
     ASTERN,
+    SIGN,
     LikelyColumn,
     is_steering,
     likely_columns,
@@ -400,7 +401,11 @@ def _by_words(
         left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]
         if len(left) == len(told) == 1:
             found[left[0]] = told
-    return {s: each[0] for s, each in found.items() if len(each) == 1 and s not in columns}
+    # Beside a command its sign may have a column, as rudder_dir beside rudder_deg.
+    own = {
+        s: [c for c in each if SIGN.isdisjoint(words_of(c.name))] or each for s, each in found.items()
+    }
+    return {s: each[0] for s, each in own.items() if len(each) == 1 and s not in columns}
 
 
 def _of_message(
@@ -501,7 +506,7 @@ def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantit
 def _signed(
     path: Path, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
 ) -> dict[str, Column]:
-    """Commands whose sign is in a column of its own, as ahead and astern of a shaft."""
+    """Commands whose sign is in a column of its own, as astern of a shaft, or port of a rudder."""
     own = {s: c for s, c in layout.columns.items() if "." in s and not c.sign}
     named = {n: signal_of_sign(n, {s: quantity[s] for s in own}) for n in unused}
     found: dict[str, Column] = {}
@@ -510,11 +515,18 @@ def _signed(
             continue
         table = table_of_file(path, layout, {name, own[signal].name})
         cells = table[name].dropna().astype("string").str.strip().unique().tolist()
-        negative = [cell for cell in cells if cell.casefold() in ASTERN]
+        negative = [cell for cell in cells if _is_negative(cell, quantity[signal])]
         values = _numbers(table[own[signal].name], "")
         if len(cells) <= 3 and len(negative) == 1 and np.nanmin(values, initial=0.0) >= 0.0:
             found[signal] = own[signal].model_copy(update={"sign": name, "negative": negative[0]})
     return found
+
+
+def _is_negative(cell: str, quantity: str) -> bool:
+    """Whether the cell of a sign is that of negative values: astern, or of an angle to port."""
+    if quantity == "angle":
+        return words_of(cell) == ["port"] or cell.casefold() in ("p", "-", "-1", "-1.0")
+    return cell.casefold() in ASTERN
 
 
 def _names_of(columns: Mapping[str, Column]) -> set[str]:
