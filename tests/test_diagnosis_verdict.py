@@ -42,7 +42,7 @@ from diagnosis.verdict.judging import (
     verdict_name,
     with_confidence,
 )
-from diagnosis.verdict.law_in_parts import beside_unbelieved, mended, of_several, on_one_line
+from diagnosis.verdict.law_in_parts import beside_possibility, mended, of_several, on_one_line
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
@@ -872,10 +872,10 @@ def test_a_small_finding_is_no_surer_than_what_explains_most(explained, believed
     """Of a towed body `Y_uv` took the most with no confidence, and `loss_surge` the rest with 0.98."""
     made = [Finding(i, {}, {}, 0.99, [], 0.9, 0.9) for i in ("Y_uv", "loss_surge")]
     sure = [Confidence(*[0.99 if each else 0.01] * 2) for each in believed]
-    assert beside_unbelieved(Findings(made), explained, sure) == doubted
+    assert beside_possibility(Findings(made), explained, sure) == doubted
     of_a_run = replace(made[1], values={"loss_surge@a": 0.1})
     assert of_a_run.of_runs
-    assert not beside_unbelieved(Findings([made[0], of_a_run]), explained, sure)
+    assert not beside_possibility(Findings([made[0], of_a_run]), explained, sure)
 
 
 @pytest.mark.parametrize(("other", "doubted"), [(1.1, True), (0.5, False), (-1.1, False)])

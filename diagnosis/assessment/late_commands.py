@@ -137,22 +137,16 @@ class Timing:
         """Commands as they are, later by some times [s], or of actuators that follow faster."""
         yield self.score(self.as_logged)
         yield self.likeliest(columns, -times)[1]
-        lags = described_lags(self.model)
+        lags = self.model.lags
         for share in np.arange(1, PARTS + 1) / PARTS if lags else ():
             faster = self.model.plus({n: -share * lag for n, lag in lags.items()})
             yield self.score(self.force((), 0.0, faster))
 
 
-def described_lags(model: Model) -> dict[str, float]:
-    """Lags of the actuators [s], by name, of a ship that has any."""
-    lags = {n: model.value(n) for n in model.ship.coefficients if model.declared(n).unit == "s"}
-    return lags if any(lags.values()) else {}
-
-
 def slower(w: WeakWindows, model: Model) -> list[Model]:
     """A model with slower actuators, for each lag that is as likely as any by a run's motion."""
     # Smoothed beside commands that act as described, the motion would follow these.
-    s, lags = w.smoothed, described_lags(model) or {"lag": 0.0}
+    s, lags = w.smoothed, model.lags or {"lag": 0.0}
     eta, eta_dot, eta_ddot, nu = without_commands(s)
     alone = replace(s, eta=eta, eta_dot=eta_dot, eta_ddot=eta_ddot, nu=nu)
     timing = Timing(weak_windows(alone), model)

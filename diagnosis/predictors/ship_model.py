@@ -206,6 +206,12 @@ class Model:
         return self.measurement.get(CLOCK_OFFSET.id, 0.0)
 
     @property
+    def lags(self) -> dict[str, float]:
+        """Lags of the actuators [s], by name; empty: none has any."""
+        lags = {n: self.value(n) for n in self.ship.coefficients if self.declared(n).unit == "s"}
+        return lags if any(lags.values()) else {}
+
+    @property
     def logging(self) -> Logging:
         """How the commands are logged."""
         return Logging(self.clock, self.measurement.get(COMMAND_LAG.id, 0.0))

@@ -6,7 +6,7 @@ import numpy as np
 
 from cybership.message_text import counted
 from fmus.effects import Effect, EffectSet
-from fmus.effects.text import Found, number
+from fmus.effects.text import Found, signed
 
 from ..execution.short_text import SHOWN
 from ..predictors.ship_model import parameter_and_run
@@ -32,7 +32,7 @@ def equation(
     formula = effect.formula or effect.id
     shown = [name for name in values if values[name] or name in ci95]
     if len(shown) > 2 * SHOWN:
-        nodes = ", ".join(_signed(values[name], 2) for name in shown)
+        nodes = ", ".join(signed(values[name], 2) for name in shown)
         return f"{formula}; {shown[0]} ... {shown[-1]} = {nodes}{_behind(unit(effect, shown[0]))}"
     symbols = [s.strip() for s in effect.symbol.split(",")]
     names = symbols if len(symbols) == len(effect.coefficients) else effect.coefficients
@@ -48,12 +48,8 @@ def equation(
 def _coefficient(symbol: str, value: float, unit: str, interval: tuple[float, float] | None) -> str:
     """Such as ``δ = 0.3 m (0.29 to 0.31)``."""
     digits = 3 if interval is None else _digits(*interval)
-    text = f"{symbol} = {_signed(value, digits)}{_behind(unit)}"
-    return text if interval is None else f"{text} ({' to '.join(_signed(x, digits) for x in interval)})"
-
-
-def _signed(x: float, digits: int) -> str:
-    return f"{'-' if x < 0.0 else ''}{number(x, digits)}"
+    text = f"{symbol} = {signed(value, digits)}{_behind(unit)}"
+    return text if interval is None else f"{text} ({' to '.join(signed(x, digits) for x in interval)})"
 
 
 def _behind(unit: str) -> str:

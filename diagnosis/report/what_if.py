@@ -229,7 +229,7 @@ class MovableModel:
         """What the page needs to predict a run of the reader's own; None where commands are delayed,
         have power settings, or a wind acts."""
         run, w, model = self.runs[0].smoothed.track.run, self.runs[0].weak_windows, self.learned
-        if Response(run, model).slow or model.clock or self.windy or run.power is not None:
+        if Response(run, model).slow or any(model.logging) or self.windy or run.power is not None:
             return None
         return {
             "columns": [*run.commanded],

@@ -43,7 +43,7 @@ NO_GAIN = "without it, calibrated coefficients predict data left out of the fit 
 IMPLAUSIBLE = "other coefficients are beyond their priors in the model with it"
 MENDED = "it and a far smaller effect on the same axes make up a force of another shape as well"
 OF_SEVERAL = "the same of another actuator changes by half as much or more in the model with it"
-UNBELIEVED = "what explains more of the error, in the model with it, is not sure"
+LESS_THAN_POSSIBLE = "what explains more of the error, in the model with it, is not sure"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -63,7 +63,7 @@ class Doubts(NamedTuple):
         implausible: whether nominal coefficients are beyond their priors.
         mended: ids of the findings of which one is far smaller than the other on the same axes.
         of_several: ids of the changes of one actuator that another one shares.
-        beside_unbelieved: ids of the findings that explain little beside one that is not believed.
+        beside_possibility: ids of the findings that explain little beside a possibility with more.
     """
 
     residual: Collection[str] = ()
@@ -78,7 +78,7 @@ class Doubts(NamedTuple):
     implausible: bool = False
     mended: Collection[str] = ()
     of_several: Collection[str] = ()
-    beside_unbelieved: Collection[str] = ()
+    beside_possibility: Collection[str] = ()
 
 
 NO_DOUBTS = Doubts()
@@ -138,7 +138,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         IMPLAUSIBLE: doubts.implausible,
         MENDED: f.id in doubts.mended,
         OF_SEVERAL: f.id in doubts.of_several,
-        UNBELIEVED: f.id in doubts.beside_unbelieved,
+        LESS_THAN_POSSIBLE: f.id in doubts.beside_possibility,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
         OUSTED: f.id in doubts.unsettled,
@@ -173,6 +173,5 @@ def may_be_none(f: Finding) -> bool:
 
 def _may_be_lags(f: Finding, start: Model) -> bool:
     """Whether commands that are logged late or filtered would make up for lags that are too long."""
-    lags = [start.value(n) for n in start.ship.coefficients if start.declared(n).unit == "s"]
     late = f.values.get("command_lag", -f.values.get("clock_offset", 0.0))
-    return 0.0 < late <= max(lags, default=0.0)
+    return 0.0 < late <= max(start.lags.values(), default=0.0)

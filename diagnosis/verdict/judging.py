@@ -35,7 +35,7 @@ from .coefficients import (
     needless,
 )
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
-from .law_in_parts import beside_unbelieved, in_parts, mended, of_several, on_one_line
+from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
@@ -226,7 +226,7 @@ def _in_doubt(
     each = [confidence_of(f, start, doubts) for f in found.effects]
     doubts = doubts._replace(
         mended=mended(found, start, falls_by_axis(found, start, train), each),
-        beside_unbelieved=beside_unbelieved(found, explained, each),
+        beside_possibility=beside_possibility(found, explained, each),
     )
     return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
 

@@ -80,10 +80,10 @@ def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Con
     return ids
 
 
-def beside_unbelieved(
+def beside_possibility(
     found: Findings, explained: Sequence[float], alone: Sequence[Confidence]
 ) -> set[str]:
-    """Ids of the findings that explain next to nothing, and less than one that is not believed.
+    """Ids of the findings that explain next to nothing, and less than a mere possibility.
 
     Of a cause that no candidate has, the nearest candidates take the most. What is found in the rest is
     what these have left, and another explanation of the most would leave something else.

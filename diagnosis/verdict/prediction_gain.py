@@ -87,8 +87,8 @@ def prediction_gain(
         return None
     position, heading = (PairedChange.of(*pair) for pair in zip(others[1:], its[1:], strict=True))
     # A window with most of the error makes the standard error of the mean as large as the mean.
-    in_most = all(lower_throughout(*pair) for pair in zip(its[1:], others[1:], strict=True))
-    gained = predicts_worse(others, its) or in_most
+    pairs = zip(its[1:], others[1:], strict=True)
+    gained = predicts_worse(others, its) or all(lower_throughout(*pair) for pair in pairs)
     return PredictionGain(data.where, its.position.size, position, heading, gained)
 
 

@@ -97,33 +97,6 @@ CLOCK_OFFSET = Effect(
     wording=Wording(clock_sentence, CLOCK),
 )
 
-# An FMU of the thrusters has the commands themselves.
-COMMAND_LAG = Effect(
-    id="command_lag",
-    kind="measurement",
-    axis="XYN",
-    description="the logged commands are low-pass filtered (first order)",
-    formula="T dc_m/dt = c - c_m",
-    symbol="T_c",
-    sign="0: none",
-    source="first-order lag of a display or a logger",
-    linear=False,
-    parameters=(
-        Variable(
-            "command_lag", "s", "time constant of the low-pass filter of the commands", 0.0, LAGS, False
-        ),
-    ),
-    function=None,
-    search=Search(tries=[{"command_lag": T} for T in TRACKERS]),
-    wording=Wording(
-        lambda f: (
-            "The commands are logged through a low-pass filter with a time constant of "
-            f"{number(f['command_lag'])} s."
-        ),
-        FILTER,
-    ),
-)
-
 
 def measured_behind(
     name: str,
@@ -204,6 +177,17 @@ def latency(channel: str, symbol: str, coordinates: str) -> Effect:
     )
 
 
+# An FMU of the thrusters has the commands themselves.
+COMMAND_LAG = measured_behind(
+    "command_lag",
+    "time constant of the low-pass filter of the commands",
+    "The commands are logged through a low-pass filter with a time constant of {}.",
+    Search(tries=[{"command_lag": T} for T in TRACKERS]),
+    description="the logged commands are low-pass filtered (first order)",
+    formula="T dc_m/dt = c - c_m",
+    symbol="T_c",
+    source="first-order lag of a display or a logger",
+)
 # No FMU has the receiver's filter, as none has its clock.
 POSITION_LAG = low_pass("position", "T_p", "x, y")
 HEADING_LAG = low_pass("heading", "T_ψ", "psi")

@@ -36,6 +36,11 @@ def number(x: float, digits: int = 3) -> str:
     return f"{abs(x):.0f}" if "e" in text and 1.0 <= abs(x) < WRITTEN_OUT else text
 
 
+def signed(x: float, digits: int = 3, plus: str = "") -> str:
+    """A number as of :func:`number` with its sign; ``plus`` stands before one that is not negative."""
+    return f"{'-' if x < 0.0 else plus}{number(x, digits)}"
+
+
 def percent(x: float) -> str:
     """The size of a share."""
     return f"{100.0 * abs(x):.3g} %"

@@ -61,8 +61,13 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray) -> list[Recurrence
     apart = 2 * BLOCK * data[0].scale.time
     least = round(apart / data[0].every) + 1  # windows, of a shift after which none is its own neighbour
     count = SETTINGS.neighbours + 2 * least  # a pass of so long to both sides has fewer windows
-    spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
-    spaces["heading"] = np.column_stack([np.real(turn), np.imag(turn)])
+    heading = np.column_stack([np.real(turn), np.imag(turn)])
+    spaces = {
+        "place": place,
+        "motion": _scaled(motion),
+        "command": _scaled(command),
+        "heading": heading,
+    }
     neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
     neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
     at_a_place = np.hstack([_scaled(place), spaces["motion"]])

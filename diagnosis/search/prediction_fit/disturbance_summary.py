@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.effects.text import number
+from fmus.effects.text import number, signed
 
 from ...predictors import Model, WeakWindows, omega
 from ...predictors.uncertainty import NOISE_TOLERANCE, omega_std
@@ -72,10 +72,7 @@ class Unrecorded:
         """The pushes at a time; empty where there are none."""
         named = {axis: f"{unit} in {name}" for axis, unit, name in zip(AXES, UNITS, NAMES, strict=True)}
         times = ((s, f"{s.run} {s.start:.1f} to {s.end:.1f} s") for s in self.stretches)
-        each = [
-            f"{time}, {'-' if s.size < 0.0 else '+'}{number(s.size, 2)} {named[s.axis]}"
-            for s, time in times
-        ]
+        each = [f"{time}, {signed(s.size, 2, '+')} {named[s.axis]}" for s, time in times]
         return f"Disturbances at single times: {'; '.join(each)}." if each else ""
 
 
