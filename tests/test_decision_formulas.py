@@ -336,6 +336,7 @@ def losses(omega=1.0, position=1.0, heading=1.0, seed=0, size=40):
         (losses(heading=1.2), "predictions of {where} are worse"),
         (losses(position=1.2, heading=0.9), "predictions of {where} are worse"),
         (losses(position=1.1, heading=0.8), ""),
+        (losses(position=1.0 - 0.9 * (np.arange(40) == 0), heading=1.001), ""),
         (losses(position=0.8, heading=1.1), ""),
         (losses(position=0.5, heading=0.5), ""),
         (losses(position=np.inf), "predictions of {where} are worse"),

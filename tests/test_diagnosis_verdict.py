@@ -350,6 +350,28 @@ def test_coefficients_moved_beyond_belief_do_not_take_the_place_of_an_effect(mov
     assert len(gone) == (not stays)
 
 
+def test_an_effect_is_not_withdrawn_for_what_the_coefficients_beside_it_spoil():
+    """The fit to the training runs has spoilt N_r, with the idle effect as well as without it."""
+    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0}), Model()
+    spoilt = Model(vessel={"N_r": start.value("N_r") - 0.1})
+    right, idle = finding(start, delta_X_u=-3.0), finding(start, delta_N_uv=1e-9)
+
+    def fitted(ids):
+        effects = [f for f in (right, idle) if f.id in ids]
+        model = spoilt
+        for f in effects:
+            model = model.plus(f.values)
+        effects = [replace(f, model=model) for f in effects]
+        moved = {"N_r": 15.0} if len(ids) < 2 else {}
+        return Findings(effects, model=model, moved=moved, sigma=np.full(3, 0.01), refit=fitted)
+
+    found = fitted(["X_u", "N_uv"])
+    unseen = ValidationData(runs[:1], runs[1:], start, found.sigma)
+    full, alone = unseen.losses(found, right.model)
+    assert harm(full, alone), "with the initial coefficients the idle effect seems harmful"
+    assert prune(found, unseen, lambda a, b: False, harm) == (found, [])
+
+
 def doubted(found, *ids):
     """The findings with effects that are possibilities."""
     effects = [replace(f, confidence=0.1, together=0.1) if f.id in ids else f for f in found.effects]

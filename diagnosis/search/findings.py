@@ -124,7 +124,7 @@ class Findings(ShortRepr):
         estimate: the most likely parameters, from which a fit to predictions begins; None where a method
             has no such.
         searched: the prior of the coefficients in which its offsets are.
-        run_models: as ``fold_models``, but each of two runs is a fold, and by the last fit.
+        run_models: as ``fold_models``, but each of two runs is a fold.
     """
 
     effects: Sequence[Finding] = field(default_factory=list)

@@ -139,17 +139,14 @@ def harm(its: Losses, others: Losses, more: int = 0) -> str:
 
 
 def predicts_worse(its: Losses, others: Losses) -> bool:
-    """Whether a model predicts worse than another by more than two paired standard errors.
+    """Whether a model predicts worse than another: in position or heading, and in both together.
 
-    Where it predicts positions better and headings worse by as much, or the reverse, the logarithms of
-    the ratios of both mean squares count together: of two models at most one predicts worse.
+    In one of them by more than two paired standard errors; in both by the logarithms of the ratios of
+    the mean squares. An error that is larger by a thousandth in each window is beyond chance as well,
+    and is no loss beside a smaller one of the other kind. Of two models at most one predicts worse.
     """
-    pairs = [(its.position, others.position), (its.heading, others.heading)]
-    if not its.position.size or not any(worse(a, b) for a, b in pairs):
-        return False
-    if any(worse(b, a) for a, b in pairs):
-        return gain_of_predictions(its, others) > 0.0
-    return True
+    pairs = zip(its[1:], others[1:], strict=True)
+    return any(worse(a, b) for a, b in pairs) and gain_of_predictions(its, others) > 0.0
 
 
 def fits_predict_worse(its: Sequence[Losses], others: Sequence[Losses]) -> bool:

@@ -76,7 +76,7 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
 def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
-    It also takes the place of effects that do not predict better than it. No effect follows from it.
+    It also takes the place of effects that fit and predict no better than it. No effect follows from it.
     Each training run is predicted without it; a current is in it where that shows beyond chance, and is
     beyond its own uncertainty. Validation runs can reject it.
     """
@@ -95,7 +95,7 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         best = flowing
     else:
         now = still
-    no_better = predicts_worse(now, other) if found.effects else gain(other, now) <= 0.0
+    no_better = harm(now, other) if found.effects else gain(other, now) <= 0.0
     if harm(now, first) or no_better:
         return None
     its, others = data.losses(best.findings.model, start)
@@ -112,8 +112,8 @@ def better_calibration(
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
-    It also takes the place of effects that predict no better, if none of them is a finding, or each has
-    intervals that hold zero.
+    It also takes the place of effects that fit and predict no better, if none of them is a finding, or
+    predict no better, if each has intervals that hold zero.
 
     Args:
         calibration: the fit; None: there is none.
@@ -132,7 +132,7 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    idle = not (believed or predicts_worse(its, now))
+    idle = not (believed or harm(its, now))
     better = needless(found, without_gain) or idle or predicts_worse(now, its)
     return calibration if better and not predicts_worse(its, first) else None
 

@@ -134,10 +134,11 @@ def _worst(
     those of ``drive`` the hull drives the ship on.
     """
     others = [_alternative(rest, kept, data.start) for rest in rests.values()]
-    full, *losses = data.losses(kept, *others)
+    full, *losses = data.losses(kept, *others, *rests.values())
     found: list[tuple[float, Withdrawn]] = []
-    for i, other in zip(rests, losses, strict=True):
-        if harmed := harm(full, other, sizes[i]):
+    for i, other, refitted in zip(rests, losses, losses[len(rests) :], strict=False):
+        harmed = harm(full, other, sizes[i])
+        if harmed and harm(full, refitted, sizes[i]):
             reason = ALONE.format(harm=harmed.format(where=data.where))
         elif i in drive and not lower_throughout(full.omega, other.omega):
             reason = DRIVES.format(where=data.where)

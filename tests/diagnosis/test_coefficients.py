@@ -98,7 +98,7 @@ CASE = {
         ({"still": 10.0}, None),  # no better than the first
         ({"still": 11.5}, None),
         ({"effects": [effect()], "found": 4.5}, "still"),  # effects predict no better, beyond chance
-        ({"effects": [effect()], "found": 3.5}, None),
+        ({"effects": [effect()], "found": 3.5}, None),  # they fit or predict better
         ({"effects": [effect()], "first": 3.5}, None),  # worse than the first
         ({"flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
         ({"flowing": 3.0}, "still"),  # a current that may be none

@@ -194,7 +194,7 @@ def test_the_scatter_is_that_of_the_push_of_each_run(monkeypatch):
 
 
 class Linear:
-    """Data y = A theta + noise in folds, whose likelihood counts by its power."""
+    """Data y = A theta + noise of two runs in two folds each, whose likelihood counts by its power."""
 
     def __init__(self, seed, spread=1.0):
         rng = np.random.default_rng(seed)
@@ -202,6 +202,7 @@ class Linear:
         self.part = np.arange(40) % 4
         self.precision, self.unit, self.names = spd(rng, Q), np.array([1.0, 10.0, 0.1]), ["a", "b", "c"]
         self.spread, self.prior = spread, None
+        self.runs, self.folds = ["one", "other"], [(k // 2, np.zeros(1)) for k in range(4)]
 
     def theta(self, at):
         return at
@@ -247,10 +248,11 @@ def test_a_linear_problem_is_solved_with_its_covariance_and_without_each_fold(se
     scores = k**2 * spread * p.A.T @ p.A
     assert found.covariance == pytest.approx(S @ (scores + P) @ S * np.outer(p.unit, p.unit), rel=1e-4)
     assert (found.names, found.push) == (p.names, "push")
-    for fold, model in enumerate(found.fold_models):
-        A, y = p.A[p.part != fold], p.y[p.part != fold]
+    left_out = [[0], [1], [2], [3], [0, 1], [2, 3]]
+    for parts, model in zip(left_out, [*found.fold_models, *found.run_models], strict=True):
+        A, y = (x[~np.isin(p.part, parts)] for x in (p.A, p.y))
         expected = np.linalg.solve(k * A.T @ A + P, k * A.T @ y)
-        assert model == pytest.approx(expected, abs=1e-5), "without the fold, exactly"
+        assert model == pytest.approx(expected, abs=1e-5), "without the folds, exactly"
 
 
 # Its parameters and folds
@@ -316,17 +318,9 @@ def test_a_window_is_of_the_fold_in_which_it_begins(monkeypatch):
     """One that begins before the first block is of the first fold of its run."""
     p, _, _, windows, place = made(monkeypatch)
     p.windows, p._place = windows, place
-    assert [(run, blocks.tolist()) for run, blocks in p.folds] == [(0, [*range(6)]), (1, [*range(6)])]
+    halves = [[0, 1, 2], [3, 4, 5]]
+    assert [(run, blocks.tolist()) for run, blocks in p.folds] == [(k, h) for k in (0, 1) for h in halves]
     (found,) = p.fold_of_window
-    assert found.tolist() == [1, 1, 0, 0, 0, 0]
-    monkeypatch.setattr(
-        fits,
-        "run_folds",
-        lambda runs, least: [(r, b) for r in (0, 1) for b in (np.arange(3), np.arange(3, 6))],
-    )
-    q, *_ = made(monkeypatch)
-    q.windows, q._place = windows, place
-    (found,) = q.fold_of_window
     assert found.tolist() == [2, 3, 0, 0, 1, 1], "the fourth block begins after six seconds"
 
 

@@ -19,7 +19,6 @@ from scipy.optimize import brentq
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Shooting
 from ..findings import Findings
-from ..gram import run_folds
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
 from .disturbance import ForceDisturbance
@@ -44,11 +43,6 @@ LEAST = 1e-4  # 1, factor of the variance of the disturbance, or one over it; ch
 
 class Calibration(PredictionFit):
     """The fit: the disturbance is scaled to what the windows miss, at each time since their start."""
-
-    @cached_property
-    def folds(self) -> list[tuple[int, np.ndarray]]:
-        """The folds of the runs, see :func:`.gram.run_folds`."""
-        return run_folds(self.runs)
 
     def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """(w, T, 3): the mean square of each run, as it grows with the time since a window's start."""

@@ -52,6 +52,7 @@ class Fitted:
         covariance: (q, q), of them, SI.
         push: the unrecorded force.
         fold_models: the model fitted without each fold of the runs, by one step about the fit to all.
+        run_models: the same, but each of two runs is a fold.
     """
 
     estimate: RefinedModel
@@ -59,6 +60,7 @@ class Fitted:
     covariance: np.ndarray
     push: ForceDisturbance
     fold_models: Sequence[Model]
+    run_models: Sequence[Model]
 
 
 def shootings(
@@ -153,7 +155,7 @@ class PredictionFit:
     @cached_property
     def folds(self) -> list[tuple[int, np.ndarray]]:
         """The folds of the runs, see :func:`.gram.run_folds`."""
-        return run_folds(self.runs, WHOLE_RUNS - 1)
+        return run_folds(self.runs)
 
     @cached_property
     def fold_of_window(self) -> list[np.ndarray]:
@@ -169,15 +171,27 @@ class PredictionFit:
             found.append(place)
         return found
 
-    def without_each_fold(self, at: RefinedModel, known: Information, power: float) -> list[Model]:
-        """The model fitted without each fold, by one step about the fit to all."""
+    def without_each_fold(
+        self, at: RefinedModel, known: Information, power: float
+    ) -> tuple[list[Model], list[Model]]:
+        """The model fitted without each fold, by one step about the fit to all.
+
+        Returns:
+            By folds as they usually are, and by whole runs where there are two.
+        """
         right = power * known.g - self.precision @ self.theta(at)
         H = power * known.H + self.precision
         H += ridge(H)
-        return [
-            self.moved(at, np.linalg.solve(H - power * h, right - power * v)).model(self.prior)
-            for h, v in zip(known.fold_H, known.fold_g, strict=True)
-        ]
+        run = np.array([number for number, _ in self.folds])
+
+        def without(held: np.ndarray) -> Model:
+            h, v = (x[held].sum(axis=0) for x in (known.fold_H, known.fold_g))
+            return self.moved(at, np.linalg.solve(H - power * h, right - power * v)).model(self.prior)
+
+        usual = [without(np.arange(run.size) == k) for k in range(run.size)]
+        if len(self.runs) != WHOLE_RUNS - 1:
+            return usual, usual
+        return usual, [without(run == k) for k in range(len(self.runs))]
 
     def theta(self, at: RefinedModel) -> np.ndarray:
         """(q,), fitted parameters about their prior means, in units of the ship's size; coefficients in
@@ -333,5 +347,5 @@ def fit_to(problem: PredictionFit, at: RefinedModel) -> Fitted:
     at, here = most_likely(at, about, problem.moved)
     S = np.linalg.inv(here.H)
     covariance = S @ (here.power**2 * here.known.G + P) @ S * np.outer(problem.unit, problem.unit)
-    folds = problem.without_each_fold(at, here.known, here.power)
-    return Fitted(at, problem.names, covariance, here.known.push, folds)
+    folds, runs = problem.without_each_fold(at, here.known, here.power)
+    return Fitted(at, problem.names, covariance, here.known.push, folds, runs)

@@ -102,7 +102,8 @@ def to_predictions(
         suspects=suspected(prior, at.offset, share),
         moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
         estimate=at,
-        run_models=fitted.fold_models,
+        fold_models=fitted.fold_models,
+        run_models=fitted.run_models,
     )
     return RefitOutcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
 
