@@ -319,7 +319,9 @@ def test_a_window_is_of_the_fold_in_which_it_begins(monkeypatch):
     p, _, _, windows, place = made(monkeypatch)
     p.windows, p._place = windows, place
     halves = [[0, 1, 2], [3, 4, 5]]
-    assert [(run, blocks.tolist()) for run, blocks in p.folds] == [(k, h) for k in (0, 1) for h in halves]
+    assert [(run, blocks.tolist()) for run, blocks in p.folds] == [
+        (k, h) for k in (0, 1) for h in halves
+    ]
     (found,) = p.fold_of_window
     assert found.tolist() == [2, 3, 0, 0, 1, 1], "the fourth block begins after six seconds"
 
