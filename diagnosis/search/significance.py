@@ -149,6 +149,14 @@ def predicts_worse(its: Losses, others: Losses) -> bool:
     return any(worse(a, b) for a, b in pairs) and gain_of_predictions(its, others) > 0.0
 
 
+def as_good(its: Losses, others: Losses) -> bool:
+    """Whether a model may take the place of another with more terms.
+
+    Its predictions are as good, position and heading together, and in no loss is it worse beyond chance.
+    """
+    return gain_of_predictions(its, others) <= 0.0 and not harm(its, others)
+
+
 def fits_predict_worse(its: Sequence[Losses], others: Sequence[Losses]) -> bool:
     """Whether a way to fit predicts worse than another one, by the losses of folds.
 

@@ -15,7 +15,7 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import gain, harm, predicts_worse
+from ..search.significance import as_good, gain, harm, predicts_worse
 from .confidence import FOUND, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
@@ -76,7 +76,7 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
 def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
-    It also takes the place of effects that fit and predict no better than it. No effect follows from it.
+    It also takes the place of effects than which it is as good. No effect follows from it.
     Each training run is predicted without it; a current is in it where that shows beyond chance, and is
     beyond its own uncertainty. Validation runs can reject it.
     """
@@ -95,8 +95,8 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         best = flowing
     else:
         now = still
-    no_better = harm(now, other) if found.effects else gain(other, now) <= 0.0
-    if harm(now, first) or no_better:
+    better = as_good(now, other) if found.effects else gain(other, now) > 0.0
+    if harm(now, first) or not better:
         return None
     its, others = data.losses(best.findings.model, start)
     return None if data.validate and harm(its, others) else best
@@ -112,7 +112,7 @@ def better_calibration(
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
-    It also takes the place of effects that fit and predict no better, if none of them is a finding, or
+    It also takes the place of effects than which it is as good, if none of them is a finding, or that
     predict no better, if each has intervals that hold zero.
 
     Args:
@@ -132,7 +132,7 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    idle = not (believed or harm(its, now))
+    idle = not believed and as_good(its, now)
     better = needless(found, without_gain) or idle or predicts_worse(now, its)
     return calibration if better and not predicts_worse(its, first) else None
 

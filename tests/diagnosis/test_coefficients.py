@@ -44,6 +44,7 @@ def by_numbers(monkeypatch):
     monkeypatch.setattr(coefficients, "harm", worse)
     monkeypatch.setattr(coefficients, "predicts_worse", lambda its, other: bool(worse(its, other)))
     monkeypatch.setattr(coefficients, "gain", lambda its, other: its - other)
+    monkeypatch.setattr(coefficients, "as_good", lambda its, other: its <= other)
 
 
 def outcome(name, V=(0.0, 0.0), std=1.0):
@@ -97,14 +98,14 @@ CASE = {
         ({"still": 9.5}, "still"),
         ({"still": 10.0}, None),  # no better than the first
         ({"still": 11.5}, None),
-        ({"effects": [effect()], "found": 4.5}, "still"),  # effects predict no better, beyond chance
-        ({"effects": [effect()], "found": 3.5}, None),  # they fit or predict better
+        ({"effects": [effect()], "found": 5.0}, "still"),  # it is as good as the effects
+        ({"effects": [effect()], "found": 4.9}, None),
         ({"effects": [effect()], "first": 3.5}, None),  # worse than the first
         ({"flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
         ({"flowing": 3.0}, "still"),  # a current that may be none
         ({"flowing": 4.5, "V": (9.0, 9.0)}, "still"),
         ({"still": 11.5, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
-        ({"effects": [effect()], "found": 4.0, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"effects": [effect()], "found": 3.0, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
         ({"validate": [1], "its": 10.5}, "still"),
         ({"validate": [1], "its": 11.5}, None),
         ({"its": 11.5}, "still"),

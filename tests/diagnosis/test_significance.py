@@ -1,10 +1,11 @@
 """Comparisons of losses: what counts as one sample."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.search.significance import Losses, fits_predict_worse, predicts_worse
+from diagnosis.search.significance import Losses, as_good, fits_predict_worse, predicts_worse
 
 
 def folds(ratios, windows=40, seed=0):
@@ -20,6 +21,22 @@ def folds(ratios, windows=40, seed=0):
 
 def joined(parts):
     return Losses(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("factors", "good"),
+    [
+        ((1.0, 1.0, 1.0), True),
+        ((1.0, 0.9, 1.0), True),
+        ((1.0, 0.99, 1.02), False),  # both predictions together, by the least
+        ((1.0, 0.9, 1.02), True),
+        ((1.2, 0.9, 0.9), False),  # the fit is worse, beyond chance
+    ],
+)
+def test_a_model_as_good_predicts_as_well_and_does_no_harm(factors, good):
+    (one, *_), _ = folds([1.0])
+    one = one._replace(omega=1.0 + 0.1 * np.random.default_rng(2).random(40))
+    assert as_good(Losses(*(f * x for f, x in zip(factors, one, strict=True))), one) == good
 
 
 def test_windows_that_one_fit_predicts_are_one_sample():
