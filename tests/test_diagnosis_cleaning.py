@@ -323,6 +323,26 @@ def test_a_clock_that_jumps_back_by_another_time_is_no_period():
         ordered(replace(run, time=back))
 
 
+@pytest.mark.parametrize(
+    ("rows", "gap", "even"), [(1.0, 0.0, True), (9.0, 0.0, False), (1.0, 3.0, False)]
+)
+def test_stamps_that_jitter_by_more_than_a_row_are_taken_as_even(rows, gap, even):
+    """Not where a row may be anywhere, or rows are missing."""
+    run = base()
+    true = run.time + gap * (run.time > 12.0)
+    run = replace(run, time=true + 0.02 * rows * np.random.default_rng(0).standard_normal(N))
+    if not even:
+        with pytest.raises(
+            InputError, match=r"time does not increase in \d+ of 1200 rows, and they are not"
+        ):
+            ordered(run)
+        return
+    found = ordered(run)
+    assert found.time - true == pytest.approx(0.0, abs=0.004)
+    assert "its stamps jitter by 0.02 s" in found.notes[-1]
+    np.testing.assert_array_equal(found.pose, run.pose)
+
+
 def test_minutes_that_begin_anew_each_hour_go_on_all_day():
     rare = base().rows(np.arange(0, N, 60))
     hours = replace(rare, time=(rare.time / 0.02 * 10.0 + 3000.0) % 3600.0)

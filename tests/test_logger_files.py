@@ -85,16 +85,44 @@ def test_the_runs_of_a_folder_have_one_origin_if_they_are_not_far_apart(
         assert np.median(north[1]) - np.median(north[0]) == pytest.approx(arc, rel=0.01)
 
 
-@pytest.mark.parametrize("letters", ["", "NE"])
-def test_degrees_and_minutes_of_nmea_are_refused_by_their_name(tmp_path: Path, letters: str) -> None:
+def in_minutes(degrees: np.ndarray) -> np.ndarray:
+    """Degrees as degrees and minutes, ddmm.mmmm."""
+    whole = np.floor(np.abs(degrees))
+    return 100.0 * whole + 60.0 * (np.abs(degrees) - whole)
+
+
+def test_positions_with_letters_are_refused_by_their_name(tmp_path: Path) -> None:
     content = table().drop(columns=["x", "y"])
-    for k, (name, degrees) in enumerate(zip(("lat", "lon"), placed(63.44, 10.4), strict=True)):
-        whole = np.floor(degrees)
-        minutes = 100.0 * whole + 60.0 * (degrees - whole)
-        content[name] = [f"{value:.5f}{letters[k : k + 1]}" for value in minutes]
-    said = "a cell of lat and lon is not a number: '6326" if letters else "degrees and minutes"
-    with pytest.raises(InputError, match=f"{said}.*decimal degrees"):
+    for name, letter, degrees in zip(("lat", "lon"), "NE", placed(63.44, 10.4), strict=True):
+        content[name] = [f"{value:.5f}{letter}" for value in in_minutes(degrees)]
+    said = "a cell of lat and lon is not a number: '6326.*decimal degrees"
+    with pytest.raises(InputError, match=said):
         propose(written(tmp_path / "a.csv", content))
+
+
+@pytest.mark.parametrize(("latitude", "side"), [(63.44, "N"), (-33.9, "S")])
+def test_degrees_and_minutes_of_nmea_are_read(tmp_path: Path, latitude: float, side: str) -> None:
+    """With the hemisphere in the next column, a position and the ship's course are as in degrees."""
+    lat, lon = placed(latitude, 10.4)
+    course = np.arctan2(np.gradient(EAST), np.gradient(NORTH))
+    columns = {"GGA lat": in_minutes(lat), "NS": side, "GGA lon": in_minutes(lon), "EW": "E"}
+    content = table(**columns).drop(columns=["x", "y", "psi"]).round(7)
+    content["HDT heading"] = np.degrees(course) % 360.0
+    found = propose(written(tmp_path / "a.csv", content))
+    assert found.run is not None
+    moved = found.run.pose[:, :2] - np.column_stack([NORTH, EAST])
+    assert np.ptp(moved, axis=0).max() < 3e-3
+    content = content.rename(columns={"HDT heading": "seventh"})
+    (likely,) = propose(written(tmp_path / "b.csv", content)).likely["psi"]
+    assert likely.reasons == ["correlates +1.00 with the course"], "on the right side of the equator"
+
+
+def test_the_quality_of_a_latitude_is_none(tmp_path: Path) -> None:
+    lat, lon = placed(63.44, 10.4)
+    columns = {"GPS.Lat": lat, "GPS.Lat.Quality": 1.0, "GPS.Lon": lon}
+    found = propose(written(tmp_path / "a.csv", table(**columns).drop(columns=["x", "y"])))
+    assert found.layout.column("x").name == "GPS.Lat"
+    assert found.unused == ["GPS.Lat.Quality"]
 
 
 @pytest.mark.parametrize("other", [{"lat": 6371.4 + TIME}, {"lat": 63.0 + TIME, "latitude": TIME}])

@@ -35,14 +35,39 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
         return run
     run = _without_empty(run)
     many = run.time.size
-    found = _spread(_merged(_begun_anew(continued(_sorted(run), scale))))
+    found = _spread(_merged(_begun_anew(continued(by_stamps(run), scale))))
     kept = in_order(found.time)
     lost = found.time.size - kept.size  # a sample that is there again is none
     if lost > MOST_WRONG * many:
-        raise InputError(f"run '{run.name}': time does not increase in {lost} of {many} rows")
+        even = _even(run)
+        if even is None:
+            raise InputError(
+                f"run '{run.name}': time does not increase in {lost} of {many} rows, and they are not "
+                "evenly spaced; state a column whose time does"
+            )
+        return even
     out = found.left_out + lost
     note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
+
+
+def _even(run: Run) -> Run | None:
+    """The run with evenly spaced rows, about which its stamps jitter; None where they do not.
+
+    All stamps are within some rows of the straight line through them.
+    """
+    row = np.arange(run.time.size)
+    if run.time.size < 2 or not np.isfinite(run.time).all():
+        return None
+    period, first = np.polyfit(row, run.time, 1).tolist()
+    off = run.time - (first + period * row)
+    if not np.abs(off).max() < LONG * period:
+        return None
+    note = (
+        f"its stamps jitter by {off.std():.2g} s (one standard deviation), more than its rows are "
+        f"apart: these are taken as evenly spaced, {period:.4g} s apart"
+    )
+    return replace(run, time=first + period * row, notes=(*run.notes, note))
 
 
 def whole_periods(step: np.ndarray, period: float) -> np.ndarray | None:
@@ -68,7 +93,7 @@ def _without_empty(run: Run) -> Run:
     return replace(run.rows(there), left_out=run.left_out + int((~there).sum()))
 
 
-def _sorted(run: Run) -> Run:
+def by_stamps(run: Run) -> Run:
     """The rows by their stamps, if the ship's way is likelier then than in the order of the file.
 
     Steps of the position are compared as ones of a Laplace distribution, which a few spikes do not rule.

@@ -1,5 +1,7 @@
 """Logs in the styles of widespread tools: PX4, MAVLink, ROS, libcosim, LabVIEW, MOOS, and tables of pandas and numpy."""
 
+import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -150,6 +152,81 @@ def test_commands_by_their_symbols_and_usual_names(tmp_path: Path, rudder: str, 
     run = seen(tmp_path / "a.csv", text, TANKER)
     np.testing.assert_allclose(run.commanded["rudder.delta"], TANKER_LOG[-2], atol=1e-5)
     np.testing.assert_allclose(run.commanded["propeller.n"], TANKER_LOG[-1], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "tempo (s);nord (m);est (m);prua (gradi);giri elica (giri/min);angolo timone (gradi)",
+        "tijd [s];noord [m];oost [m];heading [graden];toerental [omw/min];roerhoek [graden]",
+        "tid (s);nord (m);ost (m);heading (grader);varvtal (varv/min);rodervinkel (grader)",
+        "Heure (s);Nord (m);Est (m);Cap (deg);Régime hélice (tr/min);Angle de barre (deg)",
+        "Zeit [s];X0 [m];Y0 [m];PSI [deg];RPS [1/s];DELTA [deg]",
+        "Elapsed time [s];Distance north [m];Distance east [m];Heading [deg];Shaft [rpm];Rudder [deg]",
+        "t_s;gps_north_m;gps_east_m;gyro_heading_deg;shaft_rpm;rudder_deg",
+    ],
+)
+def test_names_of_loggers_in_seven_languages(tmp_path: Path, names: str) -> None:
+    """The east that is called est has to be stated: that is an estimate as well."""
+    rows = np.array(TANKER_LOG)[[0, 1, 2, 3, 5, 4]]
+    rows[[3, 5]] = np.degrees(rows[[3, 5]])
+    rows[4] *= 1.0 if "1/s" in names else 60.0
+    lines = [";".join(row) for row in rows.T.round(5).astype(str)]
+    log = tmp_path / "a.csv"
+    log.write_text("\n".join([names, *lines]) + "\n", encoding="utf-8")
+    east = re.search(r"\b[Ee]st \(m\)", names)
+    if east:
+        (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"y": east[0]}}))
+    run = propose(log, TANKER).run
+    assert run is not None
+    is_the_motion(run)
+    np.testing.assert_allclose(run.commanded["rudder.delta"], TANKER_LOG[4], atol=1e-5)
+    np.testing.assert_allclose(run.commanded["propeller.n"], TANKER_LOG[5], atol=1e-5)
+
+
+def test_the_side_of_a_rudder_may_be_a_letter(tmp_path: Path) -> None:
+    delta = TANKER_LOG[4]
+    table = pd.DataFrame(
+        dict(zip(TANKER_NAMES, TANKER_LOG, strict=True)) | {"rudder.delta": np.abs(delta)}
+    )
+    table["rudder_side"] = np.where(delta < 0.0, "L", "R")
+    run = seen(tmp_path / "a.csv", table, TANKER)
+    np.testing.assert_allclose(run.commanded["rudder.delta"], delta)
+
+
+def test_two_gyros_are_a_heading_and_a_second_one(tmp_path: Path) -> None:
+    both = {"Gyro2 Heading [deg]": np.degrees(PSI) + 1.0, "Gyro1 Heading [deg]": np.degrees(PSI)}
+    run = seen(tmp_path / "a.csv", log(**both).drop(columns="psi"))
+    is_the_motion(run)
+    np.testing.assert_allclose(run.measured["psi_2"], PSI + np.radians(1.0), atol=1e-6)
+    table = log(**both, **{"Gyro3 Heading [deg]": np.degrees(PSI)}).drop(columns="psi")
+    table.to_csv(tmp_path / "b.csv", index=False)
+    assert propose(tmp_path / "b.csv", OTTER).run is None, "which of three is not known"
+
+
+def test_a_reference_is_no_measurement(tmp_path: Path) -> None:
+    given = {"heading order [deg]": np.degrees(PSI), "x cmd [m]": NORTH}
+    log(**given).drop(columns=["psi", "x"]).to_csv(tmp_path / "a.csv", index=False)
+    found = propose(tmp_path / "a.csv", OTTER)
+    assert (found.layout.column("psi").name, found.layout.column("x").name) == ("", "")
+
+
+def test_the_newest_row_may_be_the_first(tmp_path: Path) -> None:
+    """A heading in degrees shows all the same."""
+    table = log(psi=np.degrees(PSI) % 360.0, time=1e3 * TIME)[::-1]
+    run = seen(tmp_path / "a.csv", pd.DataFrame(table))
+    is_the_motion(run.rows(np.arange(TIME.size)[::-1]))
+
+
+def test_the_form_of_commands_is_that_of_the_columns(tmp_path: Path) -> None:
+    """Columns of actuators leave the blanks of actuators, not those of a force."""
+    names = ("vsp_surge_pct", "vsp_sway_pct", "bow_pct")
+    shares = {name: 10.0 * np.sin((k + 1) * TIME) for k, name in enumerate(names)}
+    table = pd.DataFrame({"time": TIME, "x": NORTH, "y": EAST, "psi": PSI, **shares})
+    table.to_csv(tmp_path / "a.csv", index=False)
+    found = propose(tmp_path / "a.csv", ship_with(()))
+    first = {signal: likely[0].name for signal, likely in found.likely.items()}
+    assert first == dict(zip(("u_vsp_x", "u_vsp_y", "u_bow"), names, strict=True))
 
 
 def test_of_several_latitudes_that_without_another_word_counts(tmp_path: Path) -> None:

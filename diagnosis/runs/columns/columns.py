@@ -46,6 +46,7 @@ from cosim.trials import KINDS
 from cybership.message_text import name_of, quoted
 from fmus.ship import Ship
 
+from .name_words import words_of
 from .unit_check import UNITS, spelt
 
 FOLDER_FILE = "columns.json"  # what it says holds for every measurement in its folder
@@ -134,6 +135,7 @@ class Column(Named):
     noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
     sign: str | None = None  # another column, which holds the sign
     negative: str = "-1"  # the cell of that in rows with a negative value
+    minutes: bool = False  # whether numbers are degrees and minutes (ddmm.mmmm), as of NMEA 0183
     late: NonNegativeFloat = Field(default=0.0, allow_inf_nan=False)  # s, of a command, behind the pose
     # Of a command, whether it is sampled of what the actuator does, and is no order, which acts from its
     # row to the next; None: not known.
@@ -290,6 +292,12 @@ def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
         return (factor * values + column.offset) * units.get(column.unit or "", 1.0)
 
 
+def degrees(minutes: np.ndarray) -> np.ndarray:
+    """Degrees of numbers (n,) in degrees and minutes, as 6325.8 is 63.43."""
+    whole = np.floor(np.abs(minutes) / 100.0)
+    return np.copysign(whole + (np.abs(minutes) - 100.0 * whole) / 60.0, minutes)
+
+
 def beside(path: Path) -> Path:
     """The JSON file of a measurement alone."""
     return path.with_name(f"{path.name}.json")
@@ -386,8 +394,15 @@ def missing(layout: Layout, names: Sequence[str], of: Ship) -> list[str]:
     every = _forms(of)
     there = [g for g in every if any(layout.column(s).name in names for s in g)]
     # Of forces that are there, those on other axes are taken as zero.
-    needed = [s for g in there if g != TAU for s in g] if there else every[0]
+    needed = [s for g in there if g != TAU for s in g] if there else _meant(every, names)
     return [s for s in ("time", *POSE, *needed) if layout.column(s).name not in names]
+
+
+def _meant(forms: Sequence[tuple[str, ...]], names: Iterable[str]) -> tuple[str, ...]:
+    """The form of commands with words of which the most columns are called, else the first."""
+    words = [{*words_of(name)} for name in names]
+    own = [{w for s in form for w in words_of(s) if len(w) > 1} for form in forms]
+    return max(zip(forms, own, strict=True), key=lambda each: sum(bool(each[1] & w) for w in words))[0]
 
 
 def _forms(of: Ship) -> list[tuple[str, ...]]:

@@ -7,6 +7,7 @@ relative error of y is tan(latitude) times the distance to north over the earth'
 0.03 % for a kilometre.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -33,7 +34,8 @@ def geographic_pair(
 ) -> dict[str, str]:
     """Signals x and y -> names of the columns of latitude and longitude; empty without one of each.
 
-    Of several that one counts which is stated, or whose name has no other word.
+    Of several that one counts which is stated, whose name has no other word, or the last part of it, as
+    ``GPS.Lat`` beside ``GPS.Lat.Quality``.
 
     Args:
         named: column -> its name without the unit, and its unit (empty if not known).
@@ -48,11 +50,13 @@ def geographic_pair(
         for signal, words in WORDS.items()
     }
     for signal, columns in found.items():
-        own = [c for c in columns if WORDS[signal].issuperset(words_of(named[c][0]))]
+        names = {c: named[c][0] for c in columns}
+        last = {c: re.split("[./]", name)[-1] for c, name in names.items()}
+        for parts in (last, names):  # the narrower one last
+            own = [c for c, part in parts.items() if WORDS[signal].issuperset(words_of(part))]
+            found[signal] = own if len(own) == 1 else found[signal]
         if stated.get(signal) in columns:
             found[signal] = [stated[signal]]
-        elif len(own) == 1:
-            found[signal] = own
     if any(len(columns) != 1 for columns in found.values()):
         return {}
     return {signal: columns[0] for signal, columns in found.items()}
@@ -114,26 +118,32 @@ def is_geographic(signal: str, column: Column) -> bool:
     return column.factor != 1.0 and bool(WORDS[signal] & {*words_of(column.name)})
 
 
-def refuse_minutes(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> None:
-    """Refuse positions in degrees and minutes (ddmm.mmmm), or with a letter, as NMEA 0183 has them.
+def refuse_letters(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> None:
+    """Refuse positions with a letter in each cell.
 
     Args:
         pair: of :func:`geographic_pair`.
         cells: signals x and y -> the cells (n,) of their columns.
 
     Raises:
-        InputError: minutes beyond 90 and 180 degrees, or letters.
+        InputError: no cell of a column is a number.
     """
-    names, advice = " and ".join(pair.values()), "write decimal degrees, negative to south and west"
-    values = []
     for each in (cells[signal].dropna() for signal in pair):
-        numbers = np.abs(np.asarray(pd.to_numeric(each, errors="coerce"), float))
-        if numbers.size and np.isnan(numbers).all():
-            raise InputError(f"a cell of {names} is not a number: '{each.iloc[0]}'; {advice}")
-        values.append(numbers[np.isfinite(numbers)])
+        if each.size and np.isnan(np.asarray(pd.to_numeric(each, errors="coerce"), float)).all():
+            raise InputError(
+                f"a cell of {' and '.join(pair.values())} is not a number: '{each.iloc[0]}'; write "
+                "decimal degrees, negative to south and west"
+            )
+
+
+def are_minutes(latitude: np.ndarray, longitude: np.ndarray) -> bool:
+    """Whether numbers (n,) are degrees and minutes (ddmm.mmmm), as NMEA 0183 has them.
+
+    In degrees they would be beyond 90 and 180, and none has minutes beyond 60.
+    """
+    values = [np.abs(v[np.isfinite(v)]) for v in (latitude, longitude)]
     beyond = [v.max(initial=0.0) > most for v, most in zip(values, (90.0, 180.0), strict=True)]
-    if any(beyond) and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values):
-        raise InputError(f"{names} seem to be degrees and minutes (ddmm.mmmm); {advice}")
+    return any(beyond) and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values)
 
 
 def one_origin(files: Sequence[Mapping[str, Column]]) -> dict[str, Column]:

@@ -11,7 +11,7 @@ from ..files.reading import held_values
 from ..run_constants import EVERY, FEWEST
 from .columns import OUTPUTS, POSE
 from .name_words import PLAIN, words_of
-from .unit_check import UNITS, doubts, largest
+from .unit_check import SI_UNIT, UNITS, doubts, largest
 
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
 FILLERS = frozenset(
@@ -20,8 +20,10 @@ FILLERS = frozenset(
         *("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "dir", "direction"),
         *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
-        *("sign", "gear", "data", "value"),
-        *("gyro", "compass", "utm", "track", "azimuth"),
+        *("sign", "gear", "side", "data", "value"),
+        *("gyro", "compass", "utm", "track", "azimuth", "gps", "gnss", "distance"),
+        *("de", "du", "di", "van", "der"),
+        *("gga", "rmc", "hdt", "rsa", "me", "sg"),  # sentences of NMEA 0183, tags of plants
     )
 )
 # Quantity -> word that is left of a name -> signal.
@@ -41,12 +43,14 @@ REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
 # Quantity of a command -> words that tell it; words of a speed, which an angle is not.
 KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
 CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
+ORDERS = frozenset(("order", "command", "cmd"))  # words of a reference, which is no measurement
 # Words of a column that holds the sign of another one, and its cells of a negative value.
-SIGN = frozenset(("dir", "direction", "sign", "gear"))
+SIGN = frozenset(("dir", "direction", "sign", "gear", "side"))
 ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}
+AXES = {"surge": "x", "sway": "y"}  # as forces along them are called
 LIKELY = 0.4  # 1, correlation or likeness of names from which on it counts (chosen)
 
 
@@ -74,16 +78,19 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
 
     Args:
         name: of the column, without its unit.
-        unit: of the column; without one only an actuator's command is told, as in ``port/n_cmd``,
-            ``port angle``, or ``rudder`` where that has one command.
+        unit: of the column; without one only an angle is told, as in ``HDT heading``, or an actuator's
+            command, as in ``port/n_cmd``, ``port angle``, or ``rudder`` where that has one command.
         quantity: signal -> quantity.
     """
     words = words_of(name)
-    left = [w for w in words if w not in FILLERS]
+    left = [w for w in words if w not in FILLERS and not w.isdigit()]
+    kinds = {q for q in WORDS if unit in UNITS[q] or (not unit and q == "angle")}
+    if not ORDERS.isdisjoint(words) or not (unit or CHANGES.isdisjoint(words)):
+        kinds = set()
     found = {
         signals[left[0]]
         for q, signals in (WORDS if "utm" not in words else OF_UTM).items()
-        if unit in UNITS[q] and len(left) == 1 and signals.get(left[0]) in quantity
+        if q in kinds and len(left) == 1 and signals.get(left[0]) in quantity
     }
     found |= {
         s
@@ -102,6 +109,7 @@ def signal_of_symbol(name: str, unit: str, quantity: Mapping[str, str]) -> str:
         name, unit, quantity: as of :func:`meaning_of_words`.
     """
     symbol = name.translate(PLAIN)
+    symbol = symbol.casefold() if len(symbol) > 1 else symbol
     found = [s for s in quantity if s.partition(".")[2] == symbol and symbol not in OUTPUTS]
     return found[0] if len(found) == 1 and unit in ("", *UNITS[quantity[found[0]]]) else ""
 
@@ -109,6 +117,12 @@ def signal_of_symbol(name: str, unit: str, quantity: Mapping[str, str]) -> str:
 def is_steering(name: str) -> bool:
     """Whether a name is that of an angle that steers, of whatever actuator."""
     return {word for word in words_of(name) if word not in FILLERS} == {"rudder"}
+
+
+def is_of_shaft(name: str, unit: str) -> bool:
+    """Whether a name and its unit are those of revolutions, of whatever shaft."""
+    told = unit in UNITS["shaft speed"] and not REVOLUTIONS.isdisjoint(words_of(name))
+    return told or unit in ("rpm", "rps")
 
 
 def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
@@ -232,10 +246,7 @@ def _evidence(
 ) -> tuple[list[str], float] | None:
     """What speaks for a column, and how much; None where something excludes it, or nothing does."""
     numbers = values[np.isfinite(values)]
-    moves = quantity in ("time", "length") or signal == "psi"  # a shaft may turn evenly
-    if numbers.size < 2 or (moves and np.ptp(numbers) == 0.0) or unit not in ("", "-", *UNITS[quantity]):
-        return None
-    if np.abs(numbers).max() > largest(quantity) / min(UNITS[quantity].values()):
+    if not _is_possible(signal, quantity, unit, numbers):
         return None
     known = WORDS.get(quantity, {})
     words = words_of(bare)
@@ -252,6 +263,8 @@ def _evidence(
         reasons, score = [*reasons, "by its name"], score + like
     if unit in UNITS[quantity]:
         reasons, score = [*reasons, f"by its unit {unit}"], score + 0.5
+    elif unit == "%" and reasons:
+        reasons.append(f'in %: state the "factor" to {SI_UNIT[quantity]} as well')
     axes = MOVES.get(signal) or MOVED.get(quantity, ("surge", "sway", "yaw"))
     if quantity == "angle":  # it may wrap
         values = _unwrapped(values if np.abs(numbers).max() <= 2.0 * np.pi else np.radians(values))
@@ -265,9 +278,24 @@ def _evidence(
     return (reasons, score) if reasons else None
 
 
+def _is_possible(signal: str, quantity: str, unit: str, numbers: np.ndarray) -> bool:
+    """Whether finite numbers (n,) of a column in some unit may be a signal at all."""
+    moves = quantity in ("time", "length") or signal == "psi"  # a shaft may turn evenly
+    if numbers.size < 2 or (moves and np.ptp(numbers) == 0.0):
+        return False
+    of_most = unit == "%" and "." in signal  # its share of the most, which is not stated
+    if unit not in ("", "-", *UNITS[quantity]) and not of_most:
+        return False
+    return float(np.abs(numbers).max()) <= largest(quantity) / min(UNITS[quantity].values())
+
+
 def _likeness(signal: str, name: str) -> float:
     """How alike two names are, from 0 to 1: by words or beginnings that they share, or by letters."""
     own, words = words_of(signal.replace("tau", "force")), words_of(name)
+    words = [AXES.get(word, word) for word in words]
+    axes = [{*AXES.values()} & {*each} for each in (own, words)]
+    if all(axes) and axes[0].isdisjoint(axes[1]):
+        return 0.0
     shared = [w for w in words if any(w == o or (len(w) > 2 and o.startswith(w)) for o in own)]
     letters = SequenceMatcher(None, "".join(own), "".join(words)).ratio()
     return max(letters if letters > 0.6 else 0.0, len(set(shared)) / len(own))

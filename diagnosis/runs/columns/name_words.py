@@ -3,26 +3,26 @@
 import re
 import unicodedata
 
-# English words -> those that names have in their place: short forms, German, French, Spanish, Dutch,
-# Norwegian, all without accents.
+# English words -> those that names have in their place: short forms, German, French, Spanish, Italian,
+# Dutch, Norwegian, Swedish, all without accents.
 FOREIGN = {
-    "starboard": "stbd stb sb right steuerbord tribord estribor stuurboord styrbord",
-    "port": "left ps bb backbord babord babor bakboord",
-    "propeller": "prop screw helice schroef",
-    "rudder": "steer steering helm ruder gouvernail safran barre timon roer",
-    "rudder angle": "ruderlage ruderwinkel roerhoek rorvinkel",
+    "starboard": "stbd stb sb right steuerbord tribord estribor dritta stuurboord styrbord",
+    "port": "left ps bb backbord babord babor sinistra bakboord",
+    "propeller": "prop screw helice elica schroef",
+    "rudder": "steer steering helm ruder gouvernail safran barre timon timone roer roder",
+    "rudder angle": "ruderlage ruderwinkel roerhoek rorvinkel rodervinkel",
     "bow": "bowthr bowthruster bug bugstrahl bugstrahler bugstrahlruder boeg baug",
     "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
     "fore": "fwd forward vorn forut",
     "aft": "achter akter",
     "azimuth": "azimut",
     "thruster": "propulseur strahlruder boegschroef",
-    "angle": "winkel vinkel angulo hoek",
-    "rpm": "drehzahl regime toerental turtall omdreiningstall",
+    "angle": "winkel vinkel angulo angolo hoek",
+    "rpm": "drehzahl regime toerental turtall omdreiningstall omdreininger varvtal giri",
     "order": "setpoint soll sollwert consigne orden ordre",
     "measured": "ist istwert mesure medido gemeten",  # codespell:ignore
     "true": "vrai vraie wahr verdadero",
-    "time": "zeit uhrzeit temps tiempo tijd tid",
+    "time": "zeit uhrzeit temps heure tiempo tempo tijd tid",
     "timestamp": "zeitstempel horodatage",
     "north": "nord norte noord",
     "east": "ost este oost",
@@ -30,7 +30,7 @@ FOREIGN = {
     "easting": "rechtswert ostwert",
     "latitude": "breite breitengrad latitud latitudine breedtegraad breddegrad",
     "longitude": "lange langengrad longitud longitudine lengtegraad lengdegrad",
-    "heading": "steuerkurs gierwinkel cap",
+    "heading": "steuerkurs gierwinkel cap prua",
     "yaw rate": "gierrate wenderate",
     "speed": "geschwindigkeit vitesse velocidad snelheid fart",
 }

@@ -17,11 +17,11 @@ from fmus.ship import Ship, ship
 from ..cleaning import WIDTH, lost
 from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
-from ..files.reading import Run, column_names, read
+from ..files.reading import Run, column_names, read, signed
 from ..files.tables import clock_seconds, date_stamps, is_cell, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..frozen import repeated
-from ..row_order import in_order
+from ..row_order import by_stamps, in_order
 from .columns import (
     OF_UNIT,
     POSE,
@@ -30,6 +30,7 @@ from .columns import (
     WITH_UNIT,
     Column,
     Layout,
+    degrees,
     log_of,
     missing,
     no_unit,
@@ -39,11 +40,21 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .geographic import SIDES, WORDS, geographic_pair, is_side, local_columns, one_origin, refuse_minutes
+from .geographic import (
+    SIDES,
+    WORDS,
+    are_minutes,
+    geographic_pair,
+    is_side,
+    local_columns,
+    one_origin,
+    refuse_letters,
+)
 from .likely_columns import (
     ASTERN,
     SIGN,
     LikelyColumn,
+    is_of_shaft,
     is_steering,
     likely_columns,
     meaning_of_words,
@@ -393,7 +404,7 @@ def _by_words(
         ):
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
-        elif unit in ("rpm", "rps"):
+        elif is_of_shaft(" ".join(own), unit):
             only["shaft speed"].append(Column(name=name, unit=unit))
         elif unit in UNITS["angle"] and is_steering(" ".join(own)):
             only["angle"].append(Column(name=name, unit=unit))
@@ -405,7 +416,15 @@ def _by_words(
     own = {
         s: [c for c in each if SIGN.isdisjoint(words_of(c.name))] or each for s, each in found.items()
     }
+    own |= {f"{s}_2": [each.pop()] for s, each in own.items() if f"{s}_2" in quantity and _are_two(each)}
     return {s: each[0] for s, each in own.items() if len(each) == 1 and s not in columns}
+
+
+def _are_two(columns: list[Column]) -> bool:
+    """Whether columns are those of two sensors, by numbers in their names, and in their order."""
+    number = {c.name: [int(w) for w in words_of(c.name) if w.isdigit()] for c in columns}
+    columns.sort(key=lambda c: number[c.name])
+    return len(columns) == 2 and all(number.values()) and len({*map(str, number.values())}) == 2
 
 
 def _of_message(
@@ -455,16 +474,20 @@ def _geographic(
     after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
     table = table_of_file(path, layout, {*pair.values(), *after.values()})
     sides = {s: SIDES[s][1] for s, name in after.items() if is_side(table[name], SIDES[s])}
-    degrees = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
-    for signal, negative in sides.items():
-        west = is_cell(table[after[signal]], negative)
-        degrees[signal] = np.where(west, -degrees[signal], degrees[signal])
-    columns = local_columns(pair, degrees)
+    angles = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
+    minutes = are_minutes(angles["x"], angles["y"])
+    for signal, angle in angles.items():
+        angle = degrees(angle) if minutes else angle
+        west = is_cell(table[after[signal]], sides[signal]) if signal in sides else False
+        angles[signal] = np.where(west, -angle, angle)
+    columns = local_columns(pair, angles)
+    if minutes:
+        columns = {s: c.model_copy(update={"minutes": True}) for s, c in columns.items()}
     for signal in columns.keys() & sides:
         sign = {"sign": after[signal], "negative": sides[signal]}
         columns[signal] = columns[signal].model_copy(update=sign)
     if not columns:
-        refuse_minutes(pair, {signal: table[name] for signal, name in pair.items()})
+        refuse_letters(pair, {signal: table[name] for signal, name in pair.items()})
     return columns
 
 
@@ -525,7 +548,7 @@ def _signed(
 def _is_negative(cell: str, quantity: str) -> bool:
     """Whether the cell of a sign is that of negative values: astern, or of an angle to port."""
     if quantity == "angle":
-        return words_of(cell) == ["port"] or cell.casefold() in ("p", "-", "-1", "-1.0")
+        return words_of(cell) == ["port"] or cell.casefold() in ("p", "l", "-", "-1", "-1.0")
     return cell.casefold() in ASTERN
 
 
@@ -577,11 +600,15 @@ def _likely(
 ) -> dict[str, Sequence[LikelyColumn]]:
     """Columns that may be those of signals without one, of unused ones with the units below them."""
     known = {s: layout.column(s) for s in ("time", *POSE) if s not in blank}
-    table = table_of_file(path, layout, {*unused, *_names_of(known)})
+    signs = {c.sign for c in known.values() if c.sign}
+    table = table_of_file(path, layout, {*unused, *_names_of(known), *signs})
     refuse_thousands(path, layout, table)
-    pose = {s: to_si(_numbers(table[c.name], s), s, c, quantity[s]) for s, c in known.items()}
+    numbers = {s: signed(_numbers(table[c.name], s), table, c) for s, c in known.items()}
+    pose = {s: to_si(numbers[s], s, c, quantity[s]) for s, c in known.items()}
     kind = "time" if "time" in blank else ""
-    named = {n: (*_without_unit(n, below), _numbers(table[n], kind)) for n, below in unused.items()}
+    told = {n: _without_unit(n, below) for n, below in unused.items()}
+    told = {n: (n, "") if unit.isdigit() else (bare, unit) for n, (bare, unit) in told.items()}
+    named = {n: (*pair, _numbers(table[n], kind)) for n, pair in told.items()}
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}
 
@@ -602,6 +629,7 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
     unit = _time_unit(run.time)
     if unit:
         yield "time", unit, 1.0
+    run = by_stamps(run)
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     zeros = (run.pose == 0.0).all(axis=1)
@@ -615,6 +643,6 @@ def _seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
 
 def _time_unit(time: np.ndarray) -> str | None:
     """The unit that times (n,) seem to be in; None: seconds."""
-    time = time[in_order(time)]
+    time = np.unique(time[np.isfinite(time)])
     apart = float(np.median(np.diff(time))) if time.size > 1 else 1.0
     return likely_unit(apart) if not OFTENEST < apart < WIDTH else None

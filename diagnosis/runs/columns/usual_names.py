@@ -17,11 +17,11 @@ CALLED: dict[str, tuple[str, ...]] = {
     ),
     "x": (
         *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
-        *("utmn", "northings", "xnorth", "ynorth", "posxnorth", "posynorth"),
+        *("utmn", "northings", "xnorth", "ynorth", "posxnorth", "posynorth", "x0"),
     ),
     "y": (
         *("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
-        *("utme", "eastings", "xeast", "yeast", "posxeast", "posyeast"),
+        *("utme", "eastings", "xeast", "yeast", "posxeast", "posyeast", "y0"),
     ),
     "psi": (
         *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),

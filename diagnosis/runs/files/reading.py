@@ -29,6 +29,7 @@ from ..columns.columns import (
     TAU,
     Column,
     Layout,
+    degrees,
     layout_of,
     outputs,
     quantities,
@@ -225,6 +226,14 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
 
 
+def signed(read: np.ndarray, table: pd.DataFrame, column: Column) -> np.ndarray:
+    """Numbers (n,) of a column of a table with their sign; degrees where they have minutes."""
+    read = degrees(read) if column.minutes else read
+    if column.sign is None:
+        return read
+    return np.where(is_cell(table[column.sign], column.negative), -read, read)
+
+
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
     columns, noise, quantity = {}, {}, quantities(of)
@@ -239,8 +248,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
                 read = clock_seconds(read)
             if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
                 read = np.where(read == NO_HEADING, np.nan, read)
-            if column.sign:
-                read = np.where(is_cell(table[column.sign], column.negative), -read, read)
+            read = signed(read, table, column)
             values = to_si(read, signal, column, quantity[signal])
             if signal in POSE:
                 unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
