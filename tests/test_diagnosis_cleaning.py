@@ -343,6 +343,22 @@ def test_stamps_that_jitter_by_more_than_a_row_are_taken_as_even(rows, gap, even
     np.testing.assert_array_equal(found.pose, run.pose)
 
 
+@pytest.mark.parametrize("flushed", [True, False])
+def test_rows_that_were_stamped_in_batches_are_spread_and_bursts_of_samples_are_not(flushed):
+    """Eight rows 0.5 ms apart every 0.16 s: written at once, or samples of 4 ms with a pause."""
+    run = base()
+    k = np.arange(N)
+    stamps = 0.16 * (k // 8) + 0.0005 * (k % 8)
+    taken = run.time if flushed else 40.0 * np.floor(stamps / 0.16)
+    pose = np.column_stack([np.interp(taken, run.time, p) for p in run.pose.T])
+    found = ordered(replace(run, time=stamps, pose=pose))
+    if flushed:
+        assert np.diff(found.time) == pytest.approx(0.02)
+        assert "stamps are 0.16 s apart, with 8 samples each" in found.notes[-1]
+    else:
+        np.testing.assert_array_equal(found.time, stamps)
+
+
 def test_minutes_that_begin_anew_each_hour_go_on_all_day():
     rare = base().rows(np.arange(0, N, 60))
     hours = replace(rare, time=(rare.time / 0.02 * 10.0 + 3000.0) % 3600.0)

@@ -225,13 +225,18 @@ def test_deeply_nested_layout_is_refused(tmp_path):
     [
         (1e-6 * np.arange(10_000_000, 10_000_000 + N * 100_000, 100_000) ** 1.0 * 1e9, "too rare"),
         (np.append(TIME[:-1], 1e300), "a time stamp is wrong"),
-        (np.cumsum(np.where(np.arange(N) % 10 == 0, 2.9, 2e-4)), "come in bursts"),
         (np.append(np.arange(N - 1) * 1e-6, 10.0), "too frequent"),
     ],
 )
 def test_clock_that_no_run_has_is_refused(tmp_path, time, message):
     with pytest.raises(InputError, match=message):
         diagnosis.gather([run(tmp_path, time=time)])
+
+
+def test_bursts_of_samples_are_refused(tmp_path):
+    time = np.cumsum(np.where(np.arange(N) % 10 == 0, 2.9, 2e-4))
+    with pytest.raises(InputError, match=r"come in bursts, 0\.0002 s apart and 0\.268 s on average"):
+        diagnosis.gather([run(tmp_path, time=time, x=0.1 * time, y=0.05 * time)])
 
 
 def test_column_that_is_there_twice_is_refused(tmp_path):

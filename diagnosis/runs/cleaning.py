@@ -17,7 +17,7 @@ from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .frozen import repeated, stuck
-from .row_order import missing_rows, ordered
+from .row_order import in_bursts, missing_rows, ordered
 from .run_constants import EVERY, HORIZON, LEVEL, LONG, NEGLIGIBLE, ORDER, WIDTH
 
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
@@ -198,11 +198,11 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     between |= late
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
-    steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
     # With a few of the samples that regular sampling would give, nothing can be differentiated.
-    if NEGLIGIBLE * steps.sum() > row * run.time.size:
+    if in_bursts(run.time, scale):
+        mean = float(np.diff(run.time).mean())
         raise InputError(
-            f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
+            f"{where}: its samples come in bursts, {row:.3g} s apart and {mean:.3g} s on average"
         )
     if np.round(period / row) > 1.0:  # a log that is faster than the measurement
         after = np.searchsorted(fresh, np.arange(repeats.size))

@@ -14,7 +14,7 @@ from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
 from .files.reading import Run
-from .run_constants import CHANCE, HORIZON, LONG
+from .run_constants import CHANCE, HORIZON, LONG, NEGLIGIBLE
 
 ON_GRID = (
     0.2  # 1, of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
@@ -32,7 +32,7 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
         InputError: more rows than can be wrong by chance have no time of their own.
     """
     if np.isfinite(run.time).all() and (np.diff(run.time) > 0.0).all():
-        return run
+        return _spread(_of_batches(run)) if in_bursts(run.time, scale) else run
     run = _without_empty(run)
     many = run.time.size
     found = _spread(_merged(_begun_anew(continued(by_stamps(run), scale))))
@@ -49,6 +49,27 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     out = found.left_out + lost
     note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
+
+
+def in_bursts(time: np.ndarray, scale: Scale = REFERENCE) -> bool:
+    """Whether rows at increasing times (n,) [s] are far closer than they are on average, gaps apart."""
+    steps = np.minimum(np.diff(time), HORIZON * scale.time)
+    return bool(time.size > 1 and NEGLIGIBLE * steps.sum() > np.median(np.diff(time)) * time.size)
+
+
+def _of_batches(run: Run) -> Run:
+    """A run whose rows were stamped when a batch of them was written, with the batch's first stamp.
+
+    The ship moves as far within a batch as from one to the next: it is none of samples that were taken
+    in a burst.
+    """
+    step = np.diff(run.time)
+    begins = step > step.mean()
+    moved = np.linalg.norm(np.diff(run.pose[:, :2], axis=0), axis=1)
+    across, within = (moved[rows & np.isfinite(moved)] for rows in (begins, ~begins))
+    if min(across.size, within.size) < LONG or across.mean() > LONG * within.mean():
+        return run
+    return replace(run, time=run.time[np.append(True, begins)][np.append(0, np.cumsum(begins))])
 
 
 def _even(run: Run) -> Run | None:
