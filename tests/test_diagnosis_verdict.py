@@ -884,17 +884,24 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
 @pytest.mark.parametrize(
     ("explained", "believed", "doubted"),
     [
-        ((0.94, 0.02), (False, True), {"loss_surge"}),
-        ((0.94, 0.02), (True, True), set()),
-        ((0.94, 0.06), (False, True), set()),  # not next to nothing
-        ((0.01, 0.02), (False, True), set()),  # more than what is not believed
+        ((0.94, 0.02), (False, True), {"loss_surge": 0.3}),
+        ((0.94, 0.02), (True, True), {}),
+        ((0.94, 0.06), (False, True), {}),  # not next to nothing
+        ((0.01, 0.02), (False, True), {}),  # more than what is not believed
     ],
 )
 def test_a_small_finding_is_no_surer_than_what_explains_most(explained, believed, doubted):
-    """Of a towed body `Y_uv` took the most with no confidence, and `loss_surge` the rest with 0.98."""
+    """Of a towed body `Y_uv` took the most with no confidence, and `loss_surge` the rest with 0.98.
+
+    Both have to be true: the second one's probability is that of the first one times its own.
+    """
     made = [Finding(i, {}, {}, 0.99, [], 0.9, 0.9) for i in ("Y_uv", "loss_surge")]
-    sure = [Confidence(*[0.99 if each else 0.01] * 2) for each in believed]
+    sure = [Confidence(0.99, 0.99) if each else Confidence(0.01, 0.3) for each in believed]
     assert beside_possibility(Findings(made), explained, sure) == doubted
+    seen = confidence_of(made[1], Model(), Doubts(beside_possibility=doubted))
+    assert seen.own == pytest.approx(0.99 * 0.3 if doubted else 0.99)
+    assert seen.is_finding == (not doubted)
+    assert bool(seen.doubt) == bool(doubted)
     of_a_run = replace(made[1], values={"loss_surge@a": 0.1})
     assert of_a_run.of_runs
     assert not beside_possibility(Findings([made[0], of_a_run]), explained, sure)

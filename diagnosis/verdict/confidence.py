@@ -7,7 +7,8 @@ the same axes, laws that make up another one, effects and coefficients that expl
 coefficients beyond their priors, a smoothing that is slower than a filter.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +64,8 @@ class Doubts(NamedTuple):
         implausible: whether nominal coefficients are beyond their priors.
         mended: ids of the findings of which one is far smaller than the other on the same axes.
         of_several: ids of the changes of one actuator that another one shares.
-        beside_possibility: ids of the findings that explain little beside a possibility with more.
+        beside_possibility: findings that explain little beside a possibility with more, by their ids ->
+            the probability of that possibility, without which they are none.
     """
 
     residual: Collection[str] = ()
@@ -78,7 +80,7 @@ class Doubts(NamedTuple):
     implausible: bool = False
     mended: Collection[str] = ()
     of_several: Collection[str] = ()
-    beside_possibility: Collection[str] = ()
+    beside_possibility: Mapping[str, float] = MappingProxyType({})
 
 
 NO_DOUBTS = Doubts()
@@ -145,8 +147,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         NO_GAIN: f.id in doubts.without_gain,
     }
     holding = [text for text, holds in all_doubts.items() if holds]
-    most = EVEN_ODDS if holding else 1.0
-    return Confidence(min(own, most), min(of_set, most), holding[0] if own > most else "")
+    most, rest = EVEN_ODDS if holding else 1.0, doubts.beside_possibility.get(f.id, 1.0)
+    return Confidence(min(own * rest, most), min(of_set * rest, most), holding[0] if own > most else "")
 
 
 def doubt_of_data(runs: Sequence[WeakWindows]) -> str:

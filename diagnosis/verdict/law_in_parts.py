@@ -82,8 +82,8 @@ def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Con
 
 def beside_possibility(
     found: Findings, explained: Sequence[float], alone: Sequence[Confidence]
-) -> set[str]:
-    """Ids of the findings that explain next to nothing, and less than a mere possibility.
+) -> dict[str, float]:
+    """The findings that explain next to nothing, and less than a mere possibility, by their ids.
 
     Of a cause that no candidate has, the nearest candidates take the most. What is found in the rest is
     what these have left, and another explanation of the most would leave something else.
@@ -92,10 +92,14 @@ def beside_possibility(
         found: the findings.
         explained: share of the error that each explains.
         alone: the confidence of each, all others left out of account.
+
+    Returns:
+        Id -> probability that the possibility which explains the most, or its set, is a true cause.
     """
     each = [*zip(found.effects, explained, alone, strict=True)]
-    most = max((share for _, share, c in each if not c.is_finding), default=0.0)
-    return {f.id for f, share, _ in each if share < min(NEGLIGIBLE, most) and not f.of_runs}
+    possible = ((share, c.of_set) for _, share, c in each if not c.is_finding)
+    most, sure = max(possible, default=(0.0, 1.0))
+    return {f.id: sure for f, share, _ in each if share < min(NEGLIGIBLE, most) and not f.of_runs}
 
 
 def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
