@@ -205,10 +205,11 @@ def test_two_gyros_are_a_heading_and_a_second_one(tmp_path: Path) -> None:
 
 
 def test_a_reference_is_no_measurement(tmp_path: Path) -> None:
-    given = {"heading order [deg]": np.degrees(PSI), "x cmd [m]": NORTH}
+    given = {"heading order [deg]": np.degrees(PSI), "x cmd [m]": NORTH, "true wind": 3.0 + np.sin(TIME)}
     log(**given).drop(columns=["psi", "x"]).to_csv(tmp_path / "a.csv", index=False)
     found = propose(tmp_path / "a.csv", OTTER)
     assert (found.layout.column("psi").name, found.layout.column("x").name) == ("", "")
+    assert "true wind" in found.unused, "its speed or its direction"
 
 
 def test_the_newest_row_may_be_the_first(tmp_path: Path) -> None:

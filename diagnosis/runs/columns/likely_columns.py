@@ -85,7 +85,7 @@ def meaning_of_words(name: str, unit: str, quantity: Mapping[str, str]) -> str:
     words = words_of(name)
     left = [w for w in words if w not in FILLERS and not w.isdigit()]
     kinds = {q for q in WORDS if unit in UNITS[q] or (not unit and q == "angle")}
-    if not ORDERS.isdisjoint(words) or not (unit or CHANGES.isdisjoint(words)):
+    if not ORDERS.isdisjoint(words) or not (unit or (CHANGES | {"wind"}).isdisjoint(words)):
         kinds = set()
     found = {
         signals[left[0]]
