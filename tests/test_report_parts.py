@@ -143,6 +143,10 @@ def test_what_is_sure_is_a_fact_and_comes_first():
         "However, it is at its limit. It is not in the learned model."
     )
     assert headline.finding_sentence(effect("lag", np.nan)) == "Possibly lag: There is lag."
+    small = effect("lag", 0.5, share_of_error=0.003)
+    assert headline.finding_sentence(small).endswith(
+        "There is lag. It explains < 1 % of the squared error."
+    )
     both = report_data(None, diagnosis(verdict="found"), [unsure, sure])
     assert (
         headline.headline(both)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
-from ..runs.run_constants import FAR_OFF
+from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
 from ..search.significance import lower_throughout
 from ..session import CalibratedModel, Diagnosis
 from ..verdict.confidence import FOUND
@@ -76,6 +76,8 @@ def finding_sentence(e: ReportedEffect) -> str:
     others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
     sure = f" ({percent(e.confidence)} for {e.id})" if np.isfinite(e.confidence) else ""
     doubt = f" However, {e.doubt}." if e.doubt else ""
+    if 0.0 <= e.share_of_error < NEGLIGIBLE:
+        doubt += f" It explains {percent(e.share_of_error)} of the squared error."
     model = "" if e.in_model else " It is not in the learned model."
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
 
