@@ -778,6 +778,8 @@ def test_an_alternative_is_in_neither_the_effect_nor_its_set(doubts, own, of_set
     assert (seen.own, seen.of_set) == pytest.approx((own, of_set))
     assert seen.is_finding
     assert bool(seen.doubt) == (own < 0.94)
+    one_of_two = replace(f, confidence=0.49)
+    assert bool(confidence_of(one_of_two, Model(), doubts).doubt) == (own < 0.94), "of its set"
 
 
 @pytest.mark.quick

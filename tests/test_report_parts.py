@@ -154,6 +154,17 @@ def test_what_is_sure_is_a_fact_and_comes_first():
     )
 
 
+def test_beside_findings_that_are_not_sure_wrong_coefficients_are_named():
+    """Of an azimuth with 30 % less thrust than described the coefficient took all, and a filter the rest."""
+    off, unsure = {"k_ahead": "thrust", "X_u": ""}, effect("delay", 0.5)
+    said = headline.headline(report_data(None, diagnosis(), [unsure], suspects=off))
+    assert said.endswith(" Coefficients that are probably wrong as well: k_ahead (thrust) and X_u.")
+    for effects, suspects in (([unsure, effect("lag", headline.FOUND)], off), ([unsure], {})):
+        assert "Coefficients" not in headline.headline(
+            report_data(None, diagnosis(), effects, suspects=suspects)
+        )
+
+
 @pytest.mark.parametrize(
     ("by_power", "of"), [(True, "of the power of"), (False, "of the squared error")]
 )

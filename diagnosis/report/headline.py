@@ -193,10 +193,12 @@ def headline(r: ReportData) -> str:
     d = r.diagnosis
     if d is None:
         return ""
+    names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
     if r.effects:
-        return " ".join(map(finding_sentence, surest_first(r.effects)))
+        off = [f"Coefficients that are probably wrong as well: {listed(names, 'and')}."] if names else []
+        off = [] if any(map(is_sure, r.effects)) else off
+        return " ".join([*map(finding_sentence, surest_first(r.effects)), *off])
     if d.verdict == "coefficients":
-        names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
         above = f", mainly {listed(names, 'and')}" if names else ""
         model, known = d.learned.model, d.start.ship.coefficients
         fitted = (name for name in d.posterior.std if name not in known)

@@ -148,7 +148,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     }
     holding = [text for text, holds in all_doubts.items() if holds]
     most, rest = EVEN_ODDS if holding else 1.0, doubts.beside_possibility.get(f.id, 1.0)
-    return Confidence(min(own * rest, most), min(of_set * rest, most), holding[0] if own > most else "")
+    doubt = holding[0] if own > most or of_set > most else ""
+    return Confidence(min(own * rest, most), min(of_set * rest, most), doubt)
 
 
 def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
