@@ -30,9 +30,6 @@ from .ship_model import Model
 # integration is far below the noise of any measurement. A force that lags is held over a step as in
 # the FMU, which is half a step earlier than a continuous lag.
 LONGEST_STEP = 0.02
-# s, times the scale of the ship; the same of actuators that are linear filters, which cost next to
-# nothing. Half of it, by which a held lag is early, has to be far below the lags of actuators. Chosen.
-FILTER_STEP = 0.0025
 # s, times the scale of the ship; after that thrusters have forgotten a command, and a surge speed most
 # of its start. Chosen: slower ones are beyond what windows of some seconds show.
 FORGOTTEN = 60.0
@@ -231,20 +228,17 @@ class Response:
             return Integral(c.edges, c.values[:, None], c.before[None])
         edges = self.step * np.arange(self._steps + 1)
         commands = np.diff(c(edges), axis=0) / self.step
-        values = self._filtered(commands) if self._linear else self._stepped(commands)
+        linear = not any(rate > 0.0 for rate in self.drive.params.rate)
+        if linear and all(memory.filter for _, memory in self._memories):
+            values = self._filtered(commands)
+        else:
+            values = self._stepped(commands)
         return Integral(edges, values, np.stack([c.before] * 2))
-
-    @cached_property
-    def _linear(self) -> bool:
-        """Whether all that lies between commands and forces is linear filters."""
-        limited = any(rate > 0.0 for rate in self.drive.params.rate)
-        return not limited and all(memory.filter for _, memory in self._memories)
 
     @property
     def step(self) -> float:
         """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
-        longest = (FILTER_STEP if self._linear else LONGEST_STEP) * self.model.ship.scale.time
-        fine = self._period / np.ceil(self._period / longest - 1e-6)
+        fine = self._period / np.ceil(self._period / (LONGEST_STEP * self.model.ship.scale.time) - 1e-6)
         kept = [
             self._lasts(member, memory) / (memory.keeps - 1)
             for member, memory in self._memories
