@@ -195,9 +195,10 @@ def headline(r: ReportData) -> str:
         return ""
     names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
     if r.effects:
-        off = [f"Coefficients that are probably wrong as well: {listed(names, 'and')}."] if names else []
-        off = [] if any(map(is_sure, r.effects)) else off
-        return " ".join([*map(finding_sentence, surest_first(r.effects)), *off])
+        said = [finding_sentence(e) for e in surest_first(r.effects)]
+        if names and not any(map(is_sure, r.effects)):
+            said.append(f"Coefficients that are probably wrong as well: {listed(names, 'and')}.")
+        return " ".join(said)
     if d.verdict == "coefficients":
         above = f", mainly {listed(names, 'and')}" if names else ""
         model, known = d.learned.model, d.start.ship.coefficients

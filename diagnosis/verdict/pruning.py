@@ -135,8 +135,9 @@ def _worst(
     """
     others = [_alternative(rest, kept, data.start) for rest in rests.values()]
     full, *losses = data.losses(kept, *others, *rests.values())
+    compared = zip(rests, losses[: len(rests)], losses[len(rests) :], strict=True)
     found: list[tuple[float, Withdrawn]] = []
-    for i, other, refitted in zip(rests, losses, losses[len(rests) :], strict=False):
+    for i, other, refitted in compared:
         harmed = harm(full, other, sizes[i])
         if harmed and harm(full, refitted, sizes[i]):
             reason = ALONE.format(harm=harmed.format(where=data.where))

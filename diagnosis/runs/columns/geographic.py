@@ -136,12 +136,12 @@ def refuse_letters(pair: Mapping[str, str], cells: Mapping[str, pd.Series]) -> N
             )
 
 
-def are_minutes(latitude: np.ndarray, longitude: np.ndarray) -> bool:
-    """Whether numbers (n,) are degrees and minutes (ddmm.mmmm), as NMEA 0183 has them.
+def are_minutes(x: np.ndarray, y: np.ndarray) -> bool:
+    """Whether latitudes and longitudes (n,) are degrees and minutes (ddmm.mmmm), as of NMEA 0183.
 
     In degrees they would be beyond 90 and 180, and none has minutes beyond 60.
     """
-    values = [np.abs(v[np.isfinite(v)]) for v in (latitude, longitude)]
+    values = [np.abs(v[np.isfinite(v)]) for v in (x, y)]
     beyond = [v.max(initial=0.0) > most for v, most in zip(values, (90.0, 180.0), strict=True)]
     return any(beyond) and all((v % 100.0 < 60.0).all() and (v < 18_100.0).all() for v in values)
 

@@ -18,7 +18,7 @@ from ..cleaning import WIDTH, lost
 from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read, signed
-from ..files.tables import clock_seconds, date_stamps, is_cell, table_of_file
+from ..files.tables import clock_seconds, date_stamps, table_of_file
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from ..frozen import repeated
 from ..row_order import by_stamps, in_order
@@ -30,7 +30,6 @@ from .columns import (
     WITH_UNIT,
     Column,
     Layout,
-    degrees,
     log_of,
     missing,
     no_unit,
@@ -474,18 +473,12 @@ def _geographic(
     after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
     table = table_of_file(path, layout, {*pair.values(), *after.values()})
     sides = {s: SIDES[s][1] for s, name in after.items() if is_side(table[name], SIDES[s])}
-    angles = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
-    minutes = are_minutes(angles["x"], angles["y"])
-    for signal, angle in angles.items():
-        angle = degrees(angle) if minutes else angle
-        west = is_cell(table[after[signal]], sides[signal]) if signal in sides else False
-        angles[signal] = np.where(west, -angle, angle)
-    columns = local_columns(pair, angles)
-    if minutes:
-        columns = {s: c.model_copy(update={"minutes": True}) for s, c in columns.items()}
-    for signal in columns.keys() & sides:
-        sign = {"sign": after[signal], "negative": sides[signal]}
-        columns[signal] = columns[signal].model_copy(update=sign)
+    numbers = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
+    how = {s: {"minutes": True} if are_minutes(**numbers) else {} for s in pair}
+    how |= {s: how[s] | {"sign": after[s], "negative": letter} for s, letter in sides.items()}
+    read = {s: Column(name=name).model_copy(update=how[s]) for s, name in pair.items()}
+    degrees = {s: signed(numbers[s], table, c) for s, c in read.items()}
+    columns = {s: c.model_copy(update=how[s]) for s, c in local_columns(pair, degrees).items()}
     if not columns:
         refuse_letters(pair, {signal: table[name] for signal, name in pair.items()})
     return columns
