@@ -11,14 +11,14 @@ from diagnosis import Model, diagnose
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.thrust import before_low_pass, commanded_shares
 from diagnosis.predictors.weak_form import omega, weak_windows
-from fmus.effects.all_thrusters import lag_filter
 
 LAG = 0.8  # s
 
 
 def logged(given, h, lag=LAG):
     """Commands (n, k) as a filter gives them, row by row."""
-    return given[0] + lfilter(*lag_filter(h, lag), given - given[0], axis=0)
+    kept = np.exp(-h / lag)
+    return given[0] + lfilter([1.0 - kept], [1.0, -kept], given - given[0], axis=0)
 
 
 def filtered(run, lag=LAG):

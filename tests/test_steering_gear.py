@@ -25,16 +25,31 @@ def after(effect, commands, value, h=0.5):
 def test_an_angle_turns_at_its_rate_and_stops_where_it_is_wanted():
     angle, found = 0.0, []
     for _ in range(5):
-        angle = rate_limited(angle, 0.5, 0.4, 0.5, False)
+        angle, _ = rate_limited(angle, 0.5, 0.4, 0.5, False)
         found.append(angle)
     assert found == pytest.approx([0.2, 0.4, 0.5, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("wanted", [-0.3, 0.1, 0.7])
+@pytest.mark.parametrize("steps", [1, 2, 60])
+def test_the_mean_of_an_angle_that_turns_does_not_depend_on_the_steps(wanted, steps):
+    """The way at 0.4 rad/s, then at rest where it is wanted: its integral over 1 s from 0.2 rad."""
+    time = abs(wanted - 0.2) / 0.4
+    still = min(time, 1.0)
+    end = 0.2 + np.copysign(0.4 * still, wanted - 0.2)
+    angle, integral = 0.2, 0.0
+    for _ in range(steps):
+        angle, mean = rate_limited(angle, wanted, 0.4, 1.0 / steps, False)
+        integral += mean / steps
+    assert angle == pytest.approx(end)
+    assert integral == pytest.approx(0.5 * (0.2 + end) * still + wanted * (1.0 - still))
 
 
 def test_an_angle_with_play_waits_until_its_command_has_gone_through_it():
     wanted = [0.0, 0.3, 0.5, 0.45, 0.35, 0.2, 0.25]
     angle, found = 0.0, []
     for x in wanted:
-        angle = dragged(angle, x, 0.2, 0.5, False)
+        angle, _ = dragged(angle, x, 0.2, 0.5, False)
         found.append(angle)
     assert found == pytest.approx([0.0, 0.2, 0.4, 0.4, 0.4, 0.3, 0.3])
 
@@ -44,10 +59,10 @@ def test_an_angle_with_play_waits_until_its_command_has_gone_through_it():
 )
 def test_an_angle_that_goes_round_takes_the_shorter_way(move, value, expected):
     """From 3.1 rad to -3.0, which is 3.283 on the way across the stern."""
-    wrapped = move(3.1, -3.0, value, 0.5, True)
+    wrapped, _ = move(3.1, -3.0, value, 0.5, True)
     assert np.cos(wrapped) == pytest.approx(np.cos(expected), abs=1e-5)
     assert np.sin(wrapped) == pytest.approx(np.sin(expected), abs=1e-5)
-    assert abs(move(3.1, -3.0, value, 0.5, False)) < 3.1
+    assert abs(move(3.1, -3.0, value, 0.5, False)[0]) < 3.1
 
 
 @pytest.mark.parametrize("kind", ["rate", "play"])
@@ -82,7 +97,7 @@ def test_the_diagnosis_steps_a_play_as_the_thrusters_do():
     np.testing.assert_allclose(arriving[4], helm, atol=1e-9)
     angle, expected = 0.0, []
     for x in helm.tolist():
-        angle = dragged(angle, x, 0.2, 0.1, False)
+        angle, _ = dragged(angle, x, 0.2, 0.1, False)
         expected.append(angle)
     assert np.abs(arriving[3] - helm).max() > 0.09
     np.testing.assert_allclose(arriving[3], expected, atol=1e-9)

@@ -27,8 +27,7 @@ from ..runs.linear_filter import filtered
 from .ship_model import Model
 
 # s, times the scale of the ship; longest step of thrusters and vessel, where the error of the
-# integration is far below the noise of any measurement. A force that lags is held over a step as in
-# the FMU, which is half a step earlier than a continuous lag.
+# integration is far below the noise of any measurement. Lags and limited rates give exact means of it.
 LONGEST_STEP = 0.02
 # s, times the scale of the ship; after that thrusters have forgotten a command, and a surge speed most
 # of its start. Chosen: slower ones are beyond what windows of some seconds show.

@@ -275,25 +275,26 @@ def remember(
 def command_response(
     s: Past, commands: tuple[Number, ...], b: PreparedThrusters, h: Number
 ) -> tuple[Past, tuple[Number, ...]]:
-    """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
+    """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate.
+
+    Where a command moves within a step its mean arrives, as the vessel holds the force over a step.
+    """
     memories, given = remember(s.memories, commands, "command", b, h)
     rates = b.params.rate if len(b.params.rate) == len(given) else tuple(b.params.rate) * len(given)
-    given = tuple(
-        [
-            when(
-                rate > 0.0,
-                lambda x=x, w=w, rate=rate, angle=angle: rate_limited(x, w, rate, h, angle),
-                lambda w=w: w,
-            )
-            for x, w, rate, angle in zip(s.limited, given, rates, b.effects.layout.round, strict=True)
-        ]
-    )
-    return Past(s.t + h, memories, given), given
+    both = [
+        when(
+            rate > 0.0,
+            lambda x=x, w=w, rate=rate, angle=angle: rate_limited(x, w, rate, h, angle),
+            lambda w=w: (w, w),
+        )
+        for x, w, rate, angle in zip(s.limited, given, rates, b.effects.layout.round, strict=True)
+    ]
+    return Past(s.t + h, memories, tuple([x for x, _ in both])), tuple([x for _, x in both])
 
 
 def force_response(
     s: Past, shares: tuple[Number, ...], b: PreparedThrusters, h: Number
 ) -> tuple[Past, tuple[Number, ...]]:
-    """The shares of full force that act after a step of h [s], for those of the characteristic."""
+    """The shares of full force that act over a step of h [s], for those of the characteristic."""
     memories, shares = remember(s.memories, shares, "force", b, h)
     return s._replace(memories=memories), shares

@@ -19,15 +19,20 @@ LONGEST = Range(0.0, 60.0)  # s
 TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5)
 
 
-def share_reached(h: Number, lag: Number) -> Number:
-    """Share of its way that a first-order lag [s] has gone after h [s], for an input that is held."""
-    return 1.0 - exp(-h / fmax(lag, 1e-9))
+def shares_reached(h: Number, lag: Number) -> tuple[Number, Number]:
+    """Shares of its way that a first-order lag [s] has gone after h [s], and in the mean over these.
+
+    Both are exact for an input that is held.
+    """
+    x = fmax(h / fmax(lag, 1e-9), 1e-6)  # no step takes no time: the mean is the value
+    gone = 1.0 - exp(-x)
+    return gone, 1.0 - gone / x
 
 
 def lag_filter(h: float, lag: float) -> tuple[Sequence[float], Sequence[float]]:
-    """A first-order lag as a linear filter, see :class:`.effect.Memory`."""
-    share = share_reached(h, lag)
-    return (share,), (1.0, share - 1.0)
+    """The mean over each step of a first-order lag as a linear filter, see :class:`.effect.Memory`."""
+    gone, mean = shares_reached(h, lag)
+    return (mean, gone - mean), (1.0, gone - 1.0)
 
 
 def way(before: Number, wanted: Number, angle: bool) -> Number:
@@ -43,7 +48,9 @@ def slow(
     turns: Sequence[bool] = (),
     **more: Any,
 ) -> Effect:
-    """A first-order lag of some of the commands, exact at the step's end for an input that is held.
+    """A first-order lag of some of the commands, of which the mean over a step acts.
+
+    The vessel holds a force over a step, so that the one of the step's end would be half a step early.
 
     Args:
         d: the actuators.
@@ -79,14 +86,15 @@ def slow(
     def function(
         before: tuple[Number, ...], wanted: tuple[Number, ...], h: Number, lag: Number
     ) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
-        share = share_reached(h, lag)
+        gone, mean = shares_reached(h, lag)
         angles = turns or (False,) * len(before[own])
-        moved = [
-            x + share * way(x, w, angle)
-            for x, w, angle in zip(before[own], wanted[own], angles, strict=True)
-        ]
-        after = (*wanted[: own.start or 0], *moved, *wanted[own.stop or len(wanted) :])
-        return after, after
+        ways = [way(x, w, angle) for x, w, angle in zip(before[own], wanted[own], angles, strict=True)]
+
+        def moved(share: Number) -> tuple[Number, ...]:
+            own_ones = [x + share * along for x, along in zip(before[own], ways, strict=True)]
+            return (*wanted[: own.start or 0], *own_ones, *wanted[own.stop or len(wanted) :])
+
+        return moved(gone), moved(mean)
 
     return function
 

@@ -19,16 +19,31 @@ PLAYS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.32)  # rad, from end to end; chosen
 USED = 20.0
 
 
-def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle: bool) -> Number:
-    """A command that moves from ``before`` towards the wanted one at no more than ``rate`` a second."""
+def rate_limited(
+    before: Number, wanted: Number, rate: Number, h: Number, angle: bool
+) -> tuple[Number, Number]:
+    """A command that moves from ``before`` towards the wanted one at no more than ``rate`` a second.
+
+    Returns:
+        Its value after h [s], and its mean over these.
+    """
     most = rate * h
-    return before + clip(way(before, wanted, angle), -most, most)
+    moved = clip(way(before, wanted, angle), -most, most)
+    moving = abs(moved) / fmax(most, 1e-12)  # share of the step until it is there
+    return before + moved, before + moved * (1.0 - 0.5 * moving)
 
 
-def dragged(before: Number, wanted: Number, play: Number, h: Number, angle: bool) -> Number:
-    """An angle that a command drags along behind a play, half of it to each side."""
+def dragged(
+    before: Number, wanted: Number, play: Number, h: Number, angle: bool
+) -> tuple[Number, Number]:
+    """An angle that a command drags along behind a play, half of it to each side.
+
+    Returns:
+        Its value after h [s], and its mean over these, which is the same: it moves with the command.
+    """
     half = 0.5 * play
-    return wanted + clip(way(wanted, before, angle), -half, half)
+    after = wanted + clip(way(wanted, before, angle), -half, half)
+    return after, after
 
 
 def gear(
@@ -36,7 +51,7 @@ def gear(
     v: Variable,
     places: Sequence[int],
     turns: Sequence[bool],
-    move: Callable[..., Number],
+    move: Callable[..., tuple[Number, Number]],
     lasts: Callable[[Number], Number],
     **more: Any,
 ) -> Effect:
@@ -47,7 +62,7 @@ def gear(
         v: the parameter, by whose name the effect is called.
         places: of the angles among the commands of the ship.
         turns: for each of these whether it goes round.
-        move: ``move(before, wanted, value, h, turns)``: an angle after a step.
+        move: ``move(before, wanted, value, h, turns)``: an angle after a step, and its mean over it.
         lasts: of the memory.
         more: further arguments of :func:`declared`.
     """
@@ -70,8 +85,8 @@ def gear(
         before: tuple[Number, ...], wanted: tuple[Number, ...], h: Number, value: Number
     ) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         each = zip(before, places, turns, strict=True)
-        after = tuple([move(x, wanted[k], value, h, angle) for x, k, angle in each])
-        moved = dict(zip(places, after, strict=True))
+        after, means = zip(*[move(x, wanted[k], value, h, angle) for x, k, angle in each], strict=True)
+        moved = dict(zip(places, means, strict=True))
         return after, tuple([moved.get(k, x) for k, x in enumerate(wanted)])
 
     return function
