@@ -28,12 +28,17 @@ from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.forward_selection import taken_over
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
+from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
+from diagnosis.search.prediction_fit.disturbance_summary import Unrecorded
+from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
+from diagnosis.search.prediction_fit.refit import RefitOutcome
 from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
 from diagnosis.verdict.judging import (
+    differing,
     falls_by_axis,
     faster_than_smoothing,
     judge,
@@ -615,6 +620,19 @@ def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sur
     (f,) = with_confidence(found, start, doubts).effects
     assert f.confidence == (0.99 if sure else 0.5)
     assert ("as much without it" in f.doubt) != sure
+
+
+@pytest.mark.parametrize("value", ["delta_X_absu_u", "m"])
+def test_an_effect_of_which_two_fits_differ_is_even_odds(value):
+    """A coefficient beside it may be the better one of another shape; its own value may not."""
+    start = Model()
+    made = [Finding("X_|u|u", {"delta_X_absu_u": -1.0}, {}, 0.99, [], 0.5, 0.5, together=0.99)]
+    found, apart = Findings(made, model=start), {value: (-1.0, -2.0)}
+    push = ForceDisturbance(np.zeros(3), np.zeros(3))
+    fit = RefitOutcome(found, JointPosterior.nothing(), Unrecorded(push, apart, []))
+    (f,) = with_confidence(found, start, Doubts(differing=differing(fit))).effects
+    assert f.confidence == f.together == (0.99 if value == "m" else 0.5)
+    assert ("accelerations" in f.doubt) == (value != "m")
 
 
 def filters_of(*values):

@@ -4,7 +4,7 @@ It allows for causes outside of the list of candidates. A logistic regression ma
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
 the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
 the same axes, laws that make up another one, effects and coefficients that explain as much without it,
-coefficients beyond their priors, a smoothing that is slower than a filter.
+coefficients beyond their priors, a smoothing that is slower than a filter, two fits that disagree.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -45,6 +45,7 @@ IMPLAUSIBLE = "other coefficients are beyond their priors in the model with it"
 MENDED = "it and a far smaller effect on the same axes make up a force of another shape as well"
 OF_SEVERAL = "the same of another actuator changes by half as much or more in the model with it"
 LESS_THAN_POSSIBLE = "what explains more of the error, in the model with it, is not sure"
+DIFFERING = "fitted to accelerations it has another value than fitted to predictions"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -64,6 +65,8 @@ class Doubts(NamedTuple):
         implausible: whether nominal coefficients are beyond their priors.
         mended: ids of the findings of which one is far smaller than the other on the same axes.
         of_several: ids of the changes of one actuator that another one shares.
+        differing: ids of the effects whose values by the two fits differ by more than their intervals;
+            those of a model of the right shape agree (Hausman 1978).
         beside_possibility: findings that explain little beside a possibility with more, by their ids ->
             the probability of that possibility, without which they are none.
     """
@@ -80,6 +83,7 @@ class Doubts(NamedTuple):
     implausible: bool = False
     mended: Collection[str] = ()
     of_several: Collection[str] = ()
+    differing: Collection[str] = ()
     beside_possibility: Mapping[str, float] = MappingProxyType({})
 
 
@@ -141,6 +145,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         MENDED: f.id in doubts.mended,
         OF_SEVERAL: f.id in doubts.of_several,
         LESS_THAN_POSSIBLE: f.id in doubts.beside_possibility,
+        DIFFERING: f.id in doubts.differing,
         REPLACEABLE: f.id in doubts.replaceable,
         SMOOTHED: f.id in doubts.smoothed,
         OUSTED: f.id in doubts.unsettled,

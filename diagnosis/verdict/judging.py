@@ -159,7 +159,7 @@ def judge(
         gain = gain_of_search(data, start, coefficients, fit.findings, now)
         unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
     advance("residual")
-    doubted = _in_doubt(fit.findings, data, changed, unshown)
+    doubted = _in_doubt(fit, data, changed, unshown)
     if calibrates:
         other = None
         if not any_finding(fit.findings, start):
@@ -179,7 +179,7 @@ def judge(
             fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
             now = _predicting(fit.findings, data, changed)
             gain = gain_of_search(data, start, coefficients, fit.findings, now)
-            doubted = _in_doubt(fit.findings, data, changed, set())
+            doubted = _in_doubt(fit, data, changed, set())
     decided = DecidedFindings(
         doubted.learned,
         withdrawn,
@@ -204,10 +204,10 @@ class _FindingsInDoubt(NamedTuple):
 
 
 def _in_doubt(
-    found: Findings, data: ValidationData, changed: bool, unshown: Collection[str]
+    fit: RefitOutcome, data: ValidationData, changed: bool, unshown: Collection[str]
 ) -> _FindingsInDoubt:
     """The findings with their confidence; ``unshown`` are those that predictions do not show."""
-    start, train = data.start, data.train
+    found, start, train = fit.findings, data.start, data.train
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if found.model.runs else data.runs
     remainder = remainder_of(judged, start, found, changed)
@@ -221,6 +221,7 @@ def _in_doubt(
         of_several=of_several(found, start),
         smoothed=faster_than_smoothing(found, start, train),
         without_gain=unshown,
+        differing=differing(fit),
         implausible=not found.plausible,
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
@@ -252,6 +253,12 @@ def replaceable(found: Findings, explained: Sequence[float], alone: Sequence[flo
         for f, share, own in zip(found.effects, explained, alone, strict=True)
         if own is not None and own <= NEGLIGIBLE * share
     }
+
+
+def differing(fit: RefitOutcome) -> set[str]:
+    """The effects with a value that the two fits differ in by more than their intervals."""
+    values = fit.unrecorded.differing.keys()
+    return {f.id for f in fit.findings.effects if not values.isdisjoint(f.values)}
 
 
 def faster_than_smoothing(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
