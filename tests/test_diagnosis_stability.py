@@ -152,6 +152,8 @@ def test_less_dissipation_names_the_region(changes, words):
     found = check_stability(Model(changes), NOMINAL)
     assert found.region is not None
     assert all(word in found.region for word in words)
+    gains = "gains energy" in words
+    assert found.driven_on == ("surge",) * gains
 
 
 @pytest.mark.parametrize(

@@ -252,6 +252,14 @@ def test_a_model_that_predicts_worse_is_said_to(times, told):
     assert " ".join(said).startswith(f"{SEARCH_GAINED_NOTHING}{told} Predictions over 10 s in 54")
 
 
+@pytest.mark.parametrize("driven", [(), ("surge",)])
+def test_a_hull_that_gains_energy_is_in_the_headline(driven):
+    stability = SimpleNamespace(**vars(STABILITY) | {"driven_on": driven})
+    told = first_sentences(found(stability=stability))
+    assert told.startswith(first_sentences(found()))
+    assert ("In surge the hull of the learned model gains energy" in told) == bool(driven)
+
+
 @pytest.mark.parametrize("gained", [True, False])
 def test_what_the_search_gained_is_the_first_sentence(gained):
     change = PairedChange(0.032, 0.0089, 9.4e-4, 1.1e-4)

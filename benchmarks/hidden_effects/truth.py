@@ -13,7 +13,6 @@ import numpy as np
 from scipy.signal import lfilter
 
 from fmus.declare import packer, variables
-from fmus.effects.all_thrusters import lag_filter
 from fmus.frames import rotate_to_body
 from fmus.hull import Inertia, mass_matrix
 from fmus.ship import ship
@@ -141,7 +140,7 @@ def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
     ready = THRUSTERS.prepared(p)
     now = SHIP.layout.running(m.time, *nu.T, tuple(shares.T), ready)
     if lag:
-        shares = lfilter(*lag_filter(STEP, lag), shares, axis=0)
+        shares = lfilter(*SHIP.effects["lag"].memory.filter(STEP, lag), shares, axis=0)
     tau = SHIP.layout.act(tuple(shares.T), now, ready)
     return np.column_stack(np.broadcast_arrays(*tau))
 

@@ -25,7 +25,6 @@ from ..predictors import Model
 from ..predictors.thrust import FORGOTTEN
 from ..runs.cleaning import BRIEF
 from .closed_loop import REFERENCES, bound_of, largest_distance
-from .covariates import AXES
 from .settings import SETTINGS
 
 MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
@@ -97,6 +96,7 @@ class Stability:
             dissipates no more: then nothing that was learned is the reason.
         region: where the learned hull dissipates less than the nominal one, with numbers; None: nowhere.
         notes: further remarks, a sentence each.
+        driven_on: motions in which the learned hull gains energy, and the nominal one less or none.
     """
 
     mass_definite: bool
@@ -107,6 +107,7 @@ class Stability:
     notes: tuple[str, ...]
     closed_loop: bool = True
     from_start: bool = False
+    driven_on: tuple[str, ...] = ()
 
     @property
     def safe(self) -> bool:
@@ -175,6 +176,7 @@ def check_stability(
         tuple(dict.fromkeys(notes)),
         held,
         both and not _less(after.min(), before.min()),
+        driven_on(model, nominal, region),
     )
 
 
@@ -248,14 +250,19 @@ def _scaled(nu: np.ndarray, region: OperatingRegion) -> np.ndarray:
     return np.abs(nu) * np.where(nu < 0.0, *region.edges)
 
 
-def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
-    """Whether in surge, sway or yaw alone a hull drives the ship on, and another less or not at all."""
-    metric = mass(other)
-    for k in range(len(AXES)):
+def driven_on(model: Model, other: Model, region: OperatingRegion) -> tuple[str, ...]:
+    """The motions, surge, sway or yaw alone, in which a hull drives the ship on, and another less."""
+    metric, found = mass(other), []
+    for k, (name, _) in enumerate(MOTIONS):
         lowest, of_other = (dissipation(m, alone(k, region), metric).min() for m in (model, other))
         if lowest < 0.0 and _less(lowest, of_other):
-            return True
-    return False
+            found.append(name)
+    return tuple(found)
+
+
+def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
+    """Whether in any motion a hull drives the ship on, and another less, see :func:`driven_on`."""
+    return bool(driven_on(model, other, region))
 
 
 def _less(after: Any, before: Any) -> Any:

@@ -39,6 +39,10 @@ NOTHING_FOUND = "These data show no missing effect."
 TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
 UNEXPLAINED = "A model error remains that no known effect explains."
 NOT_BELIEVED = "The model has an error that no known effect explains with sufficient confidence."
+DRIVEN_ON = (
+    "In {motions} the hull of the learned model gains energy, which no hull does: it predicts motions "
+    "like those of these runs, and is wrong for others."
+)
 CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
     "and predict data left out of the fit no worse. This does not identify a cause."
@@ -164,9 +168,14 @@ def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
 
 
 def first_sentences(r: ReportData) -> str:
-    """The headline, after the sentence that the search gained nothing where that is so."""
-    gain = gain_of_search(r)
-    return " ".join([*(s for s in gain if s == SEARCH_GAINED_NOTHING), headline(r)])
+    """The headline, after the sentence that the search gained nothing where that is so.
+
+    A hull that gains energy, which none does, follows it.
+    """
+    gain, d = gain_of_search(r), r.diagnosis
+    driven = d.stability.driven_on if d and r.comparison.predictor.parametric else ()
+    warning = [DRIVEN_ON.format(motions=listed(driven, "and"))] if driven else []
+    return " ".join([*(s for s in gain if s == SEARCH_GAINED_NOTHING), headline(r), *warning])
 
 
 def verdict_title(r: ReportData) -> str:

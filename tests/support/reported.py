@@ -17,6 +17,7 @@ STABILITY = SimpleNamespace(
     mass_definite=True,
     closed_loop=True,
     notes=("a note",),
+    driven_on=(),
 )
 
 

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Shooting
+from ..conclusion import suspected
 from ..findings import Findings
 from ..prior import NominalPrior
 from ..refinement import RefinedModel
@@ -96,8 +97,11 @@ class Calibrator:
         model, folds = at.model(self.prior), fitted.fold_models
         moved = dict(zip(self.prior.mean, at.offset.tolist(), strict=True))
         f = self.found
-        learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)
         posterior = JointPosterior.of(fitted, self.prior)
+        wrong = suspected(self.prior, at.offset, posterior.shares(self.prior))
+        learned = Findings(
+            [], f.ranking, model, wrong, f.sigma, model, moved, folds, None, at, f.searched
+        )
         push = as_missed(problem, fitted, model, posterior)
         return RefitOutcome(learned, posterior, unrecorded(self.train, model, push, {}))
 

@@ -58,6 +58,11 @@ class JointPosterior(ShortRepr):
         std = np.sqrt(np.diag(self.covariance)).tolist()
         return {n.partition(".")[2]: s for n, s in zip(self.names, std, strict=True)}
 
+    def shares(self, prior: NominalPrior) -> np.ndarray:
+        """(q,), standard deviations of the nominal coefficients over those of their prior."""
+        std = self.std
+        return np.array([std.get(n, 0.0) / s if s else 0.0 for n, s in prior.std.items()])
+
     @property
     def correlation(self) -> np.ndarray:
         """(q, q), see :func:`correlation`."""

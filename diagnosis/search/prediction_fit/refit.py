@@ -88,7 +88,6 @@ def to_predictions(
             effects.append(replace(f, values=values, ci95=dict(f.ci95) | own))
     if effects:
         effects[-1] = replace(effects[-1], model=model)
-    share = np.array([std.get(n, 0.0) / s if s else 0.0 for n, s in prior.std.items()])
     first = weak.model(prior)
     differ = {
         n: (first.value(n), model.value(n))
@@ -99,7 +98,7 @@ def to_predictions(
         found,
         effects=effects,
         model=model,
-        suspects=suspected(prior, at.offset, share),
+        suspects=suspected(prior, at.offset, posterior.shares(prior)),
         moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
         estimate=at,
         fold_models=fitted.fold_models,
