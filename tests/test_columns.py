@@ -274,7 +274,7 @@ def test_words_of_other_languages_and_short_forms(name: str, unit: str, signal: 
 
 
 @pytest.mark.parametrize(
-    ("name", "signal"), [("Hochwert", "x"), ("Zeit", "time"), ("Øst", "y"), ("Est", "")]
+    ("name", "signal"), [("Hochwert", "x"), ("Zeit", "time"), ("Øst", "y"), ("Est", "y"), ("a.est", "")]
 )
 def test_names_in_other_languages(name: str, signal: str) -> None:
     assert meaning(name, quantities(TANKER)) == (signal, False)

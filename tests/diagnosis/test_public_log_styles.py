@@ -1,7 +1,5 @@
 """Logs in the styles of widespread tools: PX4, MAVLink, ROS, libcosim, LabVIEW, MOOS, and tables of pandas and numpy."""
 
-import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -161,27 +159,31 @@ def test_commands_by_their_symbols_and_usual_names(tmp_path: Path, rudder: str, 
         "tijd [s];noord [m];oost [m];heading [graden];toerental [omw/min];roerhoek [graden]",
         "tid (s);nord (m);ost (m);heading (grader);varvtal (varv/min);rodervinkel (grader)",
         "Heure (s);Nord (m);Est (m);Cap (deg);Régime hélice (tr/min);Angle de barre (deg)",
+        "時刻 [s];北 [m];東 [m];船首方位 [deg];回転数 [rpm];舵角 [deg]",
+        "时间 (s);北向 (m);东向 (m);艏向角 (deg);螺旋桨转速 (rpm);舵角 (deg)",
         "Zeit [s];X0 [m];Y0 [m];PSI [deg];RPS [1/s];DELTA [deg]",
         "Elapsed time [s];Distance north [m];Distance east [m];Heading [deg];Shaft [rpm];Rudder [deg]",
         "t_s;gps_north_m;gps_east_m;gyro_heading_deg;shaft_rpm;rudder_deg",
     ],
 )
-def test_names_of_loggers_in_seven_languages(tmp_path: Path, names: str) -> None:
-    """The east that is called est has to be stated: that is an estimate as well."""
+def test_names_of_loggers_in_nine_languages(tmp_path: Path, names: str) -> None:
     rows = np.array(TANKER_LOG)[[0, 1, 2, 3, 5, 4]]
     rows[[3, 5]] = np.degrees(rows[[3, 5]])
     rows[4] *= 1.0 if "1/s" in names else 60.0
     lines = [";".join(row) for row in rows.T.round(5).astype(str)]
     log = tmp_path / "a.csv"
     log.write_text("\n".join([names, *lines]) + "\n", encoding="utf-8")
-    east = re.search(r"\b[Ee]st \(m\)", names)
-    if east:
-        (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"y": east[0]}}))
     run = propose(log, TANKER).run
     assert run is not None
     is_the_motion(run)
     np.testing.assert_allclose(run.commanded["rudder.delta"], TANKER_LOG[4], atol=1e-5)
     np.testing.assert_allclose(run.commanded["propeller.n"], TANKER_LOG[5], atol=1e-5)
+
+
+def test_an_estimate_is_no_east(tmp_path: Path) -> None:
+    """Est alone is the east of France and Italy, and as a part of a name an estimate."""
+    log(**{"heading.est": EAST, "y_est": EAST}).drop(columns="y").to_csv(tmp_path / "a.csv", index=False)
+    assert propose(tmp_path / "a.csv", OTTER).layout.column("y").name == ""
 
 
 def test_the_side_of_a_rudder_may_be_a_letter(tmp_path: Path) -> None:

@@ -37,12 +37,35 @@ FOREIGN = {
 ENGLISH = {word: english for english, words in FOREIGN.items() for word in words.split()}
 # Letters that are no other letter with an accent.
 PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "δ": "delta", "ψ": "psi"})
+# The same in Chinese and Japanese, where no blanks are between words.
+UNSPACED = {
+    "time": "时间 時間 時刻",
+    "north": "北向 北",
+    "east": "东向 東 东",
+    "heading": "首向 艏向角 艏向 船首方位",
+    "latitude": "纬度 緯度",
+    "longitude": "经度 経度",
+    "rudder angle": "舵角",
+    "rudder": "舵",
+    "rpm": "转速 回転数",
+    "port": "左舷 左",
+    "starboard": "右舷 右",
+    "propeller": "螺旋桨 推进器 プロペラ",
+}
+
+
+def _plain(text: str) -> str:
+    """A text in small letters without accents."""
+    letters = unicodedata.normalize("NFKD", text).casefold().translate(PLAIN)
+    return "".join(c for c in letters if not unicodedata.combining(c))
+
+
+ENGLISH |= {_plain(word): english for english, words in UNSPACED.items() for word in words.split()}
+WORDS = "|".join(sorted((w for w in ENGLISH if not w.isascii()), key=len, reverse=True))
 
 
 def words_of(name: str) -> list[str]:
     """The words of a name, small letters; numbers are words of their own."""
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    letters = unicodedata.normalize("NFKD", apart).casefold().translate(PLAIN)
-    plain = "".join(c for c in letters if not unicodedata.combining(c))
-    found: list[str] = re.findall(r"[a-z]+|\d+", plain)
+    found: list[str] = re.findall(rf"[a-z]+|\d+|{WORDS}", _plain(apart))
     return " ".join(ENGLISH.get(word, word) for word in found).split()

@@ -51,6 +51,7 @@ CALLED: dict[str, tuple[str, ...]] = {
     ),
 }
 VALUE = frozenset(("value", "val", "reading", "data"))  # of all values, of a table with one in a row
+EAST = "est"  # in French and Italian, as a whole name; as a part of one it is an estimate
 OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
 
@@ -87,6 +88,8 @@ def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
         An empty name where it means none of them.
     """
     known = MEANT | {_folded(signal): (signal, False) for signal in signals}
+    if _folded(name) == EAST and "y" in signals:
+        return "y", False
     parts = re.split("[/.]", name)
     parts[-2:-1] = [part.rpartition("_")[2] for part in parts[-2:-1]]  # vehicle_local_position.x
     last = parts[-1] if len(parts[-1]) > 1 or parts[-1] == "t" or "." not in name else ""
