@@ -11,8 +11,11 @@ from support.cse1 import THRUSTERS as COMPONENT
 from support.measured import sail
 
 from diagnosis import Model, Run
+from diagnosis.predictors import ship_with
 from diagnosis.predictors.thrust import Integral, Response, thrust
+from fmus.actuators.response import layouts
 from fmus.declare import variables
+from fmus.ops import wrap
 from fmus.signals import Force, VelocityInCurrent
 
 # Of every effect on thrusters, and of every other parameter of the plant's, a value that matters.
@@ -186,4 +189,37 @@ def test_linear_memories_are_the_filters_that_they_declare(dynamics):
     commands = np.diff(response._commands(response.step * np.arange(response._steps + 1)), axis=0)
     commands /= response.step
     forgotten = np.exp(-12.0) * np.abs(commands).max()  # what the steps of a part begin without
-    np.testing.assert_allclose(response._filtered(commands), response._stepped(commands), atol=forgotten)
+    np.testing.assert_allclose(
+        response._signal_by_signal(commands), response._stepped(commands), atol=forgotten
+    )
+
+
+@pytest.mark.parametrize(
+    ("of", "slow"),
+    [
+        ("cybership2", {"play_port_rudder": 0.2}),
+        ("cybership2", {"rate_port_rudder": 0.1, "delay": 0.3}),
+        ("gunnerus", {"rate_azimuth": 0.1}),
+        ("gunnerus", {"rate_azimuth": 0.06, "lag_azimuth": 3.0}),
+    ],
+)
+def test_signals_that_move_by_themselves_are_stepped_as_the_thrusters_do(of, slow):
+    """Commands that jump, angles all around; a turn more or less is none."""
+    made = ship_with((), of)
+    layout = layouts(made.description)[0]
+    jumps = np.random.default_rng(3).uniform(-1.0, 1.0, (40, len(layout.commands)))
+    jumps[:, np.array(layout.round)] *= np.pi
+    commands = np.repeat(0.6 * jumps, 20, axis=0)
+    time = 0.5 * made.scale.time * np.arange(len(commands))
+    pose = np.column_stack([0.5 * time, 0.0 * time, 0.0 * time])
+    tau = made.commanded_force(commands)
+    response = Response(
+        Run("jumps", time, pose, tau, commands, ship=made.description), Model(ship=made).plus(slow)
+    )
+    given = np.diff(response._commands(response.step * np.arange(response._steps + 1)), axis=0)
+    given /= response.step
+    found, expected = response._signal_by_signal(given), response._stepped(given)
+    assert np.abs(found - given[:, None]).max() > 0.1
+    off = found - expected
+    off[..., np.array(layout.round)] = wrap(off[..., np.array(layout.round)])
+    np.testing.assert_allclose(off, 0.0, atol=1e-4)

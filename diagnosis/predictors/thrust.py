@@ -1,12 +1,14 @@
 """The force of the thrusters along a measured run, by the very functions of the thrusters' FMU.
 
 What lies between a command and the share of full force that acts (delay, limited rate, lag, and a user's
-effects with a memory) is computed by :mod:`fmus.actuators.response` in short steps of a regular grid, or
-by the linear filters that they declare to be. A memory lasts only so long: the grid is cut into parts
-that are stepped side by side, each from the time before it that still matters. Weak form and predictions
-use the same result, :class:`Response`.
+effects with a memory) is computed in short steps of a regular grid. Effects that are linear filters, or
+that declare how each signal moves, are computed signal by signal. Others are stepped as in
+:mod:`fmus.actuators.response`: a memory lasts only so long, so that the grid is cut into parts, side by
+side, each from the time before it that still matters. Weak form and predictions use the same result,
+:class:`Response`.
 """
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +22,7 @@ from fmus.actuators.response import (
     thruster_effects,
 )
 from fmus.effects import Memory
+from fmus.effects.steering_gear import rate_limited
 from fmus.vessel.vessel import PreparedVessel, State, water_velocity
 
 from ..runs.files.reading import Run
@@ -227,10 +230,9 @@ class Response:
             return Integral(c.edges, c.values[:, None], c.before[None])
         edges = self.step * np.arange(self._steps + 1)
         commands = np.diff(c(edges), axis=0) / self.step
-        linear = not any(rate > 0.0 for rate in self.drive.params.rate)
-        if linear and all(memory.filter for _, memory in self._memories):
-            values = self._filtered(commands)
-        else:
+        apart = all(memory.filter or memory.each for _, memory in self._memories)
+        values = self._signal_by_signal(commands) if apart else None
+        if values is None:
             values = self._stepped(commands)
         return Integral(edges, values, np.stack([c.before] * 2))
 
@@ -252,17 +254,42 @@ class Response:
     def _steps(self) -> int:
         return int(np.ceil(self._clock[-1] / self.step + 1.0)) + 1
 
-    def _filtered(self, commands: np.ndarray) -> np.ndarray:
-        """(m, 2, k), what linear memories make of commands (m, k) in steps of the grid."""
-        found, signal = [], commands - self._commands.before
+    def _signal_by_signal(self, commands: np.ndarray) -> np.ndarray | None:
+        """(m, 2, k), what the thrusters make of commands (m, k) in steps of the grid.
+
+        Of None an angle that a filter gives is more than half a turn behind.
+        """
+        found, x = [], commands.copy()
+        before, turns = self._commands.before, np.array(self.drive.effects.layout.round)
         for of in ("command", "force"):
             for member, memory in self._memories:
+                values = self.drive.params.dynamics[member.parameters]
                 if memory.of == of and memory.filter is not None:
-                    law = memory.filter(self.step, *self.drive.params.dynamics[member.parameters])
-                    signal = signal.copy()
-                    signal[:, memory.own] = filtered(*law, signal[:, memory.own])
-            found.append(signal + self._commands.before)
+                    own, wanted = memory.own, x.copy()
+                    law = memory.filter(self.step, *values)
+                    x[:, own] = before[own] + filtered(*law, x[:, own] - before[own])
+                    if np.any(np.abs(wanted - x)[:, turns] >= np.pi):
+                        return None
+                elif memory.of == of and memory.each is not None:
+                    for k, angle in zip(memory.each.places, memory.each.turns, strict=True):
+                        x[:, k] = self._moved(memory.each.move, x[:, k], before[k], values, angle)
+            if of == "command":
+                rates = np.broadcast_to(self.drive.params.rate, before.shape)
+                for k in np.flatnonzero(rates > 0.0):
+                    x[:, k] = self._moved(rate_limited, x[:, k], before[k], [rates[k]], bool(turns[k]))
+            found.append(x.copy())
         return np.stack(found, axis=1)
+
+    def _moved(
+        self, move: Callable[..., Any], x: np.ndarray, at: float, values: Sequence[float], angle: bool
+    ) -> np.ndarray:
+        """(m,), means over each step of a signal that moves, from where it is, to wanted ones (m,)."""
+        means, at = [], float(at)  # plain floats are ten times faster
+        last = *map(float, values), self.step, angle
+        for wanted in x.tolist():
+            at, mean = move(at, wanted, *last)
+            means.append(mean)
+        return np.array(means)
 
     def _stepped(self, commands: np.ndarray) -> np.ndarray:
         """(m, 2, k), what the thrusters make of commands (m, k) in steps of the grid, in parts."""

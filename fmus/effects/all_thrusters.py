@@ -76,7 +76,7 @@ def slow(
             "force",
             lambda lag: FORGOTTEN * lag,
             idle=lambda before, wanted: wanted,
-            filter=None if any(turns) else lag_filter,
+            filter=lag_filter,
             own=own,
         ),
         search=Search(tries=[{name: d.scale.time * T} for T in (*TIMES, 2.0)]),

@@ -125,6 +125,21 @@ class Thrust(NamedTuple):
     couple: tuple[Number, ...] = ()
 
 
+class EachSignal(NamedTuple):
+    """What an effect with a memory does to each of its signals, by itself.
+
+    Attributes:
+        move: ``move(before, wanted, *parameters, h, turns)``: the signal after a step of h [s] towards
+            the wanted one, and its mean over the step.
+        places: of the signals.
+        turns: for each whether it is an angle that goes round.
+    """
+
+    move: Callable[..., tuple[Number, Number]]
+    places: tuple[int, ...]
+    turns: tuple[bool, ...]
+
+
 class Memory(NamedTuple):
     """How an actuator effect depends on the past.
 
@@ -138,7 +153,9 @@ class Memory(NamedTuple):
         idle: ``idle(memory, signals)``: the memory after a step in which the effect does not act, from
             which it starts if it is switched on; by default it stays as it is.
         filter: ``filter(h, *parameters)``: numerator and denominator in 1/z of the linear filter that
-            the effect is in steps of h [s], of unit gain for constant signals; None: it is none.
+            the effect is in steps of h [s], of unit gain for constant signals; None: it is none. Of an
+            angle that goes round it holds while the way to the wanted one is less than half a turn.
+        each: the effect where its memory is the signals themselves, moved one by one; None: it is not.
         own: places of the signals that it changes.
     """
 
@@ -148,6 +165,7 @@ class Memory(NamedTuple):
     keeps: int | None = None
     idle: Callable[[Any, tuple[Number, ...]], tuple[object, ...]] | None = None
     filter: Callable[..., tuple[Sequence[float], Sequence[float]]] | None = None
+    each: EachSignal | None = None
     own: slice = slice(None)
 
     def start(self, width: int) -> tuple[object, ...]:

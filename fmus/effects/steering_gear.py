@@ -8,7 +8,7 @@ from ..declare import Range, Variable
 from ..ops import Number, clip, fmax
 from .all_thrusters import way
 from .devices import Devices, declared, parameter
-from .effect import Effect, Memory, Search
+from .effect import EachSignal, Effect, Memory, Search
 from .text import Found
 
 # rad/s, times the scale of the ship. Chosen about the 65 degrees in 28 s that SOLAS asks of a ship of
@@ -77,6 +77,7 @@ def gear(
             "command",
             lasts,
             idle=lambda before, wanted: tuple([wanted[k] for k in places]),
+            each=EachSignal(move, tuple(places), tuple(turns)),
             own=slice(min(places), max(places) + 1),
         ),
         **more,
