@@ -576,10 +576,10 @@ def test_effects_of_a_described_ship_are_its_actuators():
 
 
 @pytest.mark.parametrize("name", SHIPS)
-def test_what_a_description_is_not_sure_of_may_be_fitted_but_no_limit_of_a_command(name):
+def test_what_a_description_is_not_sure_of_may_be_fitted_but_no_end_of_a_range(name):
     """Of its actuators; what is zero has no share that it could be wrong by."""
     d = SHIPS[name]
-    limits = ("n_max", "n_min", "n_rate", "alpha_max", "delta_max", "P_idle", "P_full")
+    limits = ("n_max", "n_min", "alpha_max", "delta_max", "P_idle", "P_full")
     known = {
         v.name.removeprefix("plant_"): v.known for v in variables(ship(description=d).thrusters.params)
     }

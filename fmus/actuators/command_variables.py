@@ -24,19 +24,19 @@ def rates_of(ship: Description) -> type[Fields]:
     if limits and all(c.unit == "1" and not rate for _, c, rate in limits):
         text = "limit of a command's rate; 0: none"
         return group_of("Rate", [Variable("plant_rate", "1/s", text, 0.0, POSITIVE)])
-    return group_of(
-        "Rate",
-        [
-            Variable(
-                f"plant_{a.order}_{c.name}_rate",
-                "1/s" if c.unit == "1" else f"{c.unit}2" if c.unit == "1/s" else f"{c.unit}/s",
-                f"{a.label}: limit of the rate of {c.name}; 0: none",
-                rate,
-                POSITIVE,
-            )
-            for a, c, rate in limits
-        ],
-    )
+
+    def limit(a: Actuator, c: Command, rate: float) -> Variable:
+        v = Variable(
+            f"plant_{a.order}_{c.name}_rate",
+            "1/s" if c.unit == "1" else f"{c.unit}2" if c.unit == "1/s" else f"{c.unit}/s",
+            f"{a.label}: limit of the rate of {c.name}; 0: none",
+            rate,
+            POSITIVE,
+        )
+        stated = (x for x in a.part.values if x.name == f"{c.name}_rate")
+        return next((x.of(v, "rate") for x in stated), v)
+
+    return group_of("Rate", [limit(*each) for each in limits])
 
 
 def powers_of(ship: Description) -> type[Fields]:
