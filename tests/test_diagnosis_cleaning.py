@@ -13,7 +13,7 @@ from support.measured import NOISE, changed, sail
 from diagnosis import InputError, clean
 from diagnosis.runs import prepare
 from diagnosis.runs.cleaning import noise, unwrap
-from diagnosis.runs.row_order import continued, in_order, ordered
+from diagnosis.runs.row_order import continued, in_bursts, in_order, ordered
 
 N = 1200
 
@@ -357,6 +357,18 @@ def test_rows_that_were_stamped_in_batches_are_spread_and_bursts_of_samples_are_
         assert "stamps are 0.16 s apart, with 8 samples each" in found.notes[-1]
     else:
         np.testing.assert_array_equal(found.time, stamps)
+
+
+def test_messages_of_other_channels_a_few_milliseconds_later_are_no_burst():
+    """A position each 0.2 s, a heading 3 ms and commands 6 ms after it, each in a row of its own."""
+    run = base()
+    each = run.rows(np.repeat(np.arange(0, N, 10), 3))
+    pose, kind = np.array(each.pose), np.arange(each.time.size) % 3
+    pose[kind > 0, :2] = pose[kind != 1, 2] = np.nan
+    rows = replace(each, time=each.time + 0.003 * kind, pose=pose)
+    assert not in_bursts(rows)
+    np.testing.assert_array_equal(ordered(rows).time, rows.time)
+    assert in_bursts(replace(rows, pose=each.pose)), "three positions at once"
 
 
 def test_minutes_that_begin_anew_each_hour_go_on_all_day():

@@ -1,5 +1,6 @@
 """What the search for effects gained over calibration alone: paired errors, both ways."""
 
+import itertools
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -16,7 +17,8 @@ from diagnosis.predictors.weak_form import SMALL
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
-from diagnosis.verdict.coefficients import any_sure, better_calibration, needless
+from diagnosis.verdict import coefficients
+from diagnosis.verdict.coefficients import any_sure, better_calibration, needless, sufficient
 from diagnosis.verdict.confidence import Doubts
 from diagnosis.verdict.judging import with_confidence
 from diagnosis.verdict.prediction_gain import (
@@ -131,6 +133,36 @@ def test_effects_none_of_which_is_a_finding_give_way_unless_they_predict_better(
     for believed in (False, True):
         given = better_calibration(fit, end, data, lambda *_: False, believed=believed)
         assert given is (fit if taken and (not believed or learned > calibrated) else None)
+
+
+@pytest.mark.parametrize(("learned", "taken"), [(4.0, True), (1.0, False)])
+def test_findings_that_gain_nothing_give_way_to_coefficients_that_suffice(learned, taken, monkeypatch):
+    """Within their priors, and with nothing left, other coefficients are no missing effect."""
+    fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(1)
+    data = Data({id(START): 9.0, id(fit.findings): 4.0, id(end): learned})
+    for suffices, gained in itertools.product((True, False), repeat=2):
+        monkeypatch.setattr(coefficients, "sufficient", lambda *_, is_so=suffices: is_so)
+        given = better_calibration(fit, end, data, lambda *_: False, gained=gained)
+        assert given is (fit if taken and suffices and not gained else None)
+
+
+@pytest.mark.parametrize(
+    ("effect", "z", "left", "suffices"),
+    [
+        ("X_u", 2.9, False, True),
+        ("X_u", 3.1, False, False),
+        ("X_u", 2.9, True, False),
+        ("bow_failure", 2.9, False, False),
+        ("waves", 2.9, False, False),
+    ],
+)
+def test_coefficients_suffice_within_their_priors_where_nothing_is_left(
+    effect, z, left, suffices, monkeypatch
+):
+    monkeypatch.setattr(coefficients, "remains", lambda *_: left)
+    its = Findings(model=BETTER, moved={"X_u": z})
+    end = Findings([Finding(effect, {}, {}, 0.5, [], 1.0, 1.0)], model=BETTER)
+    assert sufficient(its, end, SimpleNamespace(start=START, runs=[])) is suffices
 
 
 def test_the_standard_error_is_paired_and_covers_the_difference():

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.special import chdtri, ndtri
 
 from cosim import InputError
+from fmus.actuators.command_variables import rates_of
+from fmus.actuators.response import layouts
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
@@ -84,10 +86,21 @@ class Track(ShortRepr):
         parts = self.run.ship.actuators if self.run.ship else ()
         return max([part.number("lag") for part in parts], default=0.0)
 
+    @cached_property
+    def slewing(self) -> float:
+        """Time [s] that commands with a limited rate take for all of their way in a run, or to zero."""
+        ship, commands = self.run.ship, self.run.commands
+        rates = np.array(rates_of(ship)()) if ship else np.zeros(0)
+        if commands is None or rates.size != commands.shape[1]:
+            return 0.0
+        ways = np.ptp(np.vstack([commands, np.zeros_like(rates)]), axis=0)
+        ways = np.where(layouts(ship)[0].round, np.minimum(ways, np.pi), ways)
+        return float(np.max(np.divide(ways, rates, out=np.zeros_like(ways), where=rates > 0.0)))
+
     @property
     def responded(self) -> float:
         """Time [s] from which commands before the run, which are not known, hardly act any more."""
-        return float(self.run.time[0]) - float(np.log(NEGLIGIBLE)) * self.lag
+        return float(self.run.time[0]) - float(np.log(NEGLIGIBLE)) * self.lag + self.slewing
 
     @cached_property
     def periods(self) -> np.ndarray:
@@ -199,7 +212,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
     # With a few of the samples that regular sampling would give, nothing can be differentiated.
-    if in_bursts(run.time, scale):
+    if in_bursts(run, scale):
         mean = float(np.diff(run.time).mean())
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {mean:.3g} s on average"

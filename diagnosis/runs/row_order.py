@@ -32,7 +32,7 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
         InputError: more rows than can be wrong by chance have no time of their own.
     """
     if np.isfinite(run.time).all() and (np.diff(run.time) > 0.0).all():
-        return _spread(_of_batches(run)) if in_bursts(run.time, scale) else run
+        return _spread(_of_batches(run)) if in_bursts(run, scale) else run
     run = _without_empty(run)
     many = run.time.size
     found = _spread(_merged(_begun_anew(continued(by_stamps(run), scale))))
@@ -51,8 +51,12 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
 
 
-def in_bursts(time: np.ndarray, scale: Scale = REFERENCE) -> bool:
-    """Whether rows at increasing times (n,) [s] are far closer than they are on average, gaps apart."""
+def in_bursts(run: Run, scale: Scale = REFERENCE) -> bool:
+    """Whether positions at increasing times are far closer than they are on average, gaps apart.
+
+    Rows of other channels a few milliseconds later, as each message has its own, are no burst.
+    """
+    time = run.time[np.isfinite(run.pose[:, :2]).all(axis=1)]
     steps = np.minimum(np.diff(time), HORIZON * scale.time)
     return bool(time.size > 1 and NEGLIGIBLE * steps.sum() > np.median(np.diff(time)) * time.size)
 

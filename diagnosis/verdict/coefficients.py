@@ -109,11 +109,12 @@ def better_calibration(
     drives: Callable[[Model, Model], bool],
     without_gain: Collection[str] = (),
     believed: bool = True,
+    gained: bool = True,
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
     It also takes the place of effects than which it is as good, if none of them is a finding, or that
-    predict no better, if each has intervals that hold zero.
+    predict no better, if each has intervals that hold zero, or if the coefficients suffice.
 
     Args:
         calibration: the fit; None: there is none.
@@ -122,6 +123,7 @@ def better_calibration(
         drives: whether the hull of a model drives the ship on more than that of another.
         without_gain: ids of the effects that predictions do not show.
         believed: whether any effect is a finding.
+        gained: whether the search predicts better than the calibration, beyond chance.
 
     Returns:
         None where it predicts no better, beyond chance, predicts worse than the initial model, or has a
@@ -133,8 +135,22 @@ def better_calibration(
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
     idle = not believed and as_good(its, now)
-    better = needless(found, without_gain) or idle or predicts_worse(now, its)
+    enough = (
+        not gained and sufficient(calibration.findings, found, data) and not predicts_worse(its, now)
+    )
+    better = needless(found, without_gain) or idle or enough or predicts_worse(now, its)
     return calibration if better and not predicts_worse(its, first) else None
+
+
+def sufficient(its: Findings, found: Findings | Model, data: ValidationData) -> bool:
+    """Whether coefficients within their priors leave nothing of what some effects explain.
+
+    What the priors allow is no missing effect. Waves and failures at times of a run are none of theirs.
+    """
+    known = data.start.ship.effects
+    searches = [known[f.id].search for f in found.effects] if isinstance(found, Findings) else []
+    apart = any(s.times or s.by != "regression" for s in searches)
+    return its.plausible and not apart and not remains(data.runs, data.start, its.model)
 
 
 def needless(found: Findings | Model, without_gain: Collection[str]) -> bool:

@@ -166,7 +166,8 @@ def judge(
             other = calibrated(fit.findings, data, prior)
         if other is None and not any_sure(doubted.learned):
             believed = not doubted.learned.effects or any(map(is_finding, doubted.learned.effects))
-            other = better_calibration(calibration, now, data, drives, unshown, believed)
+            gained = gain is None or gain.gained
+            other = better_calibration(calibration, now, data, drives, unshown, believed, gained)
         nothing = (
             other is None
             and needless(fit.findings, unshown)

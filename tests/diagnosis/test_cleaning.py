@@ -22,9 +22,12 @@ from diagnosis.runs.cleaning import (
     updates,
 )
 from diagnosis.runs.run_constants import EVERY, HORIZON, LONG, NEGLIGIBLE
+from fmus.actuators.actuation import command_names
 from fmus.scale import REFERENCE, Scale
+from fmus.ships.ship_file import read_ship
 
 H, N = 0.1, 400
+RATE = 0.5236  # rad/s, of an azimuth of the research vessel
 TIME = H * np.arange(N)
 NOTHING = np.zeros(N, bool)
 
@@ -37,7 +40,7 @@ def run(pose=None, time=TIME, **more):
 def track(time=TIME, scale=REFERENCE, fresh=None, **of_run):
     n = time.size
     fresh = np.ones((n, 3), bool) if fresh is None else fresh
-    given = {"resolution": None, "held": None, "ship": None} | of_run
+    given = {"resolution": None, "held": None, "ship": None, "commands": None} | of_run
     r = SimpleNamespace(time=time, **given)
     r.coarse = np.zeros((n, 3)) if given["resolution"] is None else given["resolution"]
     empty = np.zeros(n, bool)
@@ -202,11 +205,28 @@ def test_periods_and_rounding_are_those_of_each_channel():
 
 
 def test_commands_before_the_run_are_forgotten_after_the_longest_lag():
-    parts = [SimpleNamespace(number=lambda name, x=x: x) for x in (0.5, 2.0, 1.0)]
-    t = track(time=TIME + 7.0, ship=SimpleNamespace(actuators=parts))
-    assert t.lag == 2.0
-    assert np.exp(-(t.responded - 7.0) / 2.0) == pytest.approx(NEGLIGIBLE)
+    t = track(time=TIME + 7.0, ship=read_ship("otter"))
+    assert t.lag == 1.0
+    assert np.exp(-(t.responded - 7.0)) == pytest.approx(NEGLIGIBLE)
     assert (track().lag, track().responded) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("angle", "speed", "seconds"), [(0.6, 0.0, 0.6 / RATE), (0.1, 2.0, 4.0), (9.0, 0.0, np.pi / RATE)]
+)
+def test_commands_before_the_run_are_forgotten_once_limited_rates_have_gone_all_their_way(
+    angle, speed, seconds
+):
+    """From zero or the other end to any command; an azimuth that goes round takes half a turn at most."""
+    of = read_ship(
+        "gunnerus"
+    )  # its azimuths turn at RATE, and their shafts change by 0.5 1/s in a second
+    commands = np.zeros((N, len(command_names(of))))
+    commands[: N // 2, 0], commands[:, 1] = angle, speed
+    t = track(ship=of, commands=commands)
+    assert t.slewing == pytest.approx(seconds)
+    assert t.responded == pytest.approx(seconds - np.log(NEGLIGIBLE) * t.lag)
+    assert track(ship=of).slewing == 0.0
 
 
 def silent(held):

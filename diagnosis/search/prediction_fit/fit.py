@@ -213,12 +213,15 @@ class PredictionFit:
         return replace(found, slopes=found.slopes[..., self._columns] * self.unit)
 
     def whitening(self, s: Shooting, around: Around) -> np.ndarray:
-        """The factor (w, 3T, 3T) that whitens the residuals of windows; zero where a model runs away."""
+        """The factor (w, 3T, 3T) that whitens residuals of windows; zero where a model runs away."""
         r = around.residuals
         fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
-        seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
         none = ForceDisturbance(np.zeros(3), np.ones(3))
         V = covariance(around.motion[fine], s.at_start[fine], none)
+        # A small change at the start may be beyond all numbers at the end, where the prediction is not.
+        steady = np.isfinite(V).all(axis=(1, 2, 3, 4))
+        fine[fine], V = steady, V[steady]
+        seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
         missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
         found = np.zeros((len(r), r[0].size, r[0].size))
         whole = _square(V, s.noise[fine] + missed[fine])
