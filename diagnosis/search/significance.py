@@ -149,6 +149,15 @@ def predicts_worse(its: Losses, others: Losses) -> bool:
     return any(worse(a, b) for a, b in pairs) and gain_of_predictions(its, others) > 0.0
 
 
+def predicts_better(its: Losses, others: Losses) -> bool:
+    """Whether a model predicts better than another: beyond chance, or position and heading throughout.
+
+    A window with most of the error makes the standard error of the mean as large as the mean.
+    """
+    pairs = zip(its[1:], others[1:], strict=True)
+    return predicts_worse(others, its) or all(lower_throughout(*pair) for pair in pairs)
+
+
 def as_good(its: Losses, others: Losses) -> bool:
     """Whether a model may take the place of another with more terms.
 

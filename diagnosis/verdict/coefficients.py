@@ -15,7 +15,7 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import as_good, gain, harm, predicts_worse
+from ..search.significance import as_good, gain, harm, predicts_better, predicts_worse
 from .confidence import FOUND, confidence_of, may_be_none
 from .pruning import without
 from .validation_data import ValidationData
@@ -138,7 +138,7 @@ def better_calibration(
     enough = (
         not gained and sufficient(calibration.findings, found, data) and not predicts_worse(its, now)
     )
-    better = needless(found, without_gain) or idle or enough or predicts_worse(now, its)
+    better = needless(found, without_gain) or idle or enough or predicts_better(its, now)
     return calibration if better and not predicts_worse(its, first) else None
 
 

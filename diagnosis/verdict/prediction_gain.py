@@ -11,7 +11,7 @@ from ..predictors.weak_form import SMALL
 from ..search.candidates import model_error, shape
 from ..search.findings import Finding, Findings
 from ..search.shortlist import TIE
-from ..search.significance import lower_throughout, predicts_worse
+from ..search.significance import predicts_better, predicts_worse
 from .validation_data import ValidationData
 
 # Group of coefficients -> the kind of force that they make up with others.
@@ -86,9 +86,7 @@ def prediction_gain(
     if its.position.size < 2:
         return None
     position, heading = (PairedChange.of(*pair) for pair in zip(others[1:], its[1:], strict=True))
-    # A window with most of the error makes the standard error of the mean as large as the mean.
-    pairs = zip(its[1:], others[1:], strict=True)
-    gained = predicts_worse(others, its) or all(lower_throughout(*pair) for pair in pairs)
+    gained = predicts_better(its, others)
     return PredictionGain(data.where, its.position.size, position, heading, gained)
 
 
