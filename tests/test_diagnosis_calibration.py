@@ -133,7 +133,10 @@ def test_it_is_kept_where_runs_left_out_are_predicted_better():
     out = calibrated(nothing_found(), ValidationData(runs()[:3], [], Model(), np.ones(3)), PRIOR)
     assert out is not None
     assert not out.findings.effects
-    assert not out.findings.suspects
+    assert out.findings.suspects
+    for s in out.findings.suspects:
+        assert s.z == out.findings.moved[s.name]
+        assert s.value == pytest.approx(out.findings.model.value(s.name))
     assert "vessel.X_u" in out.posterior.names
     assert abs(out.findings.model.value("V_e")) < 1e-3, "still water"
 
