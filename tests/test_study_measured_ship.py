@@ -448,6 +448,7 @@ def test_report_has_all_that_was_learned(tmp_path, monkeypatch):
     finding = Finding("thrust_curve", CURVE, sure, 0.9, ["deadband"], 0.8, 0.8, model)
     learned = Findings([finding], [], model, [Suspect("Y_r", 74.0, 0.5)])
     sound = SimpleNamespace(
+        driven_on=(),
         nominal_min_dissipation=0.1,
         learned_min_dissipation=0.2,
         bounded=True,

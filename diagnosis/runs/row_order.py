@@ -52,13 +52,17 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
 
 
 def in_bursts(run: Run, scale: Scale = REFERENCE) -> bool:
-    """Whether positions at increasing times are far closer than they are on average, gaps apart.
+    """Whether rows at increasing times are far closer than they are on average, gaps apart.
 
-    Rows of other channels a few milliseconds later, as each message has its own, are no burst.
+    So are the positions: rows of other channels a few milliseconds later, as each message has its own,
+    are no burst.
     """
-    time = run.time[np.isfinite(run.pose[:, :2]).all(axis=1)]
-    steps = np.minimum(np.diff(time), HORIZON * scale.time)
-    return bool(time.size > 1 and NEGLIGIBLE * steps.sum() > np.median(np.diff(time)) * time.size)
+
+    def close(time: np.ndarray) -> bool:
+        steps = np.minimum(np.diff(time), HORIZON * scale.time)
+        return bool(time.size > 1 and NEGLIGIBLE * steps.sum() > np.median(np.diff(time)) * time.size)
+
+    return close(run.time) and close(run.time[np.isfinite(run.pose[:, :2]).all(axis=1)])
 
 
 def _of_batches(run: Run) -> Run:

@@ -155,8 +155,8 @@ class Memory(NamedTuple):
         filter: ``filter(h, *parameters)``: numerator and denominator in 1/z of the linear filter that
             the effect is in steps of h [s], of unit gain for constant signals; None: it is none. Of an
             angle that goes round it holds while the way to the wanted one is less than half a turn.
-        each: the effect where its memory is the signals themselves, moved one by one; None: it is not.
         own: places of the signals that it changes.
+        each: the effect where its memory is the signals themselves, moved one by one; None: it is not.
     """
 
     initial: tuple[object, ...] | Callable[[int], tuple[object, ...]]
@@ -165,8 +165,8 @@ class Memory(NamedTuple):
     keeps: int | None = None
     idle: Callable[[Any, tuple[Number, ...]], tuple[object, ...]] | None = None
     filter: Callable[..., tuple[Sequence[float], Sequence[float]]] | None = None
-    each: EachSignal | None = None
     own: slice = slice(None)
+    each: EachSignal | None = None
 
     def start(self, width: int) -> tuple[object, ...]:
         """The memory before anything was commanded, of thrusters with ``width`` commands."""
