@@ -61,6 +61,14 @@ def test_methods_on_measured_ships_are_those_of_the_results():
         for method, (place, heading) in methods.items():
             m = means[SHIPS[ship]][METHODS[method]]
             assert (place, heading) == (f"{m['position']:.3g}", f"{np.degrees(m['heading']):.3g}")
+    said = "In no data set has another method" in row
+    best = [
+        min(m[name][quantity] for name in ("calibrated", "learned") if name in m)
+        <= min(errors[quantity] for errors in m.values())
+        for m in means.values()
+        for quantity in ("position", "heading")
+    ]
+    assert said == all(best)
 
 
 def test_calibrated_ships_are_those_of_their_studies():
