@@ -212,6 +212,9 @@ def test_headline_of_each_verdict():
     assert "X_u by −3.2 and N_r by 5." in beyond
     assert said("unexplained", calibrated=True, moved=far) == headline.UNEXPLAINED + headline.CALIBRATED
     assert said("unexplained", left=False, moved=far) == headline.NOT_BELIEVED
+    doubted = said("unexplained", [effect("lag", 0.1)], left=False, moved=far)
+    assert doubted.startswith(headline.NOT_BELIEVED)
+    assert doubted.endswith("3 standard deviations of their priors: X_u by −3.2 and N_r by 5.")
     assert ", mainly a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
     assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])
     assert "a (mass), b, c, d and 2 others; no" in said("coefficients", suspects=suspects)

@@ -39,6 +39,9 @@ NOTHING_FOUND = "These data show no missing effect."
 TOO_LITTLE = "The residual exceeds the noise, but it is too small to be relevant."
 UNEXPLAINED = "A model error remains that no known effect explains."
 NOT_BELIEVED = "The model has an error that no known effect explains with sufficient confidence."
+BEYOND = (
+    " In the learned model coefficients are beyond {far:g} standard deviations of their priors: {names}."
+)
 DRIVEN_ON = (
     "In {motions} the hull of the learned model gains energy, which no hull does: it predicts motions "
     "like those of these runs, and is wrong for others."
@@ -218,11 +221,12 @@ def headline(r: ReportData) -> str:
         return f"Other values of the nominal coefficients explain these data{beside}{above}; {needed}."
     if d.verdict == "unexplained":
         remains = d.remainder.significant and not r.possibilities
-        moved = d.learned.moved if d.refitted else {}
+        moved = d.learned.moved if d.refitted or r.possibilities else {}
         far = [f"{name} by {number(z, 2)}" for name, z in moved.items() if abs(z) > FAR_OFF]
-        if far and not d.remainder.significant:
+        if far and d.refitted and not d.remainder.significant:
             return FAR.format(far=FAR_OFF, names=listed(far, "and"))
-        return (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
+        beyond = "" if d.refitted or not far else BEYOND.format(far=FAR_OFF, names=listed(far, "and"))
+        return (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated + beyond
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
 
 
