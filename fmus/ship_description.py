@@ -68,7 +68,12 @@ class Part(NamedTuple):
 
     def number(self, name: str, otherwise: float = 0.0) -> float:
         """A number of the part, by its name."""
-        return next((v.value for v in self.values if v.name == name), otherwise)
+        stated = self.stated(name)
+        return otherwise if stated is None else stated.value
+
+    def stated(self, name: str) -> Value | None:
+        """The value of a parameter of the part; None: it is as the law declares it."""
+        return next((v for v in self.values if v.name == name), None)
 
 
 class Description(NamedTuple):

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.special import chdtri, ndtri
 
 from cosim import InputError
-from fmus.actuators.command_variables import rates_of
 from fmus.actuators.response import layouts
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
@@ -89,12 +88,12 @@ class Track(ShortRepr):
     @cached_property
     def slewing(self) -> float:
         """Time [s] that commands with a limited rate take for all of their way in a run, or to zero."""
-        ship, commands = self.run.ship, self.run.commands
-        rates = np.array(rates_of(ship)()) if ship else np.zeros(0)
-        if commands is None or rates.size != commands.shape[1]:
+        layout, commands = self.run.ship and layouts(self.run.ship)[0], self.run.commands
+        if not layout or commands is None or len(layout.rates) != commands.shape[1]:
             return 0.0
+        rates = np.array(layout.rates)
         ways = np.ptp(np.vstack([commands, np.zeros_like(rates)]), axis=0)
-        ways = np.where(layouts(ship)[0].round, np.minimum(ways, np.pi), ways)
+        ways = np.where(layout.round, np.minimum(ways, np.pi), ways)
         return float(np.max(np.divide(ways, rates, out=np.zeros_like(ways), where=rates > 0.0)))
 
     @property

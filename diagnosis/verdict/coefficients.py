@@ -17,7 +17,7 @@ from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from ..search.significance import as_good, gain, harm, predicts_better, predicts_worse
 from .confidence import FOUND, confidence_of, may_be_none
-from .pruning import without
+from .pruning import judgeable, without
 from .validation_data import ValidationData
 
 
@@ -136,7 +136,7 @@ def better_calibration(
     now, its, first = data.losses(found, calibration.findings, data.start)
     idle = not believed and as_good(its, now)
     enough = (
-        not gained and sufficient(calibration.findings, found, data) and not predicts_worse(its, now)
+        not gained and not predicts_worse(its, now) and sufficient(calibration.findings, found, data)
     )
     better = needless(found, without_gain) or idle or enough or predicts_better(its, now)
     return calibration if better and not predicts_worse(its, first) else None
@@ -147,10 +147,9 @@ def sufficient(its: Findings, found: Findings | Model, data: ValidationData) -> 
 
     What the priors allow is no missing effect. Waves and failures at times of a run are none of theirs.
     """
-    known = data.start.ship.effects
-    searches = [known[f.id].search for f in found.effects] if isinstance(found, Findings) else []
-    apart = any(s.times or s.by != "regression" for s in searches)
-    return its.plausible and not apart and not remains(data.runs, data.start, its.model)
+    if isinstance(found, Findings) and len(judgeable(found, data.start)) < len(found.effects):
+        return False
+    return its.plausible and not remains(data.runs, data.start, its.model)
 
 
 def needless(found: Findings | Model, without_gain: Collection[str]) -> bool:

@@ -52,12 +52,12 @@ def prune(
         The findings that are left, all else fitted anew, and the rejected effects.
     """
     start = data.start
-    judged = _judged(found, start)
+    by_data = judgeable(found, start)
     if not found.effects or not data.judges(found):
         return found, []
     sizes = {f.id: len(f.values) for f in found.effects}
     gone: list[Withdrawn] = []
-    kept, left = found, judged
+    kept, left = found, by_data
     while left:
         rests = {i: without(found, [*(w.id for w in gone), i], start) for i in left}
         models = {i: rest.model if rest.effects else start for i, rest in rests.items()}
@@ -76,14 +76,14 @@ def prune(
             break
         gone.append(Withdrawn(i, WHOLE_SET.format(harm=harmed.format(where=data.where))))
         kept = without(found, [w.id for w in gone], start)
-    if len(gone) == len(judged) and kept.effects:
+    if len(gone) == len(by_data) and kept.effects:
         its, first = data.losses(kept, start)
         if harm(its, first, 0):
             kept = added(kept, kept.effects, start)
     return kept, gone
 
 
-def _judged(found: Findings, start: Model) -> list[str]:
+def judgeable(found: Findings, start: Model) -> list[str]:
     """The effects that data can judge, by their ids.
 
     Waves and failures are not: no model has waves, and the times of a failure are those of the run in
@@ -173,8 +173,8 @@ def proven(found: Findings, data: ValidationData, harm: Harm) -> tuple[Findings,
     Returns:
         The findings that are left, all else fitted anew, and the effects that were taken out.
     """
-    start, data, judged = data.start, data.of_other_runs, _judged(found, data.start)
-    doubted = [f for f in found.effects if f.id in judged and not confidence_of(f, start).is_finding]
+    start, data, by_data = data.start, data.of_other_runs, judgeable(found, data.start)
+    doubted = [f for f in found.effects if f.id in by_data and not confidence_of(f, start).is_finding]
     kept, gone = found, []
     while doubted and data.judges(kept):
         rests = [without(found, [*(f.id for f in gone), each.id], start) for each in doubted]

@@ -33,8 +33,8 @@ def rates_of(ship: Description) -> type[Fields]:
             rate,
             POSITIVE,
         )
-        stated = (x for x in a.part.values if x.name == f"{c.name}_rate")
-        return next((x.of(v, "rate") for x in stated), v)
+        stated = a.part.stated(f"{c.name}_rate")
+        return v if stated is None else stated.of(v, "rate")
 
     return group_of("Rate", [limit(*each) for each in limits])
 

@@ -85,6 +85,11 @@ class CommandLayout:
         """For each command the lag of its actuator [s], as it is described."""
         return tuple([a.part.number("lag") for a, _ in self._sets() for _ in a.law.commands])
 
+    @cached_property
+    def rates(self) -> tuple[float, ...]:
+        """For each command the limit of its rate, as it is described; zero: none."""
+        return tuple([a.part.number(f"{c.name}_rate") for a, _ in self._sets() for c in a.law.commands])
+
     def _sets(self) -> list[tuple[Actuator, float]]:
         """Each actuator with commands of its own, as often as it has them."""
         return [(a, side) for a in ordered(self.ship) for side in (a.sides if self.apart else (0.0,))]

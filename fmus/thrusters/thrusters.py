@@ -65,7 +65,7 @@ def make(effects: EffectSet, ship: Description, name: str = "thrusters", form: s
     """
     shape, known = layouts(ship)[0], allocating(ship)
     groups = thruster_effects(effects, shape)
-    lags = {f"lag_{a.order}": x for a in ordered(ship) for x in a.part.values if x.name == "lag"}
+    lags = {f"lag_{a.order}": x for a in ordered(ship) if (x := a.part.stated("lag")) is not None}
     slow = redeclared(
         groups.dynamics.params, lambda v: lags[v.name].of(v, "lag") if v.name in lags else v
     )
