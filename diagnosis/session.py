@@ -322,14 +322,19 @@ class Session(ShortRepr):
         """Third answer: which effect is missing, and how sure that is."""
         found = self.method.fit(self.train, self.start, self.prior, self.advance, self.seed)
         data = self.data(found.sigma)
-        nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
-        region = OperatingRegion.of(nu, self.start.ship.scale)
+        region = OperatingRegion.of(self._velocities, self.start.ship.scale)
         calibrates = self.predictor.parametric
         calibration = self.calibration if calibrates else None
         verdict, gain = judge(
             found, data, self.known, self.harms, region, calibrates, calibration, self.advance
         )
         return self._concluded(verdict, region, gain)
+
+    @property
+    def _velocities(self) -> np.ndarray:
+        """(n, 3), velocities of the training runs [m/s, m/s, rad/s]."""
+        nu = np.concatenate([w.smoothed.nu[w.known] for w in self.train])
+        return nu[np.isfinite(nu).all(axis=1)]
 
     def _compared(self, after: Model | None, predictor: Predictor | None = None) -> Comparison:
         decide, runs = len(self.train) + len(self.validate), self.runs
@@ -356,7 +361,7 @@ class Session(ShortRepr):
             **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
             comparison=replace(found, evaluations=evaluations, predictor=self.predictor),
             start=self.start,
-            stability=check_stability(learned, self.start, self.advance, region),
+            stability=check_stability(learned, self.start, self.advance, region, self._velocities),
             speeds=region.largest,
             prior=self.prior,
             seed=self.seed,

@@ -313,3 +313,14 @@ def test_a_ship_without_thrust_on_an_axis_is_judged_by_both_motions(
     assert (found.region is not None) == harmful
     assert found.safe == (learned_rests or found.from_start)
     assert not found.closed_loop
+
+
+@pytest.mark.parametrize("ahead", [True, False])
+def test_a_hull_that_runs_away_astern_is_kept_from_motions_that_were_measured_ahead(ahead):
+    """Y_uv u v brakes a drift ahead and feeds it astern, where no run of the ship went."""
+    start = Model(ship=ship_with((), "kvlcc2"))
+    U = start.ship.scale.speed
+    learned = start.plus({"delta_Y_uv": -3.0 * start.mass[1, 1] / start.ship.description.length})
+    nu = np.array([[U, 0.2 * U, 0.0], [0.5 * U, -0.2 * U, 0.0]]) * [1.0 if ahead else -1.0, 1.0, 1.0]
+    assert check_stability(learned, start, measured=nu).bounded == ahead
+    assert not check_stability(learned, start).bounded, "of all motions of the region"

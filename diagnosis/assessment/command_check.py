@@ -6,12 +6,11 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows, omega, weak_windows
 from ..predictors.thrust import full_thrust
-from ..predictors.weak_form import BLOCK, needed_force
+from ..predictors.weak_form import BLOCK, inertial, needed_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU, Named
 from ..runs.run_constants import DIGITS
 from .gains import varying
-from .readings import inertial
 from .settings import SETTINGS
 
 

@@ -20,10 +20,9 @@ from scipy.linalg import pinv
 from ..predictors import Model, WeakWindows
 from ..predictors.prediction import FAR_OFF
 from ..predictors.uncertainty import correlated_windows
-from ..predictors.weak_form import OVERLAP, commanded_force, needed_force
+from ..predictors.weak_form import OVERLAP, commanded_force, inertial, needed_force
 from ..runs.run_constants import DIGITS
 from ..runs.smoothing.command_regression import least_squares
-from .readings import inertial
 from .settings import SETTINGS
 
 

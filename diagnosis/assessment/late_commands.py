@@ -25,7 +25,7 @@ import numpy as np
 from ..predictors import Model, WeakWindows, omega, weak_windows
 from ..predictors.thrust import Integral
 from ..predictors.uncertainty import MEASURED, correlated_windows, omega_std
-from ..predictors.weak_form import OVERLAP, needed_force
+from ..predictors.weak_form import OVERLAP, inertial, needed_force
 from ..runs import Run
 from ..runs.cleaning import BRIEF
 from ..runs.columns.columns import TAU
@@ -35,7 +35,6 @@ from ..runs.smoothing.command_regression import least_squares
 from ..runs.smoothing.lateness import LONGEST
 from ..runs.smoothing.smoother import without_commands
 from .gains import other_forces
-from .readings import inertial
 from .settings import SETTINGS
 
 

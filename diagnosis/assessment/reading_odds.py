@@ -24,9 +24,9 @@ from scipy.optimize import lsq_linear
 
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
-from ..predictors.weak_form import OVERLAP, needed_force
+from ..predictors.weak_form import OVERLAP, needed_force, undamped
 from ..runs.run_constants import STEPS
-from .readings import Reading, reread, undamped
+from .readings import Reading, reread
 from .settings import SETTINGS
 
 

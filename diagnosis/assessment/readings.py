@@ -6,11 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
-from fmus.declare import variables
-
 from ..predictors import Model, WeakWindows
 from ..predictors.thrust import full_thrust
-from ..predictors.weak_form import OF_MOTION, needed_force
+from ..predictors.weak_form import OF_MOTION
 from ..runs import Run
 from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
 from ..runs.columns.geographic import is_geographic
@@ -192,14 +190,3 @@ def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
         eta_dot=s.eta_dot @ reading.motion.T / reading.pace,
     )
     return replace(w, smoothed=meant, slope=w.slope / reading.pace, whole=None, memory=memory)
-
-
-def inertial(w: WeakWindows, model: Model) -> np.ndarray:
-    """The part (K, 3) of the needed force that is not damping: M nu_dot + C nu [N, N, N m]."""
-    return needed_force(w, undamped(model))
-
-
-def undamped(model: Model) -> Model:
-    """The model without damping of its hull."""
-    none = {v.name: 0.0 for v in variables(type(model.hull.params.damping))}
-    return replace(model, vessel=dict(model.vessel) | none)

@@ -120,6 +120,7 @@ def check_stability(
     nominal: Model,
     advance: Advance = silent,
     region: OperatingRegion | None = None,
+    measured: np.ndarray | None = None,
 ) -> Stability:
     """Check a learned model against the nominal one.
 
@@ -127,6 +128,8 @@ def check_stability(
         model, nominal: the learned model and the initial one.
         advance: receives the name of each step when it begins.
         region: where the dissipation is compared; by default that of the size of the ship.
+        measured: (n, 3), velocities [m/s, m/s, rad/s] from which a ship that no controller holds has to
+            stay bounded; by default the border of the region, with motions that no run may have.
 
     Raises:
         InputError: the nominal model's mass matrix is not positive definite, the learned model's has no
@@ -161,11 +164,12 @@ def check_stability(
         held = not both  # paths on which the nominal ship is lost as well tell nothing of the other
     if not held:
         advance("the decay of the motion without thrust")
-        fastest = np.split(everywhere, SETTINGS.directions)[-1]
+        border = np.split(everywhere, SETTINGS.directions)[-1]
+        first = border if measured is None else measured[:: -(-len(measured) // len(border))]
         if not model.ship.fully_actuated:
             notes.append(NO_THRUST if model.ship.description.allocates else NO_ALLOCATION)
-        bounded = mass_definite and comes_to_rest(model, fastest, region, notes)
-        both = not (bounded or comes_to_rest(nominal, fastest, region, []))
+        bounded = mass_definite and comes_to_rest(model, first, region, notes)
+        both = not (bounded or comes_to_rest(nominal, first, region, []))
         notes += [NOR_NOMINAL] if both else []
     return Stability(
         mass_definite,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from fmus.declare import variables
 from fmus.hull import accelerated
 from fmus.scale import REFERENCE, Scale
 from fmus.signals import Force
@@ -242,6 +243,17 @@ def needed_force(w: WeakWindows, model: Model) -> np.ndarray:
         return np.nan_to_num(_balance(w, model, thrust=False), posinf=0.0, neginf=0.0)
 
 
+def inertial(w: WeakWindows, model: Model) -> np.ndarray:
+    """The part (K, 3) of the needed force that is not damping: M nu_dot + C nu [N, N, N m]."""
+    return needed_force(w, undamped(model))
+
+
+def undamped(model: Model) -> Model:
+    """The model without damping of its hull."""
+    none = {v.name: 0.0 for v in variables(type(model.hull.params.damping))}
+    return replace(model, vessel=dict(model.vessel) | none)
+
+
 def _balance(w: WeakWindows, model: Model, thrust: bool) -> np.ndarray:
     """The force that a motion needs, less that of the thrusters and what is given, if these count."""
     if w.run.name not in model.given:  # a force along a run has all of its rows
@@ -291,13 +303,13 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
 
     That is the commanded force; on an axis that is never commanded, as of a ship that cannot push
-    sideways, what the model's inertia asks for the motion that was measured.
+    sideways, what the model's inertia asks for the measured motion: in a turn m u r, and not only what
+    changes v.
     """
     force = np.concatenate([w.held @ w.run.tau_cmd for w in data])
     idle = ~force.any(axis=0)
     if idle.any():
-        change = np.concatenate([w.slope @ w.motion[1] for w in data])
-        force[:, idle] = (change @ model.reference_mass.T)[:, idle]
+        force[:, idle] = np.concatenate([inertial(w, model) for w in data])[:, idle]
     return force
 
 
