@@ -35,6 +35,7 @@ from .coefficients import (
     needless,
 )
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
+from .effects_like_coefficients import in_place_of_coefficients
 from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_one_line
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
@@ -53,8 +54,8 @@ class DecidedFindings(ShortRepr):
         withdrawn: effects that were accepted and rejected afterwards.
         remainder: what the learned model leaves; where nothing was learned, the first one.
         refitted: whether the learned model has other nominal coefficients and no effect.
-        dropped: effects that were accepted and are not in the learned model: no data prove their gain,
-            or other coefficients do as well.
+        dropped: effects that are not in the learned model: they were accepted, but no data prove their
+            gain, or coefficients do as well, or they act like a coefficient that is beyond its prior.
         shares: for each finding the share of the error's sum of squares that it explains.
         unique: for each the share that nothing else explains; None where that cannot be told.
         posterior: of all fitted values; of none where nothing was learned.
@@ -181,6 +182,8 @@ def judge(
             now = _predicting(fit.findings, data, changed)
             gain = gain_of_search(data, start, coefficients, fit.findings, now)
             doubted = _in_doubt(fit, data, changed, set())
+    alike = in_place_of_coefficients(fit, train, start, prior) if changed else []
+    dropped += [f for f in alike if f.id not in {other.id for other in dropped}]
     decided = DecidedFindings(
         doubted.learned,
         withdrawn,
