@@ -1,6 +1,6 @@
 """The judgement: evidence of a search and data that decide in, one verdict out."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -142,60 +142,112 @@ def judge(
     drives = partial(drives_on, region=region)
     kept, withdrawn = prune(found, data, drives, criterion)
     kept, unproven = proven(kept, data, criterion)
-    learned, refitted, replaced = concluded(kept, data, prior)
+    ended, refitted, replaced = concluded(kept, data, prior)
     dropped = [*unproven, *replaced]
-    changed = bool(learned.effects) or refitted
+    changed = bool(ended.effects) or refitted
     if changed:
         advance("fit to predictions")
-    fit = to_predictions(learned, train, prior, changed)
-    if changed and overfits(fit.findings, learned, data, criterion):
-        fit = fit.about(learned, prior)
+    fit = to_predictions(ended, train, prior, changed)
+    if changed and overfits(fit.findings, ended, data, criterion):
+        fit = fit.about(ended, prior)
     left = {f.id for f in fit.findings.effects}
-    withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
-    refitted = refitted or (changed and not left)
-    gain, coefficients, unshown = None, calibration and calibration.findings, set[str]()
-    now = _predicting(fit.findings, data, changed)
+    withdrawn += [Withdrawn(f.id, NOTHING) for f in ended.effects if f.id not in left]
+    end = _Fitted(fit, data, changed, refitted or (changed and not left))
+    gain, unshown = None, set[str]()
     if calibrates:
         advance("gain of the search over calibration")
-        gain = gain_of_search(data, start, coefficients, fit.findings, now)
+        gain = end.gain_over(calibration)
         unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
     advance("residual")
-    doubted = _in_doubt(fit, data, changed, unshown)
+    doubted = _in_doubt(end, unshown)
     if calibrates:
-        other = None
-        if not any_finding(fit.findings, start):
-            other = calibrated(fit.findings, data, prior)
-        if other is None and not any_sure(doubted.learned):
-            believed = not doubted.learned.effects or any(map(is_finding, doubted.learned.effects))
-            gained = gain is None or gain.gained
-            other = better_calibration(calibration, now, data, drives, unshown, believed, gained)
-        nothing = (
-            other is None
-            and needless(fit.findings, unshown)
-            and not predicts_worse(*data.losses(start, now))
-        )
-        if other is not None or nothing:
-            dropped, refitted, changed = [*dropped, *fit.findings.effects], not nothing, not nothing
-            learned = replace(found, effects=[], model=start, suspects=[])
-            fit = other or to_predictions(learned, train, prior, False)
-            fit = replace(fit, findings=replace(fit.findings, ranking=found.ranking))
-            now = _predicting(fit.findings, data, changed)
-            gain = gain_of_search(data, start, coefficients, fit.findings, now)
-            doubted = _in_doubt(fit, data, changed, set())
-    alike = in_place_of_coefficients(fit, train, start, prior) if changed else []
-    dropped += [f for f in alike if f.id not in {other.id for other in dropped}]
+        other = _coefficients_alone(end, doubted.learned, calibration, prior, drives, gain, unshown)
+        if other is not None:
+            dropped += fit.findings.effects
+            ranked = replace(other.fit.findings, ranking=found.ranking)
+            end = replace(other, fit=replace(other.fit, findings=ranked))
+            gain, doubted = end.gain_over(calibration), _in_doubt(end, set())
+    if end.changed:
+        known = {f.id for f in dropped}
+        alike = in_place_of_coefficients(end.fit, train, start, prior)
+        dropped += [f for f in alike if f.id not in known]
     decided = DecidedFindings(
         doubted.learned,
         withdrawn,
         doubted.remainder,
-        refitted,
+        end.refitted,
         dropped,
         doubted.shares,
         doubted.unique,
-        fit.posterior,
-        fit.unrecorded,
+        end.fit.posterior,
+        end.fit.unrecorded,
     )
     return decided, gain
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A model that may be the end of a search: its fit, and what it differs from the initial one by.
+
+    Attributes:
+        fit: to predictions.
+        data: the data that decide.
+        changed: whether it differs from the initial model.
+        refitted: whether it has other nominal coefficients and no effect.
+    """
+
+    fit: RefitOutcome
+    data: ValidationData
+    changed: bool
+    refitted: bool
+
+    @property
+    def predicting(self) -> Findings | Model:
+        """What the data that decide judge; of their folds each has a fit of the findings."""
+        if not self.changed:
+            return self.data.start
+        found = self.fit.findings
+        return found.model if self.data.validate else found
+
+    def gain_over(self, calibration: RefitOutcome | None) -> PredictionGain | None:
+        """What predictions gain by it, over calibration alone."""
+        coefficients = calibration and calibration.findings
+        return gain_of_search(
+            self.data, self.data.start, coefficients, self.fit.findings, self.predicting
+        )
+
+
+def _coefficients_alone(
+    end: _Fitted,
+    learned: Findings,
+    calibration: RefitOutcome | None,
+    prior: NominalPrior,
+    drives: Callable[[Model, Model], bool],
+    gain: PredictionGain | None,
+    unshown: Collection[str],
+) -> _Fitted | None:
+    """The calibrated model, or the initial one, that takes the place of effects; None: these stay.
+
+    Args:
+        end: the end of the search.
+        learned: its findings with their confidence.
+        calibration, prior, drives: see :func:`judge` and :func:`better_calibration`.
+        gain: of the search over the calibration.
+        unshown: ids of the findings that predictions do not show.
+    """
+    data, found = end.data, end.fit.findings
+    other = None if any_finding(found, data.start) else calibrated(found, data, prior)
+    if other is None and not any_sure(learned):
+        believed = not learned.effects or any(map(is_finding, learned.effects))
+        gained = gain is None or gain.gained
+        now = end.predicting
+        other = better_calibration(calibration, now, data, drives, unshown, believed, gained)
+    if other is not None:
+        return _Fitted(other, data, True, True)
+    if not needless(found, unshown) or predicts_worse(*data.losses(data.start, end.predicting)):
+        return None
+    nothing = replace(found, effects=[], model=data.start, suspects=[], moved={})
+    return _Fitted(to_predictions(nothing, data.train, prior, False), data, False, False)
 
 
 class _FindingsInDoubt(NamedTuple):
@@ -207,14 +259,13 @@ class _FindingsInDoubt(NamedTuple):
     unique: Sequence[float | None]
 
 
-def _in_doubt(
-    fit: RefitOutcome, data: ValidationData, changed: bool, unshown: Collection[str]
-) -> _FindingsInDoubt:
+def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
     """The findings with their confidence; ``unshown`` are those that predictions do not show."""
-    found, start, train = fit.findings, data.start, data.train
+    found, data = end.fit.findings, end.data
+    start, train = data.start, data.train
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if found.model.runs else data.runs
-    remainder = remainder_of(judged, start, found, changed)
+    remainder = remainder_of(judged, start, found, end.changed)
     explained = shares(found, start, data.validate)
     alone = unique_shares(found, start, train, data.validate)
     doubts = Doubts(
@@ -225,7 +276,7 @@ def _in_doubt(
         of_several=of_several(found, start),
         smoothed=faster_than_smoothing(found, start, train),
         without_gain=unshown,
-        differing=differing(fit),
+        differing=differing(end.fit),
         implausible=not found.plausible,
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
@@ -234,13 +285,6 @@ def _in_doubt(
         beside_possibility=beside_possibility(found, explained, each),
     )
     return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
-
-
-def _predicting(found: Findings, data: ValidationData, changed: bool) -> Findings | Model:
-    """What the data that decide judge at the end of a search; each fold has a fit of the findings."""
-    if not changed:
-        return data.start
-    return found.model if data.validate else found
 
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
