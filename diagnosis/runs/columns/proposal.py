@@ -1,47 +1,35 @@
 """The content of the file beside a measurement, proposed by a look at the measurement itself."""
 
-import json
 import math
-import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import chain, islice, takewhile
+from collections.abc import Collection, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
-import pandas as pd
 
 from cosim import InputError
 from fmus.ship import Ship, ship
 
-from ..cleaning import WIDTH, lost
 from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read, signed
-from ..files.tables import clock_seconds, date_stamps, table_of_file
-from ..files.text_layout import bare_unit, table_cells, text_layout
-from ..frozen import repeated
-from ..row_order import by_stamps, in_order
+from ..files.tables import date_stamps, table_of_file
+from ..files.text_layout import table_cells, text_layout
 from .columns import (
-    OF_UNIT,
     POSE,
     UNITS,
     UTF_8,
-    WITH_UNIT,
     Column,
     Layout,
     log_of,
     missing,
-    no_unit,
-    other_angles,
     quantities,
     signals,
     stated_layout,
     to_si,
 )
+from .columns_by_name import named_columns
 from .geographic import (
     SIDES,
-    WORDS,
     are_minutes,
     geographic_pair,
     is_side,
@@ -50,45 +38,22 @@ from .geographic import (
     refuse_letters,
 )
 from .likely_columns import (
-    ASTERN,
-    SIGN,
     LikelyColumn,
-    is_of_shaft,
-    is_steering,
     likely_columns,
-    meaning_of_words,
     motion_of,
-    says_command,
-    signal_of_sign,
-    signal_of_symbol,
     unit_in,
 )
-from .name_words import words_of
+from .name_units import bare_name, without_unit
 from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
-from .unit_check import (
-    HUNDREDTH,
-    OFTENEST,
-    SI_UNIT,
-    doubts,
-    doubts_of_angles,
-    in_hundredths,
-    largest,
-    likely_unit,
-    spelt,
+from .units_by_numbers import (
+    names_of,
+    numbers_of,
+    seen_units,
+    sign_columns,
+    time_unit,
+    units_of_commands,
 )
-from .usual_names import is_quaternion, meaning, value_column
-
-NO_UNIT = ("", "-")
-# Units that a name may end in; u_1 is the first of several, x_d a desired value.
-NAMED_UNITS = frozenset(unit for units in UNITS.values() for unit in units) - {"1", "d"}
-# A time that is called so, with its unit at the end: TimeUS, time_boot_ms.
-TIME_IN = re.compile(r"(?i)(time|timestamp|stamp|epoch)(?:_?boot)?_?([mun]s(?:ec)?)")
-CALLED_AS_UNIT = ("ms", "us", "ns")  # a time may be called so
-NORTH = ("true", "magnetic")  # that a heading is from; behind its name it is no unit
-# Behind a name in a log of libcosim: value reference, type and causality.
-OF_LIBCOSIM = re.compile(r" \[\d+ (real|integer) \w+\]$")
-LETTERS = ("R", "T", "U", "V")  # that are no yaw rate, time and velocity without a unit
-PATH = re.compile(r"[./]")  # between the parts of a name with a path
+from .usual_names import value_column
 
 
 class Proposal(NamedTuple):
@@ -147,7 +112,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
-    columns = _columns(path, text, names, units, quantity, kept, fields)
+    columns = named_columns(path, text, names, units, quantity, kept, fields)
     columns |= _of_message(columns, fields, kept)
     columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
@@ -167,11 +132,11 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     except InputError as error:
         more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
-    columns |= _units_of_commands(path, layout, names, of)
-    columns |= _signed(path, layout.model_copy(update={"columns": columns}), unused, quantity)
+    columns |= units_of_commands(path, layout, names, of)
+    columns |= sign_columns(path, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
-    for signal, unit, factor in _seen_units(run):
+    for signal, unit, factor in seen_units(run):
         if signal not in kept or not _is_told(kept[signal]):
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
@@ -209,7 +174,7 @@ def time_column(
         names, units: of its columns.
     """
     kept = {s: c for s, c in stated.columns.items() if s == "time" and c.name.strip()}
-    columns = _columns(path, text, names, units, {"time": "time"}, kept)
+    columns = named_columns(path, text, names, units, {"time": "time"}, kept)
     columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
     return columns.get("time")
 
@@ -227,7 +192,7 @@ def _with_blanks(
     time = layout.column("time")
     if "time" not in {*kept, *blank} and not time.unit:
         cells = table_of_file(path, layout, {time.name})[time.name]
-        columns["time"] = time.model_copy(update={"unit": _time_unit(_numbers(cells, "time"))})
+        columns["time"] = time.model_copy(update={"unit": time_unit(numbers_of(cells, "time"))})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     blanks = layout.model_copy(update={"columns": needed | {s: Column(name="") for s in blank}})
     return Proposal(blanks, [*unused], None, _likely(path, layout, unused, blank, quantity))
@@ -290,81 +255,6 @@ def units_below(path: Path, text: Layout, names: Sequence[str]) -> list[str]:
     return [*found, *[""] * len(names)][: len(names)]
 
 
-def _columns(
-    path: Path,
-    text: Layout,
-    names: Sequence[str],
-    units: Sequence[str],
-    quantity: Mapping[str, str],
-    kept: Mapping[str, Column],
-    fields: Collection[str] = (),
-) -> dict[str, Column]:
-    """The columns that names and units tell; of two for one signal, that of its own name or the first.
-
-    Those that are stated are kept. A name of which words alone are known counts where it has a unit of
-    the signal, and no other column is as likely.
-    """
-    columns = dict(kept)
-    free = [pair for pair in zip(names, units, strict=False) if pair[0] not in _names_of(kept)]
-    for name, below in sorted(free, key=lambda pair: pair[0] not in quantity):
-        bare, unit = _bare(name, below)
-        signal, flip = meaning(bare, quantity)
-        if not signal:
-            bare, unit = _unit_at_the_end(bare)
-            signal, flip = meaning(bare, quantity)
-            if unit not in UNITS.get(quantity.get(signal, ""), {}):
-                continue
-        if signal in columns or _is_beside_speed(bare, names) or _is_letter(bare, unit, names):
-            continue
-        if is_quaternion(bare) and name not in fields:  # q is the pitch rate as well
-            continue
-        known = UNITS[quantity[signal]]
-        if signal == "time" and unit not in known and _is_stamped(path, text, name):
-            unit = ""  # a time zone, or the form of the stamps
-        if unit not in known and (unit.isdigit() or (bare != signal and unit in NAMED_UNITS)):
-            continue  # an index, or of another quantity: n in rps is no position to the north
-        if unit not in NO_UNIT and unit not in known:
-            line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
-            raise InputError(
-                f"'{path}', column '{name}': {no_unit(unit, signal, known)}; "
-                f"if it is another one, put {line} with its factor to {SI_UNIT[quantity[signal]]} "
-                f"into '{path}.json'"
-            )
-        is_si = known.get(unit, 1.0) == 1.0
-        columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
-    found = _by_words([pair for pair in free if pair[0] not in _names_of(columns)], columns, quantity)
-    columns |= {s: c for s, c in found.items() if not _is_fraction(path, text, s, c, quantity)}
-    return {s: columns[s] for s in (*quantity, *kept) if s in columns}
-
-
-def _is_fraction(
-    path: Path, text: Layout, signal: str, column: Column, quantity: Mapping[str, str]
-) -> bool:
-    """Whether the column of a shaft is not called a speed, and has fractions of the full command."""
-    if quantity[signal] != "shaft speed" or column.unit or says_command(column.name, signal, quantity):
-        return False
-    values = _numbers(table_of_file(path, text, {column.name})[column.name], "")
-    return float(np.nanmax(np.abs(values), initial=0.0)) <= largest("command")
-
-
-def _is_beside_speed(name: str, names: Sequence[str]) -> bool:
-    """Whether a name is ``ax`` beside ``vx``: along the axes of that, which are not known."""
-    low, axis = name.casefold(), name[-1:].casefold()
-    return low.endswith(("ax", "ay")) and f"{low[:-2]}v{axis}" in {n.casefold() for n in names}
-
-
-def _is_letter(name: str, unit: str, names: Sequence[str]) -> bool:
-    """Whether a name is a letter that more often means another quantity than a signal.
-
-    ``n`` and ``e`` alone, or beside a latitude, are revolutions and an error. Capitals without a unit
-    are a voltage (U, V), a temperature (T), a resistance or radius (R).
-    """
-    if name.casefold() not in ("n", "e"):
-        return name in LETTERS and unit in NO_UNIT
-    bare = [_without_unit(each, "")[0].casefold() for each in names]
-    return not {"n", "e"} <= {*bare} or any(not WORDS["x"].isdisjoint(words_of(each)) for each in bare)
-
-
 def _is_told(stated: Column) -> bool:
     """Whether a column has more than a name: what its numbers mean is then stated."""
     return not {"unit", "factor", "offset"}.isdisjoint(stated.model_fields_set)
@@ -376,54 +266,10 @@ def _in_unit_of_name(
     """A column of which only the name is stated, in the unit that stands in that or below it."""
     if _is_told(stated):
         return stated
-    bare, unit = _without_unit(stated.name, below.get(stated.name, ""))
+    bare, unit = without_unit(stated.name, below.get(stated.name, ""))
     factors = UNITS.get(quantity.get(signal, ""), {})
     unit = unit or unit_in(bare)
     return stated.model_copy(update={"unit": unit}) if factors.get(unit, 1.0) != 1.0 else stated
-
-
-def _by_words(
-    free: Sequence[tuple[str, str]], columns: Mapping[str, Column], quantity: Mapping[str, str]
-) -> dict[str, Column]:
-    """Signals that words of names and units tell of columns (name, unit below), where one alone does.
-
-    The part of a path that all names with a path have in common, as of a device, tells nothing.
-    """
-    found: dict[str, list[Column]] = {}
-    only: dict[str, list[Column]] = {"shaft speed": [], "angle": []}  # of a ship with one of them
-    paths = [parts for name, _ in free if (parts := PATH.split(name)[:-1])]
-    common = [p[0] for p in takewhile(lambda p: len({*p}) == 1, zip(*paths, strict=False))]
-    for name, below in free:
-        bare, unit = _without_unit(name, below)
-        unit = unit or unit_in(bare)
-        parts = PATH.split(bare)
-        own = parts[len(common) :] if parts[: len(common)] == common else parts
-        if signal := signal_of_symbol(bare, unit, quantity) or meaning_of_words(
-            " ".join(own), unit, quantity
-        ):
-            is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
-            found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
-        elif is_of_shaft(" ".join(own), unit):
-            only["shaft speed"].append(Column(name=name, unit=unit))
-        elif unit in UNITS["angle"] and is_steering(" ".join(own)):
-            only["angle"].append(Column(name=name, unit=unit))
-    for kind, told in only.items():
-        left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]
-        if len(left) == len(told) == 1:
-            found[left[0]] = told
-    # Beside a command its sign may have a column, as rudder_dir beside rudder_deg.
-    own = {
-        s: [c for c in each if SIGN.isdisjoint(words_of(c.name))] or each for s, each in found.items()
-    }
-    own |= {f"{s}_2": [each.pop()] for s, each in own.items() if f"{s}_2" in quantity and _are_two(each)}
-    return {s: each[0] for s, each in own.items() if len(each) == 1 and s not in columns}
-
-
-def _are_two(columns: list[Column]) -> bool:
-    """Whether columns are those of two sensors, by numbers in their names, and in their order."""
-    number = {c.name: [int(w) for w in words_of(c.name) if w.isdigit()] for c in columns}
-    columns.sort(key=lambda c: number[c.name])
-    return len(columns) == 2 and all(number.values()) and len({*map(str, number.values())}) == 2
 
 
 def _of_message(
@@ -438,21 +284,16 @@ def _of_message(
         return {}
     turned = {"psi": psi.model_copy(update={"flip": True, "offset": 0.5 * math.pi})}
     known = {"x", "y"} <= columns.keys() - kept
-    if known and _without_unit(columns["x"].name, "")[0].casefold().endswith("x"):
+    if known and without_unit(columns["x"].name, "")[0].casefold().endswith("x"):
         turned |= {"x": columns["y"], "y": columns["x"]}
     return turned
-
-
-def _is_stamped(path: Path, text: Layout, name: str) -> bool:
-    """Whether a column has date stamps or times of day."""
-    return date_stamps(table_of_file(path, text, {name})[name]) is not None
 
 
 def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
     """The only column of date stamps as the time, whatever its name, if no other column is known."""
     if "time" in layout.columns:
         return {}
-    table = table_of_file(path, layout, {*names} - _names_of(layout.columns))
+    table = table_of_file(path, layout, {*names} - names_of(layout.columns))
     stamped = [str(name) for name, cells in table.items() if date_stamps(cells) is not None]
     return {"time": Column(name=stamped[0])} if len(stamped) == 1 else {}
 
@@ -465,15 +306,15 @@ def _geographic(
     Those that are stated by their names alone are read so, too.
     """
     stated = {s: c.name for s in ("x", "y") if (c := layout.columns.get(s)) and not _is_told(c)}
-    taken = _names_of(layout.columns) - {*stated.values()}
+    taken = names_of(layout.columns) - {*stated.values()}
     free = [pair for pair in zip(names, units, strict=False) if pair[0] not in taken]
-    pair = geographic_pair({name: _bare(name, below) for name, below in free}, stated)
+    pair = geographic_pair({name: bare_name(name, below) for name, below in free}, stated)
     if not pair or any(stated.get(s) != pair[s] for s in layout.columns.keys() & pair):
         return {}
     after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
     table = table_of_file(path, layout, {*pair.values(), *after.values()})
     sides = {s: SIDES[s][1] for s, name in after.items() if is_side(table[name], SIDES[s])}
-    numbers = {signal: _numbers(table[name], signal) for signal, name in pair.items()}
+    numbers = {signal: numbers_of(table[name], signal) for signal, name in pair.items()}
     how = {s: {"minutes": True} if are_minutes(**numbers) else {} for s in pair}
     how |= {s: how[s] | {"sign": after[s], "negative": letter} for s, letter in sides.items()}
     read = {s: Column(name=name).model_copy(update=how[s]) for s, name in pair.items()}
@@ -482,106 +323,6 @@ def _geographic(
     if not columns:
         refuse_letters(pair, {signal: table[name] for signal, name in pair.items()})
     return columns
-
-
-def _units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
-    """Commands without a unit that are far beyond the ship's limits, in the only unit within them.
-
-    Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit.
-    """
-    found: dict[str, Column] = {}
-    for form, commands in zip(of.command_forms, of.layouts, strict=True):
-        limits = np.abs(commands.limits(of.nominal_drive.params)).max(axis=1)
-        limits[np.array(commands.round or [False] * limits.size)] = math.tau
-        for si in dict.fromkeys(form.values()):
-            own = {s: x for (s, unit), x in zip(form.items(), limits, strict=True) if unit == si}
-            own = {s: limit for s, limit in own.items() if layout.column(s).name in names}
-            columns = {s: layout.column(s) for s in own}
-            if own and not any(column.unit or column.factor != 1.0 for column in columns.values()):
-                table = table_of_file(path, layout, _names_of(columns))
-                most = {
-                    s: float(np.nanmax(np.abs(_numbers(table[column.name], "")), initial=0.0))
-                    for s, column in columns.items()
-                }
-                unit = _unit_within(most, own, OF_UNIT[si])
-                found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
-    return found
-
-
-def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantity: str) -> str | None:
-    """The only unit in which commands of a quantity are within limits; None: SI, or it is not known."""
-    smaller = {size: unit for unit, size in reversed(UNITS[quantity].items()) if size < 1.0}
-    if not smaller:
-        return None
-    share = max((most[s] / limits[s] for s in most if limits[s] > 0.0), default=0.0)
-    within = [unit for size, unit in smaller.items() if size * share <= largest("command")]
-    far = share > max(smaller) ** -0.5 or max(most.values()) > largest(quantity)
-    return within[0] if far and len(within) == 1 else None
-
-
-def _signed(
-    path: Path, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
-) -> dict[str, Column]:
-    """Commands whose sign is in a column of its own, as astern of a shaft, or port of a rudder."""
-    own = {s: c for s, c in layout.columns.items() if "." in s and not c.sign}
-    named = {n: signal_of_sign(n, {s: quantity[s] for s in own}) for n in unused}
-    found: dict[str, Column] = {}
-    for name, signal in named.items():
-        if not signal:
-            continue
-        table = table_of_file(path, layout, {name, own[signal].name})
-        cells = table[name].dropna().astype("string").str.strip().unique().tolist()
-        negative = [cell for cell in cells if _is_negative(cell, quantity[signal])]
-        values = _numbers(table[own[signal].name], "")
-        if len(cells) <= 3 and len(negative) == 1 and np.nanmin(values, initial=0.0) >= 0.0:
-            found[signal] = own[signal].model_copy(update={"sign": name, "negative": negative[0]})
-    return found
-
-
-def _is_negative(cell: str, quantity: str) -> bool:
-    """Whether the cell of a sign is that of negative values: astern, or of an angle to port."""
-    if quantity == "angle":
-        return words_of(cell) == ["port"] or cell.casefold() in ("p", "l", "-", "-1", "-1.0")
-    return cell.casefold() in ASTERN
-
-
-def _names_of(columns: Mapping[str, Column]) -> set[str]:
-    return {column.name for column in columns.values()}
-
-
-def _bare(name: str, below: str) -> tuple[str, str]:
-    """A column's name without its unit, and the unit, which may stand below it."""
-    name = OF_LIBCOSIM.sub("", name)
-    told = WITH_UNIT.fullmatch(name)
-    if told and told[2].casefold() in NORTH:
-        return told[1], bare_unit(below)
-    return (told[1], spelt(told[2])) if told else (name, bare_unit(below))
-
-
-def _without_unit(name: str, below: str) -> tuple[str, str]:
-    """The same, where the unit may be the end of the name, too."""
-    bare, unit = _bare(name, below)
-    return (bare, unit) if unit else _unit_at_the_end(bare)
-
-
-def _unit_at_the_end(name: str) -> tuple[str, str]:
-    """A name without the unit that its end is, as x_mm, yaw_rate_deg_s, x/mm, x in mm, TimeUS."""
-    if stamped := TIME_IN.fullmatch(name):
-        return stamped[1], spelt(stamped[2].lower())
-    if (unit := spelt(name.lower())) in CALLED_AS_UNIT:
-        return "time", unit
-    for mark in (" in ", ", ", "/"):  # tables of DIN 461, and ISO 80000-1, 7.1.2
-        quantity, _, unit = name.partition(mark)
-        if quantity and spelt(unit) in NAMED_UNITS:
-            return quantity, spelt(unit)
-    words = name.split("_")
-    if (inner := re.fullmatch(r"(\w*[a-z\d])([A-Z][a-z]+)", name)) and "_" not in name:  # headingDeg
-        words = [*inner.groups()]
-    for count in (2, 1):
-        unit = spelt("/".join(words[-count:]))
-        if len(words) > count and unit in NAMED_UNITS:
-            return "_".join(words[:-count]), unit
-    return name, ""
 
 
 def _likely(
@@ -594,48 +335,13 @@ def _likely(
     """Columns that may be those of signals without one, of unused ones with the units below them."""
     known = {s: layout.column(s) for s in ("time", *POSE) if s not in blank}
     signs = {c.sign for c in known.values() if c.sign}
-    table = table_of_file(path, layout, {*unused, *_names_of(known), *signs})
+    table = table_of_file(path, layout, {*unused, *names_of(known), *signs})
     refuse_thousands(path, layout, table)
-    numbers = {s: signed(_numbers(table[c.name], s), table, c) for s, c in known.items()}
+    numbers = {s: signed(numbers_of(table[c.name], s), table, c) for s, c in known.items()}
     pose = {s: to_si(numbers[s], s, c, quantity[s]) for s, c in known.items()}
     kind = "time" if "time" in blank else ""
-    told = {n: _without_unit(n, below) for n, below in unused.items()}
+    told = {n: without_unit(n, below) for n, below in unused.items()}
     told = {n: (n, "") if unit.isdigit() else (bare, unit) for n, (bare, unit) in told.items()}
-    named = {n: (*pair, _numbers(table[n], kind)) for n, pair in told.items()}
+    named = {n: (*pair, numbers_of(table[n], kind)) for n, pair in told.items()}
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}
-
-
-def _numbers(cells: pd.Series, signal: str) -> np.ndarray:
-    """A column as floats, NaN where it is none; date stamps as seconds."""
-    stamps = date_stamps(cells) if signal == "time" else None
-    if stamps is not None:
-        return stamps
-    found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
-    return clock_seconds(found) if signal == "time" else found
-
-
-def _seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
-    """Signals that seem to be in another unit: which, in which, and by which factor to that."""
-    if not np.isfinite(run.time).any():
-        return
-    unit = _time_unit(run.time)
-    if unit:
-        yield "time", unit, 1.0
-    run = by_stamps(run)
-    run = run.rows(in_order(run.time))
-    there = ~lost(run.pose)
-    zeros = (run.pose == 0.0).all(axis=1)
-    fresh = ~zeros & ~repeated(run.pose, there)
-    time = UNITS["time"][unit or "s"] * run.time[fresh]
-    angles = doubts_of_angles(other_angles(run.measured))
-    for doubt in chain(doubts(time, run.pose[fresh]), angles):
-        factor = HUNDREDTH if doubt.signals == ("psi",) and in_hundredths(run.pose[fresh]) else 1.0
-        yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
-
-
-def _time_unit(time: np.ndarray) -> str | None:
-    """The unit that times (n,) seem to be in; None: seconds."""
-    time = np.unique(time[np.isfinite(time)])
-    apart = float(np.median(np.diff(time))) if time.size > 1 else 1.0
-    return likely_unit(apart) if not OFTENEST < apart < WIDTH else None

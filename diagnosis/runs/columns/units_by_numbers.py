@@ -1,0 +1,145 @@
+"""What the numbers of a table say of its columns: units, signs, and whether they are stamps."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from fmus.ship import Ship
+
+from ..cleaning import WIDTH, lost
+from ..files.reading import Run
+from ..files.tables import clock_seconds, date_stamps, table_of_file
+from ..frozen import repeated
+from ..row_order import by_stamps, in_order
+from .columns import OF_UNIT, UNITS, Column, Layout, other_angles
+from .likely_columns import ASTERN, says_command, signal_of_sign
+from .name_words import words_of
+from .unit_check import (
+    HUNDREDTH,
+    OFTENEST,
+    doubts,
+    doubts_of_angles,
+    in_hundredths,
+    largest,
+    likely_unit,
+)
+
+
+def is_fraction(
+    path: Path, text: Layout, signal: str, column: Column, quantity: Mapping[str, str]
+) -> bool:
+    """Whether the column of a shaft is not called a speed, and has fractions of the full command."""
+    if quantity[signal] != "shaft speed" or column.unit or says_command(column.name, signal, quantity):
+        return False
+    values = numbers_of(table_of_file(path, text, {column.name})[column.name], "")
+    return float(np.nanmax(np.abs(values), initial=0.0)) <= largest("command")
+
+
+def is_stamped(path: Path, text: Layout, name: str) -> bool:
+    """Whether a column has date stamps or times of day."""
+    return date_stamps(table_of_file(path, text, {name})[name]) is not None
+
+
+def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
+    """Commands without a unit that are far beyond the ship's limits, in the only unit within them.
+
+    Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit.
+    """
+    found: dict[str, Column] = {}
+    for form, commands in zip(of.command_forms, of.layouts, strict=True):
+        limits = np.abs(commands.limits(of.nominal_drive.params)).max(axis=1)
+        limits[np.array(commands.round or [False] * limits.size)] = math.tau
+        for si in dict.fromkeys(form.values()):
+            own = {s: x for (s, unit), x in zip(form.items(), limits, strict=True) if unit == si}
+            own = {s: limit for s, limit in own.items() if layout.column(s).name in names}
+            columns = {s: layout.column(s) for s in own}
+            if own and not any(column.unit or column.factor != 1.0 for column in columns.values()):
+                table = table_of_file(path, layout, names_of(columns))
+                most = {
+                    s: float(np.nanmax(np.abs(numbers_of(table[column.name], "")), initial=0.0))
+                    for s, column in columns.items()
+                }
+                unit = _unit_within(most, own, OF_UNIT[si])
+                found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
+    return found
+
+
+def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantity: str) -> str | None:
+    """The only unit in which commands of a quantity are within limits; None: SI, or it is not known."""
+    smaller = {size: unit for unit, size in reversed(UNITS[quantity].items()) if size < 1.0}
+    if not smaller:
+        return None
+    share = max((most[s] / limits[s] for s in most if limits[s] > 0.0), default=0.0)
+    within = [unit for size, unit in smaller.items() if size * share <= largest("command")]
+    far = share > max(smaller) ** -0.5 or max(most.values()) > largest(quantity)
+    return within[0] if far and len(within) == 1 else None
+
+
+def sign_columns(
+    path: Path, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
+) -> dict[str, Column]:
+    """Commands whose sign is in a column of its own, as astern of a shaft, or port of a rudder."""
+    own = {s: c for s, c in layout.columns.items() if "." in s and not c.sign}
+    named = {n: signal_of_sign(n, {s: quantity[s] for s in own}) for n in unused}
+    found: dict[str, Column] = {}
+    for name, signal in named.items():
+        if not signal:
+            continue
+        table = table_of_file(path, layout, {name, own[signal].name})
+        cells = table[name].dropna().astype("string").str.strip().unique().tolist()
+        negative = [cell for cell in cells if _is_negative(cell, quantity[signal])]
+        values = numbers_of(table[own[signal].name], "")
+        if len(cells) <= 3 and len(negative) == 1 and np.nanmin(values, initial=0.0) >= 0.0:
+            found[signal] = own[signal].model_copy(update={"sign": name, "negative": negative[0]})
+    return found
+
+
+def _is_negative(cell: str, quantity: str) -> bool:
+    """Whether the cell of a sign is that of negative values: astern, or of an angle to port."""
+    if quantity == "angle":
+        return words_of(cell) == ["port"] or cell.casefold() in ("p", "l", "-", "-1", "-1.0")
+    return cell.casefold() in ASTERN
+
+
+def names_of(columns: Mapping[str, Column]) -> set[str]:
+    """The names of some columns."""
+    return {column.name for column in columns.values()}
+
+
+def numbers_of(cells: pd.Series, signal: str) -> np.ndarray:
+    """A column as floats, NaN where it is none; date stamps as seconds."""
+    stamps = date_stamps(cells) if signal == "time" else None
+    if stamps is not None:
+        return stamps
+    found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+    return clock_seconds(found) if signal == "time" else found
+
+
+def seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
+    """Signals that seem to be in another unit: which, in which, and by which factor to that."""
+    if not np.isfinite(run.time).any():
+        return
+    unit = time_unit(run.time)
+    if unit:
+        yield "time", unit, 1.0
+    run = by_stamps(run)
+    run = run.rows(in_order(run.time))
+    there = ~lost(run.pose)
+    zeros = (run.pose == 0.0).all(axis=1)
+    fresh = ~zeros & ~repeated(run.pose, there)
+    time = UNITS["time"][unit or "s"] * run.time[fresh]
+    angles = doubts_of_angles(other_angles(run.measured))
+    for doubt in chain(doubts(time, run.pose[fresh]), angles):
+        factor = HUNDREDTH if doubt.signals == ("psi",) and in_hundredths(run.pose[fresh]) else 1.0
+        yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
+
+
+def time_unit(time: np.ndarray) -> str | None:
+    """The unit that times (n,) seem to be in; None: seconds."""
+    time = np.unique(time[np.isfinite(time)])
+    apart = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    return likely_unit(apart) if not OFTENEST < apart < WIDTH else None
