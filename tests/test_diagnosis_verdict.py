@@ -36,6 +36,7 @@ from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging
+from diagnosis.verdict.coefficients import spoils
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
 from diagnosis.verdict.judging import (
     differing,
@@ -717,6 +718,18 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(sear
     assert (coefficients.refitted, nothing.refitted) == (True, False)
     assert (coefficients.changed, nothing.changed) == (True, False)
     assert nothing.learned.model == session.start
+
+
+@pytest.mark.parametrize(("second", "spoilt"), [({"delta_X_u": -3.0}, False), ({}, True)])
+def test_effects_that_predict_one_of_their_runs_worse_spoil_it(second, spoilt):
+    """More drag that acts in the first run alone, as by a failure that is paid for with coefficients."""
+    start, change = Model(), {"delta_X_u": -3.0}
+    runs = [voyages(**SHORT, ship=change)[0], voyages(**SHORT, ship=second)[1]]
+    f = Finding("X_u", change, {}, 0.1, [], 0.5, 0.5)
+    found = Findings([f], model=start.plus(change), sigma=np.array([0.1, 0.1, 0.05]))
+    data = ValidationData(runs, [], start, found.sigma)
+    assert spoils(found, data) == spoilt
+    assert not spoils(replace(found, effects=[]), data), "without an effect nothing is paid for"
 
 
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])

@@ -158,6 +158,18 @@ def needless(found: Findings | Model, without_gain: Collection[str]) -> bool:
     return bool(effects) and all(f.id in without_gain and may_be_none(f) for f in effects)
 
 
+def spoils(found: Findings, data: ValidationData) -> bool:
+    """Whether effects predict any run that they were fitted to worse than the initial model does.
+
+    What fails at times of one run is judged by no other, and may be paid for with coefficients of all.
+    """
+    if not found.effects:
+        return False
+    fitted = ValidationData(data.train, data.train, data.start, found.sigma)
+    pairs = zip(*fitted.losses_of_folds(found.model, data.start), strict=True)
+    return any(predicts_worse(its, first) for its, first in pairs)
+
+
 def _flows(fit: RefitOutcome) -> bool:
     """Whether the current of a fit differs from zero by more than its uncertainty gives by chance."""
     known, effects = fit.posterior, fit.findings.model.ship.effects

@@ -33,6 +33,7 @@ from .coefficients import (
     calibrated,
     concluded,
     needless,
+    spoils,
 )
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .effects_like_coefficients import in_place_of_coefficients
@@ -244,7 +245,8 @@ def _coefficients_alone(
         other = better_calibration(calibration, now, data, drives, unshown, believed, gained)
     if other is not None:
         return _Fitted(other, data, True, True)
-    if not needless(found, unshown) or predicts_worse(*data.losses(data.start, end.predicting)):
+    idle = needless(found, unshown) and not predicts_worse(*data.losses(data.start, end.predicting))
+    if not idle and (any(map(is_finding, learned.effects)) or not spoils(found, data)):
         return None
     nothing = replace(found, effects=[], model=data.start, suspects=[], moved={})
     return _Fitted(to_predictions(nothing, data.train, prior, False), data, False, False)
