@@ -1,5 +1,6 @@
 """The check of a learned model in parts: where a hull dissipates less, what paths and decay decide."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -158,10 +159,26 @@ def test_a_force_from_outside_that_is_too_strong_is_named(monkeypatch):
 
     stubbed(monkeypatch, far, lambda _: True)
     found = check_stability(learned, nominal)
-    said = "checked without wind, waves and current, which are too strong for the thrusters"
-    assert said in found.notes
-    assert (found.bounded, found.closed_loop) == (False, True)
+    assert stability.NOT_BY_HULL in found.notes
+    assert (found.bounded, found.closed_loop, found.safe) == (False, True, True)
     assert asked[-1].vessel == {k: v for k, v in learned.vessel.items() if k != "F_n"}
+
+
+@pytest.mark.parametrize("hull_is_lost", [False, True])
+def test_thrusters_that_are_too_weak_are_no_reason_to_withhold_a_model(monkeypatch, hull_is_lost):
+    """Lost on both paths; the initial model is held on one, the hull by initial thrusters on the same."""
+    nominal = surge()
+    learned = replace(surge(X_u=-3.0), thrusters={"loss_surge": 0.6})
+
+    def far(r, m):
+        by_initial = not m.thrusters and (m is nominal or not hull_is_lost)
+        return 0.5 if by_initial and r.name == "ellipse" else np.inf
+
+    stubbed(monkeypatch, far, lambda _: False)
+    found = check_stability(learned, nominal)
+    assert (found.bounded, found.closed_loop) == (False, True)
+    assert found.weak == found.safe == (not hull_is_lost)
+    assert (stability.NOT_BY_HULL in found.notes) == (not hull_is_lost)
 
 
 def test_an_indefinite_mass_matrix_is_never_safe(monkeypatch):

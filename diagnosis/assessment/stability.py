@@ -73,6 +73,10 @@ class OperatingRegion(NamedTuple):
 
 
 OPERATING = OperatingRegion()
+NOT_BY_HULL = (
+    "its hull is held there without wind, waves and current by the thrusters of the initial model; "
+    "these are too strong for the learned thrusters"
+)
 NOT_HELD = "the initial model is not held there either"
 NOR_NOMINAL = "nor does that of the initial model"
 NO_THRUST = "its thrusters give no force on some axis, so no reference controller can hold it"
@@ -96,6 +100,8 @@ class Stability:
             dissipates no more: then nothing that was learned is the reason.
         region: where the learned hull dissipates less than the nominal one, with numbers; None: nowhere.
         notes: further remarks, a sentence each.
+        weak: whether the ship is lost because its thrusters are too weak, and nowhere by its hull, which
+            is held on each path on which the initial model is.
         driven_on: motions in which the learned hull gains energy, and the nominal one less or none.
     """
 
@@ -108,11 +114,12 @@ class Stability:
     closed_loop: bool = True
     from_start: bool = False
     driven_on: tuple[str, ...] = ()
+    weak: bool = False
 
     @property
     def safe(self) -> bool:
         """Whether the model may be written without ``--allow-unstable``."""
-        return self.mass_definite and (self.bounded or self.from_start)
+        return self.mass_definite and (self.bounded or self.from_start or self.weak)
 
 
 def check_stability(
@@ -158,9 +165,9 @@ def check_stability(
             f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
             f"{after.min():.3g} 1/s (nominal at least {before.min():.3g})"
         ]
-    bounded, both, held = False, False, model.ship.fully_actuated
+    bounded, both, weak, held = False, False, False, model.ship.fully_actuated
     if held and mass_definite:
-        bounded, both = _bounded(model, nominal, advance, notes)
+        bounded, both, weak = _bounded(model, nominal, advance, notes)
         held = not both  # paths on which the nominal ship is lost as well tell nothing of the other
     if not held:
         advance("the decay of the motion without thrust")
@@ -181,6 +188,7 @@ def check_stability(
         held,
         both and not _less(after.min(), before.min()),
         driven_on(model, nominal, region),
+        weak,
     )
 
 
@@ -311,29 +319,31 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     return kept
 
 
-def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> tuple[bool, bool]:
+def _bounded(
+    model: Model, nominal: Model, advance: Advance, notes: list[str]
+) -> tuple[bool, bool, bool]:
     """Whether the reference controller keeps the ship on every path; adds to the notes how well.
 
-    Then whether the nominal ship is lost wherever this one is.
+    Then whether the nominal ship is lost wherever this one is, and :attr:`Stability.weak`.
     """
-    bounded, both, bound = True, True, bound_of(model)
+    bounded, both, weak, bound = True, True, False, bound_of(model)
     advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
     distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
     outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
-    undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
+    calm = {k: v for k, v in model.vessel.items() if k not in outside}
+    hull, by_hull = replace(model, vessel=calm, thrusters=nominal.thrusters), False
     for reference, distance in zip(REFERENCES, distances, strict=True):
         if distance < bound:
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue
         bounded = False
         notes.append(f"{reference.name}: more than {bound:.3g} m from the target")
-        if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < bound:
-            notes.append(
-                "checked without wind, waves and current, which are too strong for the thrusters"
-            )
-            both = False
+        of_hull = (hull.vessel, hull.thrusters) != (model.vessel, model.thrusters)
+        if of_hull and largest_distance(reference, hull) < bound:
+            notes.append(NOT_BY_HULL)
+            both, weak = False, True
         elif largest_distance(reference, nominal) >= bound:
             notes.append(NOT_HELD)
         else:
-            both = False
-    return bounded, both and not bounded
+            both, by_hull = False, True
+    return bounded, both and not bounded, weak and not by_hull
