@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model, weak_windows
@@ -18,7 +19,7 @@ from diagnosis.search.prediction_fit.coefficient_calibration import (
     as_missed,
     begin,
 )
-from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, push_of, shootings
+from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, push_of, shootings, whitened
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.refit import prediction_bands
 from diagnosis.search.prior import NominalPrior
@@ -93,10 +94,11 @@ def test_the_disturbance_is_scaled_to_what_the_windows_miss():
     plain = Unscaled(runs(), problem.windows, at, PRIOR).information(at)
     share = np.trace(problem.information(at).G) / np.trace(plain.G)
     model = at.model(PRIOR)
-    (W,), around = plain.weights, problem.around(windows, model)
+    (spread,), around = plain.spreads, problem.around(windows, model)
+    W = problem.whitening(windows, spread, around.residuals)
     _, pushes = push_of(runs(), model_error(runs(), model), problem.std)
     expected = np.einsum("wii->", problem.scatter(windows, around, W, pushes))
-    assert share == pytest.approx(problem.squares(0, W, model) / expected, rel=2e-3)
+    assert share == pytest.approx(np.sum(whitened(W, around.residuals) ** 2) / expected, rel=2e-3)
 
 
 def test_early_errors_count_as_much_as_late_ones():
@@ -169,3 +171,26 @@ def test_nothing_is_calibrated_without_a_remainder_or_of_few_runs():
     assert (
         calibrated(nothing_found(), ValidationData(runs()[:2], [], Model(), np.ones(3)), PRIOR) is None
     )
+
+
+def test_the_misfit_is_twice_the_negative_log_density_of_the_residuals_of_all_windows():
+    """By scipy's normal density, the variance of what the model misses included."""
+    windows = Shooting([w.smoothed for w in runs()[:2]], 8.0)
+    at = RefinedModel.at(Model(), PRIOR)
+    problem = PredictionFit(runs()[:2], [windows], at, PRIOR)
+    start, drag = Model(), Model().plus({"delta_X_u": DRAG})
+    spread = problem.spread(windows, problem.around(windows, start))
+
+    def density(model):
+        r = windows.residuals(model)
+        missed = problem.missed(windows, r**2, np.ones(r.shape[:2], bool))
+        flat, V = r.reshape(len(r), -1), np.broadcast_to(missed, r.shape).reshape(len(r), -1)
+        found = [
+            multivariate_normal(cov=S + np.diag(v)).logpdf(x) + 0.5 * x.size * np.log(2.0 * np.pi)
+            for x, v, S in zip(flat, V, spread, strict=True)
+        ]
+        return -2.0 * sum(found)
+
+    for model in (start, drag):
+        assert problem.misfit(windows, spread, model) == pytest.approx(density(model), rel=1e-4)
+    assert problem.misfit(windows, spread, drag) < problem.misfit(windows, spread, start)

@@ -9,6 +9,10 @@ parameters about their prior means, P their prior precision. The inverse of W is
 initial state and the measurement's noise give, plus on its diagonal the mean square of what the model
 misses in that run, position and heading apart. The three lengths share the weight.
 
+What the model misses is that of the parameters at hand, so that the cost counts its logarithm as well:
+else a model that misses more would have lower weights and a lower cost. To it the log determinant of
+W^-1 is added.
+
 W takes the instants of a window as independent beyond the initial state; what really correlates them
 is the unrecorded force, :mod:`.push`. With V the covariance that it gives, H = J^T W J and
 G = J^T W V W J, the information in the data is that of a likelihood to the power k = tr(S H) / tr(S G),
@@ -97,7 +101,8 @@ class Information:
     Attributes:
         H, G: (q, q), see the module.
         g: (q,), J^T W r.
-        weights: of each length the factor (w, 3T, 3T) of W.
+        spreads: of each length the covariance (w, 3T, 3T) of residuals by initial state and noise; zero
+            where a model runs away.
         push: the unrecorded force.
         fold_H, fold_g: (folds, q, q) and (folds, q), what each fold says; their sums are H and g.
     """
@@ -105,7 +110,7 @@ class Information:
     H: np.ndarray
     G: np.ndarray
     g: np.ndarray
-    weights: Sequence[np.ndarray]
+    spreads: Sequence[np.ndarray]
     push: ForceDisturbance
     fold_H: np.ndarray
     fold_g: np.ndarray
@@ -212,8 +217,8 @@ class PredictionFit:
         found = s.around(model, self._steps)
         return replace(found, slopes=found.slopes[..., self._columns] * self.unit)
 
-    def whitening(self, s: Shooting, around: Around) -> np.ndarray:
-        """The factor (w, 3T, 3T) that whitens residuals of windows; zero where a model runs away."""
+    def spread(self, s: Shooting, around: Around) -> np.ndarray:
+        """The covariance (w, 3T, 3T) of residuals by start and noise; zero where one runs away."""
         r = around.residuals
         fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
         none = ForceDisturbance(np.zeros(3), np.ones(3))
@@ -221,14 +226,28 @@ class PredictionFit:
         # A small change at the start may be beyond all numbers at the end, where the prediction is not.
         steady = np.isfinite(V).all(axis=(1, 2, 3, 4))
         fine[fine], V = steady, V[steady]
+        found = np.zeros((len(r), r[0].size, r[0].size))
+        found[fine] = _square(V, s.noise[fine])
+        return found
+
+    def factors(self, s: Shooting, spread: np.ndarray, r: np.ndarray) -> np.ndarray:
+        """Cholesky's factors (w, 3T, 3T) of W^-1 where the model of the spread runs: of that, and what
+        residuals r (w, T, 3) miss.
+        """
+        fine = running(spread)
         seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
         missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
-        found = np.zeros((len(r), r[0].size, r[0].size))
-        whole = _square(V, s.noise[fine] + missed[fine])
-        # Of a ship that turns far within a window rounding alone would make it indefinite.
+        whole = spread[fine]
         diagonal = np.einsum("wii->wi", whole)
+        diagonal += np.broadcast_to(missed[fine], r[fine].shape).reshape(len(whole), -1)
+        # Of a ship that turns far within a window rounding alone would make it indefinite.
         diagonal += DIGITS * diagonal.max(axis=1, keepdims=True)
-        found[fine] = np.linalg.inv(np.linalg.cholesky(whole))
+        return np.linalg.cholesky(whole)
+
+    def whitening(self, s: Shooting, spread: np.ndarray, r: np.ndarray) -> np.ndarray:
+        """The factor (w, 3T, 3T) that whitens residuals (w, T, 3); zero where a model runs away."""
+        found = np.zeros_like(spread)
+        found[running(spread)] = np.linalg.inv(self.factors(s, spread, r))
         return found
 
     def scatter(
@@ -258,16 +277,21 @@ class PredictionFit:
         missed[:, :2] = missed[:, :2].mean(axis=1, keepdims=True)
         return missed[s.run][:, None]
 
-    def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
-        """Sum of squares of the whitened residuals of a model in the windows of one length."""
-        return float(np.sum(whitened(weights, self.windows[k].residuals(model)) ** 2))
+    def misfit(self, s: Shooting, spread: np.ndarray, model: Model) -> float:
+        """r^T W r + log det W^-1 of a model in windows of one length; infinite where it runs away."""
+        r, fine = s.residuals(model), running(spread)
+        if not np.isfinite(r[fine]).all():
+            return np.inf
+        L = self.factors(s, spread, r)
+        z = np.linalg.solve(L, r[fine].reshape(len(L), -1, 1))
+        return float(np.sum(z**2) + 2.0 * np.sum(np.log(np.einsum("wii->wi", L))))
 
-    def cost(self, at: RefinedModel, weights: Sequence[np.ndarray], power: float) -> float:
+    def cost(self, at: RefinedModel, spreads: Sequence[np.ndarray], power: float) -> float:
         """Twice the negative logarithm of the posterior, but for a constant."""
         theta, model = self.theta(at), at.model(self.prior)
-        squares = [self.squares(k, W, model) for k, W in enumerate(weights)]
-        total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
-        return total if np.isfinite(total) else np.inf
+        pairs = zip(self.windows, spreads, strict=True)
+        misfit = float(np.mean([self.misfit(s, spread, model) for s, spread in pairs]))
+        return float(theta @ self.precision @ theta) + power * misfit
 
     def share(self, missed: float, expected: float) -> float:
         """Of the sum of squares that disturbance and noise are expected to give, what counts.
@@ -285,7 +309,8 @@ class PredictionFit:
         def of_windows(group: tuple[Shooting, np.ndarray]) -> tuple[np.ndarray, ...]:
             s, of = group
             around = self.around(s, model)
-            W = self.whitening(s, around)
+            spread = self.spread(s, around)
+            W = self.whitening(s, spread, around.residuals)
             A = whitened(W, around.slopes)
             r = whitened(W, around.residuals)
             parts = [(A[of == k].reshape(-1, q), r[of == k].ravel()) for k in range(folds)]
@@ -293,12 +318,12 @@ class PredictionFit:
             g = np.array([J.T @ left for J, left in parts])
             V = self.scatter(s, around, W, pushes)
             share = self.share(float(np.sum(r**2)), float(np.einsum("wii->", V)))
-            return H, share * information_of(A, V), g, W
+            return H, share * information_of(A, V), g, spread
 
         groups = [*zip(self.windows, self.fold_of_window, strict=True)]
-        Hs, Gs, gs, weights = zip(*for_each(of_windows, groups), strict=True)
+        Hs, Gs, gs, spreads = zip(*for_each(of_windows, groups), strict=True)
         H, G, g = (np.mean(each, axis=0) for each in (Hs, Gs, gs))
-        return Information(H.sum(axis=0), G, g.sum(axis=0), weights, push, H, g)
+        return Information(H.sum(axis=0), G, g.sum(axis=0), spreads, push, H, g)
 
 
 def _square(V: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -343,9 +368,9 @@ def fit_to(problem: PredictionFit, at: RefinedModel) -> Fitted:
 
     def about(at: RefinedModel) -> _Weighed:
         known = problem.information(at)
-        k, weights = known.power(P), known.weights
+        k, spreads = known.power(P), known.spreads
         H, right = k * known.H + P, k * known.g - P @ problem.theta(at)
-        return _Weighed(H + ridge(H), right, lambda e: problem.cost(e, weights, k), known, k)
+        return _Weighed(H + ridge(H), right, lambda e: problem.cost(e, spreads, k), known, k)
 
     at, here = most_likely(at, about, problem.moved)
     S = np.linalg.inv(here.H)
