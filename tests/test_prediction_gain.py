@@ -246,9 +246,9 @@ def test_what_calibration_predicts_as_well_is_not_shown_but_for_changes_of_coeff
     findings = Findings(each, model=start, sigma=np.array([1e-3, 1e-3, 1e-3]))
     change = PairedChange(1.0, 1.0, 0.0, 1.0)
     gain = PredictionGain("validation runs", 9, change, change, gained, over)
-    coefficients = [*NominalPrior.of(start).std]
-    assert without_gain(gain, findings, start, run(), coefficients) == unshown
-    assert not without_gain(None, findings, start, run(), coefficients)
+    prior = NominalPrior.of(start)
+    assert without_gain(gain, findings, start, run(), prior) == unshown
+    assert not without_gain(None, findings, start, run(), prior)
 
 
 BOAT = """
@@ -298,12 +298,18 @@ def test_what_only_all_coefficients_together_make_up_is_no_change_of_coefficient
     findings = Findings(each, model=start, sigma=np.ones(3))
     change = PairedChange(1.0, 1.0, 0.0, 1.0)
     gain = PredictionGain("validation runs", 9, change, change, False, "calibrated")
-    names = [*NominalPrior.of(start).std]
+    prior = NominalPrior.of(start)
+    names = [*prior.std]
     columns = [
         _columns(runs, start, model_error(runs, start), x, np.ones(3)) for x in (["delta_Y_ur"], names)
     ]
     assert _spanned(*columns)
-    assert without_gain(gain, findings, start, runs, names) == {"Y_ur"}
+    assert without_gain(gain, findings, start, runs, prior) == {"Y_ur"}
+    # Y_vdot is -30 kg, known to 9 kg: beyond three of these it is no other value of the coefficient.
+    for more, plausible, beyond in ((24.0, True, False), (32.0, True, True), (32.0, False, False)):
+        each[1] = replace(each[1], values={"added_mass_Y": more})
+        unshown = without_gain(gain, replace(findings, effects=each), start, runs, prior, plausible)
+        assert ("added_mass_Y" in unshown, more) == (beyond, more)
     for unshown, sure in ((set(), True), ({"Y_ur"}, False)):
         doubts = Doubts(without_gain=unshown)
         assert any_sure(with_confidence(Findings(each[:1], model=start), start, doubts)) == sure

@@ -227,11 +227,12 @@ def likeliest_mistake(
         return None
     near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
     # Of a ship that is the same on both sides, axes that are mirrored are as well commands that are
-    # swapped, which is a rarer mistake.
+    # swapped, which is a rarer mistake, unless it is likelier by these data.
     order = sorted(
         near,
         key=lambda k: (
             k >= named,
+            found[k] < found.max() - np.log(2.0),
             possible[k].commands is not None,
             len(possible[k].changes),
             -found[k],

@@ -158,7 +158,8 @@ def judge(
     if calibrates:
         advance("gain of the search over calibration")
         gain = end.gain_over(calibration)
-        unshown = without_gain(gain, fit.findings, start, train, [*prior.std])
+        plausible = calibration is not None and calibration.findings.plausible
+        unshown = without_gain(gain, fit.findings, start, train, prior, plausible)
     advance("residual")
     doubted = _in_doubt(end, unshown)
     if calibrates:

@@ -8,8 +8,10 @@ import numpy as np
 
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import SMALL
+from ..runs.run_constants import FAR_OFF
 from ..search.candidates import model_error, shape
 from ..search.findings import Finding, Findings
+from ..search.prior import NominalPrior
 from ..search.shortlist import TIE
 from ..search.significance import predicts_better, predicts_worse
 from .validation_data import ValidationData
@@ -124,21 +126,24 @@ def without_gain(
     found: Findings,
     start: Model,
     runs: Sequence[WeakWindows],
-    coefficients: Sequence[str],
+    prior: NominalPrior,
+    plausible: bool = False,
 ) -> set[str]:
     """Ids of the findings that predictions do not show: calibration alone predicts as well.
 
     An effect that is a change of coefficients of one kind, as an added mass or a lag, is a calibration,
-    and stays. What only inertia, damping and thrust together make up, each far from its prior, is none:
-    a sway force by u r is, as the equation of each axis may be multiplied by a factor. Waves and
-    failures in times of one run are in no prediction of other data.
+    and stays; not if it is beyond their priors and other coefficients do as well within theirs. What
+    only inertia, damping and thrust together make up, each far from its prior, is none: a sway force
+    by u r is, as the equation of each axis may be multiplied by a factor. Waves and failures in times
+    of one run are in no prediction of other data.
 
     Args:
         gain: of the search over calibration; None: not known, so that nothing follows.
         found: the findings.
         start: the initial model.
         runs: training runs.
-        coefficients: names of those that calibration may change.
+        prior: of the coefficients that calibration may change.
+        plausible: whether these are within their priors in the calibrated model.
     """
     if gain is None or gain.gained:
         return set()
@@ -147,11 +152,12 @@ def without_gain(
     if gain.over == "initial" or not shown:
         return {f.id for f in shown}
     base, kinds = model_error(runs, start), dict[str, list[str]]()
-    for n in coefficients:
+    for n in prior.std:
         group = start.ship.coefficients[n].group
         kinds.setdefault(KIND.get(group, group), []).append(n)
     by_kind = [_columns(runs, start, base, names, found.sigma) for names in kinds.values()]
-    lags = any(start.declared(n).unit == "s" for n in coefficients)
+    deviations = [np.array([prior.std[n] for n in names]) for names in kinds.values()]
+    lags = any(start.declared(n).unit == "s" for n in prior.std)
 
     def is_coefficient(f: Finding) -> bool:
         """A further lag is a time constant of the actuators, though not the same function of it."""
@@ -159,7 +165,14 @@ def without_gain(
             start.declared(n).unit == "s" for n in f.values
         )
         own = _columns(runs, start, base, [*f.values], found.sigma)
-        return (lags and of_time) or any(_spanned(own, of_kind) for of_kind in by_kind)
+        if lags and of_time:
+            return True
+        size = np.array([*f.values.values()])
+        pairs = zip(by_kind, deviations, strict=True)
+        return any(
+            _spanned(own, of_kind) and not (plausible and _beyond(own @ size, of_kind * std))
+            for of_kind, std in pairs
+        )
 
     return {f.id for f in shown if not is_coefficient(f)}
 
@@ -170,6 +183,14 @@ def _columns(
     """(3 K, names), the model error by small steps of some parameters, in units of the noise."""
     columns = shape(runs, start, base, {}, names, SMALL).columns / sigma[:, None]
     return columns.reshape(-1, len(names))
+
+
+def _beyond(force: np.ndarray, columns: np.ndarray) -> bool:
+    """Whether a force (n,) takes more than FAR_OFF of any of some columns (n, q), the least of each.
+
+    What a small step makes of a column is no other one: m is X_udot and Y_vdot together.
+    """
+    return bool((np.abs(np.linalg.lstsq(columns, force, SMALL)[0]) > FAR_OFF).any())
 
 
 def _spanned(columns: np.ndarray, others: np.ndarray) -> bool:
