@@ -451,6 +451,30 @@ def test_a_blank_that_is_filled_gets_the_unit_in_its_name(tmp_path: Path) -> Non
     np.testing.assert_allclose(np.ptp(run.commands, axis=0), [8.0, 0.6], rtol=1e-6)
 
 
+def test_per_cent_of_a_shaft_speed_or_an_angle_are_those_of_its_limit(tmp_path: Path) -> None:
+    table = zigzag(**{"propeller.n": "Main engine %", "rudder.delta": "rudder_pct"})
+    most, full = (
+        np.abs(np.array(x)).max() for x in TANKER.layouts[0].limits(TANKER.nominal_drive.params)
+    )
+    table["Main engine %"] *= 100.0 / most
+    table["rudder_pct"] *= 100.0 / full
+    path = written(tmp_path / "a.csv", table)
+    named = {"propeller.n": "Main engine %", "rudder.delta": "rudder_pct"}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": named}))
+    told = propose(path, TANKER).needed["columns"]
+    assert told["propeller.n"] == {
+        "name": "Main engine %",
+        "factor": pytest.approx(most / 100.0, rel=1e-5),
+    }
+    assert told["rudder.delta"] == {
+        "name": "rudder_pct",
+        "factor": pytest.approx(full / 100.0, rel=1e-5),
+    }
+    run = propose(path, TANKER).run
+    assert run is not None
+    np.testing.assert_allclose(np.ptp(run.commands, axis=0), [8.0, 0.6], rtol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("name", "signal"),
     [

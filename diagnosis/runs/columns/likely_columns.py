@@ -264,7 +264,7 @@ def _evidence(
     if unit in UNITS[quantity]:
         reasons, score = [*reasons, f"by its unit {unit}"], score + 0.5
     elif unit == "%" and reasons:
-        reasons.append(f'in %: state the "factor" to {SI_UNIT[quantity]} as well')
+        reasons.append(f'in %: of its limit, or state the "factor" to {SI_UNIT[quantity]}')
     axes = MOVES.get(signal) or MOVED.get(quantity, ("surge", "sway", "yaw"))
     if quantity == "angle":  # it may wrap
         values = _unwrapped(values if np.abs(numbers).max() <= 2.0 * np.pi else np.radians(values))
@@ -283,7 +283,7 @@ def _is_possible(signal: str, quantity: str, unit: str, numbers: np.ndarray) -> 
     moves = quantity in ("time", "length") or signal == "psi"  # a shaft may turn evenly
     if numbers.size < 2 or (moves and np.ptp(numbers) == 0.0):
         return False
-    of_most = unit == "%" and "." in signal  # its share of the most, which is not stated
+    of_most = unit == "%" and "." in signal  # its share of the most
     if unit not in ("", "-", *UNITS[quantity]) and not of_most:
         return False
     return float(np.abs(numbers).max()) <= largest(quantity) / min(UNITS[quantity].values())

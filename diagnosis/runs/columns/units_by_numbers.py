@@ -1,6 +1,7 @@
 """What the numbers of a table say of its columns: units, signs, and whether they are stamps."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -26,6 +27,7 @@ from .unit_check import (
     in_hundredths,
     largest,
     likely_unit,
+    spelt,
 )
 
 
@@ -47,7 +49,8 @@ def is_stamped(path: Path, text: Layout, name: str) -> bool:
 def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
     """Commands without a unit that are far beyond the ship's limits, in the only unit within them.
 
-    Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit.
+    Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit. Per
+    cent of a shaft speed or an angle are those of its limit.
     """
     found: dict[str, Column] = {}
     for form, commands in zip(of.command_forms, of.layouts, strict=True):
@@ -63,9 +66,18 @@ def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship
                     s: float(np.nanmax(np.abs(numbers_of(table[column.name], "")), initial=0.0))
                     for s, column in columns.items()
                 }
+                if OF_UNIT[si] != "command" and all(_is_percent(c.name) for c in columns.values()):
+                    shares = {s: float(f"{limit / 100.0:.6g}") for s, limit in own.items()}
+                    found |= {s: c.model_copy(update={"factor": shares[s]}) for s, c in columns.items()}
+                    continue
                 unit = _unit_within(most, own, OF_UNIT[si])
                 found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
     return found
+
+
+def _is_percent(name: str) -> bool:
+    """Whether a word of a column's name is per cent."""
+    return any(spelt(word.casefold()) == "%" for word in re.split(r"[\s_.()\[\]]+", name))
 
 
 def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantity: str) -> str | None:
