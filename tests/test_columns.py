@@ -79,6 +79,12 @@ def written(path: Path, table: pd.DataFrame) -> Path:
         ("wind_velo_relative_mid", "m/s", ""),
         ("x_position_mid", "", ""),
         ("utm_easting", "m", "y"),
+        ("proa", "deg", "psi"),
+        ("hélice de proa", "rps", ""),
+        ("ângulo do leme", "deg", "rudder.delta"),
+        ("północ", "m", "x"),
+        ("obroty śruby", "rpm", "propeller.n"),
+        ("kurs", "deg", ""),
     ],
 )
 def test_words_of_a_name_and_its_unit_tell_a_signal(name: str, unit: str, signal: str) -> None:

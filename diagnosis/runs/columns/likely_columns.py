@@ -22,7 +22,7 @@ FILLERS = frozenset(
         *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
         *("sign", "gear", "side", "data", "value"),
         *("gyro", "compass", "utm", "track", "azimuth", "gps", "gnss", "distance"),
-        *("de", "du", "di", "van", "der"),
+        *("de", "du", "di", "do", "van", "der", "burta"),
         *("gga", "rmc", "hdt", "rsa", "me", "sg"),  # sentences of NMEA 0183, tags of plants
     )
 )
@@ -30,7 +30,7 @@ FILLERS = frozenset(
 WORDS = {
     "length": {"x": "x", "north": "x", "northing": "x", "y": "y", "east": "y", "easting": "y"},
     "angle": {
-        **dict.fromkeys(("psi", "heading", "yaw", "hdg"), "psi"),
+        **dict.fromkeys(("psi", "heading", "yaw", "hdg", "proa"), "psi"),
         **dict.fromkeys(("course", "cog"), "course"),
         "wind": "wind_direction",
     },

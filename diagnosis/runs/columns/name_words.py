@@ -4,28 +4,33 @@ import re
 import unicodedata
 
 # English words -> those that names have in their place: short forms, German, French, Spanish, Italian,
-# Dutch, Norwegian, Swedish, all without accents.
+# Portuguese, Dutch, Norwegian, Swedish, Polish, all without accents.
 FOREIGN = {
-    "starboard": "stbd stb sb right steuerbord tribord estribor dritta stuurboord styrbord",
-    "port": "left ps bb backbord babord babor sinistra bakboord",
-    "propeller": "prop screw helice elica schroef",
-    "rudder": "steer steering helm ruder gouvernail safran barre timon timone roer roder",
+    "starboard": (
+        "stbd stb sb right steuerbord tribord estribor dritta stuurboord styrbord boreste prawa"
+    ),
+    "port": "left ps bb backbord babord babor sinistra bakboord bombordo lewa",
+    "propeller": "prop screw helice elica schroef sruba sruby",
+    "rudder": "steer steering helm ruder gouvernail safran barre timon timone roer roder leme",
     "rudder angle": "ruderlage ruderwinkel roerhoek rorvinkel rodervinkel",
     "bow": "bowthr bowthruster bug bugstrahl bugstrahler bugstrahlruder boeg baug",
     "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
     "fore": "fwd forward vorn forut",
     "aft": "achter akter",
-    "azimuth": "azimut",
-    "thruster": "propulseur strahlruder boegschroef",
-    "angle": "winkel vinkel angulo angolo hoek",
-    "rpm": "drehzahl regime toerental turtall omdreiningstall omdreininger varvtal giri",
+    "azimuth": "azimut azimute",
+    "thruster": "propulseur strahlruder boegschroef pednik pednika",
+    "angle": "winkel vinkel angulo angolo hoek kat",
+    "rpm": (
+        "drehzahl regime toerental turtall omdreiningstall omdreininger varvtal giri rotacao rotacoes "
+        "obroty"
+    ),
     "order": "setpoint soll sollwert consigne orden ordre",
     "measured": "ist istwert mesure medido gemeten",  # codespell:ignore
     "true": "vrai vraie wahr verdadero",
-    "time": "zeit uhrzeit temps heure tiempo tempo tijd tid",
+    "time": "zeit uhrzeit temps heure tiempo tempo tijd tid czas",
     "timestamp": "zeitstempel horodatage",
-    "north": "nord norte noord",
-    "east": "ost este oost",
+    "north": "nord norte noord polnoc",
+    "east": "ost este oost leste wschod",
     "northing": "hochwert nordwert",
     "easting": "rechtswert ostwert",
     "latitude": "breite breitengrad latitud latitudine breedtegraad breddegrad",

@@ -33,6 +33,7 @@ SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
     **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),  # codespell:ignore
     **dict.fromkeys(("degree", "degrees", "grader", "Grad", "graden", "grados", "gradi"), "deg"),
+    **dict.fromkeys(("graus", "stopnie", "stopni"), "deg"),
     **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("day", "days"), "d"),
@@ -42,7 +43,7 @@ SPELT = {
     **dict.fromkeys(("pct", "percent"), "%"),
     **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
     **dict.fromkeys(("1/min", "min-1", "min^-1", "r/min", "rev/min", "U/min", "tr/min"), "rpm"),
-    **dict.fromkeys(("o/min", "omdr/min", "omw/min", "varv/min", "giri/min"), "rpm"),
+    **dict.fromkeys(("o/min", "omdr/min", "omw/min", "varv/min", "giri/min", "obr/min"), "rpm"),
     **dict.fromkeys(("°/min",), "deg/min"),
     **{f"{unit}/sec": f"{unit}/s" for unit in ("m", "rad", "deg")},
 }
