@@ -154,7 +154,7 @@ def test_whitened_residuals_of_what_is_expected_have_unit_covariance(monkeypatch
     monkeypatch.setattr(fits, "covariance", lambda motion, at_start, push: V[motion].copy())
     a.slopes[4, 0, 0, 0] = np.nan
     V[3, 0, 0, 0, 0] = np.nan  # the prediction does not run away, the motion about it does
-    found = alone().whitening(s, a)
+    found = alone().whitening(s, alone().spread(s, a), a.residuals)
     assert (found[3:5] == 0.0).all()
     seen = s.noise[..., 2] < UNKNOWN
     seen[3:5] = False
@@ -330,16 +330,37 @@ def test_a_window_is_of_the_fold_in_which_it_begins(monkeypatch):
 def test_the_cost_is_the_prior_and_the_likelihood_at_its_power(monkeypatch):
     p, at, *_ = made(monkeypatch)
     rng = np.random.default_rng(0)
-    residuals, factors = rng.standard_normal((2, W, T, 3)), rng.standard_normal((2, W, 3 * T, 3 * T))
-    p.windows = [SimpleNamespace(residuals=lambda model, r=r: r) for r in residuals]
-    squares = [
-        float(np.sum((f @ r.reshape(W, -1, 1)) ** 2)) for f, r in zip(factors, residuals, strict=True)
+    residuals = rng.standard_normal((2, W, T, 3))
+    spreads = np.array([[spd(rng, 3 * T) for _ in range(W)] for _ in range(2)])
+    spreads[0, 3] = 0.0  # a window in which the model ran away counts no more
+    p.windows = [
+        SimpleNamespace(
+            residuals=lambda model, r=r: r, noise=np.zeros((W, T, 3)), run=np.zeros(W, int), runs=[0]
+        )
+        for r in residuals
     ]
+
+    def misfit(s, spread):
+        counts = running(spread)
+        r = np.where(counts[:, None, None], s.residuals(None), 0.0)
+        missed = p.missed(s, r**2, counts[:, None].repeat(T, axis=1))
+        each = [
+            S + np.diag(np.broadcast_to(m, (T, 3)).ravel())
+            for S, m in zip(spread[counts], missed[counts], strict=True)
+        ]
+        squares = [
+            x.ravel() @ np.linalg.solve(S, x.ravel()) for S, x in zip(each, r[counts], strict=True)
+        ]
+        return sum(squares) + sum(np.linalg.slogdet(S)[1] for S in each)
+
     theta = p.theta(at)
-    expected = theta @ p.precision @ theta + 0.3 * np.mean(squares)
-    assert p.cost(at, factors, 0.3) == pytest.approx(expected)
+    likelihood = np.mean([misfit(*pair) for pair in zip(p.windows, spreads, strict=True)])
+    expected = theta @ p.precision @ theta + 0.3 * likelihood
+    assert p.cost(at, spreads, 0.3) == pytest.approx(expected, rel=1e-6)
+    residuals[0, 3] = np.nan
+    assert p.cost(at, spreads, 0.3) < np.inf, "in a window that does not count"
     residuals[1, 2] = np.nan
-    assert p.cost(at, factors, 0.3) == np.inf, "it runs away in a window"
+    assert p.cost(at, spreads, 0.3) == np.inf, "it runs away in a window"
 
 
 def test_windows_of_one_kind_of_commands_are_together_and_empty_ones_left_out(monkeypatch):
