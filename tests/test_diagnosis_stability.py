@@ -280,7 +280,7 @@ def test_a_region_of_data_holds_nearly_all_of_them():
 def test_the_reason_why_no_controller_holds_a_ship_is_its_own(name, note, monkeypatch):
     """Two azimuths give forces on every axis, of which none is requested."""
     start = Model(ship=ship_with((), name))
-    monkeypatch.setattr(stability, "_bounded", lambda *_: (True, False, False))
+    monkeypatch.setattr(stability, "_on_paths", lambda *_: (True, False, False))
     monkeypatch.setattr(stability, "comes_to_rest", lambda *_: True)
     reasons = {stability.NO_THRUST, stability.NO_ALLOCATION} & set(check_stability(start, start).notes)
     assert reasons == ({note} if note else set())

@@ -167,7 +167,7 @@ def check_stability(
         ]
     bounded, both, weak, held = False, False, False, model.ship.fully_actuated
     if held and mass_definite:
-        bounded, both, weak = _bounded(model, nominal, advance, notes)
+        bounded, both, weak = _on_paths(model, nominal, advance, notes)
         held = not both  # paths on which the nominal ship is lost as well tell nothing of the other
     if not held:
         advance("the decay of the motion without thrust")
@@ -319,13 +319,22 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     return kept
 
 
-def _bounded(
-    model: Model, nominal: Model, advance: Advance, notes: list[str]
-) -> tuple[bool, bool, bool]:
-    """Whether the reference controller keeps the ship on every path; adds to the notes how well.
+class _OnPaths(NamedTuple):
+    """What the reference paths say of a model.
 
-    Then whether the nominal ship is lost wherever this one is, and :attr:`Stability.weak`.
+    Attributes:
+        bounded: whether the reference controller keeps the ship on every path.
+        nor_nominal: whether it does not, and the nominal ship is lost wherever this one is.
+        weak: see :class:`Stability`.
     """
+
+    bounded: bool
+    nor_nominal: bool
+    weak: bool
+
+
+def _on_paths(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> _OnPaths:
+    """Let the reference controller steer a model along every path; adds to the notes how well."""
     bounded, both, weak, bound = True, True, False, bound_of(model)
     advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
     distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
@@ -346,4 +355,4 @@ def _bounded(
             notes.append(NOT_HELD)
         else:
             both, by_hull = False, True
-    return bounded, both and not bounded, weak and not by_hull
+    return _OnPaths(bounded, both and not bounded, weak and not by_hull)
