@@ -24,8 +24,8 @@ from diagnosis.verdict.judging import with_confidence
 from diagnosis.verdict.prediction_gain import (
     PairedChange,
     PredictionGain,
-    _columns,
     _spanned,
+    columns_of,
     gain_of_search,
     prediction_gain,
     without_gain,
@@ -301,7 +301,7 @@ def test_what_only_all_coefficients_together_make_up_is_no_change_of_coefficient
     prior = NominalPrior.of(start)
     names = [*prior.std]
     columns = [
-        _columns(runs, start, model_error(runs, start), x, np.ones(3)) for x in (["delta_Y_ur"], names)
+        columns_of(runs, start, model_error(runs, start), x, np.ones(3)) for x in (["delta_Y_ur"], names)
     ]
     assert _spanned(*columns)
     assert without_gain(gain, findings, start, runs, prior) == {"Y_ur"}

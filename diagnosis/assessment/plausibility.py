@@ -227,7 +227,7 @@ def likeliest_mistake(
         return None
     near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
     # Of a ship that is the same on both sides, axes that are mirrored are as well commands that are
-    # swapped, which is a rarer mistake, unless it is likelier by these data.
+    # swapped, which is a rarer mistake, unless it is twice as likely or more.
     order = sorted(
         near,
         key=lambda k: (

@@ -341,13 +341,13 @@ def _on_paths(model: Model, nominal: Model, advance: Advance, notes: list[str]) 
     outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
     calm = {k: v for k, v in model.vessel.items() if k not in outside}
     hull, by_hull = replace(model, vessel=calm, thrusters=nominal.thrusters), False
+    of_hull = (hull.vessel, hull.thrusters) != (model.vessel, model.thrusters)
     for reference, distance in zip(REFERENCES, distances, strict=True):
         if distance < bound:
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue
         bounded = False
         notes.append(f"{reference.name}: more than {bound:.3g} m from the target")
-        of_hull = (hull.vessel, hull.thrusters) != (model.vessel, model.thrusters)
         if of_hull and largest_distance(reference, hull) < bound:
             notes.append(NOT_BY_HULL)
             both, weak = False, True

@@ -14,15 +14,16 @@ from scipy.special import expit
 from fmus.effects import Effect
 
 from ..predictors import Model, WeakWindows
-from ..predictors.weak_form import OVERLAP, SMALL
+from ..predictors.weak_form import OVERLAP
 from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
-from ..search.candidates import model_error, shape
+from ..search.candidates import model_error
 from ..search.conclusion import interval
 from ..search.findings import Finding
 from ..search.nonlinear.multistart import limits
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
 from .confidence import EVEN_ODDS
+from .prediction_gain import columns_of
 
 EITHER = "another value of {0}, beyond its prior by {1:.2g} standard deviations, acts in the same way"
 
@@ -62,31 +63,27 @@ def in_place_of_coefficients(
         start: the initial model.
         prior: of its coefficients.
     """
-    model, std = fit.findings.model, fit.posterior.std
-    known = {f.id for f in fit.findings.effects}
-    weight = 1.0 / fit.findings.sigma
-    base = model_error(runs, model)
-
-    def force(of: Model, name: str, step: float) -> np.ndarray:
-        unit = SMALL * step
-        return (base - model_error(runs, of.plus({name: unit}))) / unit * weight
-
+    model, std, sigma = fit.findings.model, fit.posterior.std, fit.findings.sigma
+    names = [n for n, z in fit.findings.moved.items() if abs(z) > FAR_OFF and std.get(n)]
+    if not names:
+        return []
+    base, first = (model_error(runs, m) for m in (model, start))
+    forces = columns_of(runs, model, base, names, sigma).T
     far = [
-        _Far(n, z * prior.std[n], std[n], prior.std[n], force(model, n, prior.std[n]))
-        for n, z in fit.findings.moved.items()
-        if abs(z) > FAR_OFF and std.get(n)
+        _Far(n, fit.findings.moved[n] * prior.std[n], std[n], prior.std[n], force)
+        for n, force in zip(names, forces, strict=True)
     ]
-    ids = [i for i in start.ship.candidates if i not in known] if far else []
-    effects = [start.ship.effects[i] for i in ids]
+    known = {f.id for f in fit.findings.effects}
+    effects = [start.ship.effects[i] for i in start.ship.candidates if i not in known]
     windows = len(base) / OVERLAP
     found = []
-    first = float(np.sum((model_error(runs, start) * weight) ** 2)) if far else 0.0
     for c in far:  # an effect acts on the ship with the coefficient that it takes the place of
         at = model.plus({c.name: -c.change})
         error = model_error(runs, at)
-        share = float(np.sum((error * weight) ** 2) - np.sum((base * weight) ** 2)) / first
+        squares = [float(np.sum((e / sigma) ** 2)) for e in (error, base, first)]
+        share = (squares[0] - squares[1]) / squares[2]
         for e in filter(_has_one_value, effects):
-            column = shape(runs, at, error, {}, e.fitted, SMALL).columns[..., 0] * weight
+            column = columns_of(runs, at, error, e.fitted, sigma)[:, 0]
             possible = _possible(c, e, column, windows, len(start.ship.candidates), at)
             found += [replace(possible, share=share, q2=share)] if possible else []
     return sorted(found, key=lambda f: -f.confidence)

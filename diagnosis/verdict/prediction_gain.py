@@ -155,7 +155,7 @@ def without_gain(
     for n in prior.std:
         group = start.ship.coefficients[n].group
         kinds.setdefault(KIND.get(group, group), []).append(n)
-    by_kind = [_columns(runs, start, base, names, found.sigma) for names in kinds.values()]
+    by_kind = [columns_of(runs, start, base, names, found.sigma) for names in kinds.values()]
     deviations = [np.array([prior.std[n] for n in names]) for names in kinds.values()]
     lags = any(start.declared(n).unit == "s" for n in prior.std)
 
@@ -164,7 +164,7 @@ def without_gain(
         of_time = effects[f.id].kind == "actuator" and all(
             start.declared(n).unit == "s" for n in f.values
         )
-        own = _columns(runs, start, base, [*f.values], found.sigma)
+        own = columns_of(runs, start, base, [*f.values], found.sigma)
         if lags and of_time:
             return True
         size = np.array([*f.values.values()])
@@ -177,7 +177,7 @@ def without_gain(
     return {f.id for f in shown if not is_coefficient(f)}
 
 
-def _columns(
+def columns_of(
     runs: Sequence[WeakWindows], start: Model, base: np.ndarray, names: Sequence[str], sigma: np.ndarray
 ) -> np.ndarray:
     """(3 K, names), the model error by small steps of some parameters, in units of the noise."""

@@ -67,8 +67,10 @@ def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship
                     for s, column in columns.items()
                 }
                 if OF_UNIT[si] != "command" and all(_is_percent(c.name) for c in columns.values()):
-                    shares = {s: float(f"{limit / 100.0:.6g}") for s, limit in own.items()}
-                    found |= {s: c.model_copy(update={"factor": shares[s]}) for s, c in columns.items()}
+                    found |= {
+                        s: c.model_copy(update={"factor": float(f"{own[s] / 100.0:.6g}")})
+                        for s, c in columns.items()
+                    }
                     continue
                 unit = _unit_within(most, own, OF_UNIT[si])
                 found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
