@@ -62,6 +62,18 @@ def test_the_size_of_an_effect_varies_by_its_spread_less_that_of_noise():
     assert variation(force * (two == 3)[:, None], force, two) == 0.0, "of one block nothing varies"
 
 
+@pytest.mark.parametrize("nearest", [1e-4, 0.02, 0.17, 1.0])
+def test_beside_a_residual_an_effect_is_as_sure_as_unknown_causes_are_further_than_it(nearest):
+    """Unknown causes as dense as known ones: one known within the nearest, so many within what is left."""
+    sure = [EffectEvidence(1.0, left, 0.0, nearest).beside_unknown for left in np.linspace(0, 1.2, 25)]
+    assert sure[0] == 1.0
+    assert np.all(np.diff(sure) <= 0.0)
+    assert min(sure) == 0.5, "as far as the nearest candidate or further: even odds"
+    half_way = EffectEvidence(1.0, np.sqrt(nearest / 9.0), 0.0, nearest).beside_unknown
+    assert half_way == pytest.approx(0.9)
+    assert EffectEvidence(1.0, 0.1, 0.0).beside_unknown == 0.5, "it has a twin"
+
+
 # Bands, and errors of windows
 
 

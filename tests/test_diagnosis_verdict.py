@@ -24,6 +24,7 @@ from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
 from diagnosis.search.conclusion import AcceptedEffect
 from diagnosis.search.effect_evidence import credible
+from diagnosis.search.effect_evidence import EffectEvidence
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.forward_selection import taken_over
 from diagnosis.search.gram import block_folds
@@ -811,6 +812,17 @@ def test_an_alternative_is_in_neither_the_effect_nor_its_set(doubts, own, of_set
     assert bool(seen.doubt) == (own < 0.94)
     one_of_two = replace(f, confidence=0.49)
     assert bool(confidence_of(one_of_two, Model(), doubts).doubt) == (own < 0.94), "of its set"
+
+
+@pytest.mark.parametrize(("left", "nearest"), [(0.1, 0.09), (0.1, 0.005), (0.2, 0.3)])
+def test_beside_a_residual_an_effect_is_as_sure_as_its_nearest_rival_is_far(left, nearest):
+    seen = EffectEvidence(1.0, left, 0.0, nearest)
+    f = Finding("X_u", {"delta_X_u": -2.0}, {}, np.nan, [], 0.9, 0.9, evidence=seen, set_evidence=seen)
+    alone = confidence_of(f, Model()).own
+    beside = confidence_of(f, Model(), Doubts(residual="X"))
+    assert beside.own == pytest.approx(min(alone, max(1.0 / (1.0 + left**2 / nearest), 0.5)))
+    assert bool(beside.doubt) == (beside.own < alone)
+    assert confidence_of(f, Model(), Doubts(residual="X", without_gain={"X_u"})).own == 0.5
 
 
 @pytest.mark.quick

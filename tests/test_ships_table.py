@@ -1,6 +1,7 @@
 """The table of methods: windows are the project's, what is left out stays left out, others can join."""
 
 import json
+import sys
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -13,6 +14,7 @@ from support.measured import DATA, needs_data, sail
 
 import diagnosis
 from benchmarks.ships import __main__ as ships
+from benchmarks.ships import simulated_otter
 from benchmarks.ships.chosen_settings import searched
 from benchmarks.ships.datasets import DATASETS, digest_of
 from benchmarks.ships.entry_predictor import OfLaw, OfModel, Score, Training, score, spread
@@ -210,15 +212,37 @@ def test_the_page_begins_with_what_others_win(tmp_path):
     answer("nominal", 0.3, 0.02)
     answer("calibrated", 0.1, 0.03)
     answer("learned", 0.2, 0.04)
-    assert [*ships.lost(folder, 0)] == [("heading", "calibrated", "nominal")]
+    assert [*ships.lost(ships.means(folder, 0))] == [("heading", "calibrated", "nominal")]
     answer("ridge", 0.05, 0.01)
-    page = ships.write(tmp_path, ["kvlcc2"]).read_text()
+    page = ships.write(tmp_path).read_text()
     told = "| kvlcc2, 20 s | position | calibrated | ridge |"
     assert page.index(told) < page.index("Errors in windows")
     assert "| kvlcc2, 20 s | heading | calibrated | nominal, ridge |" in page
     for name in ("nominal", "ridge"):
         (folder / f"{name}.json").unlink()
-    assert "smaller error" not in ships.write(tmp_path, ["kvlcc2"]).read_text()
+    assert "smaller error" not in ships.write(tmp_path).read_text()
+
+
+def test_what_is_not_run_stays_in_the_table(tmp_path):
+    def answer(folder, position):
+        (tmp_path / folder / "kvlcc2").mkdir(parents=True)
+        found = {"one": {"scores": [[position, 0.02, -1.0, 0.9]], "seconds": 1.0}}
+        (tmp_path / folder / "kvlcc2" / "ridge.json").write_text(json.dumps(found))
+        return tmp_path / folder
+
+    earlier = ships.stored_means(ships.write(answer("first", 0.3)).with_name("results.json"))
+    others = {
+        "otter, 10 s": earlier["kvlcc2, 20 s"],
+        "kvlcc2, 20 s": {"steady": earlier["kvlcc2, 20 s"]["ridge"]},
+    }
+    now = ships.of_all(answer("second", 0.4), earlier | others)
+    assert [*now] == ["kvlcc2, 20 s", "otter, 10 s"]
+    assert [*now["kvlcc2, 20 s"]] == ["steady", "ridge"]
+    assert (now["kvlcc2, 20 s"]["ridge"].position, now["otter, 10 s"]["ridge"].position) == (
+        pytest.approx(0.4),
+        pytest.approx(0.3),
+    )
+    assert "## otter, 10 s" in ships.write(tmp_path / "second", others).read_text()
 
 
 def test_what_is_not_installed_is_reported_in_one_line(monkeypatch, capsys):
@@ -229,6 +253,56 @@ def test_what_is_not_installed_is_reported_in_one_line(monkeypatch, capsys):
     assert ships.entry("narx") is None
     (line,) = capsys.readouterr().err.splitlines()
     assert line == "'narx' is left out: it needs sysidentpy"
+
+
+def simulator(monkeypatch, classes):
+    """A simulator of this name in which only the ship is another one: it keeps what it is told."""
+    module = SimpleNamespace(**classes)
+    monkeypatch.setitem(sys.modules, "python_vehicle_simulator", SimpleNamespace(vehicles=module))
+    monkeypatch.setitem(sys.modules, "python_vehicle_simulator.vehicles", module)
+
+
+def test_runs_of_a_simulator_are_its_motion_by_orders_of_this_project(monkeypatch):
+    class Turning:
+        """Ahead with a hundredth of the mean shaft speed, turning with a hundredth of the difference."""
+
+        def __init__(self, V_current, beta_current):
+            assert (V_current, beta_current) == simulated_otter.CURRENT
+
+        def dynamics(self, eta, nu, n, order, h):
+            return np.array(
+                [order.sum() / 200.0, 0.0, 0.0, 0.0, 0.0, (order[0] - order[1]) / 100.0]
+            ), order
+
+    simulator(monkeypatch, {"otter": Turning})
+    logs = dict(simulated_otter.simulated())
+    assert {"zigzag_6", "turn_port", "stop", "random_3"} <= set(logs)
+    for name, log in logs.items():
+        step = np.diff(log["time"])
+        assert step == pytest.approx(np.full(step.size, 0.1))
+        given = 2.0 * np.pi * log[["port.n", "starboard.n"]].to_numpy() / 100.0
+        turned = 0.1 * (given[:, 0] - given[:, 1])
+        off = log["psi"].to_numpy()[1:] - np.cumsum(turned)[:-1]
+        # An order may change within a sample, in a zig-zag.
+        assert np.abs(off).max() < 0.2, name
+        if "zigzag" not in name:
+            assert np.std(off) == pytest.approx(simulated_otter.NOISE[1], rel=0.1)
+        way = 0.1 * given.mean(axis=1) * np.exp(1j * log["psi"].to_numpy())
+        gone = (log["x"] + 1j * log["y"]).to_numpy()[1:]
+        assert np.abs(gone - np.cumsum(way)[:-1]).max() < 0.02 * np.abs(way).sum(), name
+    sides = np.sign(np.diff(logs["zigzag_6"]["psi"].rolling(20).mean().dropna()))
+    assert np.abs(logs["zigzag_6"]["psi"]).max() < 0.6
+    assert np.sum(np.diff(sides[sides != 0.0]) != 0.0) > 4
+
+
+def test_a_data_set_without_its_simulator_is_left_out_in_one_line(monkeypatch, capsys, tmp_path):
+    monkeypatch.setitem(sys.modules, "python_vehicle_simulator", None)
+    assert ships.main([str(tmp_path), "--datasets", "otter", "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr()
+    (line,) = [x for x in (told.out + told.err).splitlines() if "'otter' is left out" in x]
+    assert "'otter'" in line
+    assert "pip install git+https" in line
+    assert not (tmp_path / "out" / "otter").exists()
 
 
 def test_other_files_than_those_of_the_split_are_refused(tmp_path):
@@ -283,6 +357,6 @@ def test_table_compares_with_the_nominal_model(tmp_path):
     for name, errors in {"nominal": (0.4, 0.2), "learn": (0.1, 0.4), "ridge": (0.3, 0.3)}.items():
         found = {"scores": [Score(*errors, -1.0, 0.9)], "seconds": 2.0}
         (folder / f"{name}.json").write_text(json.dumps({"a": found, "b": found}))
-    found = {name: cells for name, *cells in ships.rows(folder, 0)}
+    found = {name: cells for name, *cells in ships.rows(ships.means(folder, 0))}
     assert found["learn"] == ["2", "0.1", "22.9", "4.00x", "0.50x", "-1", "90", "2"]
     assert "| ridge | 2 | 0.3 |" in ships.write(tmp_path, ["cse1"]).read_text()

@@ -1,4 +1,4 @@
-"""Methods on measured ships: ``python -m benchmarks.ships DATA``.
+"""Methods on measured and simulated ships: ``python -m benchmarks.ships DATA``.
 
 DATA has a folder for each data set (``--datasets``). The runs of each fold are left out in turn. Every
 method learns from all others and predicts these in the same windows, from the same start states. An
@@ -14,6 +14,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, entry_points, version
 from math import degrees
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,9 +132,8 @@ def means(folder: Path, horizon: int) -> dict[str, Means]:
     return found
 
 
-def rows(folder: Path, horizon: int) -> Iterator[list[str]]:
-    """The table of a folder's answers in windows of a horizon."""
-    found = means(folder, horizon)
+def rows(found: Mapping[str, Means]) -> Iterator[list[str]]:
+    """The table of one data set in windows of one horizon, by the means of its methods."""
     nominal = found.get("nominal")
     for name, m in found.items():
         falls = ["–", "–"]
@@ -150,9 +150,8 @@ def rows(folder: Path, horizon: int) -> Iterator[list[str]]:
         ]
 
 
-def lost(folder: Path, horizon: int) -> Iterator[tuple[str, str, str]]:
+def lost(found: Mapping[str, Means]) -> Iterator[tuple[str, str, str]]:
     """Position or heading, this project's best method, and those that have a smaller error."""
-    found = means(folder, horizon)
     for quantity in ("position", "heading"):
         errors = {name: getattr(m, quantity) for name, m in found.items()}
         own = {name: error for name, error in errors.items() if name in PROJECT}
@@ -197,11 +196,27 @@ def differing(earlier: Mapping[str, Any], found: Mapping[str, Any]) -> list[str]
     return lines
 
 
-def write(folder: Path, names: Sequence[str]) -> Path:
-    """The report of all answers in a folder; its path."""
-    report = Report(folder, "Methods on measured ships", [SEED])
-    horizons = [(name, k, h) for name in names for k, h in enumerate(DATASETS[name].horizons)]
-    told = [[f"{n}, {h:g} s", *each] for n, k, h in horizons for each in lost(folder / n, k)]
+def of_all(folder: Path, kept: Mapping[str, Any]) -> dict[str, dict[str, Means]]:
+    """Data set and horizon -> method -> means, of all answers in a folder and of an earlier page.
+
+    Args:
+        folder: of the answers.
+        kept: ``means`` of the file ``results.json`` of an earlier page, for what has no answer here.
+    """
+    found = {}
+    for name, data in DATASETS.items():
+        for k, horizon in enumerate(data.horizons):
+            title = f"{name}, {horizon:g} s"
+            before = {method: Means(**each) for method, each in kept.get(title, {}).items()}
+            if now := before | means(folder / name, k):
+                found[title] = dict(sorted(now.items(), key=lambda item: [*OWN, item[0]].index(item[0])))
+    return found
+
+
+def write(folder: Path, kept: Mapping[str, Any] = MappingProxyType({})) -> Path:
+    """The report of all answers in a folder, and of an earlier page, see :func:`of_all`; its path."""
+    report, found = Report(folder, "Methods on ships", [SEED]), of_all(folder, kept)
+    told = [[title, *each] for title, methods in found.items() for each in lost(methods)]
     if told:
         report.text("Here other methods have a smaller error than the best one of this project.")
         report.table(["data", "error", "best of this project", "smaller error"], told)
@@ -214,21 +229,13 @@ def write(folder: Path, names: Sequence[str]) -> Path:
         in training. """
         f"{', '.join(f'{p} {_version(p)}' for p in sorted(packages))}."
     )
-    report.result(
-        "means",
-        {
-            f"{n}, {h:g} s": {m: x._asdict() for m, x in means(folder / n, k).items()}
-            for n, k, h in horizons
-        },
-    )
+    report.result("means", {t: {m: x._asdict() for m, x in of.items()} for t, of in found.items()})
     head = ["method", "runs", "position [m]", "heading [°]", "position", "heading", "NLL", "inside [%]"]
-    for name in names:
-        data = DATASETS[name]
-        for k, horizon in enumerate(data.horizons):
-            if found := [*rows(folder / name, k)]:
-                report.heading(f"{name}, {horizon:g} s")
-                report.text(f"Data: {data.source}. Licence: {data.licence}.")
-                report.table([*head, "time [s]"], found)
+    for title, methods in found.items():
+        data = DATASETS[title.partition(",")[0]]
+        report.heading(title)
+        report.text(f"Data: {data.source}. Licence: {data.licence}.")
+        report.table([*head, "time [s]"], rows(methods))
     return report.write()
 
 
@@ -256,14 +263,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE",
         help="results.json of an earlier page: exit code 1 if an error differs by more than 1 %%",
     )
+    parser.add_argument(
+        "--keep",
+        type=Path,
+        metavar="FILE",
+        help="results.json of an earlier page: what is not run now stays in the table",
+    )
     options = parser.parse_args(arguments)
+    kept = stored_means(options.keep) if options.keep else {}
     earlier = stored_means(options.compare) if options.compare else None
     warnings.simplefilter("ignore")  # of fits that fail, which the search sees
     with threadpool_limits(1):
         for dataset in options.datasets:
             folder = options.out / dataset
+            try:
+                loaded = DATASETS[dataset].load(options.data)
+            except ModuleNotFoundError as error:
+                complain(f"'{dataset}' is left out: {error}", kind="")
+                continue
             folder.mkdir(parents=True, exist_ok=True)
-            loaded = DATASETS[dataset].load(options.data)
             for name in options.methods:
                 if (fit := entry(name)) is None:
                     continue
@@ -272,7 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     print(f"{dataset}, {name}, without {run}: {scores}", flush=True)
                     found[run] = {"scores": scores, "seconds": took}
                 (folder / f"{name}.json").write_text(json.dumps(found, indent=1) + "\n")
-    page = write(options.out, options.datasets)
+    page = write(options.out, kept)
     print(page.read_text())
     if earlier is None:
         return 0

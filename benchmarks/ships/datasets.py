@@ -1,7 +1,7 @@
-"""Measured ships: where their runs are, under which licence, and how they are split.
+"""The ships: where their runs are, under which licence, and how they are split.
 
 No file of them is part of this project. A split follows from the names of the runs, and the hashes of
-the files are checked, so that all entries see the same.
+the files are checked, so that all entries see the same. The runs of the Otter are simulated.
 """
 
 import hashlib
@@ -13,8 +13,11 @@ import diagnosis
 from cosim import InputError
 from diagnosis import Model, WeakWindows
 from diagnosis.predictors import ship_with
+from diagnosis.runs import read_frame
 from studies import low_speed_tanker, research_vessel, tanker
 from studies.ship_folds import read
+
+from . import simulated_otter
 
 Runs = tuple[list[WeakWindows], Model]
 
@@ -25,7 +28,7 @@ class DataSet:
 
     Attributes:
         folder: name of the folder with its files.
-        files: patterns of their names.
+        files: patterns of their names; none: the runs are simulated.
         source: where to get them.
         licence: of the files.
         digest: SHA-256 of their names and hashes.
@@ -51,7 +54,10 @@ class DataSet:
 
         Raises:
             InputError: files are absent, or others than those of the split.
+            ModuleNotFoundError: the simulator is not installed.
         """
+        if not self.files:
+            return self.runs((), self.horizons[-1])
         folder = data / self.folder
         files = sorted(f for pattern in self.files for f in folder.glob(pattern))
         if not files:
@@ -104,6 +110,12 @@ def _gunnerus(files: Sequence[Path], horizon: float) -> Runs:
     return diagnosis.gather(parts, model=model, anyway=True, horizon=horizon), model
 
 
+def _otter(_: Sequence[Path], horizon: float) -> Runs:
+    model = Model(ship=ship_with((), "otter"))
+    found = [read_frame(log, name, model.ship) for name, log in simulated_otter.simulated()]
+    return diagnosis.gather(found, model=model, horizon=horizon), model
+
+
 _ESSO_OSAKA = DataSet(
     "esso_osaka",
     tuple(f"{kind}_*.csv" for kind in low_speed_tanker.KINDS),
@@ -143,6 +155,17 @@ DATASETS = {
         "af9a8bd9e1c190ab2a3181b8fe019badee2b06535356ad2c25865fda8ebef83f",
         (60.0,),
         _gunnerus,
+        3,
+    ),
+    "otter": DataSet(
+        "",
+        (),
+        f"simulated by T. I. Fossen's Python Vehicle Simulator ({simulated_otter.INSTALLED_BY}), "
+        f"{simulated_otter.WHAT}",
+        "MIT",
+        "",
+        (10.0,),
+        _otter,
         3,
     ),
     "esso_osaka": _ESSO_OSAKA,

@@ -31,6 +31,7 @@ class AcceptedEffect:
         weights: id -> probability of the effect and of its rivals, of the candidates together 1.
         instead_of: ids that had its place before others were found.
         beside: ids of these, when it took the place.
+        nearest: see :class:`.effect_evidence.EffectEvidence`.
     """
 
     id: str
@@ -39,6 +40,7 @@ class AcceptedEffect:
     weights: Mapping[str, float]
     instead_of: Sequence[str] = ()
     beside: Sequence[str] = ()
+    nearest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +170,8 @@ class Selection:
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
         std = np.concatenate([omega_std(w, model) for w in data])
-        return evidence(bagged, without - left, left, std, self.t.blocks)
+        found = evidence(bagged, without - left, left, std, self.t.blocks)
+        return found._replace(nearest=p.nearest)
 
     def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
         """Probability of sets of so many ids, with an effect, beside coefficients as stated."""

@@ -8,7 +8,10 @@ A share of wins among candidates says nothing of causes that no candidate has. W
 - varies: relative standard deviation between blocks of the factor by which the effect would fit best.
   The parameters of a true cause are constants; those of a stand-in change with the motion.
 
-The last two are root mean squares beyond what noise gives, so that neither grows with its level.
+These two are root mean squares beyond what noise gives, so that neither grows with its level.
+
+- nearest: what the candidate that imitates the effect best leaves of what the effect explains. Where
+  something is left of the effect, too, it tells how near a cause would have to be that no candidate has.
 """
 
 from collections.abc import Mapping
@@ -27,11 +30,25 @@ class EffectEvidence(NamedTuple):
         bagged: probability of the id beside the other candidates, 0...1.
         left: RMS of what is left beyond noise, over that of the effect's force, on its axes.
         varies: relative standard deviation of the effect's size between blocks, beyond noise.
+        nearest: share of the squared error that the effect explains, which the best other candidate in
+            its place leaves.
     """
 
     bagged: float
     left: float
     varies: float
+    nearest: float = 0.0
+
+    @property
+    def beside_unknown(self) -> float:
+        """Probability of the effect beside causes that no candidate has, where something is left.
+
+        Unknown causes are taken to lie as close to the effect as the candidates do, of which one is
+        within the distance of the nearest. As many unknown ones as known ones are then expected within
+        the distance that the effect leaves, in proportion to the squared error; at most one counts.
+        """
+        squared = self.left**2
+        return 1.0 / (1.0 + squared / max(squared, self.nearest)) if squared else 1.0
 
 
 def credible(own: str, weights: Mapping[str, float]) -> list[str]:

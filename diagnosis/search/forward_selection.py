@@ -125,7 +125,7 @@ def search(
         if harms and before is not None:
             break
         before = (t, alone) if harms else None
-        accepted.append(accepted_effect(best, rng))
+        accepted.append(accepted_effect(best, rng, nothing))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
         if len(accepted) > 1 and before is None:
@@ -184,18 +184,21 @@ def searched_again(
             continue
         again, ranking, best = weighed
         beside = refit(again, beside, ranking.nuisance).estimate
-        if scored_alone(again, beside).score - best.scored[0].score < NEW:
+        nothing = scored_alone(again, beside)
+        if nothing.score - best.scored[0].score < NEW:
             gone.add(found.pop(k).id)
             t, at, due = again, beside, [*range(len(found))]
             continue
         chosen = better(found[k].id, best, at.start.ship)
         if chosen is not None:
-            taken = taken_over(accepted_effect(best, rng, chosen), found[k], at.start.ship)
+            taken = taken_over(accepted_effect(best, rng, nothing, chosen), found[k], at.start.ship)
             found[k] = replace(taken, beside=[p.id for p in others])
             t, at = again, best.of(chosen)
             due = [(k + j) % len(found) for j in range(1, len(found))]
-        elif found[k].id in (weights := accepted_effect(best, rng).weights):
-            found[k] = replace(found[k], weights=weights)
+        elif found[k].id in best.ids:
+            number = next(j for j, s in enumerate(best.scored) if best.ids[s.candidate] == found[k].id)
+            now = accepted_effect(best, rng, nothing, number)
+            found[k] = replace(found[k], weights=now.weights, nearest=now.nearest)
     return at, found, gone
 
 
@@ -205,15 +208,24 @@ def taken_over(new: AcceptedEffect, old: AcceptedEffect, ship: Ship) -> Accepted
     return replace(new, instead_of=tuple(sorted(had - {new.id})))
 
 
-def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> AcceptedEffect:
-    """A candidate of a shortlist, by its place in the order, as an effect that was found."""
+def accepted_effect(
+    best: Shortlist, rng: np.random.Generator, nothing: Scored, chosen: int = 0
+) -> AcceptedEffect:
+    """A candidate of a shortlist, by its place in the order, as an effect that was found.
+
+    ``nothing`` is the score without any.
+    """
     first = best.scored[chosen].candidate
     shares = first_share(best.scored, rng).tolist()
+    losses = [float(s.blocks.sum()) for s in best.scored]
+    own = losses.pop(chosen)
+    nearest = (min(losses, default=np.inf) - own) / max(float(nothing.blocks.sum()) - own, NEW)
     return AcceptedEffect(
         best.ids[first],
         tuple(best.starts[first].values),
         best.refined[first].intervals,
         {best.ids[s.candidate]: share for s, share in zip(best.scored, shares, strict=True)},
+        nearest=float(np.clip(nearest, 0.0, 1.0)),
     )
 
 

@@ -2,9 +2,10 @@
 
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
-the limit of its range, an interval that holds zero, an alternative that looks the same, a residual on
-the same axes, laws that make up another one, effects and coefficients that explain as much without it,
-coefficients beyond their priors, a smoothing that is slower than a filter, two fits that disagree.
+the limit of its range, an interval that holds zero, an alternative that looks the same, laws that make
+up another one, effects and coefficients that explain as much without it, coefficients beyond their
+priors, a smoothing that is slower than a filter, two fits that disagree. A residual on the same axes
+does so by its size, beside what the nearest other candidate would leave.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -136,8 +137,6 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         MAY_BE_NONE: may_be_none(f),
         MAY_BE_LAGS: _may_be_lags(f, start),
         doubts.of_data: bool(doubts.of_data),
-        # Waves are a residual themselves.
-        RESIDUAL: effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual),
         RIVAL: f.id in doubts.rivals,
         IN_PARTS: effect.kind == "force" and not axes.isdisjoint(doubts.of_parts),
         ON_ONE_LINE: f.id in doubts.on_one_line,
@@ -153,6 +152,9 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     }
     holding = [text for text, holds in all_doubts.items() if holds]
     most, rest = EVEN_ODDS if holding else 1.0, doubts.beside_possibility.get(f.id, 1.0)
+    # Waves are a residual themselves.
+    if not holding and effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
+        holding, most = [RESIDUAL], EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown
     doubt = holding[0] if own > most or of_set > most else ""
     return Confidence(min(own * rest, most), min(of_set * rest, most), doubt)
 

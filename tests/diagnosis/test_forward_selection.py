@@ -216,13 +216,26 @@ def test_an_effect_that_is_accepted_has_its_intervals_and_the_shares_of_all(chos
         refined=[SimpleNamespace(intervals={"delta_X_u": (0.0, 2.0)}), SimpleNamespace(intervals={})],
         scored=each,
     )
-    found = accepted_effect(best, np.random.default_rng(1), chosen)
+    found = accepted_effect(best, np.random.default_rng(1), scored(-1, np.full(20, 9.0)), chosen)
+    own, other = (each[k].blocks.sum() for k in (chosen, 1 - chosen))
+    assert found.nearest == pytest.approx(max((other - own) / (20 * 9.0 - own), 0.0))
     assert found.id == ["lag", "X_u"][chosen]
     assert found.names == [("T", "d"), ("delta_X_u",)][chosen]
     assert found.intervals == [{}, {"delta_X_u": (0.0, 2.0)}][chosen]
     shares = first_share(each, np.random.default_rng(1))
     assert found.weights == {"lag": pytest.approx(shares[0]), "X_u": pytest.approx(shares[1])}
     assert sum(found.weights.values()) == pytest.approx(1.0)
+
+
+def test_what_has_no_other_candidate_is_imitated_by_none():
+    best = SimpleNamespace(
+        ids=["X_u"],
+        starts=[SimpleNamespace(values={"delta_X_u": 1.0})],
+        refined=[SimpleNamespace(intervals={})],
+        scored=[scored(0, [1.0] * 10)],
+    )
+    nothing = scored(-1, [30.0] * 10)
+    assert accepted_effect(best, np.random.default_rng(1), nothing).nearest == 1.0
 
 
 def test_shares_are_odds_of_scores_on_blocks_that_are_drawn_anew():
