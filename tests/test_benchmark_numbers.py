@@ -42,6 +42,7 @@ SHIPS = {
     "R/V Gunnerus": "gunnerus, 60 s",
     "Esso Osaka": "esso_osaka, 60 s",
     "seven training tests of Esso Osaka": "esso_osaka_tzrb, 60 s",
+    "the Otter of another simulator": "otter, 10 s",
 }
 METHODS = {"`learn --quick`": "calibrated", "`learn`": "learned", "ridge": "ridge", "initial": "nominal"}
 METHODS |= {"network": "neural", "SINDy": "sindy"}
