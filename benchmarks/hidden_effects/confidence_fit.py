@@ -40,7 +40,7 @@ def judged(rows: Iterable[Row]) -> list[Judged]:
     for r in rows:
         for told, true in zip(r.evidence, r.true, strict=True):
             if told:
-                bagged, left, varies = map(float, told.split())
+                bagged, left, varies, *_ = map(float, told.split())
                 found.append(Judged(bagged, left, varies, true == "1"))
     return found
 

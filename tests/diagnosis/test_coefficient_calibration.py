@@ -99,16 +99,17 @@ def test_a_calibration_begins_with_the_terms_that_models_leave_out():
     assert at.start is start
     assert (at.offset == 0.0).all()
     effects = start.ship.effects
-    names = [
-        n for i in LEFT_OUT if i in effects and i not in prior.mean for n in effects[i].coefficients
-    ]
+    own = {f"delta_{n}" for n in prior.mean}
+    names = [n for i in LEFT_OUT for n in effects[i].coefficients if n not in own]
+    assert "delta_X_absu_u" in own
+    assert {"delta_N_v", "delta_X_uu", "delta_N_uv"} <= {*names}
     assert [*at.values] == [*names, "heading_offset"]
     assert not any(at.values.values())
     sizes = [
         size * start.unit(n)
         for i, size in LEFT_OUT.items()
-        if i in effects and i not in prior.mean
         for n in effects[i].coefficients
+        if n in names
     ]
     assert np.diag(at.precision) == pytest.approx([*(s**-2.0 for s in sizes), AXIS**-2.0])
     assert np.count_nonzero(at.precision) == len(at.values)

@@ -1,12 +1,12 @@
 """Calibration: all coefficients at once, by predictions and priors, where no cause is found.
 
-In addition to the nominal coefficients, each with the prior of where its value is from, those that
-simple models leave out are fitted (lift of the hull by sway and yaw, drag in turns, resistance that is
-not quadratic), and the axis of the heading. The windows are weighed by what the model misses in the run
-of each, as in :mod:`.fit`, and at each time since their start: errors of slow runs count as much as
-those of quick ones, early errors as much as late ones. Where the information is counted, the disturbance
-that the model error shows is scaled to what the windows miss: a part of that error does not add up over
-a window.
+In addition to the nominal coefficients, each with the prior of where its value is from, those of all
+further products of speeds are fitted that the hull may have (lift by sway and yaw, drag in turns,
+resistance that is not quadratic, ...), zero give or take their size, and the axis of the heading. The
+windows are weighed by what the model misses in the run of each, as in :mod:`.fit`, and at each time
+since their start: errors of slow runs count as much as those of quick ones, early errors as much as late
+ones. Where the information is counted, the disturbance that the model error shows is scaled to what the
+windows miss: a part of that error does not add up over a window.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +15,8 @@ from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
+
+from fmus.effects.force import CHANGES
 
 from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Shooting
@@ -30,11 +32,11 @@ from .refit import RefitOutcome, WindowSpread
 
 # 1; effects whose coefficients models of few terms leave out, and their prior deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
-# (1983, RINA 125, 45-68) gives such terms 2 to 25 units. Models have some of these by other terms. Half
+# (1983, RINA 125, 45-68) gives lift 2 to 25 units. Models have some of these by other terms. Half
 # a unit of X_uuu is three tenths of the resistance of both at their speed.
-LIFT, RESISTANCE = 3.0, 0.5
-LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), LIFT)
-LEFT_OUT |= dict.fromkeys(("X_u", "X_uuu"), RESISTANCE)
+LIFT, FURTHER = 3.0, 0.5
+BY_LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr")
+LEFT_OUT = {e.id: LIFT if e.id in BY_LIFT else FURTHER for e in CHANGES}
 AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; chosen
 # 1, prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
 # for a ship of 34 m; chosen.
@@ -158,8 +160,9 @@ def begin(
     std = {
         n: size * start.unit(n)
         for i, size in (LEFT_OUT | dict(further or {})).items()
-        if i in effects and i not in prior.mean
+        if i in effects
         for n in effects[i].coefficients
+        if n.removeprefix("delta_") not in prior.mean
     } | ({"heading_offset": AXIS} if "heading_offset" in effects else {})
     precision = np.diag([s**-2.0 for s in std.values()])
     values = dict.fromkeys(std, 0.0)
