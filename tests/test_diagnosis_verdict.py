@@ -23,8 +23,7 @@ from diagnosis.predictors.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
 from diagnosis.search.conclusion import AcceptedEffect
-from diagnosis.search.effect_evidence import credible
-from diagnosis.search.effect_evidence import EffectEvidence
+from diagnosis.search.effect_evidence import EffectEvidence, credible
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.forward_selection import taken_over
 from diagnosis.search.gram import block_folds

@@ -15,6 +15,7 @@ from diagnosis.report import notebook
 from diagnosis.report.content import gain_content
 from diagnosis.report.headline import (
     NOTHING_FOUND,
+    OTHER_CALIBRATION,
     OTHER_FIT,
     SEARCH_GAINED,
     SEARCH_GAINED_NOTHING,
@@ -23,6 +24,7 @@ from diagnosis.report.headline import (
 )
 from diagnosis.report.pictures import figures, tracks
 from diagnosis.report.pictures.chart import Chart, Panel
+from diagnosis.report.reported_effect import fitted_beside
 from diagnosis.report.terminal import as_text, show_calibration, show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.measured_channels import UNUSED
@@ -295,6 +297,29 @@ def test_a_search_without_an_effect_says_why_its_numbers_differ(refitted, now, t
     gain = PredictionGain("validation runs", 54, change, change, False, "calibrated")
     shown = " ".join(lines(show_diagnosis(found(gain=gain, refitted=refitted), "out")))
     assert (OTHER_FIT in shown) is told
+
+
+def test_a_calibrated_model_says_that_it_is_another_calibration():
+    change = PairedChange(0.03, 0.02, 0.03**2 - 0.02**2, 1e-4)
+    gain = PredictionGain("validation runs", 54, change, change, False, "calibrated")
+    calibrated = found(gain=gain, refitted=True, calibrated=True)
+    shown = " ".join(lines(show_diagnosis(calibrated, "out")))
+    assert OTHER_CALIBRATION in shown
+    assert OTHER_FIT not in shown
+
+
+def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
+    start = Model()
+
+    def said(**values):
+        learned = SimpleNamespace(model=start.plus(values))
+        return fitted_beside(SimpleNamespace(start=start, learned=learned, speeds=(0.4, 0.1, 0.2)))
+
+    assert said() == said(delta_X_uu=1.0) == []
+    assert said(V_n=0.3) == ["The water moves at 0.3 m/s towards 0°."]
+    (water, compass) = sorted(said(V_n=0.0, V_e=-0.2, heading_offset=0.1))[::-1]
+    assert water == "The water moves at 0.2 m/s towards 270°."
+    assert "5.73°" in compass
 
 
 def test_without_a_gain_nothing_is_said_of_it():

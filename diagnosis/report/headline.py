@@ -15,13 +15,17 @@ from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
 from .formatting import number, percent
 from .report_data import ReportData
-from .reported_effect import ReportedEffect
+from .reported_effect import ReportedEffect, fitted_beside
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
 OTHER_FIT = (
     "It found no effect to add. It fits the same coefficients to accelerations first and to predictions "
     "over several times then, so that its numbers differ from those of the calibration."
+)
+OTHER_CALIBRATION = (
+    "It found no effect to add. Its model is another calibration, with all products of speeds that the "
+    "hull may have and an offset of the heading, so that its numbers differ."
 )
 NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
@@ -50,6 +54,7 @@ CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
     "and predict data left out of the fit no worse. This does not identify a cause."
 )
+BESIDE = " In addition it fits, without claiming a cause: {}"
 FAR = (
     "Other values of the nominal coefficients explain these data, but beyond {far:g} standard "
     "deviations of their priors: {names}. Either these priors are wrong, or an effect acts like a "
@@ -125,7 +130,7 @@ def gain_of_search(r: ReportData) -> list[str]:
     gain = None if d is None else d.gain
     said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
     if d and gain and d.refitted and not d.learned.effects and gain.position.difference:
-        said.insert(1, OTHER_FIT)
+        said.insert(1, OTHER_CALIBRATION if d.calibrated else OTHER_FIT)
     return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
 
 
@@ -226,7 +231,10 @@ def headline(r: ReportData) -> str:
         if far and d.refitted and not d.remainder.significant:
             return FAR.format(far=FAR_OFF, names=listed(far, "and"))
         beyond = "" if d.refitted or not far else BEYOND.format(far=FAR_OFF, names=listed(far, "and"))
-        return (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated + beyond
+        beside = fitted_beside(d) if d.calibrated else []
+        further = BESIDE.format(" ".join(beside)) if beside else ""
+        known = (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
+        return known + further + beyond
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
 
 
