@@ -17,7 +17,7 @@ from .columns.columns import other_angles
 from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
-from .frozen import repeated, stuck
+from .frozen import goes_straight, repeated, stuck
 from .row_order import in_bursts, missing_rows, ordered
 from .run_constants import EVERY, HORIZON, LEVEL, LONG, NEGLIGIBLE, ORDER, WIDTH
 
@@ -182,6 +182,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     notes += lines
     seen, repeats = seen & ~alone, repeats | alone
     turned, constant, lined = updates(run, HEADING, gone)
+    straight = goes_straight(run, seen, constant, WIDTH * scale.time)
+    turned, constant = turned | straight, constant & ~straight
     late, lines = perhaps_late(run.time, seen, repeats | between, row, "positions")
     notes += lines
     turned_late, lines = perhaps_late(run.time, turned, constant | lined, row, "headings")

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from .files.reading import Run
-from .run_constants import CHANCE, IN_A_ROW, LONG
+from .run_constants import CHANCE, DIGITS, FEWEST, IN_A_ROW, LONG
 
 
 def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
@@ -98,3 +98,26 @@ def _moves(pose: np.ndarray) -> bool:
         return False
     known[:, 2] = np.unwrap(known[:, 2])
     return bool((np.ptp(known, axis=0) > LONG * np.abs(np.diff(known, axis=0)).max(axis=0)).any())
+
+
+def goes_straight(run: Run, seen: np.ndarray, held: np.ndarray, least: float) -> np.ndarray:
+    """Rows (n,) in which a heading repeats because the ship goes straight, in a log without noise.
+
+    Its positions are then on a line to their last digit, which those of a receiver never are.
+
+    Args:
+        run: its rows in order.
+        seen: (n,), rows with a new position.
+        held: (n,), rows in which the heading repeats.
+        least: length of a stretch of these rows from which on it is looked at [s].
+    """
+    found = np.zeros_like(held)
+    for first, last in np.flatnonzero(np.diff(held, prepend=False, append=False)).reshape(-1, 2):
+        rows = first + np.flatnonzero(seen[first:last])
+        if run.time[last - 1] - run.time[first] < least or rows.size < IN_A_ROW:
+            continue
+        place = run.pose[rows, :2] - run.pose[rows, :2].mean(axis=0)
+        along, across = np.ptp(place @ np.linalg.svd(place, full_matrices=False)[2].T, axis=0)
+        digit = max(float(run.coarse[rows, :2].max()), DIGITS * along)
+        found[first:last] = across <= 2.0 * digit < along / FEWEST
+    return found

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis import Run
-from diagnosis.runs.frozen import repeated, stuck, without_frozen
+from diagnosis.runs.frozen import goes_straight, repeated, stuck, without_frozen
 from diagnosis.runs.run_constants import IN_A_ROW, LONG
 
 TIME = np.arange(0.0, 100.0, 0.25)
@@ -171,3 +171,36 @@ def test_a_channel_of_which_little_pose_is_known_is_as_it_was():
     pose[100 : 100 + IN_A_ROW] = run.pose[100 : 100 + IN_A_ROW] * [30.0, 1.0, 1.0]
     unknown = replace(run, pose=pose)
     assert without_frozen(unknown) is unknown
+
+
+@pytest.mark.parametrize(
+    ("noise", "decimals", "seconds", "straight"),
+    [
+        (0.0, 12, 50.0, True),
+        (0.0, 3, 50.0, True),
+        (1e-3, 12, 50.0, False),
+        (5e-3, 3, 50.0, False),
+        (0.0, 12, 2.0, False),
+    ],
+)
+@pytest.mark.parametrize("course", [0.0, 0.7])
+def test_a_heading_that_repeats_on_a_straight_way_without_noise_is_measured(
+    noise, decimals, seconds, straight, course
+):
+    """With noise, of positions that are not on a line to their last digit, it may be one that is held."""
+    run = wandering()
+    way = 0.3 * TIME[:, None] * [np.cos(course), np.sin(course)]
+    place = way + noise * np.random.default_rng(2).standard_normal((N, 2))
+    pose = np.column_stack([np.round(place, decimals), run.pose[:, 2]])
+    held = np.abs(TIME - 20.0 - 0.5 * seconds) < 0.5 * seconds
+    pose[held, 2] = pose[np.argmax(held), 2]
+    rounded = np.full((N, 3), 10.0**-decimals if decimals < 12 else 0.0)
+    found = goes_straight(replace(run, pose=pose, resolution=rounded), EVERY, held, 3.0)
+    assert np.array_equal(found, held & straight)
+
+
+def test_a_heading_is_held_where_the_ship_turns_or_rests():
+    held = TIME > 20.0
+    turning = np.column_stack([10.0 * np.sin(0.02 * TIME), 10.0 * np.cos(0.02 * TIME), 0.0 * TIME])
+    for pose in (turning, np.ones((N, 3))):
+        assert not goes_straight(wandering(pose=pose), EVERY, held, 3.0).any()
