@@ -45,6 +45,10 @@ def test_what_is_left_counts_beyond_the_noise_and_by_how_far_the_effect_acts_on_
     weight = np.array([2.0**2 / 0.2**2, 1.0 / 0.1**2])
     assert e.left == pytest.approx(np.sqrt(weight @ [(0.5**2 - 0.2**2) / 2.0**2, 0.0] / weight.sum()))
     assert (e.bagged, e.varies) == (0.7, 0.0)
+    noise = std**2
+    beyond = (left**2 - noise)[0, :2] / [2.0**2, 1.0]
+    assert e.remains == pytest.approx(np.sqrt(weight @ beyond / weight.sum()))
+    assert e.remains > e.left, "what is within the tolerance of the noise remains, too"
     assert evidence(0.7, 0.0 * ones, left, std, one_block).left == 0.0
 
 
@@ -65,13 +69,16 @@ def test_the_size_of_an_effect_varies_by_its_spread_less_that_of_noise():
 @pytest.mark.parametrize("nearest", [1e-4, 0.02, 0.17, 1.0])
 def test_beside_a_residual_an_effect_is_as_sure_as_unknown_causes_are_further_than_it(nearest):
     """Unknown causes as dense as known ones: one known within the nearest, so many within what is left."""
-    sure = [EffectEvidence(1.0, left, 0.0, nearest).beside_unknown for left in np.linspace(0, 1.2, 25)]
+
+    def probability_of(remains, nearest):
+        return EffectEvidence(1.0, 0.0, 0.0, nearest, remains).beside_unknown
+
+    sure = [probability_of(remains, nearest) for remains in np.linspace(0, 1.2, 25)]
     assert sure[0] == 1.0
     assert np.all(np.diff(sure) <= 0.0)
     assert min(sure) == 0.5, "as far as the nearest candidate or further: even odds"
-    half_way = EffectEvidence(1.0, np.sqrt(nearest / 9.0), 0.0, nearest).beside_unknown
-    assert half_way == pytest.approx(0.9)
-    assert EffectEvidence(1.0, 0.1, 0.0).beside_unknown == 0.5, "it has a twin"
+    assert probability_of(np.sqrt(nearest / 9.0), nearest) == pytest.approx(0.9)
+    assert probability_of(0.1, 0.0) == 0.5, "it has a twin"
 
 
 # Bands, and errors of windows

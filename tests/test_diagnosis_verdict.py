@@ -815,7 +815,7 @@ def test_an_alternative_is_in_neither_the_effect_nor_its_set(doubts, own, of_set
 
 @pytest.mark.parametrize(("left", "nearest"), [(0.1, 0.09), (0.1, 0.005), (0.2, 0.3)])
 def test_beside_a_residual_an_effect_is_as_sure_as_its_nearest_rival_is_far(left, nearest):
-    seen = EffectEvidence(1.0, left, 0.0, nearest)
+    seen = EffectEvidence(1.0, left, 0.0, nearest, left)
     f = Finding("X_u", {"delta_X_u": -2.0}, {}, np.nan, [], 0.9, 0.9, evidence=seen, set_evidence=seen)
     alone = confidence_of(f, Model()).own
     beside = confidence_of(f, Model(), Doubts(residual="X"))

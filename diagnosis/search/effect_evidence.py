@@ -32,12 +32,15 @@ class EffectEvidence(NamedTuple):
         varies: relative standard deviation of the effect's size between blocks, beyond noise.
         nearest: share of the squared error that the effect explains, which the best other candidate in
             its place leaves.
+        remains: as ``left``, beyond the noise as it is stated, without a tolerance: a residual that is
+            significant may be as small as the noise, and as large as the effect.
     """
 
     bagged: float
     left: float
     varies: float
     nearest: float = 0.0
+    remains: float = 0.0
 
     @property
     def beside_unknown(self) -> float:
@@ -47,7 +50,7 @@ class EffectEvidence(NamedTuple):
         within the distance of the nearest. As many unknown ones as known ones are then expected within
         the distance that the effect leaves, in proportion to the squared error; at most one counts.
         """
-        squared = self.left**2
+        squared = self.remains**2
         return 1.0 / (1.0 + squared / max(squared, self.nearest)) if squared else 1.0
 
 
@@ -78,14 +81,19 @@ def evidence(
         std: (K, 3), its standard deviation by the noise of the measurement.
         blocks: (K, ...), which block each window is in.
     """
-    std = NOISE_TOLERANCE * std
-    own = np.sum(force**2, axis=0)
-    beyond = np.maximum(np.sum(left**2 - std**2, axis=0), 0.0)
+    own, noise = np.sum(force**2, axis=0), np.sum(std**2, axis=0)
     # An axis counts by how far the effect acts on it, seen through the noise.
-    weight = own / np.sum(std**2, axis=0)
-    shares = np.divide(beyond, own, out=np.zeros(3), where=own > 0.0)
-    share = float(weight @ shares / max(weight.sum(), np.finfo(float).tiny))
-    return EffectEvidence(bagged, float(np.sqrt(share)), variation(force / std, left / std, blocks))
+    weight = own / noise
+
+    def beyond(tolerance: float) -> float:
+        """RMS of what is left beyond the noise, over that of the force."""
+        more = np.maximum(np.sum(left**2, axis=0) - tolerance**2 * noise, 0.0)
+        shares = np.divide(more, own, out=np.zeros(3), where=own > 0.0)
+        return float(np.sqrt(weight @ shares / max(weight.sum(), np.finfo(float).tiny)))
+
+    doubted = NOISE_TOLERANCE * std
+    varies = variation(force / doubted, left / doubted, blocks)
+    return EffectEvidence(bagged, beyond(NOISE_TOLERANCE), varies, remains=beyond(1.0))
 
 
 def variation(force: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> float:
