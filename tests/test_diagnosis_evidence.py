@@ -32,24 +32,24 @@ def drawn(*shape, seed=0):
 
 
 def test_confidence_is_even_odds_where_a_third_is_left_or_the_size_varies_by_as_much():
-    assert probability(EffectEvidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
+    assert probability(EffectEvidence(1.0, 0.0, 0.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
     third = 4.6 / 14.0
     for left, varies in ((third, 0.0), (0.0, third), (0.5 * third, 0.5 * third)):
-        assert probability(EffectEvidence(0.8, left, varies)) == pytest.approx(0.4)
+        assert probability(EffectEvidence(0.8, left, varies, 0.0, 0.0)) == pytest.approx(0.4)
 
 
 def test_what_is_left_counts_beyond_the_noise_and_by_how_far_the_effect_acts_on_an_axis():
     ones, one_block = np.ones((60, 3)), np.zeros(60, int)
     left, std = ones * [0.5, 0.1, 9.0], ones * [0.2, 0.1, 1.0] / NOISE_TOLERANCE
-    e = evidence(0.7, ones * [2.0, 1.0, 0.0], left, std, one_block)
+    e = evidence(0.7, 0.2, ones * [2.0, 1.0, 0.0], left, std, one_block)
     weight = np.array([2.0**2 / 0.2**2, 1.0 / 0.1**2])
     assert e.left == pytest.approx(np.sqrt(weight @ [(0.5**2 - 0.2**2) / 2.0**2, 0.0] / weight.sum()))
-    assert (e.bagged, e.varies) == (0.7, 0.0)
+    assert (e.bagged, e.varies, e.nearest) == (0.7, 0.0, 0.2)
     noise = std**2
     beyond = (left**2 - noise)[0, :2] / [2.0**2, 1.0]
     assert e.remains == pytest.approx(np.sqrt(weight @ beyond / weight.sum()))
     assert e.remains > e.left, "what is within the tolerance of the noise remains, too"
-    assert evidence(0.7, 0.0 * ones, left, std, one_block).left == 0.0
+    assert evidence(0.7, 0.2, 0.0 * ones, left, std, one_block).left == 0.0
 
 
 def test_the_size_of_an_effect_varies_by_its_spread_less_that_of_noise():

@@ -578,13 +578,13 @@ def test_an_effect_that_took_the_place_of_another_rests_on_the_other_findings(ot
 
 
 def test_a_law_that_gives_way_is_another_cause_and_a_free_curve_is_none():
-    old, new = (AcceptedEffect(i, (), {}, {}) for i in ("lag", "mass"))
-    ship, curve = Model().ship, AcceptedEffect("curve_X(u)", (), {}, {})
+    old, new = (AcceptedEffect(i, (), {}, {}, 1.0) for i in ("lag", "mass"))
+    ship, curve = Model().ship, AcceptedEffect("curve_X(u)", (), {}, {}, 1.0)
     assert ship.effects[curve.id].search.smooth
     taken = taken_over(new, old, ship)
     assert (taken.id, taken.instead_of) == ("mass", ("lag",))
     assert taken_over(new, curve, ship).instead_of == ()
-    assert taken_over(AcceptedEffect("N_r", (), {}, {}), taken, ship).instead_of == ("lag", "mass")
+    assert taken_over(AcceptedEffect("N_r", (), {}, {}, 1.0), taken, ship).instead_of == ("lag", "mass")
     assert taken_over(old, taken, ship).instead_of == ("mass",)
 
 

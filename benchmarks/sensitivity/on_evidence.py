@@ -23,7 +23,9 @@ def read(path: Path) -> list[EffectEvidence]:
     """The evidence of all findings of a table."""
     with path.open(encoding="utf-8", newline="") as file:
         texts = [text for row in csv.DictReader(file) for text in row["evidence"].split(BETWEEN)]
-    return [EffectEvidence(*map(float, text.split())) for text in texts if text]
+    # Earlier tables lack what the logistic map does not need.
+    numbers = [[*map(float, text.split()), 0.0, 0.0][:5] for text in texts if text]
+    return [EffectEvidence(*each) for each in numbers]
 
 
 def outcome(e: EffectEvidence) -> str:

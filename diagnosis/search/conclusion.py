@@ -29,18 +29,18 @@ class AcceptedEffect:
         names: of its parameters.
         intervals: 95 % interval of each change point [s] and of each parameter that it is not smooth in.
         weights: id -> probability of the effect and of its rivals, of the candidates together 1.
+        nearest: see :class:`.effect_evidence.EffectEvidence`.
         instead_of: ids that had its place before others were found.
         beside: ids of these, when it took the place.
-        nearest: see :class:`.effect_evidence.EffectEvidence`.
     """
 
     id: str
     names: Sequence[str]
     intervals: Mapping[str, tuple[float, float]]
     weights: Mapping[str, float]
+    nearest: float
     instead_of: Sequence[str] = ()
     beside: Sequence[str] = ()
-    nearest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +170,7 @@ class Selection:
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
         std = np.concatenate([omega_std(w, model) for w in data])
-        found = evidence(bagged, without - left, left, std, self.t.blocks)
-        return found._replace(nearest=p.nearest)
+        return evidence(bagged, p.nearest, without - left, left, std, self.t.blocks)
 
     def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
         """Probability of sets of so many ids, with an effect, beside coefficients as stated."""

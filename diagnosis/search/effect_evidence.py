@@ -39,8 +39,8 @@ class EffectEvidence(NamedTuple):
     bagged: float
     left: float
     varies: float
-    nearest: float = 0.0
-    remains: float = 0.0
+    nearest: float
+    remains: float
 
     @property
     def beside_unknown(self) -> float:
@@ -70,12 +70,17 @@ def credible(own: str, weights: Mapping[str, float]) -> list[str]:
 
 
 def evidence(
-    bagged: float, force: np.ndarray, left: np.ndarray, std: np.ndarray, blocks: np.ndarray
+    bagged: float,
+    nearest: float,
+    force: np.ndarray,
+    left: np.ndarray,
+    std: np.ndarray,
+    blocks: np.ndarray,
 ) -> EffectEvidence:
     """Evidence of a finding.
 
     Args:
-        bagged: probability of the id beside the other candidates.
+        bagged, nearest: see :class:`EffectEvidence`.
         force: (K, 3), of the effect [N, N, N m].
         left: (K, 3), the model error with all that was found.
         std: (K, 3), its standard deviation by the noise of the measurement.
@@ -93,7 +98,7 @@ def evidence(
 
     doubted = NOISE_TOLERANCE * std
     varies = variation(force / doubted, left / doubted, blocks)
-    return EffectEvidence(bagged, beyond(NOISE_TOLERANCE), varies, remains=beyond(1.0))
+    return EffectEvidence(bagged, beyond(NOISE_TOLERANCE), varies, nearest, beyond(1.0))
 
 
 def variation(force: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> float:

@@ -225,7 +225,7 @@ def accepted_effect(
         tuple(best.starts[first].values),
         best.refined[first].intervals,
         {best.ids[s.candidate]: share for s, share in zip(best.scored, shares, strict=True)},
-        nearest=float(np.clip(nearest, 0.0, 1.0)),
+        float(np.clip(nearest, 0.0, 1.0)),
     )
 
 

@@ -97,7 +97,7 @@ def _linear(monkeypatch):
 
 
 def effect(name, **more):
-    return AcceptedEffect(name.upper(), (name,), {}, {name.upper(): 0.9, "other": 0.1}, **more)
+    return AcceptedEffect(name.upper(), (name,), {}, {name.upper(): 0.9, "other": 0.1}, 1.0, **more)
 
 
 def selection(names="abc", runs=1):

@@ -366,7 +366,7 @@ def search_places(monkeypatch, scores, accepted):
     monkeypatch.setattr(forward_selection, "leads", lambda *given: False)
     monkeypatch.setattr(forward_selection, "nuisance_of", lambda *given: NUISANCE)
     monkeypatch.setattr(forward_selection, "refit", lambda t, at, nuisance: SimpleNamespace(estimate=at))
-    found = [AcceptedEffect(i, (i,), {}, {i: 1.0}) for i in accepted]
+    found = [AcceptedEffect(i, (i,), {}, {i: 1.0}, 1.0) for i in accepted]
     t = SimpleNamespace(error=lambda at: None)
     rng = np.random.default_rng(0)
     at, kept, gone = searched_again(t, FakeModel(accepted), found, {}, lambda text: None, rng)
