@@ -221,6 +221,8 @@ def test_headline_of_each_verdict():
     assert said("coefficients").endswith("explain these data; no effect is needed.")
     beside = said("coefficients", shared={"heading_offset": 0.1, "body_bias_N": 2.0})
     assert "explain these data together with body_bias_N and heading_offset; no other" in beside
+    beside = said("coefficients", shared={"heading_offset": 0.1, "delta_Y_ur": 2.0, "delta_X_rr": 1.0})
+    assert f"together with {headline.PRODUCTS} and heading_offset; no other" in beside
 
 
 def test_names_in_a_row():

@@ -5,6 +5,8 @@ from math import degrees
 
 import numpy as np
 
+from fmus.effects.force import CHANGES
+
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
 from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
@@ -55,6 +57,7 @@ CALIBRATED = (
     "and predict data left out of the fit no worse. This does not identify a cause."
 )
 BESIDE = " In addition it fits, without claiming a cause: {}"
+PRODUCTS = "small coefficients of further products of speeds"
 FAR = (
     "Other values of the nominal coefficients explain these data, but beyond {far:g} standard "
     "deviations of their priors: {names}. Either these priors are wrong, or an effect acts like a "
@@ -218,9 +221,7 @@ def headline(r: ReportData) -> str:
         return " ".join(said)
     if d.verdict == "coefficients":
         above = f", mainly {listed(names, 'and')}" if names else ""
-        model, known = d.learned.model, d.start.ship.coefficients
-        fitted = (name for name in d.posterior.std if name not in known)
-        others = [name for name in fitted if model.value(name) != d.start.value(name)]
+        others = further_values(d)
         beside = f" together with {listed(others, 'and')}" if others else ""
         needed = "no other effect is needed" if others else "no effect is needed"
         return f"Other values of the nominal coefficients explain these data{beside}{above}; {needed}."
@@ -236,6 +237,15 @@ def headline(r: ReportData) -> str:
         known = (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
         return known + further + beyond
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
+
+
+def further_values(d: Diagnosis) -> list[str]:
+    """What the learned model has beside the coefficients of the ship; products of speeds as one."""
+    model, known = d.learned.model, d.start.ship.coefficients
+    fitted = (name for name in d.posterior.std if name not in known)
+    others = [name for name in fitted if model.value(name) != d.start.value(name)]
+    products = {name for e in CHANGES for name in e.coefficients}.intersection(others)
+    return [*([PRODUCTS] if products else []), *(name for name in others if name not in products)]
 
 
 def boundedness(s: Stability) -> str:
