@@ -373,7 +373,7 @@ def test_doubts_are_of_the_data_the_residual_and_the_list(monkeypatch, listed, t
     assert len(found) == count
     left = [d for d in found if "leaves a significant residual" in d]
     assert left == [
-        "b leaves a significant residual in X in the runs so far; its confidence stays at most 50 %."
+        "b leaves a significant residual in X in the runs so far, which limits its confidence."
     ]
     assert any("probability of 50%" in d for d in found) == (listed == 0.5)
 

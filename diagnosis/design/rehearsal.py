@@ -19,7 +19,7 @@ from ..predictors.uncertainty import omega_std
 from ..predictors.weak_form import OVERLAP
 from ..runs.cleaning import Z95
 from ..search.candidates import Candidate, CandidateShape, candidates, model_error
-from ..search.effect_evidence import EffectEvidence, evidence
+from ..search.effect_evidence import EffectEvidence, evidence, nearest_share
 from ..search.findings import Finding
 from ..search.gram import GramTable, Nuisance, block_numbers, gram_table
 from ..search.map_regression import first_share, regression, score
@@ -31,7 +31,7 @@ from .information import Hypothesis, Knowledge
 from .spread import MEMBERS
 
 CAPPED = "The confidence of any finding of these runs stays at most 50 %: {}."
-LEFT = "{} leaves a significant residual in {} in the runs so far; its confidence stays at most 50 %."
+LEFT = "{} leaves a significant residual in {} in the runs so far, which limits its confidence."
 UNLISTED = "A listed candidate is the cause with a probability of {:.0%}, by the diagnosis so far."
 
 
@@ -194,7 +194,8 @@ class RehearsedEffect:
         share = float(first_share(each, rng)[0])
         seen, values, std = self.judged(y)
         ci95 = {n: (x - Z95 * std[n], x + Z95 * std[n]) for n, x in values.items() if n in std}
-        seen = seen._replace(bagged=share)
+        own, *others, nothing = (float(s.blocks.sum()) for s in each)
+        seen = seen._replace(bagged=share, nearest=nearest_share(own, others, nothing))
         name = self.rivals[0].effect.id
         return Finding(name, values, ci95, share, [], 0.0, 0.0, evidence=seen, set_evidence=seen)
 
@@ -207,7 +208,7 @@ class RehearsedEffect:
         r = regression(table, 0, 0)
         fit, own = r.fitted(table.total), r.use[: r.free]
         force = A[..., own] @ fit.beta + (0.0 if s.offset is None else s.offset)
-        seen = evidence(1.0, force, A[..., fit.used] @ fit.left, self.rows.std, self.rows.blocks)
+        seen = evidence(1.0, 1.0, force, A[..., fit.used] @ fit.left, self.rows.std, self.rows.blocks)
         H = table.total[np.ix_(r.use, r.use)] + r.precision
         scale = 1.0 / np.sqrt(np.diag(H))
         std = scale * np.sqrt(np.diag(np.linalg.pinv(H * np.outer(scale, scale))))

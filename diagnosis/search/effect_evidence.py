@@ -14,7 +14,7 @@ These two are root mean squares beyond what noise gives, so that neither grows w
   something is left of the effect, too, it tells how near a cause would have to be that no candidate has.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +52,17 @@ class EffectEvidence(NamedTuple):
         """
         squared = self.remains**2
         return 1.0 / (1.0 + squared / max(squared, self.nearest)) if squared else 1.0
+
+
+def nearest_share(own: float, others: Sequence[float], nothing: float) -> float:
+    """Share of what an effect explains, which the best other candidate leaves.
+
+    Args:
+        own, others: cross-validated losses with the effect, and with each candidate in its place.
+        nothing: that without any.
+    """
+    gained = max(nothing - own, np.finfo(float).tiny)
+    return float(np.clip((min(others, default=np.inf) - own) / gained, 0.0, 1.0))
 
 
 def credible(own: str, weights: Mapping[str, float]) -> list[str]:

@@ -24,6 +24,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import commanded
 from .candidates import CandidateShape
 from .conclusion import AcceptedEffect, Selection
+from .effect_evidence import nearest_share
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
 from .gram import Entry, GramTable
 from .map_regression import Scored, first_share, fitted_columns, score
@@ -219,13 +220,13 @@ def accepted_effect(
     shares = first_share(best.scored, rng).tolist()
     losses = [float(s.blocks.sum()) for s in best.scored]
     own = losses.pop(chosen)
-    nearest = (min(losses, default=np.inf) - own) / max(float(nothing.blocks.sum()) - own, NEW)
+    nearest = nearest_share(own, losses, float(nothing.blocks.sum()))
     return AcceptedEffect(
         best.ids[first],
         tuple(best.starts[first].values),
         best.refined[first].intervals,
         {best.ids[s.candidate]: share for s, share in zip(best.scored, shares, strict=True)},
-        float(np.clip(nearest, 0.0, 1.0)),
+        nearest,
     )
 
 
