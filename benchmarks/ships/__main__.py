@@ -121,7 +121,7 @@ def means(folder: Path, horizon: int) -> dict[str, Means]:
     """By method, of all answers in a folder."""
     read = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
     found = {}
-    for name, answer in sorted(read.items(), key=lambda item: [*OWN, item[0]].index(item[0])):
+    for name, answer in read.items():
         scored = [r for r in answer.values() if len(r["scores"]) > horizon]
         if not scored:
             continue

@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from fmus.ops import wrap
+
 INSTALLED_BY = "pip install git+https://github.com/cybergalactic/PythonVehicleSimulator"
 STEP = 0.02  # s, of the simulator's method of Euler
 EACH = 5  # steps of it are one sample
@@ -90,7 +92,7 @@ def simulated() -> Iterator[tuple[str, pd.DataFrame]]:
             eta[:3] += STEP * turn.apply(nu[:3])
             attitude = (turn * Rotation.from_rotvec(STEP * nu[3:])).as_euler("ZYX")[::-1]
             eta[3:5] = attitude[:2]
-            eta[5] += (attitude[2] - eta[5] + pi) % (2.0 * pi) - pi
+            eta[5] += wrap(attitude[2] - eta[5])
         log = pd.DataFrame(rows, columns=["time", "x", "y", "psi", "port.n", "starboard.n"])
         noise = np.random.default_rng([SEED, k])
         log[["x", "y"]] += noise.normal(0.0, NOISE[0], (len(log), 2))

@@ -17,7 +17,7 @@ from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
 from .formatting import number, percent
 from .report_data import ReportData
-from .reported_effect import ReportedEffect, fitted_beside
+from .reported_effect import ReportedEffect, fitted_beside, is_fitted
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
@@ -241,9 +241,8 @@ def headline(r: ReportData) -> str:
 
 def further_values(d: Diagnosis) -> list[str]:
     """What the learned model has beside the coefficients of the ship; products of speeds as one."""
-    model, known = d.learned.model, d.start.ship.coefficients
-    fitted = (name for name in d.posterior.std if name not in known)
-    others = [name for name in fitted if model.value(name) != d.start.value(name)]
+    known = d.start.ship.coefficients
+    others = [name for name in d.posterior.std if name not in known and is_fitted(d, name)]
     products = {name for e in CHANGES for name in e.coefficients}.intersection(others)
     return [*([PRODUCTS] if products else []), *(name for name in others if name not in products)]
 

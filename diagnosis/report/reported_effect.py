@@ -1,6 +1,6 @@
 """The findings of a diagnosis with what is said of them, for terminal, page and files alike."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
@@ -72,26 +72,25 @@ def reported_effects(d: Diagnosis) -> tuple[list[ReportedEffect], list[ReportedE
     for f, share, unique, told in zip(d.learned.effects, d.shares, d.unique, d.believed, strict=True):
         fitted = d.start.ship.effects[f.id].search.by == "regression"
         (found if told else possible).append(_reported(d, f, share, unique, told or fitted))
-    return found, [
-        *possible,
-        *(_reported(d, f, f.share, None, _is_fitted(d, f.values)) for f in d.dropped),
-    ]
+    for f in d.dropped:
+        possible.append(_reported(d, f, f.share, None, all(is_fitted(d, n) for n in f.values)))
+    return found, possible
 
 
 def fitted_beside(d: Diagnosis) -> list[str]:
     """What a calibrated model has of the measurement and the water, in words, a sentence each."""
     told, learned = [], d.learned.model
     for effect in d.start.ship.effects.values():
-        fitted = any(_is_fitted(d, [n]) for n in effect.coefficients)
+        fitted = any(is_fitted(d, n) for n in effect.coefficients)
         if effect.kind in ("measurement", "environment") and fitted:
             values = {n: learned.value(n) for n in effect.coefficients}
             told.append(sentence(Found(effect, values, d.speeds)))
     return told
 
 
-def _is_fitted(d: Diagnosis, names: Iterable[str]) -> bool:
-    """Whether the learned model has other values of all these parameters than the initial one."""
-    return all(d.learned.model.value(n) != d.start.value(n) for n in names)
+def is_fitted(d: Diagnosis, name: str) -> bool:
+    """Whether the learned model has another value of a parameter than the initial one."""
+    return d.learned.model.value(name) != d.start.value(name)
 
 
 def _reported(

@@ -37,8 +37,7 @@ def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
         if not moves.size:
             continue
         usual = float(np.quantile(moves, 1.0 - CHANCE))
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], step == 0.0, [False]])))
-        for first, last in edges.reshape(-1, 2).tolist():
+        for first, last in _stretches(step == 0.0):
             at_end = last == step.size
             jump = float(step[last]) if not at_end else np.inf if first and not coarse[last] else 0.0
             if last - first >= IN_A_ROW and jump > max(usual, 1.5 * coarse[last]):
@@ -49,6 +48,11 @@ def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
                     "start: the position is not used there"
                 )
     return found, lines
+
+
+def _stretches(true: np.ndarray) -> list[list[int]]:
+    """First row, and the one after the last, of each stretch of rows that are true (n,)."""
+    return np.flatnonzero(np.diff(true, prepend=False, append=False)).reshape(-1, 2).tolist()
 
 
 def without_frozen(run: Run) -> Run:
@@ -112,7 +116,7 @@ def goes_straight(run: Run, seen: np.ndarray, held: np.ndarray, least: float) ->
         least: length of a stretch of these rows from which on it is looked at [s].
     """
     found = np.zeros_like(held)
-    for first, last in np.flatnonzero(np.diff(held, prepend=False, append=False)).reshape(-1, 2):
+    for first, last in _stretches(held):
         rows = first + np.flatnonzero(seen[first:last])
         if run.time[last - 1] - run.time[first] < least or rows.size < IN_A_ROW:
             continue

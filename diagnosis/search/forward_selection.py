@@ -196,9 +196,8 @@ def searched_again(
             found[k] = replace(taken, beside=[p.id for p in others])
             t, at = again, best.of(chosen)
             due = [(k + j) % len(found) for j in range(1, len(found))]
-        elif found[k].id in best.ids:
-            number = next(j for j, s in enumerate(best.scored) if best.ids[s.candidate] == found[k].id)
-            now = accepted_effect(best, rng, nothing, number)
+        elif found[k].id in (order := [best.ids[s.candidate] for s in best.scored]):
+            now = accepted_effect(best, rng, nothing, order.index(found[k].id))
             found[k] = replace(found[k], weights=now.weights, nearest=now.nearest)
     return at, found, gone
 

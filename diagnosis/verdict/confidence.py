@@ -150,12 +150,12 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         OUSTED: f.id in doubts.unsettled,
         NO_GAIN: f.id in doubts.without_gain,
     }
-    holding = [text for text, holds in all_doubts.items() if holds]
-    most, rest = EVEN_ODDS if holding else 1.0, doubts.beside_possibility.get(f.id, 1.0)
+    caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
     # Waves are a residual themselves.
-    if not holding and effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
-        holding, most = [RESIDUAL], EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown
-    doubt = holding[0] if own > most or of_set > most else ""
+    if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
+        caps[RESIDUAL] = EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown
+    most, rest = min(caps.values(), default=1.0), doubts.beside_possibility.get(f.id, 1.0)
+    doubt = min(caps, key=caps.__getitem__) if own > most or of_set > most else ""
     return Confidence(min(own * rest, most), min(of_set * rest, most), doubt)
 
 
