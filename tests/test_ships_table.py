@@ -335,6 +335,15 @@ def test_runs_of_one_log_are_never_in_training_and_test():
     assert listed == [([a1, b], [c])]
 
 
+@pytest.mark.parametrize("further", [[], ["--keep", "absent.json"], ["--compare", "absent.json"]])
+def test_bad_input_is_one_line_and_nothing_is_written(further, capsys, tmp_path):
+    out = tmp_path / "out"
+    assert ships.main([str(tmp_path), "--datasets", "kvlcc2", "--out", str(out), *further]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: no results of" if further else "error: no z_")
+    assert not out.exists()
+
+
 def test_errors_of_another_environment_are_compared(tmp_path):
     def answered(folder, position):
         (folder / "cse1").mkdir(parents=True)

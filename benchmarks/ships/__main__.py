@@ -21,7 +21,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import cosim
-from cosim.command import complain, run_command
+from cosim.command import BAD_INPUT, complain, run_command
 from cosim.errors import nearest
 from diagnosis import Windows
 from studies.study_report import RESULTS, Report
@@ -269,7 +269,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE",
         help="results.json of an earlier page: what is not run now stays in the table",
     )
-    options = parser.parse_args(arguments)
+    try:
+        return _table(parser.parse_args(arguments))
+    except cosim.InputError as error:
+        complain(str(error))
+        return BAD_INPUT
+
+
+def _table(options: argparse.Namespace) -> int:
+    """Run the methods, write the page, compare it; returns the exit code."""
     kept = stored_means(options.keep) if options.keep else {}
     earlier = stored_means(options.compare) if options.compare else None
     warnings.simplefilter("ignore")  # of fits that fail, which the search sees
