@@ -97,19 +97,29 @@ def test_a_failure_that_passes_and_one_for_good(spans, passes, endless):
 
 def test_the_cost_is_that_of_direct_least_squares_and_log_n_for_each_change():
     p = problem(0.05, b=(0.2, -0.1))
+
+    def of_all(spans):
+        """The least sum of squares, with the prior's as rows of its own."""
+        root = np.sqrt(p.precision)
+        X = np.vstack([p.nuisance, root])
+        z = np.concatenate([p.left(spans), -root @ p.offset])
+        return np.linalg.lstsq(X, z, rcond=None)[1][0]
+
     rest = p.left([(60, 110)])
     assert rest == pytest.approx(p.y - np.asarray(p.columns.todense())[:, 60:110].sum(axis=1))
     root = np.sqrt(p.precision)
     X, z = np.vstack([p.nuisance, root]), np.concatenate([rest, -root @ p.offset])
-    b, (least,), *_ = np.linalg.lstsq(X, z, rcond=None)
-    over, cost = p.fitted(rest)
+    b = np.linalg.lstsq(X, z, rcond=None)[0]
+    over = p.fitted(rest)
     assert over == pytest.approx(rest - p.nuisance @ b, abs=1e-6)
-    assert cost == pytest.approx(least, rel=1e-6)
     charge = np.log(p.y.size / OVERLAP)
-    assert p.cost([(60, 110)]) == pytest.approx(least + 2.0 * charge, rel=1e-6)
-    assert p.cost([(60, 240)]) == pytest.approx(p.fitted(p.left([(60, 240)]))[1] + charge)
+    assert p.cost([(60, 110)]) == pytest.approx(of_all([(60, 110)]) + 2.0 * charge, rel=1e-6)
+    assert p.cost([(60, 240)]) == pytest.approx(of_all([(60, 240)]) + charge, rel=1e-6)
+    two = [(60, 63), (65, 110), (250, 251)]
+    assert p.cost(two) == pytest.approx(of_all(two) + 6.0 * charge, rel=1e-6)
     bare = replace(p, nuisance=np.zeros((p.y.size, 0)), precision=np.zeros((0, 0)), offset=np.zeros(0))
-    assert bare.fitted(rest)[1] == pytest.approx(rest @ rest)
+    assert bare.fitted(rest) is rest
+    assert bare.cost([(60, 110)]) == pytest.approx(rest @ rest + 2.0 * charge)
     scaled = p.weighted(np.array([1.0, 2.0, 0.5]))
     assert scaled.y.reshape(-1, 3) * np.sqrt(OVERLAP) * [1.0, 2.0, 0.5] == pytest.approx(
         p.y.reshape(-1, 3)

@@ -35,6 +35,7 @@ from ...predictors.uncertainty import FLOOR
 from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
 from ...runs.cleaning import BRIEF
 from ..most_likely import ENOUGH, STEPS, ridge, rise
+from .interval_sums import IntervalSums
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -167,25 +168,44 @@ class SegmentationProblem:
             dead[a:b] = 1.0
         return self.y - self.columns @ dead
 
-    def fitted(self, left: np.ndarray) -> tuple[np.ndarray, float]:
-        """What the nuisance parameters leave over (3 K,), and the cost with their prior penalty."""
+    def fitted(self, left: np.ndarray) -> np.ndarray:
+        """What the nuisance parameters leave over (3 K,)."""
         if not self.offset.size:
-            return left, float(left @ left)
+            return left
         right = self.nuisance.T @ left - self.precision @ self.offset
-        b = cho_solve(self._information, right)
-        over = left - self.nuisance @ b
-        last = self.offset + b
-        return over, float(over @ over + last @ self.precision @ last)
+        return left - self.nuisance @ cho_solve(self._information, right)
+
+    @cached_property
+    def _gram(self) -> np.ndarray:
+        """(q, q), of the nuisance parameters, without their prior."""
+        return np.asarray(self.nuisance.T @ self.nuisance)
 
     @cached_property
     def _information(self) -> tuple[np.ndarray, bool]:
-        H = self.nuisance.T @ self.nuisance + self.precision
+        H = self._gram + self.precision
         return cho_factor(H + ridge(H, self.unit))
+
+    @cached_property
+    def _sums(self) -> IntervalSums:
+        """Of what intervals add to the model error, with its products (q + 1, m) with Z and y."""
+        return IntervalSums(self.columns, np.vstack([self.nuisance.T, self.y]) @ self.columns)
+
+    @cached_property
+    def _whole(self) -> tuple[np.ndarray, float]:
+        """Of the model error without intervals: its products (q,) with Z, and its sum of squares."""
+        return self.nuisance.T @ self.y, float(self.y @ self.y)
 
     def cost(self, spans: Spans) -> float:
         """What is minimised; an end beyond the data of a run is no change point."""
         points = sum(1 + (b < self.section(a).end) for a, b in spans)
-        return self.fitted(self.left(spans))[1] + self.charge * points
+        (along, whole), given = self._whole, self._sums.linear(spans)
+        along, square = along - given[:-1], whole - 2.0 * given[-1] + self._sums.square(spans)
+        cost = float(square) + self.charge * points
+        if not self.offset.size:
+            return cost
+        b = cho_solve(self._information, along - self.precision @ self.offset)
+        last = self.offset + b
+        return cost - float(2.0 * b @ along - b @ self._gram @ b - last @ self.precision @ last)
 
 
 def segmented(p: SegmentationProblem, start: Spans | None = None) -> Spans:
@@ -196,7 +216,7 @@ def segmented(p: SegmentationProblem, start: Spans | None = None) -> Spans:
     for _ in range(STEPS):
         left = p.left(best)
         # With b held where it is: the error were there no interval, and what it falls by in each window.
-        before = p.fitted(left)[0] + p.y - left
+        before = p.fitted(left) + p.y - left
         gain = (2.0 * before * whole - whole**2).reshape(-1, 3).sum(axis=1)
         found = moved(p, [span for s in p.sections for span in programmed_in(p, s, gain)])
         cost = p.cost(found)
@@ -224,7 +244,7 @@ def intervals(p: SegmentationProblem) -> Spans:
     """
     spans: Spans = []
     for _ in range(STEPS):
-        left = p.fitted(p.left(spans))[0].reshape(-1, 3)
+        left = p.fitted(p.left(spans)).reshape(-1, 3)
         sigma = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
         before, spans = spans, segmented(p.weighted(sigma), spans)
         if spans == before:
