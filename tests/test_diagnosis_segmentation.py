@@ -1,14 +1,17 @@
 """When a thruster gave nothing, on problems that are made up: times and cells, the cost, and what is found."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.sparse import csc_matrix
 
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search.most_likely import rise
+from diagnosis.search.nonlinear.interval_sums import IntervalSums
 from diagnosis.search.nonlinear.segmentation import (
     RunCells,
     SegmentationProblem,
@@ -216,3 +219,24 @@ def test_what_windows_gain_is_programmed_in_the_bins_of_their_run():
     assert abs(last - 420) <= 5
     ((_, last),) = programmed_in(p, B, np.where(p.middles > 400, 50.0, -1.0))
     assert last == 600
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
+def test_sums_over_intervals_are_those_of_their_cells(seed, width):
+    """Of windows of any width, and of intervals that touch, are next to each other, or at an end."""
+    rng = np.random.default_rng(seed)
+    dense = np.zeros((45, 40))
+    for row in dense:
+        first = rng.integers(0, 40)
+        row[first : first + width] = rng.normal(size=row[first : first + width].size)
+    ends = np.sort(rng.choice(41, 6, replace=False))
+    spans = [*zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)]
+    spans += [(b, c) for (_, b), (c, _) in pairwise(spans)][: rng.integers(0, 3)]
+    further = rng.normal(size=(3, 40))
+    dead = np.zeros(40)
+    for a, b in spans:
+        dead[a:b] = 1.0
+    sums = IntervalSums(csc_matrix(dense), further)
+    assert sums.square(spans) == pytest.approx(float(np.square(dense @ dead).sum()), abs=1e-9)
+    assert sums.linear(spans) == pytest.approx(further @ dead)
+    assert (sums.square([]), sums.linear([]).tolist()) == (0.0, [0.0] * 3)
