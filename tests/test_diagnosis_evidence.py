@@ -175,7 +175,12 @@ def repeats(best=None, lasts=10.0, in_part=False):
         (repeats("place", in_part=True), 1.0, "depends on the position", "a bank"),
         (repeats("heading"), 1.0, "depends on the heading", "error of the compass"),
         (repeats("motion"), 1.0, "speed, drift and yaw rate", "a force on the hull"),
-        (repeats("motion", in_part=True), 1.0, "proportional to the command", "fails and recovers"),
+        (
+            repeats("motion", in_part=True),
+            1.0,
+            "proportional to the command",
+            "fails and recovers, cavitates",
+        ),
         (repeats("command"), 1.0, "on the commands", "differs from the thruster model"),
         (repeats("time"), 1.0, "since the start of a run", "a drift"),
         (
@@ -185,11 +190,11 @@ def repeats(best=None, lasts=10.0, in_part=False):
             "that sticks",
         ),
         (repeats(lasts=3.1), 1.0, "lasts for about 3 s", "gusts"),
-        (repeats(lasts=2.9), 1.0, "and is short", "waves"),
+        (repeats(lasts=2.9), 1.0, "and lasts for 3 s at the most, the width of a window", "waves"),
         (
             repeats(lasts=5.9),
             4.0,
-            "and is short",
+            "and lasts for 6 s at the most",
             "waves",
         ),  # a ship of four times the length, twice the time
         (repeats(lasts=6.1), 4.0, "lasts for about 6 s", "gusts"),

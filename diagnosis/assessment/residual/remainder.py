@@ -66,7 +66,8 @@ REPEATS = {
 }
 IN_PART = (
     "is proportional to the command of its axis for some time only",
-    "a thruster that fails and recovers, or whose power changes",
+    "a thruster whose force is lower at times, as it fails and recovers, cavitates, draws air or has "
+    "less power",
 )
 CHANGES = (
     "changes at about {1:.0f} s of {0}, and is another function of speed and command from then on",
@@ -88,7 +89,7 @@ THROUGHOUT = (
     "otherwise than recorded",
 )
 BRIEF = (
-    OF_NONE + "is short",
+    OF_NONE + "lasts for {0:.2g} s at the most, the width of a window",
     "waves, a disturbance of the measurement, or commands that differ from the recorded ones",
 )
 
@@ -315,4 +316,4 @@ def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
         return THROUGHOUT
     if r.lasts > briefly:
         return LASTS[0].format(r.lasts), LASTS[1]
-    return BRIEF
+    return BRIEF[0].format(briefly), BRIEF[1]
