@@ -1,8 +1,8 @@
 """Sums of squares over intervals of cells, from sums that are made once.
 
-With d_j 1 in the cells j of some intervals and 0 elsewhere, |C d|^2 and B d take a few additions for each
-interval, however long it is: C^T C has a band of the width of a window, and its sums up to each row and
-column are kept.
+With d_j 1 in the cells j of some intervals and 0 elsewhere, |C d|^2 and B d take a few additions for
+each interval, however long it is: C^T C has a band of the width of a window, and its sums up to each row
+and column are kept.
 """
 
 from collections.abc import Sequence
