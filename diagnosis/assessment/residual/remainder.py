@@ -287,7 +287,8 @@ def remainder_sentence(
             parts.setdefault(_kind(how[k], WIDTH * scale.time), []).append(axis)
     texts = []
     for (comes, cause), group in parts.items():
-        amounts = " and ".join(_amount(axis, axes[axis]) for axis in group)
+        *most, last = [_amount(axis, axes[axis]) for axis in group]
+        amounts = f"{', '.join(most)} and {last}" if most else last
         where = [r for axis in group for r in regions if r.axis == axis][:1]
         place = f", most {where[0].phrase}" if where else ""
         texts.append(f"{amounts} not explained{place}. It {comes}: this suggests {cause}.")
