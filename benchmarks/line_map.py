@@ -111,8 +111,9 @@ class LineMap:
         """Tests that execute a line, file by file and the fastest first.
 
         A line that runs while its module is imported is executed by the tests that execute functions of
-        the module; if it has none, of modules in its folder. What one test of a file executes, in each
-        process, may be a result that the others use, too: they come last.
+        the module; if it has none, of modules in its folder. Others of the same files may use what it
+        made without a function, and what one or two tests of a file execute, in each process, may be a
+        result that the others use, too: they come last.
         """
         path = ROOT / module
         where = executed_with(path, line)
@@ -120,7 +121,8 @@ class LineMap:
         for places in ([path], path.parent.glob("*.py")) if where is None else ():
             found = found or {test for place in places for test in self._using(place)}
         of_files = Counter(map(file_of, found))
-        others = {t for t in self.seconds if 0 < of_files[file_of(t)] <= WORKERS}
+        few = WORKERS if where is not None else len(self.seconds)
+        others = {t for t in self.seconds if 0 < of_files[file_of(t)] <= few}
         whole = Counter[str]()
         for test in found:
             whole[file_of(test)] += self.seconds[test]

@@ -27,7 +27,7 @@ from fmucheck.checking import main
 from fmucheck.description import FmuDescription
 from fmucheck.examine import examine
 from fmucheck.fmu import FmuArchive
-from fmucheck.fmu_on_trial import FmuOnTrial, near, other
+from fmucheck.fmu_on_trial import FmuOnTrial, near, other, same
 from fmucheck.registry import RULES, NotApplicableError, Outcome, in_order
 from fmucheck.report import listing
 from fmucheck.source import BadFileError
@@ -567,3 +567,15 @@ def test_fmus_do_not_carry_the_checker_and_trials_start_light():
         [sys.executable, "-c", heavy], capture_output=True, text=True, cwd=ROOT, env=os.environ
     )
     assert done.stdout.strip() == "set()", done.stderr
+
+
+def test_values_are_the_same_but_for_rounding():
+    assert same(0.1 + 0.2, 0.3)
+    assert same(float("nan"), float("nan"))
+    assert same(0.0, 1e-13)
+    assert not same(0.3, 0.3 + 1e-8)
+    assert not same(float("nan"), 0.0)
+    assert same("a", "a")
+    assert not same("a", "b")
+    assert same(3, 3)
+    assert not same(10**12, 10**12 + 1), "whole numbers have no rounding"

@@ -98,3 +98,13 @@ def test_hidden_one_is_found_with_its_values(hidden):
 def test_none_is_claimed_where_it_is_not():
     (found,) = learn([voyage(loss_vsp1=0.3)], prior=0.0).effects
     assert found.id not in HIDDEN
+
+
+def test_only_exponents_that_differ_are_told():
+    told = EFFECTS["power_exponent"].wording.sentence
+    bow = told({"exponent_vsp": 0.0, "exponent_bow": 0.5})
+    both = told({"exponent_vsp": 0.25, "exponent_bow": 0.5})
+    assert "bow thruster is 1.5" in bow
+    assert "1.25" not in bow
+    assert bow.count(" is ") == 2, "that it is not linear, and one exponent"
+    assert both.count(" is ") == 3

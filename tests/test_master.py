@@ -500,3 +500,15 @@ def test_the_rest_of_a_step_in_which_the_compiled_loop_has_stopped(algorithm, k,
     ]
     exchanged = [] if algorithm == "jacobi" else [(n, round(0.1 * k, 9)) for n in after]
     assert [(n, t) for n, name, t in calls if name == "exchange"] == exchanged
+
+
+def test_values_that_must_stay_finite_are_the_real_ones_that_fmus_write():
+    def got(name, kind):
+        return SimpleNamespace(name=name, variable=SimpleNamespace(type=kind))
+
+    steppers = [
+        SimpleNamespace(got=[got("a.x", "Real"), got("a.count", "Integer")]),
+        SimpleNamespace(got=[]),
+        SimpleNamespace(got=[got("b.on", "Boolean"), got("b.y", "Real"), got("b.text", "String")]),
+    ]
+    assert Master.outputs.fget(SimpleNamespace(steppers=steppers)) == ["a.x", "b.y"]

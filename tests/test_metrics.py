@@ -1,6 +1,7 @@
 """Metrics and pictures of a run."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from cosim.results import (
 from cosim.results.picture_files import PictureOptions
 from cosim.results.run_options import RunOptions
 from cosim.scenario import Roles
+from cosim.system.system import System
 
 ROLES = Roles()
 ARROW = AnnotatedOutline("arrow", 3.0, ((2.0, 0.0), (-1.0, 0.5), (-1.0, -0.5)))
@@ -603,3 +605,37 @@ class TestRoles:
         assert json.loads(capsys.readouterr().out) == compute(log, roles=self.OTHER)
         assert plots_main([str(run), "--out", str(run / "drawn")]) == 0
         assert {path.name for path in (run / "drawn").iterdir()} == set(TestPlots.ALL)
+
+
+def test_limits_of_commands_are_start_values_or_those_that_the_scenario_gives():
+    def real(causality, start=None, unit="rad", kind="Real"):
+        unit = unit and SimpleNamespace(name=unit)
+        return SimpleNamespace(type=kind, start=start, causality=causality, unit=unit)
+
+    thrusters = {
+        "delta": real("input"),
+        "delta_max": real("parameter", "0.6"),
+        "n": real("output", unit=None),
+        "n_max": real("parameter", "9.0"),
+        "n_min": real("parameter", "-4.0"),
+        "lift": real("local"),
+        "lift_max": real("parameter", "1.0"),
+        "lag": real("parameter"),
+        "lag_max": real("parameter", "1.0"),
+        "steps": real("input"),
+        "steps_max": real("parameter", "3", kind="Integer"),
+        "free": real("input"),
+        "free_max": real("parameter"),
+    }
+    given = [
+        (SimpleNamespace(name="n_max", type="Real"), 7.5),
+        (SimpleNamespace(name="free_max", type="Integer"), 2),
+    ]
+    system = SimpleNamespace(
+        models={"t": SimpleNamespace(variables=thrusters), "v": SimpleNamespace(variables={})},
+        parameters={"t": given},
+    )
+    assert System.limited.fget(system) == {
+        "t.delta": CommandLimit(-0.6, 0.6, "rad"),
+        "t.n": CommandLimit(-4.0, 7.5, ""),
+    }

@@ -190,3 +190,21 @@ def test_a_push_is_told_where_it_is_beyond_the_noise_and_what_is_usual(seed, axi
     for s in found.stretches:
         assert s.size > 0.0
         assert s.start < middle[at] < s.end
+
+
+@given(seeds)
+def test_slopes_are_by_axis_of_the_force_and_then_by_speed(seed):
+    rng = np.random.default_rng(seed)
+    A, weights = rng.normal(size=(3, 3)), rng.random((4, 30))
+    weights /= weights.sum(axis=1, keepdims=True)
+    w = SimpleNamespace(
+        smoothed=SimpleNamespace(nu_std=rng.random((30, 3)) + 0.01),
+        known=rng.random(30) < 0.7,
+        scale=REFERENCE,
+        motion=(None, rng.normal(size=(30, 3))),
+    )
+    w.known[0] = True
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(uncertainty, "modelled_force", lambda w, model, nu: weights @ nu @ A.T + 1.0)
+        found = uncertainty._by_steps(w, Model())
+    np.testing.assert_allclose(found, np.broadcast_to(A, (4, 3, 3)), rtol=1e-8, atol=1e-8)
