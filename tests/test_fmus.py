@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import fmpy
 import numpy as np
@@ -19,10 +20,13 @@ from support.cse1 import VESSEL
 from support.opened import Opened
 from support.project import COMPONENTS, ROOT
 
+from cosim.system.own_fmus import builder_options
 from fmus.build import BuildError, build, building, packing
 from fmus.build.__main__ import main
 from fmus.declare import flatten, packer, width
 from fmus.fmi.slave import Slave, StateError
+from fmus.ship import ship
+from fmus.ships.naming import described_ship
 
 every_fmu = pytest.mark.parametrize("name", COMPONENTS)
 
@@ -461,3 +465,58 @@ def test_serialised_state_of_a_python_fmu_is_refused_where_it_was_changed():
         one._fmu_state_from_bytes(b"[2" + saved[2:])
     with pytest.raises(StateError, match="checksum"):
         one._fmu_state_from_bytes(saved.replace(b"0.0", b"0.5", 1))
+
+
+def test_another_source_is_another_key(tmp_path, monkeypatch):
+    monkeypatch.setattr(building, "ROOT", tmp_path)
+    seen = []
+
+    def key_with(name, content):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(content, encoding="utf-8")
+        building.own_source.cache_clear()
+        seen.append(building.own_source())
+        return seen[-1]
+
+    try:
+        first = key_with("a.py", "x = 1")
+        assert key_with("b/wave.c", "int x;") not in seen[:-1]
+        assert key_with("a.py", "x = 2") not in seen[:-1]
+        assert key_with("b/wave.c", "int y;") not in seen[:-1]
+        present = seen[-1]
+        assert key_with("notes.md", "no code") == present
+        (tmp_path / "b/wave.c").unlink()
+        assert key_with("a.py", "x = 1") == first
+    finally:
+        building.own_source.cache_clear()
+
+
+@pytest.mark.parametrize("name", [None, "otter"])
+def test_the_builder_is_told_the_ship_and_whether_to_compile(name):
+    scenario = SimpleNamespace(ship=name, ship_source=name)
+    of_ship = [] if name is None else ["--ship=otter"]
+    assert builder_options(scenario, native=False) == of_ship
+    assert builder_options(scenario, native=True) == ["--native", *of_ship]
+
+
+def test_the_key_of_a_build_covers_all_that_it_reads(tmp_path):
+    own, other = tmp_path / "own.py", tmp_path / "other.py"
+    own.write_text("x = 1", encoding="utf-8")
+    other.write_text("x = 1", encoding="utf-8")
+    native = SimpleNamespace(key="gcc 12")
+    inputs = [
+        (None, ship(), {}, None),
+        (own, ship(), {}, None),
+        (other, ship(), {}, None),
+        (None, ship(description=described_ship("otter")), {}, None),
+        (None, ship(), {"m": 20.0}, None),
+        (None, ship(), {"m": 21.0}, None),
+        (None, ship(), {}, native),
+        (None, ship(), {}, SimpleNamespace(key="gcc 13")),
+    ]
+    keys = [building._source_hash(*each) for each in inputs]
+    assert keys == [building._source_hash(*each) for each in inputs]
+    own.write_text("x = 2", encoding="utf-8")
+    keys.append(building._source_hash(*inputs[1]))
+    assert len(set(keys)) == len(keys)

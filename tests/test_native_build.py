@@ -2,13 +2,11 @@
 
 import math
 import struct
-from types import SimpleNamespace
 
 import pytest
 from support import ccode
 from support.command import command
 
-from cosim.system.own_fmus import builder_options
 from fmus.build import build, building, platforms, released
 from fmus.build.__main__ import main
 from fmus.build.building import own_source
@@ -174,36 +172,3 @@ def test_compiled_fmu_of_the_package_is_left_alone_elsewhere(came_along, tmp_pat
     monkeypatch.setattr(building, "own_source", lambda: "of a changed source")
     assert command(main, "--list", "--native").stdout == ""
     assert command(main, "--native", "observer_mdf").returncode == 2
-
-
-def test_another_source_is_another_key(tmp_path, monkeypatch):
-    monkeypatch.setattr(building, "ROOT", tmp_path)
-    seen = []
-
-    def key_with(name, content):
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(content, encoding="utf-8")
-        building.own_source.cache_clear()
-        seen.append(own_source())
-        return seen[-1]
-
-    try:
-        first = key_with("a.py", "x = 1")
-        assert key_with("b/wave.c", "int x;") not in seen[:-1]
-        assert key_with("a.py", "x = 2") not in seen[:-1]
-        assert key_with("b/wave.c", "int y;") not in seen[:-1]
-        present = seen[-1]
-        assert key_with("notes.md", "no code") == present
-        (tmp_path / "b/wave.c").unlink()
-        assert key_with("a.py", "x = 1") == first
-    finally:
-        building.own_source.cache_clear()
-
-
-@pytest.mark.parametrize("name", [None, "otter"])
-def test_the_builder_is_told_the_ship_and_whether_to_compile(name):
-    scenario = SimpleNamespace(ship=name, ship_source=name)
-    of_ship = [] if name is None else ["--ship=otter"]
-    assert builder_options(scenario, native=False) == of_ship
-    assert builder_options(scenario, native=True) == ["--native", *of_ship]
