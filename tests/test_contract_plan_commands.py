@@ -360,3 +360,26 @@ def test_entries_of_one_file_alone_are_said_unless_it_has_them(monkeypatch):
     assert line.startswith("'b.csv' also needs, in '")
     others[Path("a.csv")] = {"x": Column(name="other")}
     assert len([*propose_columns._own_entries(others)]) == 2
+
+
+@pytest.mark.parametrize(
+    ("length", "parts"),
+    [
+        (None, [(0, 7)]),
+        (7.0, [(0, 7)]),
+        (20.0, [(0, 7)]),
+        (3.0, [(0, 3), (3, 6)]),
+        (3.5, [(0, 3), (4, 7)]),
+    ],
+)
+def test_windows_of_a_run_follow_each_other_and_hold_all_samples_of_a_whole_one(
+    monkeypatch, length, parts
+):
+    run = measured_system.MeasuredRun("a", 2.0 + np.arange(8.0), {})
+    monkeypatch.setattr(measured_system, "_window", lambda run, given, model, noise, rows: rows)
+    monkeypatch.setattr(measured_system, "FEWEST", 3)
+    found = measured_system.windows_of(run, None, None, None, length)
+    assert [(rows[0], rows[-1]) for rows in found] == parts
+    monkeypatch.setattr(measured_system, "FEWEST", 9)
+    with pytest.raises(InputError, match="run 'a' has no window with 9 samples"):
+        measured_system.windows_of(run, None, None, None, length)

@@ -115,3 +115,12 @@ def test_a_document_knows_its_number_of_pages(tmp_path):
     assert across_ / high == pytest.approx(
         chart.figure().get_size_inches()[0] / chart.figure().get_size_inches()[1], rel=0.02
     )
+
+
+def test_an_area_is_interrupted_where_one_of_its_lines_is():
+    panel, nan = Panel(), np.nan
+    panel.fill([0, 1, 2, 3, 4, 5], [0, 1, 2, 3, 4, nan], [5, 6, nan, 8, 9, 10], "red", "band")
+    (mark,) = panel.marks
+    np.testing.assert_array_equal(mark.x, [0, 1, 1, 0, nan, 3, 4, 4, 3, nan])
+    np.testing.assert_array_equal(mark.y, [0, 1, 6, 5, nan, 3, 4, 9, 8, nan])
+    assert (mark.area, mark.faint, mark.label) == (True, True, "band")

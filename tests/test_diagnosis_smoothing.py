@@ -378,3 +378,28 @@ def test_the_variance_of_a_sum_is_that_of_the_coefficients():
             L = sum(np.diag(b[: grid.size - k], -k) for k, b in enumerate(band))
             expected = np.einsum("ki,ij,kj->k", a, np.linalg.inv(L @ L.T), a)
             assert found[:, channel] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "at_rest"),
+    [
+        ((0.0, 0.0, 0.0), True),
+        ((0.1, 0.0, 0.0), False),
+        ((0.0, 0.1, 0.0), False),
+        ((0.0, 0.0, 0.1), False),
+    ],
+)
+def test_a_ship_begins_at_rest_only_if_it_neither_moves_nor_turns(monkeypatch, speeds, at_rest):
+    """A ship that drifts straight on, or turns on the spot, had commands before the run began."""
+    time, seen = np.arange(0.0, 30.0, 0.1), []
+    pose = time[:, None] * speeds + NOISE * np.random.default_rng(5).standard_normal((time.size, 3))
+    pose[:, 0] += 0.1 * np.maximum(time - 10.0, 0.0)  # a log of a ship that never moves is refused
+    given = smoother.Commands
+
+    def kept(*parts):
+        seen.append(parts[3])
+        return given(*parts)
+
+    monkeypatch.setattr(smoother, "Commands", kept)
+    smooth(clean(Run("steady", time, pose, np.zeros((time.size, 3)))))
+    assert set(seen) == {at_rest}

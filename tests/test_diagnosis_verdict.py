@@ -32,6 +32,7 @@ from diagnosis.search.prediction_fit.disturbance import ForceDisturbance
 from diagnosis.search.prediction_fit.disturbance_summary import Unrecorded
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.refit import RefitOutcome
+from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
@@ -50,6 +51,7 @@ from diagnosis.verdict.judging import (
 )
 from diagnosis.verdict.law_in_parts import beside_possibility, mended, of_several, on_one_line
 from diagnosis.verdict.pruning import overfits, proven, prune, without
+from diagnosis.verdict.pruning_criteria import criterion
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}
@@ -718,6 +720,20 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(sear
     assert (coefficients.refitted, nothing.refitted) == (True, False)
     assert (coefficients.changed, nothing.changed) == (True, False)
     assert nothing.learned.model == session.start
+
+
+@pytest.mark.parametrize("calibrates", [True, False])
+def test_coefficients_are_asked_for_where_the_model_has_them(monkeypatch, calibrates):
+    start, asked = Model(), []
+    runs = [voyages(**SHORT, ship={})[0]]
+    found = Findings([], model=start, sigma=np.array([0.1, 0.1, 0.05]))
+    data = ValidationData(runs, [], start, found.sigma)
+    known = NominalPrior.of(start, None)
+    monkeypatch.setattr(judging, "_coefficients_alone", lambda *given: asked.append(given))
+    decided, gain = judge(found, data, known, criterion(), OPERATING, calibrates, None, silent)
+    assert len(asked) == calibrates
+    assert (decided.learned.effects, decided.learned.model) == ([], start)
+    assert (gain is None) != calibrates
 
 
 @pytest.mark.parametrize(("second", "spoilt"), [({"delta_X_u": -3.0}, False), ({}, True)])

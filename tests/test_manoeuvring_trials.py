@@ -413,7 +413,8 @@ def test_a_run_is_measured_where_its_guidance_is_a_trial(name, names, tmp_path):
     assert (tmp_path / "commands.png").exists() == bool(limited) == (name == "otter_zigzag")
     assert result.trial is not None
     assert result.trial.limits.keys() & names
-    assert [c.header for c in sheet(result.trial).columns][:3] == ["measure", "value", "unit"]
+    headers = [c.header for c in sheet(result.trial).columns]
+    assert headers == ["measure", "value", "unit", "in L", "IMO limit", "meaning"]
     done = command(metrics_main, tmp_path, "--json")
     assert json.loads(done.stdout) == pytest.approx(told, rel=1e-9)
     assert "limit" in command(metrics_main, tmp_path).stdout
