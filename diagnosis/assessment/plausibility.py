@@ -10,13 +10,13 @@ dead actuators, do not do as well.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, compress
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from cosim import InputError
 
+from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.weak_form import thrust_along
 from ..runs import Run, line_beside
@@ -42,7 +42,7 @@ class Misreading(NamedTuple):
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
 
     seen: str
-    changes: Mapping[str, Named] = MappingProxyType({})
+    changes: Mapping[str, Named] | None = None
     name: str | None = None
     sure: bool = True
 
@@ -57,19 +57,23 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWi
         InputError: with the likeliest mistake, and the line for the file next to the measurement.
     """
     found = []
-    for w in runs:
-        with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
-            doubt = _doubt(w, model)
-            if not (doubt and all(_doubt(w, each) for each in slower(w, model))):
-                doubt = _late(w, model)  # actuators that are slower than described are no mistake
+    for w, doubt in zip(runs, for_each(lambda w: _misread(w, model), runs), strict=True):
         if doubt:
-            remedy = line_beside(w.run.file, w.run.layout, doubt.changes, doubt.name)
+            remedy = line_beside(w.run.file, w.run.layout, doubt.changes or {}, doubt.name)
             if doubt.sure:
                 raise InputError(f"run '{w.run.name}': {doubt.seen}{remedy}; {GO_ON}")
             doubted = (*w.smoothed.doubted, f"{doubt.seen}{remedy.replace('; ', '; if so, ', 1)}")
             w = replace(w, smoothed=replace(w.smoothed, doubted=doubted))
         found.append(w)
     return found
+
+
+def _misread(w: WeakWindows, model: Model) -> Misreading | None:
+    with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
+        doubt = _doubt(w, model)
+        if doubt and all(_doubt(w, each) for each in slower(w, model)):
+            return doubt
+        return _late(w, model)  # actuators that are slower than described are no mistake
 
 
 def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
