@@ -26,7 +26,7 @@ class IntervalSums:
         apart = gram.row - gram.col
         lower = apart >= 0
         self.band = int(apart.max(initial=0))
-        size = columns.shape[1]
+        size = further.shape[1]
         # Column d: the sum of a row up to the d-th place before the diagonal, itself included.
         rows = np.zeros((size, self.band + 2))
         rows[gram.row[lower], apart[lower]] = gram.data[lower]
