@@ -101,25 +101,20 @@ def test_a_failure_that_passes_and_one_for_good(spans, passes, endless):
 def test_the_cost_is_that_of_direct_least_squares_and_log_n_for_each_change():
     p = problem(0.05, b=(0.2, -0.1))
 
-    def of_all(spans):
-        """The least sum of squares, with the prior's as rows of its own."""
+    def direct(spans):
+        """The nuisance parameters and the least sum of squares, with the prior as rows of its own."""
         root = np.sqrt(p.precision)
-        X = np.vstack([p.nuisance, root])
-        z = np.concatenate([p.left(spans), -root @ p.offset])
-        return np.linalg.lstsq(X, z, rcond=None)[1][0]
+        X, z = np.vstack([p.nuisance, root]), np.concatenate([p.left(spans), -root @ p.offset])
+        b, (least,), *_ = np.linalg.lstsq(X, z, rcond=None)
+        return b, least
 
     rest = p.left([(60, 110)])
     assert rest == pytest.approx(p.y - np.asarray(p.columns.todense())[:, 60:110].sum(axis=1))
-    root = np.sqrt(p.precision)
-    X, z = np.vstack([p.nuisance, root]), np.concatenate([rest, -root @ p.offset])
-    b = np.linalg.lstsq(X, z, rcond=None)[0]
-    over = p.fitted(rest)
-    assert over == pytest.approx(rest - p.nuisance @ b, abs=1e-6)
+    assert p.fitted(rest) == pytest.approx(rest - p.nuisance @ direct([(60, 110)])[0], abs=1e-6)
     charge = np.log(p.y.size / OVERLAP)
-    assert p.cost([(60, 110)]) == pytest.approx(of_all([(60, 110)]) + 2.0 * charge, rel=1e-6)
-    assert p.cost([(60, 240)]) == pytest.approx(of_all([(60, 240)]) + charge, rel=1e-6)
-    two = [(60, 63), (65, 110), (250, 251)]
-    assert p.cost(two) == pytest.approx(of_all(two) + 6.0 * charge, rel=1e-6)
+    three = [(60, 63), (65, 110), (250, 251)]
+    for spans, changes in (([(60, 110)], 2), ([(60, 240)], 1), (three, 6)):
+        assert p.cost(spans) == pytest.approx(direct(spans)[1] + changes * charge, rel=1e-6)
     bare = replace(p, nuisance=np.zeros((p.y.size, 0)), precision=np.zeros((0, 0)), offset=np.zeros(0))
     assert bare.fitted(rest) is rest
     assert bare.cost([(60, 110)]) == pytest.approx(rest @ rest + 2.0 * charge)

@@ -69,6 +69,7 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWi
 
 
 def _misread(w: WeakWindows, model: Model) -> Misreading | None:
+    """What is wrong with a run, be its actuators slower than described or not."""
     with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
         doubt = _doubt(w, model)
         if doubt and all(_doubt(w, each) for each in slower(w, model)):

@@ -6,7 +6,7 @@ import numpy as np
 
 from cybership.message_text import counted
 from fmus.effects import Effect, EffectSet
-from fmus.effects.text import Found, signed
+from fmus.effects.text import Found, enumeration, signed
 
 from ..execution.short_text import SHOWN
 from ..predictors.ship_model import parameter_and_run
@@ -105,8 +105,7 @@ def listed(names: Sequence[str], joined: str = "or") -> str:
     """Names in a row: a, b or c; of many the first few, and how many more."""
     hidden = len(names) - SHOWN
     more = [counted(hidden, "other")] if hidden > 0 else []
-    *most, last = [*names[:SHOWN], *more]
-    return f"{', '.join(most)} {joined} {last}" if most else last
+    return enumeration([*names[:SHOWN], *more], joined)
 
 
 def separation_note(name: str, alike: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from ..declare import POSITIVE, Variable
 from ..ops import Condition, Number, clip, fmax, where
 from .devices import SHARE, Devices, added, changed, declared, parameter
 from .effect import Effect, Running, Search, Thrust, Values
-from .text import Found, against_command, capital, lost, number, percent
+from .text import Found, against_command, capital, enumeration, lost, number, percent
 
 INTERVALS = 8  # of an outage: the parameters of the FMU are so many
 INSTANT = 1e-9  # s; times that differ by less are the same
@@ -129,8 +129,8 @@ def outage(d: Devices, lasting: str = "") -> Effect:
 
     def sentence(f: Found) -> str:
         found = sorted((f[a], f[b]) for a, b in pairs if f[b] > f[a])
-        *most, last = [f"from {number(a)} to {number(b)} s" for a, b in found] or ["at no time"]
-        return f"{d.does('fail')} {', '.join(most)}{' and ' if most else ''}{last}."
+        intervals = [f"from {number(a)} to {number(b)} s" for a, b in found]
+        return f"{d.does('fail')} {enumeration(intervals or ['at no time'])}."
 
     @declared(
         d,

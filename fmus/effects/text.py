@@ -1,6 +1,6 @@
 """What the sentences of all effects share: the finding, and how numbers read."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import atan2, degrees
 
@@ -59,6 +59,12 @@ def compass(north: float, east: float) -> str:
 def capital(text: str) -> str:
     """The text with a capital letter at its start."""
     return text[:1].upper() + text[1:]
+
+
+def enumeration(parts: Sequence[str], joined: str = "and") -> str:
+    """One or more parts of a sentence: a, b and c."""
+    *most, last = parts
+    return f"{', '.join(most)} {joined} {last}" if most else last
 
 
 def lost(name: str, sentence: Callable[[str, str], str]) -> Callable[[Found], str]:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
-from fmus.effects.text import number
+from fmus.effects.text import enumeration, number
 from fmus.scale import REFERENCE, Scale
 
 from ...predictors import Model, WeakWindows, omega
@@ -287,8 +287,7 @@ def remainder_sentence(
             parts.setdefault(_kind(how[k], WIDTH * scale.time), []).append(axis)
     texts = []
     for (comes, cause), group in parts.items():
-        *most, last = [_amount(axis, axes[axis]) for axis in group]
-        amounts = f"{', '.join(most)} and {last}" if most else last
+        amounts = enumeration([_amount(axis, axes[axis]) for axis in group])
         where = [r for axis in group for r in regions if r.axis == axis][:1]
         place = f", most {where[0].phrase}" if where else ""
         texts.append(f"{amounts} not explained{place}. It {comes}: this suggests {cause}.")

@@ -172,8 +172,11 @@ class SegmentationProblem:
         """What the nuisance parameters leave over (3 K,)."""
         if not self.offset.size:
             return left
-        right = self.nuisance.T @ left - self.precision @ self.offset
-        return left - self.nuisance @ cho_solve(self._information, right)
+        return left - self.nuisance @ self._likeliest(self.nuisance.T @ left)
+
+    def _likeliest(self, along: np.ndarray) -> np.ndarray:
+        """b (q,), by the products (q,) of Z with what is left of the model error."""
+        return cho_solve(self._information, along - self.precision @ self.offset)
 
     @cached_property
     def _gram(self) -> np.ndarray:
@@ -203,7 +206,7 @@ class SegmentationProblem:
         cost = float(square) + self.charge * points
         if not self.offset.size:
             return cost
-        b = cho_solve(self._information, along - self.precision @ self.offset)
+        b = self._likeliest(along)
         last = self.offset + b
         return cost - float(2.0 * b @ along - b @ self._gram @ b - last @ self.precision @ last)
 
