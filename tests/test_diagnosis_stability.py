@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 from support.cases import slow
 
 from cosim import InputError
@@ -123,6 +124,21 @@ def test_a_hull_drives_on_where_it_adds_energy_and_the_other_adds_less():
     assert not is_driven(3.0, 3.0)
     assert not is_driven(3.0, 3.1)
     assert not is_driven(0.3, 0.0), "less damping is damping"
+
+
+@pytest.mark.parametrize(("grows_by", "driven"), [(0.04, False), (0.06, True)])
+def test_a_hull_that_gains_next_to_no_energy_within_the_time_of_a_prediction_drives_nothing_on(
+    grows_by, driven
+):
+    """Surge by u' = -(X_u + d) u / m alone, at the lowest speed that is sampled."""
+    motions = stability.alone(0, OPERATING)
+
+    def growth(change):
+        model = Model({"delta_X_u": change})
+        return -stability.dissipation(model, motions, stability.mass(NOMINAL)).min() * 60.0
+
+    change = brentq(lambda change: growth(change) - grows_by, 0.0, 5.0)
+    assert stability.driven_on(Model({"delta_X_u": change}), NOMINAL, OPERATING) == ("surge",) * driven
 
 
 @pytest.mark.parametrize("whole", [False, slow(True)])

@@ -320,6 +320,8 @@ def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
     (water, compass) = sorted(said(V_n=0.0, V_e=-0.2, heading_offset=0.1))[::-1]
     assert water == "The water moves at 0.2 m/s towards 270°."
     assert "5.73°" in compass
+    assert said(heading_offset=0.0049) == [], "0.28 degrees matter in no manoeuvre"
+    assert said(heading_offset=-0.0051)
 
 
 def test_without_a_gain_nothing_is_said_of_it():

@@ -24,6 +24,7 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model
 from ..predictors.thrust import FORGOTTEN
 from ..runs.cleaning import BRIEF
+from ..runs.run_constants import NEGLIGIBLE
 from .closed_loop import REFERENCES, bound_of, largest_distance
 from .settings import SETTINGS
 
@@ -263,11 +264,15 @@ def _scaled(nu: np.ndarray, region: OperatingRegion) -> np.ndarray:
 
 
 def driven_on(model: Model, other: Model, region: OperatingRegion) -> tuple[str, ...]:
-    """The motions, surge, sway or yaw alone, in which a hull drives the ship on, and another less."""
+    """The motions, surge, sway or yaw alone, in which a hull drives the ship on, and another less.
+
+    A motion that grows by less than NEGLIGIBLE until the ship has forgotten its commands does not count.
+    """
     metric, found = mass(other), []
+    slow = NEGLIGIBLE / (FORGOTTEN * model.ship.scale.time)
     for k, (name, _) in enumerate(MOTIONS):
         lowest, of_other = (dissipation(m, alone(k, region), metric).min() for m in (model, other))
-        if lowest < 0.0 and _less(lowest, of_other):
+        if lowest < -slow and _less(lowest, of_other):
             found.append(name)
     return tuple(found)
 

@@ -13,6 +13,7 @@ from ..assessment.stability import force
 from ..predictors import Model
 from ..predictors.ship_model import of_one_run, parameter_and_run
 from ..runs.run_constants import DIGITS
+from ..runs.sensors.constants import LEAST
 from ..search.findings import Finding
 from ..session import Diagnosis
 from .finding_text import advice, equation, sentence, separation_note, unit
@@ -78,12 +79,17 @@ def reported_effects(d: Diagnosis) -> tuple[list[ReportedEffect], list[ReportedE
 
 
 def fitted_beside(d: Diagnosis) -> list[str]:
-    """What a calibrated model has of the measurement and the water, in words, a sentence each."""
+    """What a calibrated model has of the measurement and the water, in words, a sentence each.
+
+    An angle that matters in no manoeuvre is left out.
+    """
     told, learned = [], d.learned.model
     for effect in d.start.ship.effects.values():
-        fitted = any(is_fitted(d, n) for n in effect.coefficients)
+        values = {n: learned.value(n) for n in effect.coefficients}
+        fitted = any(
+            is_fitted(d, n) and (unit(effect, n) != "rad" or abs(x) >= LEAST) for n, x in values.items()
+        )
         if effect.kind in ("measurement", "environment") and fitted:
-            values = {n: learned.value(n) for n in effect.coefficients}
             told.append(sentence(Found(effect, values, d.speeds)))
     return told
 

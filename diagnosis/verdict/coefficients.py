@@ -73,12 +73,15 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     return Conclusion(replace(found, model=start, suspects=[]), False, [])
 
 
-def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> RefitOutcome | None:
+def calibrated(
+    found: Findings, data: ValidationData, prior: NominalPrior, coefficients: RefitOutcome | None = None
+) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
     It also takes the place of effects than which it is as good. No effect follows from it.
     Each training run is predicted without it; a current is in it where that shows beyond chance, and is
-    beyond its own uncertainty. Validation runs can reject it.
+    beyond its own uncertainty. Where ``coefficients``, the calibration of the nominal ones alone, is as
+    good, it is taken. Validation runs can reject either.
     """
     train, start = data.train, data.start
     if len(train) < WHOLE_RUNS or not any(prior.std.values()):
@@ -95,6 +98,9 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Re
         best = flowing
     else:
         now = still
+    if coefficients is not None:
+        plain, now = runs.losses(coefficients.findings, best.findings)
+        best, now = (coefficients, plain) if as_good(plain, now) else (best, now)
     better = as_good(now, other) if found.effects else gain(other, now) > 0.0
     if harm(now, first) or not better:
         return None

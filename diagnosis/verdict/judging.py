@@ -238,7 +238,7 @@ def _coefficients_alone(
         unshown: ids of the findings that predictions do not show.
     """
     data, found = end.data, end.fit.findings
-    other = None if any_finding(found, data.start) else calibrated(found, data, prior)
+    other = None if any_finding(found, data.start) else calibrated(found, data, prior, calibration)
     if other is None and not any_sure(learned):
         believed = not learned.effects or any(map(is_finding, learned.effects))
         gained = gain is None or gain.gained

@@ -80,6 +80,7 @@ CASE = {
     "found": 10.0,
     "still": 5.0,
     "flowing": 5.0,
+    "plain": None,
     "V": (0.0, 0.0),
     "validate": [],
     "its": 5.0,
@@ -106,6 +107,14 @@ CASE = {
         ({"flowing": 4.5, "V": (9.0, 9.0)}, "still"),
         ({"still": 11.5, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
         ({"effects": [effect()], "found": 3.0, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"plain": 5.0}, "plain"),  # as good, of fewer coefficients
+        ({"plain": 4.0}, "plain"),
+        ({"plain": 5.1}, "still"),
+        ({"plain": 3.0, "flowing": 3.0, "V": (9.0, 9.0)}, "plain"),
+        ({"plain": 4.0, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"still": 11.5, "plain": 5.0}, "plain"),
+        ({"still": 11.5, "plain": 11.4}, None),
+        ({"plain": 5.0, "validate": [1], "its": 11.5}, None),
         ({"validate": [1], "its": 10.5}, "still"),
         ({"validate": [1], "its": 11.5}, None),
         ({"its": 11.5}, "still"),
@@ -115,11 +124,13 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
     case = CASE | changes
     found = Findings(case["effects"])
     still, flowing = outcome("still"), outcome("flowing", case["V"])
+    plain = outcome("plain") if case["plain"] else None
     losses = {
         id(found): "found",
         id(START): "first",
         id(still.findings): "still",
         id(flowing.findings): "flowing",
+        id(plain and plain.findings): "plain",
     }
 
     class Runs:
@@ -142,5 +153,5 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
         start=START,
         losses=lambda model, start: [case["its"], case["others"]],
     )
-    chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}))
-    assert chosen is {"still": still, "flowing": flowing, None: None}[taken]
+    chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}), plain)
+    assert chosen is {"still": still, "flowing": flowing, "plain": plain, None: None}[taken]
