@@ -194,6 +194,9 @@ def test_categories_have_boxes_and_numbers_a_median_where_several_runs_share_a_v
     assert median.get_xdata().tolist() == [1.0, 2.0]
     assert median.get_ydata().tolist() == [12.0, 21.5]
     assert [text.get_text() for text in over_c.get_xticklabels()] == ["b", "a"], "in their order"
+    heights = [line.get_ydata().tolist() for line in over_c.get_lines()]
+    assert [21.0, 21.0] in heights, "median of b"
+    assert [16.0, 16.0] in heights, "median of a"
     assert (over_c.get_xlabel(), over_c.get_ylabel()) == ("c", "W [J]")
     (panel,) = kept[1].axes
     assert panel.get_title() == "c: less b"

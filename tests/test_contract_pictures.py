@@ -140,6 +140,9 @@ def test_the_model_error_stands_with_its_estimate_for_each_run():
         lost = log[f"thrusters.tau_act_{axis}"] - log[f"thrusters.tau_cmd_{axis}"]
         assert data(panel) == pytest.approx(log[f"vessel.omega_star_{axis}"] + lost)
         assert data(panel, 1) == pytest.approx(log[f"controller.omega_hat_{axis}"])
+        true, estimate = panel.lines[:2]
+        assert true.get_linewidth() < 0.6 * estimate.get_linewidth(), "each is seen beside the other"
+        assert true.get_zorder() > estimate.get_zorder()
     assert [p.get_title() for p in figure.axes] == ["a", "b", "", "", "", ""]
     units = ["ω in X [N]", "", "ω in Y [N]", "", "ω in N [N m]", ""]
     assert [p.get_ylabel() for p in figure.axes] == units
@@ -326,6 +329,13 @@ def test_margins_are_those_of_letters_whatever_the_size():
         ahead = (panels[0, 0].transAxes.transform((0.0, 0.5))[0] - label.get_transform().transform(
             label.get_position())[0]) / figure.dpi  # fmt: skip
         assert ahead == pytest.approx(5.0 * LETTER)
+
+
+def test_panels_share_a_time_axis_that_ends_just_beyond_the_runs():
+    _, panels = canvas.stacked(2, 1, 5.0)
+    panels[0, 0].plot([10.0, 60.0], [0.0, 1.0])
+    for panel in panels.flat:
+        assert panel.get_xlim() == pytest.approx((9.5, 60.5))
 
 
 @pytest.mark.parametrize(

@@ -212,6 +212,12 @@ def test_what_it_prints_goes_to_standard_error(plain_fmu, tmp_path):
     assert "to the world" not in done.stdout
 
 
+def test_it_reads_nothing_from_standard_input(plain_fmu, tmp_path):
+    """The messages of the process are not for it."""
+    fmu = plain_fmu("Reads", GAIN, "assert os.read(0, 1) == b''\nreturn True")
+    assert cosim.simulate(cosim.load_scenario(one(fmu)), tmp_path / "out").status == "done"
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 @pytest.mark.parametrize("last", ["return True", "os._exit(0)"])
 def test_what_an_fmu_has_started_ends_with_it(plain_fmu, tmp_path, last):

@@ -238,6 +238,8 @@ class TestCommand:
         out = capsys.readouterr().out
         assert all(metric.name in out for metric in performance.METRICS)
         assert "1.25 " in out  # ISE
+        header = next(line for line in out.splitlines() if "metric" in line)
+        assert header.startswith("metric"), "columns begin where a line begins"
 
     def test_json(self, folder, capsys):
         log = wild()

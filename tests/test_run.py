@@ -24,6 +24,7 @@ from support.project import ROOT
 import cosim
 from cosim import metrics, plots, run
 from cosim.master import real_time
+from cosim.results.log import to_parquet
 from cosim.scenario import Roles
 from fmucheck.checking import main as check_main
 from fmus.build.__main__ import main as build_main
@@ -262,6 +263,20 @@ def test_pace_waits_in_short_sleeps_and_measures_how_late_it_is(monkeypatch):
     stopped = real_time.RealTimePace(1.0, 0.1, lambda: True, started=100.0)
     stopped.wait(1000.0)
     assert now[0] == 101.0, "who has stopped a run does not wait"
+
+
+def test_columns_of_any_type_become_parquet(tmp_path):
+    """Only of floating-point numbers the bytes are split."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    (tmp_path / "log.csv").write_text("time,on,steps,name\n0.0,true,3,a\n0.5,false,4,b\n")
+    file = parquet.ParquetFile(to_parquet(tmp_path))
+    assert file.read().to_pydict() == {
+        "time": [0.0, 0.5], "on": [True, False], "steps": [3, 4], "name": ["a", "b"]
+    }  # fmt: skip
+    columns = [file.metadata.row_group(0).column(k) for k in range(4)]
+    split = ["BYTE_STREAM_SPLIT" in column.encodings for column in columns]
+    assert split == [True, False, False, False]
+    assert [path.name for path in tmp_path.iterdir()] == ["log.parquet"]
 
 
 def test_parquet_holds_what_csv_holds(scenario, tmp_path):
