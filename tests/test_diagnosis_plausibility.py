@@ -502,7 +502,7 @@ def test_degrees_of_latitude_are_in_no_unit_of_length():
     columns = {"x": Column(name="Lat", factor=111e3), "y": Column(name="Lon", factor=68e3)}
     for layout, expected in ((Layout(columns=columns), False), (Layout(), True)):
         run = replace(base(), layout=layout)
-        found = [*readings(run, Model()), *other_factors(run, 2.0)]
+        found = [*readings(run, Model()), *other_factors(run, 2.0, 0.7)]
         assert any("position is in" in r.mistake for r in found) == expected
         assert any("as in axes east and north" in r.mistake for r in found) == expected
         assert any(r.mistake == "y points west (east is positive here)" for r in found)

@@ -51,7 +51,11 @@ class ThrustGains:
     @property
     def mean(self) -> float | None:
         """Geometric mean of the wrong axes, each as well as it is known; None if none is."""
-        known = self.wrong & (self.value > 0.0)
+        return self.mean_of(self.wrong)
+
+    def mean_of(self, axes: np.ndarray) -> float | None:
+        """The same of some axes (3,); None if none of them has a k above zero."""
+        known = axes & (self.value > 0.0)
         if not known.any():
             return None
         weights = (self.value[known] / self.error[known]) ** 2

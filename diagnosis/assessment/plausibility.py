@@ -22,6 +22,7 @@ from ..predictors.weak_form import thrust_along
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU, Column, Named
 from ..runs.columns.unit_check import GO_ON
+from ..runs.run_constants import STEPS
 from ..runs.sensors.evidence import ALIKE, VELOCITIES
 from ..runs.sensors.sensor_finding import Examined
 from .command_check import beyond_thrusters, constant_commands, contradicted_commands
@@ -191,6 +192,23 @@ def scale_is_confirmed(sensors: Examined | None) -> bool:
     )
 
 
+def pace_of(w: WeakWindows, model: Model) -> float:
+    """Seconds meant for a second read, where the clock is wrong: accelerations are off by its square.
+
+    The lags of the thrusters are read in the same clock, so that the factor is found with those of the
+    one before, by half of each step: with lags that are too long the commands tell nothing.
+    """
+    pace = 1.0
+    for _ in range(2 * STEPS):
+        slow = model.plus({name: lag * (1.0 / pace - 1.0) for name, lag in model.lags.items()})
+        given = gains(w, slow)
+        factor = given.mean_of(given.told)
+        if factor is None:
+            break
+        pace = float(np.sqrt(pace * np.sqrt(factor)))
+    return pace
+
+
 def likeliest_mistake(
     w: WeakWindows, model: Model, doubted: bool = False, factor: float | None = None
 ) -> Mistake | None:
@@ -203,7 +221,9 @@ def likeliest_mistake(
         factor: by which a column without a unit may be off; None: by none.
     """
     odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
-    others = [] if factor is None else [*other_factors(w.run, factor)]
+    others = []
+    if factor is not None:
+        others = [*other_factors(w.run, factor, pace_of(w, model))]
     # Without a response to commands, another scale is as well a thrust that is lost.
     if scale_is_confirmed(w.smoothed.sensors) or constant_commands(w.run):
         possible, others = ([r for r in some if r.density == 0.0] for some in (possible, others))

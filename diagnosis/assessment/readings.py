@@ -155,14 +155,20 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
             yield _in_unit(f"in {name} of the limits", factors.tolist(), names)
 
 
-def other_factors(run: Run, k: float) -> Iterator[Reading]:
-    """Readings in a unit without a name, or of another clock: the ship accelerates k times too much."""
+def other_factors(run: Run, k: float, pace: float) -> Iterator[Reading]:
+    """Readings in a unit without a name, or of another clock: the ship accelerates k times too much.
+
+    Args:
+        run: that is read.
+        k: 1.
+        pace: seconds meant for a second read.
+    """
     if _has_unit(run):
         yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
-    clock = {"time": Named(name="time", factor=k**0.5)}
-    yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock)
+    clock = {"time": Named(name="time", factor=pace)}
+    yield Reading(f"{pace:.3g} s passed in each second of its time", clock)
 
 
 def _has_unit(run: Run) -> bool:

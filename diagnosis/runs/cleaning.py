@@ -233,7 +233,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     pose = np.where(measured, run.pose, np.nan)
     gap = long_gap(period, scale)
     of_heading = np.flatnonzero(measured[:, 2])
-    refuse_units(run.time, pose, other_angles(run.measured), where, anyway, run.called or {})
+    refuse_units(run.time, pose, other_angles(run.measured), where, anyway, run.called or {}, scale)
     pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])

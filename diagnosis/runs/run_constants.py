@@ -27,6 +27,9 @@ EVERY, LONG = 0.5, 5.0
 # 1, standard deviations beyond which a speed is not that of rest, a gain is wrong, and a nominal
 # coefficient alone does not explain the data (contract).
 FAR_OFF = 3.0
+# 1, times what is usual, or a limit, from which on a step or a sample is none of a ship's motion, and a
+# cell no command (chosen).
+FAR = 8.0
 # 1, samples, windows or parts of a run by which a correlation, a noise or a standard deviation is
 # estimated (chosen).
 FEWEST = 20

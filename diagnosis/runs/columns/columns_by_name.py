@@ -18,6 +18,7 @@ from .units_by_numbers import is_fraction, is_stamped, names_of
 from .usual_names import is_quaternion, meaning
 
 LETTERS = ("R", "T", "U", "V")  # that are no yaw rate, time and velocity without a unit
+SIGNED = ("shaft speed", "command")  # quantities whose sign may have a column of its own
 PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
@@ -102,9 +103,13 @@ def _by_words(
         unit = unit or unit_in(bare)
         parts = PATH.split(bare)
         own = parts[len(common) :] if parts[: len(common)] == common else parts
-        if signal := signal_of_symbol(bare, unit, quantity) or meaning_of_words(
+        is_sign = not unit and not SIGN.isdisjoint(words_of(bare))  # shaft_dir is no speed of a shaft
+        signal = signal_of_symbol(bare, unit, quantity) or meaning_of_words(
             " ".join(own), unit, quantity
-        ):
+        )
+        if is_sign and (quantity.get(signal) in SIGNED or is_of_shaft(" ".join(own), unit)):
+            continue
+        if signal:
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
         elif is_of_shaft(" ".join(own), unit):

@@ -16,7 +16,15 @@ from ..run_constants import NEGLIGIBLE, WIDTH
 
 # Quantity -> its units, that of SI first -> factor to that [1].
 UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": c.milli, "us": c.micro, "ns": c.nano, "d": c.day, "min": c.minute},
+    "time": {
+        "s": 1.0,
+        "ms": c.milli,
+        "us": c.micro,
+        "ns": c.nano,
+        "d": c.day,
+        "h": c.hour,
+        "min": c.minute,
+    },
     "length": {"m": 1.0, "mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch},
     "angle": {"rad": 1.0, "deg": c.degree, "°": c.degree},
     "force": {"N": 1.0, "mN": c.milli, "kN": c.kilo},
@@ -37,6 +45,7 @@ SPELT = {
     **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("day", "days"), "d"),
+    **dict.fromkeys(("hour", "hours", "hr", "hrs"), "h"),
     **{f"{unit}ec": unit for unit in ("ms", "us", "ns")},
     **dict.fromkeys(("millis", "milliseconds"), "ms"),
     **dict.fromkeys(("micros", "microseconds"), "us"),
@@ -60,7 +69,13 @@ OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 LARGEST = 1e9
 # Beyond these no ship moves, so that the unit must be another one (chosen).
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
-TURN, HUNDREDTH = 360.0, 0.01  # degrees, 1
+# m/s, times the scale of the ship: a Froude number of 0.12, where most ships manoeuvre (chosen); it only
+# orders units ten times apart.
+USUAL = 0.4
+TURN = 360.0  # degrees
+# Counts in a turn: tenths and hundredths of a degree, as of some compasses and of MAVLink, mils, parts
+# of 16 bits, thousandths of a radian.
+COUNTS = (10.0 * TURN, 100.0 * TURN, 6400.0, 65536.0, 2000.0 * math.pi)
 AHEAD = 0.5  # 1, of the way that a constant heading does not explain, what one in degrees does (chosen)
 
 
@@ -119,24 +134,29 @@ def refuse_units(
     where: str,
     anyway: bool,
     called: Mapping[str, str],
+    scale: Scale = REFERENCE,
 ) -> None:
     """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
     Args:
         time, pose: as in :func:`doubts`.
         angles: other angles of the run, by their signals.
+        scale: of the ship.
 
     Raises:
         InputError: it goes or turns too fast, or an angle is in degrees.
     """
-    for signals, unit, reason in () if anyway else chain(doubts(time, pose), doubts_of_angles(angles)):
+    for signals, unit, reason in (
+        () if anyway else chain(doubts(time, pose, scale), doubts_of_angles(angles))
+    ):
         raise InputError(f"{where} {reason} {remedy(signals, unit, called)}; {GO_ON}")
 
 
-def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
+def doubts(time: np.ndarray, pose: np.ndarray, scale: Scale = REFERENCE) -> Iterator[Doubt]:
     """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s].
 
-    Position and heading are NaN in rows without their measurement.
+    Position and heading are NaN in rows without their measurement. Of several possible units that of the
+    usual speed of a ship of this scale is the likeliest.
     """
     there, turned = np.isfinite(pose[:, :2]).all(axis=1), np.isfinite(pose[:, 2])
     if there.sum() < 2 or not turned.any():
@@ -150,7 +170,8 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
     if speed > FASTEST:
         slow = (u for u, size in UNITS["length"].items() if speed * size < FASTEST)
-        units = sorted(slow, key=UNITS["length"].__getitem__)
+        usual = USUAL * scale.speed
+        units = sorted(slow, key=lambda u: abs(math.log(speed * UNITS["length"][u] / usual)))
         reason = f"goes {speed:.3g} m/s: is its position in {' or '.join(units)}?"
         yield Doubt(("x", "y"), units[0] if units else "mm", reason)
     psi = pose[:, 2]
@@ -170,15 +191,24 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
         yield Doubt(("psi",), "deg", reason)
 
 
-def in_hundredths(pose: np.ndarray) -> bool:
-    """Whether the heading of a pose (n, 3) is in hundredths of a degree within a turn, as of MAVLink."""
+def part_of_degree(pose: np.ndarray) -> float:
+    """The part of a degree that the heading of a pose (n, 3) is in, within a turn; 1: whole ones.
+
+    Where it goes from the end of a turn to the beginning, it jumps by the counts of one. Where it does
+    not, it is in degrees, in tenths or in hundredths, whichever the ship's way follows.
+    """
     there = np.isfinite(pose).all(axis=1)
     psi = pose[there, 2]
-    if psi.size < 2 or not 2.0 * TURN < np.abs(psi).max() <= TURN / HUNDREDTH:
-        return False
+    most = float(np.abs(psi).max(initial=0.0))
+    if most <= 2.0 * TURN:
+        return 1.0
+    steps = np.abs(np.diff(psi))
+    if (jumps := steps[2.0 * steps > most]).size:
+        turn = min(COUNTS, key=lambda n: abs(np.median(jumps) - n))
+        return TURN / turn
     way = np.diff(pose[there, 0]) + 1j * np.diff(pose[there, 1])
-    in_deg, in_parts = (follows(way, psi[:-1] * c.degree * size) for size in (1.0, HUNDREDTH))
-    return in_parts > in_deg
+    within = [1.0, *(TURN / n for n in COUNTS[:2] if most <= n)]
+    return max(within, key=lambda part: follows(way, psi[:-1] * c.degree * part))
 
 
 def doubts_of_angles(angles: Mapping[str, np.ndarray]) -> Iterator[Doubt]:

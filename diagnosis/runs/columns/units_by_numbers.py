@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fmus.ship import Ship
+from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
 from ..files.reading import Run
@@ -20,13 +20,12 @@ from .columns import OF_UNIT, UNITS, Column, Layout, other_angles
 from .likely_columns import ASTERN, says_command, signal_of_sign
 from .name_words import words_of
 from .unit_check import (
-    HUNDREDTH,
     OFTENEST,
     doubts,
     doubts_of_angles,
-    in_hundredths,
     largest,
     likely_unit,
+    part_of_degree,
     spelt,
 )
 
@@ -147,8 +146,9 @@ def seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
     fresh = ~zeros & ~repeated(run.pose, there)
     time = UNITS["time"][unit or "s"] * run.time[fresh]
     angles = doubts_of_angles(other_angles(run.measured))
-    for doubt in chain(doubts(time, run.pose[fresh]), angles):
-        factor = HUNDREDTH if doubt.signals == ("psi",) and in_hundredths(run.pose[fresh]) else 1.0
+    scale = ship(description=run.ship).scale
+    for doubt in chain(doubts(time, run.pose[fresh], scale), angles):
+        factor = part_of_degree(run.pose[fresh]) if doubt.signals == ("psi",) else 1.0
         yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
 
 

@@ -40,7 +40,7 @@ from ..columns.columns import (
     with_units_of_names,
 )
 from ..columns.unit_check import LARGEST, UNITS, largest, remedy
-from ..run_constants import DIGITS
+from ..run_constants import DIGITS, FAR, NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
 from .tables import (
     as_table,
@@ -254,8 +254,12 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
                 unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
                 there = np.where(np.abs(values) < LARGEST, read, np.nan)  # 1e38 is no measurement
                 steps[signal] = resolution(there) * abs(column.factor) * unit
-        if signal == "time" and np.nanmin(values, initial=np.inf) > LARGEST:  # of an epoch
-            values = values - values[np.isfinite(values)][0]
+        if signal == "time":
+            stamps = values[np.isfinite(values)]
+            if not stamps.size:
+                raise InputError(f"{where}: time has no value in any of {len(values)} rows")
+            if stamps.min() > LARGEST:  # of an epoch
+                values = values - stamps[0]
         columns[signal] = values
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
@@ -293,6 +297,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
         return np.column_stack([columns[s] for s in group]) if columns.keys() & group[:1] else None
 
+    false = _false_commands(columns, of)
+    columns = columns | {s: np.where(cells, np.nan, columns[s]) for s, cells in false.items()}
     tau, commands, power = (_held(stack(group)) for group in (TAU, own, settings))
     power = None if power is None else np.maximum(power, 0.0)
     if units == {"1"} and commands is not None:
@@ -319,7 +325,10 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     if tau is None:
         assert commands is not None
         tau = of.commanded_force(commands, power)
-    notes = (f"commands are missing in {lost} columns; the last value is held",) if lost else ()
+    notes = tuple(
+        f"{s}: {cells.sum()} cells far beyond its limit count as missing" for s, cells in false.items()
+    )
+    notes += (f"commands are missing in {lost} columns; the last value is held",) if lost else ()
     notes += tuple(f"no column {signal}: zero is used" for signal in absent)
     return Run(
         name,
@@ -335,6 +344,23 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         ship=of.description,
         measured={s: c for s, c in columns.items() if s in {*BESIDE, *outputs(own)}},
     )
+
+
+def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np.ndarray]:
+    """Signal -> (n,), cells of an actuator's command that are far beyond its limit, where most are not.
+
+    Loggers write numbers such as -999 where they have no value. An angle without a limit is turned on.
+    """
+    found = {}
+    for form, layout in zip(of.command_forms, of.layouts, strict=True):
+        limits = np.abs(layout.limits(of.nominal_drive.params)).max(axis=1)
+        turning = layout.round or [False] * limits.size
+        for signal, limit, turns in zip(form, limits, turning, strict=True):
+            size = np.abs(columns.get(signal, ()))
+            far = size > FAR * limit
+            if not turns and 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
+                found[signal] = far
+    return found
 
 
 def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:

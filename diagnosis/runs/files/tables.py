@@ -31,7 +31,7 @@ from .text_layout import STAMP, is_marked
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
-LEAP_SECOND = re.compile(r"(?<=:59):60")
+LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
 DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
 ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
 FULL = 60.0  # 1, seconds in a minute, and minutes in an hour

@@ -39,7 +39,10 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
 def table_cells(line: str, separator: str) -> list[str]:
     """The cells of a line, without blanks around them."""
     cells = csv.reader([line], delimiter=separator, skipinitialspace=True)
-    return [cell.strip() for cell in next(cells, [])]
+    try:
+        return [cell.strip() for cell in next(cells, [])]
+    except csv.Error:  # a field of more than 128 KiB
+        return [line]
 
 
 def is_marked(path: Path, layout: Layout) -> bool:

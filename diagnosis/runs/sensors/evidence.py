@@ -15,7 +15,6 @@ from ..frozen import repeated
 from ..run_constants import FAR_OFF, FEWEST
 
 SURE = 4.0  # 1, standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
-FAR = 8.0  # 1, times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
 AGREED = 0.7  # 1, correlation from which on two channels measure the same motion (chosen)
 ALIKE = 0.3  # 1, relative difference up to which two quantities may be the same but for a fault (chosen)
 LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)

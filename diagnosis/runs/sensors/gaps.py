@@ -4,10 +4,10 @@ import numpy as np
 
 from ..cleaning import Z95
 from ..files.telegrams import groups_of
-from ..run_constants import EVERY, LONG
+from ..run_constants import EVERY, FAR, LONG
 from ..thinning import MOST_ROWS
 from .constants import LEAST
-from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
+from .evidence import AGREED, ALIKE, FEWEST, LEAST_TURN, Evidence, spread_of
 from .sensor_finding import SensorFinding
 
 FAST = 3.0  # 1, times the log's step, or its inverse: what is less is a clock that runs fast (chosen)

@@ -8,7 +8,8 @@ from fmus.scale import Scale
 
 from ..files.reading import Run
 from ..files.telegrams import groups_of
-from .evidence import FAR, LEAST_TURN
+from ..run_constants import FAR
+from .evidence import LEAST_TURN
 from .sensor_finding import Examined, SensorFinding
 
 ANGLES = ("psi", "psi_2", "course")

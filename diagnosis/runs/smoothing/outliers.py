@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cleaning import Z95
-from ..run_constants import CHANCE, STEPS
-from ..sensors.evidence import FAR
+from ..run_constants import CHANCE, FAR, STEPS
 from .likelihood import adapt, likeliest, with_noise
 from .penalised import Fit, Problem, solve
 from .spline import DEGREE, WIDTH
