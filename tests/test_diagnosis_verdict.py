@@ -619,10 +619,12 @@ def test_a_coefficient_is_no_second_part_of_its_own_change():
 def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sure):
     """By shares of the first error; a method that cannot fit without it says nothing."""
     found, start = told(0.99, 0.99), Model()
-    doubts = Doubts(replaceable=replaceable(found, [0.9], [own]))
+    doubts = Doubts(replaceable=replaceable(found, [0.9], [own], 0.5))
     (f,) = with_confidence(found, start, doubts).effects
     assert f.confidence == (0.99 if sure else 0.5)
     assert ("as much without it" in f.doubt) != sure
+    # Coefficients explain most of the 90 %; without the effect ten times as much is left.
+    assert not replaceable(found, [0.9], [0.01], 0.001)
 
 
 @pytest.mark.parametrize("value", ["delta_X_absu_u", "m"])
@@ -669,7 +671,7 @@ def test_waves_are_in_no_model_and_have_no_share_of_the_squared_error(validate):
     explained = judging.shares(found, start, [run] if validate else [])
     unique = judging.unique_shares(found, start, [run], [])
     assert (explained, unique) == ([0.8], [None])
-    assert not replaceable(found, explained, unique)
+    assert not replaceable(found, explained, unique, 0.2)
 
 
 @pytest.fixture(scope="module")
@@ -913,15 +915,15 @@ def test_a_method_that_tells_no_set_has_findings_by_their_own_confidence(own, fi
     [
         (
             {"bias_rudder": (0, 0.7, 0.9), "inflow_rudder": (0, 0, 0.03)},
-            {"bias_rudder", "inflow_rudder"},
+            {"bias_rudder": 0.1, "inflow_rudder": 1.0},
         ),
-        ({"bias_rudder": (0, 0.7, 0.9), "inflow_rudder": (0, 0, 0.06)}, set()),  # two causes
-        ({"bias_rudder": (0, 0.04, 0.04), "inflow_rudder": (0, 0.04, 0.04)}, set()),
-        ({"X_u": (0.9, 0, 0), "N_r": (0, 0, 0.9)}, set()),
-        ({"mass": (0, 0.5, 0.5), "X_u": (0.9, 0, 0)}, set()),  # each explains an axis of its own
-        ({"mass": (0.9, 0.5, 0.5), "X_u": (0.04, 0, 0)}, {"mass", "X_u"}),
-        ({"X_u": (0.9, 0, 0), "heading_offset": (0.03, 0, 0.01)}, {"heading_offset"}),
-        ({"heading_offset": (0.9, 0.5, 0), "X_u": (0.03, 0, 0)}, set()),
+        ({"bias_rudder": (0, 0.7, 0.9), "inflow_rudder": (0, 0, 0.06)}, {}),  # two causes
+        ({"bias_rudder": (0, 0.04, 0.04), "inflow_rudder": (0, 0.04, 0.04)}, {}),
+        ({"X_u": (0.9, 0, 0), "N_r": (0, 0, 0.9)}, {}),
+        ({"mass": (0, 0.5, 0.5), "X_u": (0.9, 0, 0)}, {}),  # each explains an axis of its own
+        ({"mass": (0.9, 0.5, 0.5), "X_u": (0.04, 0, 0)}, {"mass": 0.1, "X_u": 1.0}),
+        ({"X_u": (0.9, 0, 0), "heading_offset": (0.03, 0, 0.01)}, {"heading_offset": 1.0}),
+        ({"heading_offset": (0.9, 0.5, 0), "X_u": (0.03, 0, 0)}, {}),
     ],
 )
 def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger(falls, doubted):
@@ -933,13 +935,21 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
         for i, v in values.items()
     ]
     by_axis, sure = np.array([*falls.values()], float), [Confidence(0.99, 0.99)] * len(made)
-    assert mended(Findings(made), start, by_axis, sure) == doubted
+    squares = np.array([[10.0, 10.0, 10.0], [9.0, 0.5, 1.0]])[:, :: -1 if "mass" in falls else 1]
+    assert mended(Findings(made), start, by_axis, squares, sure) == doubted
     none = [replace(f, ci95=dict.fromkeys(f.values, (-0.05, 0.25))) for f in made]
-    assert not mended(Findings(none), start, by_axis, sure)
+    assert not mended(Findings(none), start, by_axis, squares, sure)
     possible = [Confidence(0.3, 0.3)] * len(made)
-    assert not mended(Findings(made), start, by_axis, possible)
+    assert not mended(Findings(made), start, by_axis, squares, possible)
     seen = confidence_of(made[0], start, Doubts(mended=doubted))
     assert seen.own == (0.5 if made[0].id in doubted else 0.99)
+    # With evidence: what a smaller one explains counts as a residual.
+    for nearest, odds in ((0.9, 1.0 / (1.0 + 0.1 / 0.9)), (0.05, 0.5)):
+        known = EffectEvidence(0.999, 0.0, 0.0, nearest, 0.0)
+        seen = confidence_of(
+            replace(made[0], evidence=known, set_evidence=known), start, Doubts(mended=doubted)
+        )
+        assert seen.own == pytest.approx(odds if doubted.get(made[0].id) == 0.1 else 0.99, abs=0.002)
 
 
 @pytest.mark.parametrize(

@@ -44,13 +44,16 @@ class EffectEvidence(NamedTuple):
 
     @property
     def beside_unknown(self) -> float:
-        """Probability of the effect beside causes that no candidate has, where something is left.
+        """Probability of the effect beside causes that no candidate has, where something is left."""
+        return self.beside(self.remains**2)
+
+    def beside(self, squared: float) -> float:
+        """The same where so much is left of the square of what the effect explains.
 
         Unknown causes are taken to lie as close to the effect as the candidates do, of which one is
         within the distance of the nearest. As many unknown ones as known ones are then expected within
         the distance that the effect leaves, in proportion to the squared error; at most one counts.
         """
-        squared = self.remains**2
         return 1.0 / (1.0 + squared / max(squared, self.nearest)) if squared else 1.0
 
 

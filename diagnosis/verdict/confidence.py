@@ -64,7 +64,8 @@ class Doubts(NamedTuple):
         without_gain: ids of the effects that predictions do not show, as calibration predicts as well.
         unsettled: ids of the effects that took the place of another beside findings that are not sure.
         implausible: whether nominal coefficients are beyond their priors.
-        mended: ids of the findings of which one is far smaller than the other on the same axes.
+        mended: findings of which one explains far less than the other on the same axes, by their ids ->
+            square of the force of the smaller one, as a share of that of the finding.
         of_several: ids of the changes of one actuator that another one shares.
         differing: ids of the effects whose values by the two fits differ by more than their intervals;
             those of a model of the right shape agree (Hausman 1978).
@@ -82,7 +83,7 @@ class Doubts(NamedTuple):
     without_gain: Collection[str] = ()
     unsettled: Collection[str] = ()
     implausible: bool = False
-    mended: Collection[str] = ()
+    mended: Mapping[str, float] = MappingProxyType({})
     of_several: Collection[str] = ()
     differing: Collection[str] = ()
     beside_possibility: Mapping[str, float] = MappingProxyType({})
@@ -141,7 +142,6 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         IN_PARTS: effect.kind == "force" and not axes.isdisjoint(doubts.of_parts),
         ON_ONE_LINE: f.id in doubts.on_one_line,
         IMPLAUSIBLE: doubts.implausible,
-        MENDED: f.id in doubts.mended,
         OF_SEVERAL: f.id in doubts.of_several,
         LESS_THAN_POSSIBLE: f.id in doubts.beside_possibility,
         DIFFERING: f.id in doubts.differing,
@@ -151,6 +151,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         NO_GAIN: f.id in doubts.without_gain,
     }
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
+    if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
+        caps[MENDED] = EVEN_ODDS if f.evidence is None else f.evidence.beside(doubts.mended[f.id])
     # Waves are a residual themselves.
     if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
         caps[RESIDUAL] = EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown

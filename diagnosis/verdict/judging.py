@@ -274,7 +274,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
     doubts = Doubts(
         residual=unexplained_axes(found, remainder, start),
         of_data=doubt_of_data(train),
-        replaceable=replaceable(found, explained, alone),
+        replaceable=replaceable(found, explained, alone, _left(found, start, data.validate or train)),
         on_one_line=on_one_line(found, start, train),
         of_several=of_several(found, start),
         smoothed=faster_than_smoothing(found, start, train),
@@ -284,7 +284,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
     doubts = doubts._replace(
-        mended=mended(found, start, falls_by_axis(found, start, train), each),
+        mended=mended(found, start, falls_by_axis(found, start, train), forces(found, train), each),
         beside_possibility=beside_possibility(found, explained, each),
     )
     return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
@@ -297,13 +297,30 @@ def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set
     return {axis for axis, r in remainder.axes.items() if r.significant and (r.is_slow or not are_sure)}
 
 
-def replaceable(found: Findings, explained: Sequence[float], alone: Sequence[float | None]) -> set[str]:
-    """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`."""
+def replaceable(
+    found: Findings, explained: Sequence[float], alone: Sequence[float | None], left: float
+) -> set[str]:
+    """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`.
+
+    Of what an effect and the coefficients explain together its own part may be small. It is needed all
+    the same where that is much of what is left without it.
+
+    Args:
+        found: the findings.
+        explained, alone: of each, the share that it explains with the coefficients, and its own part.
+        left: share of the first sum of squares that the model with all of them leaves.
+    """
     return {
         f.id
         for f, share, own in zip(found.effects, explained, alone, strict=True)
-        if own is not None and own <= NEGLIGIBLE * share
+        if own is not None and own <= NEGLIGIBLE * min(share, own + left)
     }
+
+
+def _left(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> float:
+    """Share of the first sum of squares that a learned model leaves."""
+    left, first = (float(_squares(runs, m) @ found.sigma**-2.0) for m in (found.model, start))
+    return left / first if first > 0.0 else 0.0
 
 
 def differing(fit: RefitOutcome) -> set[str]:
@@ -377,6 +394,15 @@ def falls_by_axis(found: Findings, start: Model, runs: Sequence[WeakWindows]) ->
     """(findings, 3), shares of the error's sum of squares of each axis, by which it falls with each."""
     sums = np.array([_squares(runs, model) for model in (start, *(f.model for f in found.effects))])
     return np.divide(-np.diff(sums, axis=0), sums[0], out=np.zeros_like(sums[1:]), where=sums[0] > 0.0)
+
+
+def forces(found: Findings, runs: Sequence[WeakWindows]) -> np.ndarray:
+    """(findings, 3), sum of squares of what each effect of a model does to its error on each axis."""
+    model = found.model
+    rest = [model.plus({name: -value for name, value in f.values.items()}) for f in found.effects]
+    return np.sum(
+        [[np.square(omega(w, m) - omega(w, model)).sum(axis=0) for m in rest] for w in runs], axis=0
+    )
 
 
 def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> list[float]:

@@ -48,8 +48,10 @@ def _family(law: Effect) -> tuple[str, str]:
     return law.axis, law.wording.family.name
 
 
-def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Confidence]) -> set[str]:
-    """Ids of the findings on one axis of which one explains next to nothing there, and the other more.
+def mended(
+    found: Findings, start: Model, falls: np.ndarray, squares: np.ndarray, alone: Sequence[Confidence]
+) -> dict[str, float]:
+    """The findings on one axis of which one explains next to nothing there, and the other more.
 
     Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
     mend its shape, until no residual is left to speak against it. A small effect on the measurement is
@@ -60,24 +62,32 @@ def mended(found: Findings, start: Model, falls: np.ndarray, alone: Sequence[Con
         start: the initial model.
         falls: (findings, 3), shares of the error's sum of squares of each axis, by which it falls with
             each finding.
+        squares: (findings, 3), sums of squares of the force of each [N2, N2, N2 m2].
         alone: the confidence of each, all others left out of account.
+
+    Returns:
+        Id -> square of the force of a smaller one, as a share of that of the finding, the largest of the
+        axes on which that explains more; of a smaller one it is 1.
     """
-    effects, ids = start.ship.effects, set[str]()
+    effects, shares = start.ship.effects, dict[str, float]()
     judged = [
-        (f, fall)
-        for f, fall, c in zip(found.effects, falls, alone, strict=True)
+        (f, fall, square)
+        for f, fall, square, c in zip(found.effects, falls, squares, alone, strict=True)
         if c.is_finding and effects[f.id].search.by == "regression"
     ]
-    for small, fall in judged:
+    for small, fall, square in judged:
         axes = ["XYN".index(axis) for axis in effects[small.id].axis]
         larger = {
-            f.id
-            for f, more in judged
-            if (more - fall)[axes].max() > NEGLIGIBLE and effects[f.id].kind != "measurement"
+            f.id: max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
+            for f, more, own in judged
+            if (shown := [k for k in axes if more[k] - fall[k] > NEGLIGIBLE])
+            and effects[f.id].kind != "measurement"
         }
         if larger and fall[axes].max() < NEGLIGIBLE and not may_be_none(small):
-            ids |= {small.id} | (larger if effects[small.id].kind != "measurement" else set())
-    return ids
+            if effects[small.id].kind != "measurement":
+                shares |= {i: max(share, shares.get(i, 0.0)) for i, share in larger.items()}
+            shares[small.id] = 1.0
+    return shares
 
 
 def beside_possibility(
