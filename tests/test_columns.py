@@ -377,7 +377,7 @@ def test_the_motion_of_a_pose_is_that_which_made_it() -> None:
 def test_units_have_their_factors_by_definition() -> None:
     minute, degree, foot = 60.0, np.pi / 180.0, 0.3048
     others = {
-        "time": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "d": 86400.0, "min": minute},
+        "time": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "d": 86400.0, "h": 3600.0, "min": minute},
         "length": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": foot, "in": foot / 12.0},
         "angle": {"deg": degree, "°": degree},
         "force": {"mN": 1e-3, "kN": 1e3},

@@ -340,6 +340,22 @@ def test_propellers_that_are_slower_than_described_are_no_mistake(lag, seed, mon
     assert "s passed in each second of its time" in doubt(table)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("pace", [0.25, 0.1])
+def test_another_clock_is_found_with_the_lags_of_the_thrusters_in_it(pace):
+    """Of lags of 1 s in a clock that runs ten times too fast half the pace was found."""
+    ship = ship_with((), "otter")
+    table = sail_of(
+        ship, causes(ship)["none"], np.random.default_rng(1), None, steps_of_thrust(), seconds=160.0
+    )
+    table["time"] /= pace
+    text = doubt(table)
+    assert text is not None
+    found = re.search(r"probably ([\d.]+) s passed in each second of its time", text)
+    assert found, text
+    assert float(found[1]) == pytest.approx(pace, rel=0.1)
+
+
 @pytest.mark.parametrize("cause", ["none", "wind", "lag"])
 def test_a_steady_turn_may_have_constant_commands(cause):
     """With every coefficient 10 % wrong; commands that were others are found by their varying force."""

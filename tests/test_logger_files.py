@@ -258,3 +258,110 @@ def test_vectors_of_a_machine_with_another_byte_order_are_numbers_of_this_one(
     for name, vector in other.items():
         assert vector.dtype.isnative
         np.testing.assert_array_equal(vector, own[name])
+
+
+@pytest.mark.parametrize("begin", ["08:59:58", "23:59:58"])
+def test_milliseconds_behind_a_colon_are_no_leap_second(begin: str) -> None:
+    """``:59:600`` begins as ``:59:60``."""
+    tenths = 0.1 * np.arange(60)
+    clock = pd.Timestamp(f"2026-05-04T{begin}") + pd.to_timedelta(tenths, "s")
+    stamps = [f"{t:%H:%M:%S}:{t.microsecond // 1000:03d}" for t in clock]
+    np.testing.assert_allclose(date_stamps(pd.Series(stamps)), tenths, atol=1e-6)
+
+
+TANKER = ship_with((), "kvlcc2")
+SHAFT = {"rpm": np.full(TIME.size, 600.0), "rudder_deg": 10.0 * np.sin(0.1 * TIME)}
+
+
+@pytest.mark.parametrize("name", ["shaft_dir", "propeller_direction", "prop dir"])
+@pytest.mark.parametrize(("cells", "sign"), [((1, 1), 1.0), ((1, -1), -1.0), (("AHEAD", "AHEAD"), 1.0)])
+def test_the_direction_of_a_shaft_is_not_its_speed(
+    tmp_path: Path, name: str, cells: tuple[object, object], sign: float
+) -> None:
+    """One that changes is the sign of the speed beside it."""
+    astern = TIME > 30.0
+    content = table(**SHAFT, **{name: np.where(astern, cells[1], cells[0])})
+    found = propose(
+        written(tmp_path / "a.csv", content.drop(columns=["tau_X", "tau_Y", "tau_N"])), TANKER
+    )
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.commanded["propeller.n"], np.where(astern, sign * 10.0, 10.0))
+
+
+@pytest.mark.parametrize("mark", [-999.0, 9999.0, -32768.0])
+def test_cells_far_beyond_the_limit_of_a_command_are_missing(tmp_path: Path, mark: float) -> None:
+    """As loggers mark what they do not have; a column of them is in another unit."""
+    own = {"port.n": 5.0 + np.sin(0.3 * TIME), "starboard.n": np.full(TIME.size, 4.0)}
+    content = table(**own).drop(columns=["tau_X", "tau_Y", "tau_N"])
+    content.loc[[20, 50, 51], "port.n"] = mark
+    run = read(written(tmp_path / "a.csv", content), of=OTTER)
+    expected = own["port.n"].copy()
+    expected[[20, 50, 51]] = expected[[19, 49, 49]]
+    np.testing.assert_allclose(run.commanded["port.n"], expected)
+    np.testing.assert_allclose(run.commanded["starboard.n"], 4.0)
+    assert "port.n: 3 cells far beyond its limit count as missing" in run.notes
+    content.loc[:60, "port.n"] = 60.0 * content.loc[:60, "port.n"]  # in revolutions a minute
+    as_written = content["port.n"].to_numpy()
+    run = read(written(tmp_path / "a.csv", content), of=OTTER)
+    np.testing.assert_allclose(run.commanded["port.n"], as_written)
+
+
+def test_the_length_of_a_field_is_no_internal_error(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("x" * 200_000 + "\n" + "y" * 200_000)
+    with pytest.raises(InputError, match="has no table of numbers"):
+        propose(path)
+
+
+@pytest.mark.parametrize("rows", [0, 3])
+def test_a_time_without_a_value_is_named(tmp_path: Path, rows: int) -> None:
+    content = table().iloc[:rows].assign(time=np.nan)
+    with pytest.raises(InputError, match=f"'.*a.csv': time has no value in any of {rows} rows"):
+        read(written(tmp_path / "a.csv", content))
+
+
+def circling(turn: float, wraps: bool) -> pd.DataFrame:
+    """A ship that goes where it heads, its heading in counts of a turn."""
+    psi = 0.1 * TIME + 0.5
+    x, y = np.cumsum(0.25 * np.cos(psi)), np.cumsum(0.25 * np.sin(psi))
+    within = psi % (2.0 * np.pi) if wraps else np.minimum(psi, 6.2)
+    return table(x=x, y=y, psi=np.round(within / (2.0 * np.pi) * turn))
+
+
+@pytest.mark.parametrize(
+    ("turn", "wraps"),
+    [
+        (3600.0, True),
+        (3600.0, False),
+        (36000.0, True),
+        (36000.0, False),
+        (6400.0, True),
+        (65536.0, True),
+    ],
+)
+def test_a_heading_in_counts_of_a_turn_is_told_by_where_the_ship_goes_and_by_its_jumps(
+    tmp_path: Path, turn: float, wraps: bool
+) -> None:
+    content = circling(turn, wraps)
+    found = propose(written(tmp_path / "a.csv", content))
+    assert found.run is not None
+    expected = content["psi"] * 2.0 * np.pi / turn
+    np.testing.assert_allclose(np.unwrap(found.run.pose[:, 2]), np.unwrap(expected), atol=1e-9)
+
+
+@pytest.mark.parametrize(("ship", "size"), [("cse1", 1.1), ("otter", 2.0), ("gunnerus", 31.3)])
+@pytest.mark.parametrize(("unit", "parts"), [("mm", 1e3), ("cm", 1e2)])
+def test_of_two_units_of_a_position_that_of_a_usual_speed_is_proposed(
+    tmp_path: Path, ship: str, size: float, unit: str, parts: float
+) -> None:
+    """By Froude number 0.2, whatever the size."""
+    speed = 0.2 * np.sqrt(9.81 * size)
+    content = (
+        table(x=parts * speed * TIME, y=parts * 0.1 * speed * TIME)
+        .drop(columns=[*NAMES][1:])
+        .assign(**{s: 0.1 * np.sin(TIME) for s in ship_with((), ship).commands})
+    )
+    if parts * speed < 30.0:
+        pytest.skip("so slow, it may be in metres")
+    found = propose(written(tmp_path / "a.csv", content), ship_with((), ship))
+    assert found.needed["columns"]["x"] == {"name": "x", "unit": unit}
