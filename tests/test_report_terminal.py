@@ -19,6 +19,7 @@ from diagnosis.report.headline import (
     OTHER_FIT,
     SEARCH_GAINED,
     SEARCH_GAINED_NOTHING,
+    SEARCH_NAMES_CAUSE,
     first_sentences,
     gain_sentences,
 )
@@ -268,10 +269,12 @@ def test_what_the_search_gained_is_the_first_sentence(gained):
     gain = PredictionGain("validation runs", 54, change, change, gained, "calibrated")
     made = found(gain=gain)
     shown = lines(show_diagnosis(made, "out"))
-    first = SEARCH_GAINED if gained else SEARCH_GAINED_NOTHING
+    first = SEARCH_GAINED if gained else SEARCH_NAMES_CAUSE
     assert shown[:2] == ["Gain of the search", first]
     assert "mean square falls by 940 ± 110 mm²" in " ".join(shown)
-    assert first_sentences(made).startswith(SEARCH_GAINED_NOTHING) is not gained
+    assert first_sentences(made).startswith(SEARCH_NAMES_CAUSE) is not gained
+    unsure = found(gain=gain, effects=EFFECTS[:1])
+    assert first_sentences(unsure).startswith(SEARCH_GAINED_NOTHING) is not gained
     assert gain_content(gain, ["One.", "Two."]) == {
         "gained": gained,
         "over": "calibrated",

@@ -21,6 +21,9 @@ from .reported_effect import ReportedEffect, fitted_beside, is_fitted
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
+SEARCH_NAMES_CAUSE = (
+    "The search for effects predicts no better than calibration alone; it shows which cause is likely."
+)
 OTHER_FIT = (
     "It found no effect to add. It fits the same coefficients to accelerations first and to predictions "
     "over several times then, so that its numbers differ from those of the calibration."
@@ -131,7 +134,8 @@ def gain_of_search(r: ReportData) -> list[str]:
     """What the search for effects gained over calibration alone; empty where that is not known."""
     d = r.diagnosis
     gain = None if d is None else d.gain
-    said = gain_sentences(gain, SEARCH_GAINED, SEARCH_GAINED_NOTHING, r.lengths[0])
+    nothing = SEARCH_NAMES_CAUSE if any(map(is_sure, r.effects)) else SEARCH_GAINED_NOTHING
+    said = gain_sentences(gain, SEARCH_GAINED, nothing, r.lengths[0])
     if d and gain and d.refitted and not d.learned.effects and gain.position.difference:
         said.insert(1, OTHER_CALIBRATION if d.calibrated else OTHER_FIT)
     return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
@@ -186,7 +190,8 @@ def first_sentences(r: ReportData) -> str:
     gain, d = gain_of_search(r), r.diagnosis
     driven = d.stability.driven_on if d and r.comparison.predictor.parametric else ()
     warning = [DRIVEN_ON.format(motions=listed(driven, "and"))] if driven else []
-    return " ".join([*(s for s in gain if s == SEARCH_GAINED_NOTHING), headline(r), *warning])
+    nothing = [s for s in gain if s in (SEARCH_GAINED_NOTHING, SEARCH_NAMES_CAUSE)]
+    return " ".join([*nothing, headline(r), *warning])
 
 
 def verdict_title(r: ReportData) -> str:
