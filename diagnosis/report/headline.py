@@ -21,9 +21,7 @@ from .reported_effect import ReportedEffect, fitted_beside, is_fitted
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
 SEARCH_GAINED_NOTHING = "The search for effects gained nothing over calibration alone."
-SEARCH_NAMES_CAUSE = (
-    "The search for effects predicts no better than calibration alone; it shows which cause is likely."
-)
+SEARCH_NAMES_CAUSE = "Calibration alone predicts as well; the search shows a likely cause."
 OTHER_FIT = (
     "It found no effect to add. It fits the same coefficients to accelerations first and to predictions "
     "over several times then, so that its numbers differ from those of the calibration."
