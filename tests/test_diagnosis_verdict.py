@@ -40,6 +40,7 @@ from diagnosis.verdict import judging
 from diagnosis.verdict.coefficients import spoils
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
 from diagnosis.verdict.judging import (
+    beside_slow,
     differing,
     falls_by_axis,
     faster_than_smoothing,
@@ -499,6 +500,28 @@ def test_waves_account_for_a_quick_remainder_and_not_for_a_slow_one(slow, unexpl
     waves = Finding("waves", {"wave_peak": 1.0}, {}, 0.9, [], 0.9, 0.9, together=0.9)
     axes = {"X": AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True)}
     assert unexplained_axes(Findings([waves]), Remainder(axes, ""), Model()) == unexplained
+
+
+@pytest.mark.parametrize(
+    ("axis", "slow", "force", "own"),
+    [
+        ("X", 0.9, 0.9, 0.5),  # as large as the waves: their peak may be by chance
+        ("X", 0.9, 0.1, 0.5),
+        ("X", 0.9, 3.0, 0.9),
+        ("Y", 0.9, 1.5, 1.0 / (1.0 + 0.36)),
+        ("X", 0.5, 0.9, 0.9),  # quick
+        ("N", 0.9, 0.9, 0.9),  # of a moment the force says nothing
+    ],
+)
+def test_waves_beside_a_slow_residual_of_their_size_are_even_odds(axis, slow, force, own):
+    waves = Finding(
+        "waves", {"wave_peak": 1.0, "wave_force": force}, {}, 0.9, [], 0.9, 0.9, together=0.9
+    )
+    left = Remainder({axis: AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True)}, "")
+    doubts = Doubts(beside_slow=beside_slow(Findings([waves]), left, Model()))
+    assert confidence_of(waves, Model(), doubts).own == pytest.approx(min(own, 0.9))
+    other = replace(waves, id="X_u", values={"delta_X_u": 1.0})
+    assert beside_slow(Findings([other]), left, Model()) == {}
 
 
 @pytest.mark.parametrize(
