@@ -947,6 +947,10 @@ def test_a_method_that_tells_no_set_has_findings_by_their_own_confidence(own, fi
         ({"mass": (0.9, 0.5, 0.5), "X_u": (0.04, 0, 0)}, {"mass": 0.1, "X_u": 1.0}),
         ({"X_u": (0.9, 0, 0), "heading_offset": (0.03, 0, 0.01)}, {"heading_offset": 1.0}),
         ({"heading_offset": (0.9, 0.5, 0), "X_u": (0.03, 0, 0)}, {}),
+        (
+            {"position_latency": (0, 0.5, 0.9), "marker_offset": (0, 0, 0.03)},
+            {"position_latency": 0.1, "marker_offset": 1.0},
+        ),
     ],
 )
 def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger(falls, doubted):
@@ -964,6 +968,9 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
     assert not mended(Findings(none), start, by_axis, squares, sure)
     possible = [Confidence(0.3, 0.3)] * len(made)
     assert not mended(Findings(made), start, by_axis, squares, possible)
+    # A possibility mends a finding as well, and has no confidence to lose.
+    first = {i: share for i, share in doubted.items() if share < 1.0}
+    assert mended(Findings(made), start, by_axis, squares, [sure[0], possible[1]]) == first
     seen = confidence_of(made[0], start, Doubts(mended=doubted))
     assert seen.own == (0.5 if made[0].id in doubted else 0.99)
     # With evidence: what a smaller one explains counts as a residual.

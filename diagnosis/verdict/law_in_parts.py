@@ -54,8 +54,9 @@ def mended(
     """The findings on one axis of which one explains next to nothing there, and the other more.
 
     Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
-    mend its shape, until no residual is left to speak against it. A small effect on the measurement is
-    in doubt itself, and says nothing of a force; a large one hides forces that are smaller.
+    mend its shape, until no residual is left to speak against it; they need not be findings themselves.
+    A small effect on the measurement is in doubt, and says nothing of a force; a large one hides forces
+    that are smaller, and may be mended by another on the measurement.
 
     Args:
         found: the findings.
@@ -71,22 +72,25 @@ def mended(
     """
     effects, shares = start.ship.effects, dict[str, float]()
     judged = [
-        (f, fall, square)
+        (f, fall, square, c.is_finding)
         for f, fall, square, c in zip(found.effects, falls, squares, alone, strict=True)
-        if c.is_finding and effects[f.id].search.by == "regression"
+        if effects[f.id].search.by == "regression"
     ]
-    for small, fall, square in judged:
+    for small, fall, square, believed in judged:
         axes = ["XYN".index(axis) for axis in effects[small.id].axis]
+        measured = effects[small.id].kind == "measurement"
         larger = {
             f.id: max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
-            for f, more, own in judged
-            if (shown := [k for k in axes if more[k] - fall[k] > NEGLIGIBLE])
-            and effects[f.id].kind != "measurement"
+            for f, more, own, is_finding in judged
+            if is_finding
+            and (shown := [k for k in axes if more[k] - fall[k] > NEGLIGIBLE])
+            and (measured or effects[f.id].kind != "measurement")
         }
         if larger and fall[axes].max() < NEGLIGIBLE and not may_be_none(small):
-            if effects[small.id].kind != "measurement":
-                shares |= {i: max(share, shares.get(i, 0.0)) for i, share in larger.items()}
-            shares[small.id] = 1.0
+            same = {i for i in larger if (effects[i].kind == "measurement") == measured}
+            shares |= {i: max(share, shares.get(i, 0.0)) for i, share in larger.items() if i in same}
+            if believed:
+                shares[small.id] = 1.0
     return shares
 
 
