@@ -646,8 +646,9 @@ def test_an_effect_without_which_all_else_explains_as_much_is_even_odds(own, sur
     (f,) = with_confidence(found, start, doubts).effects
     assert f.confidence == (0.99 if sure else 0.5)
     assert ("as much without it" in f.doubt) != sure
-    # Coefficients explain most of the 90 %; without the effect ten times as much is left.
-    assert not replaceable(found, [0.9], [0.01], 0.001)
+    # Coefficients explain most of the 90 %; without the effect more than twice as much is left.
+    assert not replaceable(found, [0.9], [0.01], 0.009)
+    assert replaceable(found, [0.9], [0.01], 0.011)
 
 
 @pytest.mark.parametrize("value", ["delta_X_absu_u", "m"])

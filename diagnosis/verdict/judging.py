@@ -315,7 +315,7 @@ def replaceable(
     """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`.
 
     Of what an effect and the coefficients explain together its own part may be small. It is needed all
-    the same where that is much of what is left without it.
+    the same where that is more than half of what is left without it.
 
     Args:
         found: the findings.
@@ -325,7 +325,7 @@ def replaceable(
     return {
         f.id
         for f, share, own in zip(found.effects, explained, alone, strict=True)
-        if own is not None and own <= NEGLIGIBLE * min(share, own + left)
+        if own is not None and own <= min(NEGLIGIBLE * share, left)
     }
 
 
