@@ -155,7 +155,7 @@ def test_a_cell_that_is_a_mark_must_be_empty(tmp_path: Path) -> None:
     table = zigzag().astype("object")
     table.loc[5, NAMES["x"]] = "-"
     with pytest.raises(
-        InputError, match="'-' is not a number; a cell without a measurement must be empty"
+        InputError, match="'-' in row 6 is not a number; a cell without a measurement must be empty"
     ):
         propose(written(tmp_path / "a.csv", table), TANKER)
 

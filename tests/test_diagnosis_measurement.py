@@ -153,7 +153,7 @@ def test_first_stamp_that_is_none_is_told(tmp_path):
     with_tau().assign(time=np.where(np.arange(N) == 7, "noon", stamps)).to_csv(
         tmp_path / "a.csv", index=False
     )
-    refused(tmp_path / "a.csv", "time = 'noon' is not a time stamp of ISO 8601")
+    refused(tmp_path / "a.csv", "time = 'noon' in row 8 is not a time stamp of ISO 8601")
 
 
 def test_unit_that_cannot_be_is_told_with_the_own_name_of_the_column(tmp_path):
@@ -216,7 +216,7 @@ def test_lost_poses_are_kept_as_they_are(tmp_path):
         (lambda t: t.drop(columns="time"), "no column 'time'"),
         (lambda t: t.rename(columns={"tau_Y": "Tau_y"}), "no column 'tau_Y'; did you mean 'Tau_y'?"),
         (lambda t: t.drop(columns=list(TAU)), "has no commands: tau_X, tau_Y, tau_N, or u_vsp_x"),
-        (lambda t: t.assign(x="north"), "x = 'north' is not a number"),
+        (lambda t: t.assign(x="north"), "x = 'north' in row 1 is not a number"),
         (lambda t: t.assign(tau_X=np.nan), "the command tau_X has no value in any row; if it was never"),
         (lambda t: t.assign(u1=50.0, u2=0.0, u3=0.0, u4=0.0, u5=0.0), 'commands reach 50; allowed is -1 to 1; are they in percent? Then put {"columns": {"u1": {"name": "u1", "unit": "%"}'),
     ],

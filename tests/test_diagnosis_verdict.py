@@ -40,11 +40,11 @@ from diagnosis.verdict import judging
 from diagnosis.verdict.coefficients import spoils
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
 from diagnosis.verdict.judging import (
-    beside_slow,
     differing,
     falls_by_axis,
     faster_than_smoothing,
     judge,
+    more_than_waves,
     replaceable,
     unexplained_axes,
     verdict_name,
@@ -503,25 +503,26 @@ def test_waves_account_for_a_quick_remainder_and_not_for_a_slow_one(slow, unexpl
 
 
 @pytest.mark.parametrize(
-    ("axis", "slow", "force", "own"),
+    ("axis", "rms", "force", "own"),
     [
-        ("X", 0.9, 0.9, 0.5),  # as large as the waves: their peak may be by chance
-        ("X", 0.9, 0.1, 0.5),
-        ("X", 0.9, 3.0, 0.9),
-        ("Y", 0.9, 1.5, 1.0 / (1.0 + 0.36)),
-        ("X", 0.5, 0.9, 0.9),  # quick
-        ("N", 0.9, 0.9, 0.9),  # of a moment the force says nothing
+        ("X", 2.0, 1.0, 0.5),  # three times the power of the waves is left: their peak may be by chance
+        ("X", 2.0, np.sqrt(2.0), 0.5),
+        ("Y", 2.0, np.sqrt(3.0), 0.75),
+        ("Y", 2.0, 2.1, 0.9),  # that is the waves themselves
+        ("N", 2.0, 1.0, 0.9),  # of a moment their force says nothing
     ],
 )
-def test_waves_beside_a_slow_residual_of_their_size_are_even_odds(axis, slow, force, own):
+def test_waves_that_account_for_half_of_a_residual_are_even_odds(axis, rms, force, own):
     waves = Finding(
         "waves", {"wave_peak": 1.0, "wave_force": force}, {}, 0.9, [], 0.9, 0.9, together=0.9
     )
-    left = Remainder({axis: AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True)}, "")
-    doubts = Doubts(beside_slow=beside_slow(Findings([waves]), left, Model()))
-    assert confidence_of(waves, Model(), doubts).own == pytest.approx(min(own, 0.9))
+    left = Remainder({axis: AxisRemainder(rms, 0.0, 0.5, 0.1, 1e-9, 0.1, True)}, "")
+    doubts = Doubts(more_than_waves=more_than_waves(Findings([waves]), left, Model()))
+    assert confidence_of(waves, Model(), doubts).own == pytest.approx(own)
     other = replace(waves, id="X_u", values={"delta_X_u": 1.0})
-    assert beside_slow(Findings([other]), left, Model()) == {}
+    assert more_than_waves(Findings([other]), left, Model()) == {}
+    noise = Remainder({axis: replace(left.axes[axis], significant=False)}, "")
+    assert more_than_waves(Findings([waves]), noise, Model()) == {}
 
 
 @pytest.mark.parametrize(

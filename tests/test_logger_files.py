@@ -173,7 +173,7 @@ def test_the_same_instants_in_any_form_are_the_same_times(form: str, begin: str)
 def test_a_text_that_is_no_stamp_is_none() -> None:
     for texts in (["on", "off"], ["A1", "A2"], ["May", "Auto"], ["12 deg", "13 deg"], ["1:2:3", "x"]):
         assert date_stamps(pd.Series(texts)) is None
-    with pytest.raises(InputError, match=r"'31\.31\.2026 10:00:00' is not a time stamp"):
+    with pytest.raises(InputError, match=r"'31\.31\.2026 10:00:00' in row 2 is not a time stamp"):
         date_stamps(pd.Series(["30.12.2026 10:00:00", "31.31.2026 10:00:00"]), "'a.csv'")
 
 
@@ -365,3 +365,15 @@ def test_of_two_units_of_a_position_that_of_a_usual_speed_is_proposed(
         pytest.skip("so slow, it may be in metres")
     found = propose(written(tmp_path / "a.csv", content), ship_with((), ship))
     assert found.needed["columns"]["x"] == {"name": "x", "unit": unit}
+
+
+def test_decimal_commas_in_quotes_beside_commas_between_cells(tmp_path: Path) -> None:
+    """As spreadsheets of some countries write them."""
+    names = ",".join(f'"{name}"' for name in table().columns)
+    rows = [",".join(f'"{x:.6f}"'.replace(".", ",") for x in row) for row in table().to_numpy()]
+    (tmp_path / "a.csv").write_text("\n".join([names, *rows]))
+    found = propose(tmp_path / "a.csv")
+    assert found.run is not None
+    assert found.needed["decimal"] == ","
+    np.testing.assert_allclose(found.run.pose[:, 0], NORTH, atol=1e-6)
+    np.testing.assert_allclose(found.run.time, TIME, atol=1e-6)

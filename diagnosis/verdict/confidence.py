@@ -71,8 +71,8 @@ class Doubts(NamedTuple):
             those of a model of the right shape agree (Hausman 1978).
         beside_possibility: findings that explain little beside a possibility with more, by their ids ->
             the probability of that possibility, without which they are none.
-        beside_slow: waves, by their ids -> mean square of a residual that is slower than any wave, as a
-            share of that of their force.
+        more_than_waves: waves, by their ids -> mean square of the residual that they do not account for,
+            as a share of that of their force.
     """
 
     residual: Collection[str] = ()
@@ -89,7 +89,7 @@ class Doubts(NamedTuple):
     of_several: Collection[str] = ()
     differing: Collection[str] = ()
     beside_possibility: Mapping[str, float] = MappingProxyType({})
-    beside_slow: Mapping[str, float] = MappingProxyType({})
+    more_than_waves: Mapping[str, float] = MappingProxyType({})
 
 
 NO_DOUBTS = Doubts()
@@ -156,8 +156,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
     if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
         caps[MENDED] = EVEN_ODDS if f.evidence is None else f.evidence.beside(doubts.mended[f.id])
-    if f.id in doubts.beside_slow:
-        caps[RESIDUAL] = 1.0 / (1.0 + min(doubts.beside_slow[f.id], 1.0))
+    if f.id in doubts.more_than_waves:
+        caps[RESIDUAL] = 1.0 / (1.0 + min(doubts.more_than_waves[f.id], 1.0))
     # Waves are a residual themselves.
     if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
         caps[RESIDUAL] = EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown

@@ -273,7 +273,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
     alone = unique_shares(found, start, train, data.validate)
     doubts = Doubts(
         residual=unexplained_axes(found, remainder, start),
-        beside_slow=beside_slow(found, remainder, start),
+        more_than_waves=more_than_waves(found, remainder, start),
         of_data=doubt_of_data(train),
         replaceable=replaceable(found, explained, alone, _left(found, start, data.validate or train)),
         on_one_line=on_one_line(found, start, train),
@@ -298,15 +298,18 @@ def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set
     return {axis for axis, r in remainder.axes.items() if r.significant and (r.is_slow or not are_sure)}
 
 
-def beside_slow(found: Findings, remainder: Remainder, start: Model) -> dict[str, float]:
-    """Waves beside a slow residual, by their ids -> its mean square, as a share of that of their force.
+def more_than_waves(found: Findings, remainder: Remainder, start: Model) -> dict[str, float]:
+    """Waves beside a residual that they do not account for, by their ids.
 
     The spectrum of what no effect explains may have a peak by chance, or where the ship is steered.
+
+    Returns:
+        Id -> mean square of the horizontal residual beyond noise and waves, as a share of the waves'.
     """
-    slow = [r.slow for axis, r in remainder.axes.items() if axis in "XY" and r.significant and r.is_slow]
-    square = float(np.sum(np.square(slow)))
-    waves = [f for f in found.effects if _is_random(f, start)] if square else []
-    return {f.id: square / f.values["wave_force"] ** 2 for f in waves}
+    left = [r for axis, r in remainder.axes.items() if axis in "XY" and r.significant]
+    square = sum(r.rms**2 - r.uncertainty**2 for r in left)
+    waves = {f.id: f.values["wave_force"] ** 2 for f in found.effects if _is_random(f, start)}
+    return {i: square / own - 1.0 for i, own in waves.items() if square > own}
 
 
 def replaceable(

@@ -184,9 +184,12 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         stamps = pd.to_datetime(cells, errors="coerce", utc=True)
     if stamps.isna().all():
         return None
-    wrong = _first(cells, stamps.isna())
-    if wrong is not None and where is not None:
-        raise InputError(f"{where}: {cells.name} = {quoted(wrong)} is not a time stamp of ISO 8601")
+    first = _first(cells, stamps.isna())
+    if first is not None and where is not None:
+        wrong, row = first
+        raise InputError(
+            f"{where}: {cells.name} = {quoted(wrong)} in row {row} is not a time stamp of ISO 8601"
+        )
     seconds = np.array((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
     if without_date:
         there = np.isfinite(seconds)
@@ -231,14 +234,15 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
         found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
         raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
-    wrong = _first(cells, np.isnan(found))
-    if wrong is not None:
+    first = _first(cells, np.isnan(found))
+    if first is not None:
+        wrong, row = first
         hint = what_to_do(path, layout, wrong)
         if cells.name == layout.column("time").name:
             hint = hint or " or a time stamp of ISO 8601, such as 2026-12-31T23:59:59.5Z"
         elif not any(c.isdigit() for c in wrong):
             hint = "; a cell without a measurement must be empty"
-        raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} is not a number{hint}")
+        raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} in row {row} is not a number{hint}")
     return found
 
 
@@ -272,10 +276,10 @@ def is_cell(cells: pd.Series, text: str) -> np.ndarray:
     return same | np.asarray(pd.to_numeric(cells, errors="coerce") == number)
 
 
-def _first(cells: pd.Series, unreadable: Any) -> str | None:
-    """The first cell that is not empty and could not be read."""
+def _first(cells: pd.Series, unreadable: Any) -> tuple[str, int] | None:
+    """The first cell that is not empty and could not be read, and its row below the names, from 1."""
     wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
-    return str(cells.iloc[wrong[0]]) if wrong.size else None
+    return (str(cells.iloc[wrong[0]]), int(wrong[0]) + 1) if wrong.size else None
 
 
 def resolution(values: np.ndarray) -> np.ndarray:

@@ -82,7 +82,8 @@ def _with(
     rows = [(k, table_cells(line, separator)) for k, line in enumerate(lines) if line.strip()]
     widths = Counter(len(cells) for _, cells in rows)
     width = max(widths, key=lambda n: widths[n], default=0)
-    if separator == decimal or width < 2:
+    quoted = any('"' in line for line in lines)  # "1,5","2,5"
+    if (separator == decimal and not quoted) or width < 2:
         return -1.0, None
 
     def share(cells: Sequence[str]) -> float:
