@@ -1,6 +1,7 @@
 """Files of one run as one table: topics with rows of their own, parts that follow, one value in a row."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -164,6 +165,23 @@ def test_clocks_of_other_units_are_one(tmp_path: Path) -> None:
     joined = one_table([pose, tmp_path / "orders.csv"])
     own = joined[joined["propeller.n"].notna()]
     np.testing.assert_allclose(own["time"], table["time"], atol=1e-9)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e-3, "ms"), (1e6, "us"), (2.0, None)])
+def test_files_that_last_as_long_but_for_a_unit_are_refused(
+    tmp_path: Path, factor: float, unit: str | None
+) -> None:
+    """They overlap, as both begin with zero; the longer one is in the smaller unit."""
+    table = sailed()
+    pose = topic(tmp_path, "pose", table, POSE)
+    orders = topic(tmp_path, "orders", table.assign(time=factor * table["time"]), COMMANDS)
+    if unit is None:
+        assert len(one_table([pose, orders])) == 2 * len(table)
+        return
+    longer = orders if factor > 1.0 else pose
+    line = f'"unit": "{unit}".*into \'{re.escape(str(longer))}.json\''
+    with pytest.raises(InputError, match=f"different units: .*{line}"):
+        one_table([pose, orders])
 
 
 def test_stamps_of_messages_and_names_that_repeat(tmp_path: Path) -> None:

@@ -9,11 +9,12 @@ import pandas as pd
 
 from cosim import InputError
 
-from .columns.columns import Column, Layout, stated_layout, to_si
+from .columns.columns import UNITS, Column, Layout, stated_layout, to_si
 from .columns.proposal import text_of, time_column, units_below
 from .columns.usual_names import value_column
 from .files.message_fields import message_fields
 from .files.tables import clock_seconds, column_names, date_stamps, numbers, table_of_file
+from .run_constants import NEGLIGIBLE
 
 TIME = "time"  # the column of the time in the one table
 UNIT = frozenset(("unit", "units"))  # of that with their units
@@ -132,12 +133,19 @@ def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
 
 
 def _refuse_apart(times: Mapping[Path, pd.Series]) -> None:
-    """Refuse files whose times are all before or after those of the first one."""
+    """Refuse files whose times are all before or after those of the first one, or in another unit."""
     (first, low, high), *others = ((path, time.min(), time.max()) for path, time in times.items())
     for path, begin, end in others:
-        if not (begin <= high and low <= end):
+        apart = not (begin <= high and low <= end)
+        short, long = sorted((high - low, end - begin))
+        other = first if high - low > end - begin else path
+        smaller = {u: size for u, size in UNITS[TIME].items() if size < 1.0}
+        units = [u for u, size in smaller.items() if abs(long * size - short) < NEGLIGIBLE * short]
+        if apart or units:
+            unit, other = (units[0], other) if units else ("ms", path)
+            what = "no time in common" if apart else "times that seem to be in different units"
             raise InputError(
-                f"'{first}' and '{path}' have no time in common: {low:.10g} to {high:.10g}, "
+                f"'{first}' and '{path}' have {what}: {low:.10g} to {high:.10g}, "
                 f"{begin:.10g} to {end:.10g}; if these are in other units, state them: put "
-                f'{{"columns": {{"time": {{"name": "NAME", "unit": "ms"}}}}}} into \'{path}.json\''
+                f'{{"columns": {{"time": {{"name": "NAME", "unit": "{unit}"}}}}}} into \'{other}.json\''
             )
