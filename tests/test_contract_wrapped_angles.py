@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from diagnosis.runs.run_constants import FAR
 from diagnosis.runs.sensors import wraps
-from diagnosis.runs.sensors.evidence import FAR, LEAST_TURN, Evidence
+from diagnosis.runs.sensors.evidence import LEAST_TURN, Evidence
 
 
 @dataclass
