@@ -349,6 +349,14 @@ def test_a_heading_in_counts_of_a_turn_is_told_by_where_the_ship_goes_and_by_its
     np.testing.assert_allclose(np.unwrap(found.run.pose[:, 2]), np.unwrap(expected), atol=1e-9)
 
 
+def test_a_spike_makes_no_other_unit_of_a_heading_in_degrees(tmp_path: Path) -> None:
+    """One in a hundred cells is a mark, or a bit that is lost."""
+    content = circling(360.0, True)
+    content.loc[40, "psi"] = 32767.0
+    found = propose(written(tmp_path / "a.csv", content))
+    assert found.needed["columns"]["psi"] == {"name": "psi", "unit": "deg"}
+
+
 @pytest.mark.parametrize(("ship", "size"), [("cse1", 1.1), ("otter", 2.0), ("gunnerus", 31.3)])
 @pytest.mark.parametrize(("unit", "parts"), [("mm", 1e3), ("cm", 1e2)])
 def test_of_two_units_of_a_position_that_of_a_usual_speed_is_proposed(

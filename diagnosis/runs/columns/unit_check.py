@@ -12,7 +12,7 @@ from scipy import constants as c
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
-from ..run_constants import NEGLIGIBLE, WIDTH
+from ..run_constants import CHANCE, NEGLIGIBLE, WIDTH
 
 # Quantity -> its units, that of SI first -> factor to that [1].
 UNITS: dict[str, dict[str, float]] = {
@@ -199,11 +199,11 @@ def part_of_degree(pose: np.ndarray) -> float:
     """
     there = np.isfinite(pose).all(axis=1)
     psi = pose[there, 2]
-    most = float(np.abs(psi).max(initial=0.0))
+    most = float(np.quantile(np.abs(psi), 1.0 - CHANCE)) if psi.size else 0.0  # without spikes
     if most <= 2.0 * TURN:
         return 1.0
     steps = np.abs(np.diff(psi))
-    if (jumps := steps[2.0 * steps > most]).size:
+    if (jumps := steps[(2.0 * steps > most) & (steps < 2.0 * most)]).size:
         turn = min(COUNTS, key=lambda n: abs(np.median(jumps) - n))
         return TURN / turn
     way = np.diff(pose[there, 0]) + 1j * np.diff(pose[there, 1])
