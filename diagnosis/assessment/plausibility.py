@@ -221,9 +221,7 @@ def likeliest_mistake(
         factor: by which a column without a unit may be off; None: by none.
     """
     odds, possible = ReadingOdds(w, model), [*readings(w.run, model)]
-    others = []
-    if factor is not None:
-        others = [*other_factors(w.run, factor, pace_of(w, model))]
+    others = [] if factor is None else [*other_factors(w.run, factor, pace_of(w, model))]
     # Without a response to commands, another scale is as well a thrust that is lost.
     if scale_is_confirmed(w.smoothed.sensors) or constant_commands(w.run):
         possible, others = ([r for r in some if r.density == 0.0] for some in (possible, others))

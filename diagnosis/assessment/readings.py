@@ -160,7 +160,7 @@ def other_factors(run: Run, k: float, pace: float) -> Iterator[Reading]:
 
     Args:
         run: that is read.
-        k: 1.
+        k: by which accelerations are too large, 1.
         pace: seconds meant for a second read.
     """
     if _has_unit(run):

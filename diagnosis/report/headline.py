@@ -188,7 +188,7 @@ def first_sentences(r: ReportData) -> str:
     gain, d = gain_of_search(r), r.diagnosis
     driven = d.stability.driven_on if d and r.comparison.predictor.parametric else ()
     warning = [DRIVEN_ON.format(motions=listed(driven, "and"))] if driven else []
-    nothing = [s for s in gain if s in (SEARCH_GAINED_NOTHING, SEARCH_NAMES_CAUSE)]
+    nothing = gain[:1] if d and d.gain and not d.gain.gained else []
     return " ".join([*nothing, headline(r), *warning])
 
 

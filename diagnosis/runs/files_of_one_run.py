@@ -137,12 +137,11 @@ def _refuse_apart(times: Mapping[Path, pd.Series]) -> None:
     (first, low, high), *others = ((path, time.min(), time.max()) for path, time in times.items())
     for path, begin, end in others:
         apart = not (begin <= high and low <= end)
-        short, long = sorted((high - low, end - begin))
-        other = first if high - low > end - begin else path
+        (short, _), (long, longer) = sorted([(high - low, first), (end - begin, path)])
         smaller = {u: size for u, size in UNITS[TIME].items() if size < 1.0}
         units = [u for u, size in smaller.items() if abs(long * size - short) < NEGLIGIBLE * short]
         if apart or units:
-            unit, other = (units[0], other) if units else ("ms", path)
+            unit, other = (units[0], longer) if units else ("ms", path)
             what = "no time in common" if apart else "times that seem to be in different units"
             raise InputError(
                 f"'{first}' and '{path}' have {what}: {low:.10g} to {high:.10g}, "

@@ -45,16 +45,21 @@ class EffectEvidence(NamedTuple):
     @property
     def beside_unknown(self) -> float:
         """Probability of the effect beside causes that no candidate has, where something is left."""
-        return self.beside(self.remains**2)
+        return beside_unknown(self.remains**2, self.nearest)
 
-    def beside(self, squared: float) -> float:
-        """The same where so much is left of the square of what the effect explains.
 
-        Unknown causes are taken to lie as close to the effect as the candidates do, of which one is
-        within the distance of the nearest. As many unknown ones as known ones are then expected within
-        the distance that the effect leaves, in proportion to the squared error; at most one counts.
-        """
-        return 1.0 / (1.0 + squared / max(squared, self.nearest)) if squared else 1.0
+def beside_unknown(left: float, nearest: float) -> float:
+    """Probability of an effect beside causes that no candidate has.
+
+    Unknown causes are taken to lie as close to the effect as the candidates do, of which one is within
+    the distance of the nearest. As many unknown ones as known ones are then expected within the distance
+    that the effect leaves, in proportion to the squared error; at most one counts.
+
+    Args:
+        left: squared error that the effect leaves, as a share of what it explains.
+        nearest: the same of the nearest other candidate in its place.
+    """
+    return 1.0 / (1.0 + left / max(left, nearest)) if left else 1.0
 
 
 def nearest_share(own: float, others: Sequence[float], nothing: float) -> float:

@@ -99,7 +99,7 @@ def calibrated(
     else:
         now = still
     if coefficients is not None:
-        plain, now = runs.losses(coefficients.findings, best.findings)
+        (plain,) = runs.losses(coefficients.findings)
         best, now = (coefficients, plain) if as_good(plain, now) else (best, now)
     better = as_good(now, other) if found.effects else gain(other, now) > 0.0
     if harm(now, first) or not better:

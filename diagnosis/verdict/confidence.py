@@ -18,7 +18,7 @@ from scipy.special import expit
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import MEASURED
 from ..runs.run_constants import DIGITS, EVERY
-from ..search.effect_evidence import EffectEvidence
+from ..search.effect_evidence import EffectEvidence, beside_unknown
 from ..search.findings import Finding
 from ..search.refinement import at_limit
 
@@ -155,9 +155,10 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     }
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
     if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
-        caps[MENDED] = EVEN_ODDS if f.evidence is None else f.evidence.beside(doubts.mended[f.id])
-    if f.id in doubts.more_than_waves:
-        caps[RESIDUAL] = 1.0 / (1.0 + min(doubts.more_than_waves[f.id], 1.0))
+        nearest = 0.0 if f.evidence is None else f.evidence.nearest
+        caps[MENDED] = beside_unknown(doubts.mended[f.id], nearest)
+    if f.id in doubts.more_than_waves:  # no candidate is like waves
+        caps[RESIDUAL] = beside_unknown(doubts.more_than_waves[f.id], 1.0)
     # Waves are a residual themselves.
     if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
         caps[RESIDUAL] = EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown

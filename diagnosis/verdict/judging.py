@@ -37,7 +37,7 @@ from .coefficients import (
 )
 from .confidence import FOUND, Confidence, Doubts, confidence_of, doubt_of_data
 from .effects_like_coefficients import in_place_of_coefficients
-from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_one_line
+from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_one_line, squares
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
@@ -285,7 +285,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
     )
     each = [confidence_of(f, start, doubts) for f in found.effects]
     doubts = doubts._replace(
-        mended=mended(found, start, falls_by_axis(found, start, train), forces(found, train), each),
+        mended=mended(found, start, falls_by_axis(found, start, train), squares(found, train), each),
         beside_possibility=beside_possibility(found, explained, each),
     )
     return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
@@ -409,15 +409,6 @@ def falls_by_axis(found: Findings, start: Model, runs: Sequence[WeakWindows]) ->
     """(findings, 3), shares of the error's sum of squares of each axis, by which it falls with each."""
     sums = np.array([_squares(runs, model) for model in (start, *(f.model for f in found.effects))])
     return np.divide(-np.diff(sums, axis=0), sums[0], out=np.zeros_like(sums[1:]), where=sums[0] > 0.0)
-
-
-def forces(found: Findings, runs: Sequence[WeakWindows]) -> np.ndarray:
-    """(findings, 3), sum of squares of what each effect of a model does to its error on each axis."""
-    model = found.model
-    rest = [model.plus({name: -value for name, value in f.values.items()}) for f in found.effects]
-    return np.sum(
-        [[np.square(omega(w, m) - omega(w, model)).sum(axis=0) for m in rest] for w in runs], axis=0
-    )
 
 
 def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> list[float]:

@@ -1,7 +1,7 @@
 """Findings that together make up a law which no candidate has, so that none of them is known."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -71,6 +71,7 @@ def mended(
         axes on which that explains more; of a smaller one it is 1.
     """
     effects, shares = start.ship.effects, dict[str, float]()
+    of_measurement = {i for i, effect in effects.items() if effect.kind == "measurement"}
     judged = [
         (f, fall, square, c.is_finding)
         for f, fall, square, c in zip(found.effects, falls, squares, alone, strict=True)
@@ -78,19 +79,18 @@ def mended(
     ]
     for small, fall, square, believed in judged:
         axes = ["XYN".index(axis) for axis in effects[small.id].axis]
-        measured = effects[small.id].kind == "measurement"
-        larger = {
-            f.id: max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
-            for f, more, own, is_finding in judged
-            if is_finding
-            and (shown := [k for k in axes if more[k] - fall[k] > NEGLIGIBLE])
-            and (measured or effects[f.id].kind != "measurement")
-        }
-        if larger and fall[axes].max() < NEGLIGIBLE and not may_be_none(small):
-            same = {i for i in larger if (effects[i].kind == "measurement") == measured}
-            shares |= {i: max(share, shares.get(i, 0.0)) for i, share in larger.items() if i in same}
+        if fall[axes].max() >= NEGLIGIBLE or may_be_none(small):
+            continue
+        for large, more, own, is_finding in judged:
+            shown = [k for k in axes if more[k] - fall[k] > NEGLIGIBLE]
+            mending = {small.id, large.id} & of_measurement
+            if not (shown and is_finding) or mending == {large.id}:
+                continue
             if believed:
                 shares[small.id] = 1.0
+            if len(mending) != 1:
+                share = max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
+                shares[large.id] = max(share, shares.get(large.id, 0.0))
     return shares
 
 
@@ -161,8 +161,20 @@ def of_several(found: Findings, start: Model) -> set[str]:
     return {f.id for f in found.effects if any(x and is_shared(n, x) for n, x in f.values.items())}
 
 
+def squares(found: Findings, runs: Sequence[WeakWindows]) -> np.ndarray:
+    """(findings, 3), sums of squares of the force of each effect on each axis [N2, N2, N2 m2]."""
+    forces = ([*_forces(f, found.model, runs)] for f in found.effects)
+    return np.array([np.square(np.concatenate(each)).sum(axis=0) for each in forces]).reshape(-1, 3)
+
+
+def _forces(f: Finding, model: Model, runs: Sequence[WeakWindows]) -> Iterator[np.ndarray]:
+    """Of each run the force (K, 3) of an effect of a model [N, N, N m]."""
+    without = model.plus({name: -value for name, value in f.values.items()})
+    return (omega(w, without) - omega(w, model) for w in runs)
+
+
 def _line(f: Finding, model: Model, runs: Sequence[WeakWindows]) -> np.ndarray:
     """(3,), unit vector of the line of an effect's force (X, Y, N), in units of the size of the ship."""
-    without = model.plus({name: -value for name, value in f.values.items()})
-    force = np.concatenate([(omega(w, without) - omega(w, model)) / w.scale.forces for w in runs])
+    each = zip(_forces(f, model, runs), runs, strict=True)
+    force = np.concatenate([one / w.scale.forces for one, w in each])
     return np.asarray(np.linalg.svd(force, full_matrices=False)[2][0])

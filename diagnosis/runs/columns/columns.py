@@ -44,6 +44,7 @@ from cosim.results import read_options
 from cosim.scenario import checked, read_model
 from cosim.trials import KINDS
 from cybership.message_text import name_of, quoted
+from fmus.actuators.response import CommandLayout
 from fmus.ship import Ship
 
 from .name_words import words_of
@@ -91,6 +92,12 @@ def outputs(commands: Iterable[str]) -> dict[str, str]:
     """Outputs of a ship's actuators that may be measured -> quantity, for its ``ACTUATOR.COMMAND``."""
     actuators = dict.fromkeys(name.partition(".")[0] for name in commands if "." in name)
     return {f"{actuator}.{name}": q for actuator in actuators for name, q in OUTPUTS.items()}
+
+
+def largest_commands(layout: CommandLayout, of: Ship, turning: float) -> np.ndarray:
+    """(k,), largest size of each command of a layout; of an angle that turns on what is given for it."""
+    limits = np.abs(layout.limits(of.nominal_drive.params)).max(axis=1)
+    return np.where(layout.round or False, turning, limits)
 
 
 def quantities(of: Ship) -> dict[str, str]:

@@ -146,9 +146,9 @@ def refuse_units(
     Raises:
         InputError: it goes or turns too fast, or an angle is in degrees.
     """
-    for signals, unit, reason in (
-        () if anyway else chain(doubts(time, pose, scale), doubts_of_angles(angles))
-    ):
+    if anyway:
+        return
+    for signals, unit, reason in chain(doubts(time, pose, scale), doubts_of_angles(angles)):
         raise InputError(f"{where} {reason} {remedy(signals, unit, called)}; {GO_ON}")
 
 

@@ -16,7 +16,7 @@ from ..files.reading import Run
 from ..files.tables import clock_seconds, date_stamps, table_of_file
 from ..frozen import repeated
 from ..row_order import by_stamps, in_order
-from .columns import OF_UNIT, UNITS, Column, Layout, other_angles
+from .columns import OF_UNIT, UNITS, Column, Layout, largest_commands, other_angles
 from .likely_columns import ASTERN, says_command, signal_of_sign
 from .name_words import words_of
 from .unit_check import (
@@ -53,8 +53,7 @@ def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship
     """
     found: dict[str, Column] = {}
     for form, commands in zip(of.command_forms, of.layouts, strict=True):
-        limits = np.abs(commands.limits(of.nominal_drive.params)).max(axis=1)
-        limits[np.array(commands.round or [False] * limits.size)] = math.tau
+        limits = largest_commands(commands, of, math.tau)
         for si in dict.fromkeys(form.values()):
             own = {s: x for (s, unit), x in zip(form.items(), limits, strict=True) if unit == si}
             own = {s: limit for s, limit in own.items() if layout.column(s).name in names}

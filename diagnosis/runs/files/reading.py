@@ -30,6 +30,7 @@ from ..columns.columns import (
     Column,
     Layout,
     degrees,
+    largest_commands,
     layout_of,
     outputs,
     quantities,
@@ -353,12 +354,10 @@ def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np
     """
     found = {}
     for form, layout in zip(of.command_forms, of.layouts, strict=True):
-        limits = np.abs(layout.limits(of.nominal_drive.params)).max(axis=1)
-        turning = layout.round or [False] * limits.size
-        for signal, limit, turns in zip(form, limits, turning, strict=True):
+        for signal, limit in zip(form, largest_commands(layout, of, np.inf), strict=True):
             size = np.abs(columns.get(signal, ()))
             far = size > FAR * limit
-            if not turns and 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
+            if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
                 found[signal] = far
     return found
 
