@@ -33,7 +33,7 @@ from diagnosis.search.prediction_fit.disturbance_summary import Unrecorded
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.refit import RefitOutcome
 from diagnosis.search.prior import NominalPrior
-from diagnosis.search.refinement import at_limit
+from diagnosis.search.refinement import RefinedModel, at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging
@@ -463,6 +463,21 @@ def told(confidence, together, ids=("X_u",), start=None):
 )
 def test_verdict_follows_the_confidence(found, refitted, remains, said):
     assert verdict_name(found, refitted, left_on(X=remains)) == said
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({}, "coefficients"),
+        ({"delta_X_uu": 0.3, "heading_offset": 0.01}, "coefficients"),
+        ({"delta_X_uu": 0.3, "deadband": 0.1}, "unexplained"),
+        ({"position_latency": 0.2}, "unexplained"),
+        ({"V_n": 0.1, "V_e": 0.0}, "unexplained"),
+    ],
+)
+def test_a_calibration_with_more_than_coefficients_explains_nothing(values, said):
+    at = RefinedModel(Model(), np.zeros(0), values)
+    assert verdict_name(Findings(estimate=at), True, left_on()) == said
 
 
 def test_verdict_goes_on_without_what_is_not_believed():

@@ -314,9 +314,10 @@ def test_a_calibrated_model_says_that_it_is_another_calibration():
 def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
     start = Model()
 
-    def said(**values):
+    def said(posterior=SimpleNamespace(std={}), **values):
         learned = SimpleNamespace(model=start.plus(values))
-        return fitted_beside(SimpleNamespace(start=start, learned=learned, speeds=(0.4, 0.1, 0.2)))
+        d = SimpleNamespace(start=start, learned=learned, speeds=(0.4, 0.1, 0.2), posterior=posterior)
+        return fitted_beside(d)
 
     assert said() == said(delta_X_uu=1.0) == []
     assert said(V_n=0.3) == ["The water moves at 0.3 m/s towards 0°."]
@@ -325,6 +326,10 @@ def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
     assert "5.73°" in compass
     assert said(heading_offset=0.0049) == [], "0.28 degrees matter in no manoeuvre"
     assert said(heading_offset=-0.0051)
+    (dead,) = said(deadband=0.3)
+    assert "0.3 N" in dead
+    assert said(SimpleNamespace(std={"deadband": 0.14}), deadband=0.3) == [dead]
+    assert said(SimpleNamespace(std={"deadband": 0.16}), deadband=0.3) == [], "it may be none"
 
 
 def test_without_a_gain_nothing_is_said_of_it():

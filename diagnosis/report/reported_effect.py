@@ -1,7 +1,7 @@
 """The findings of a diagnosis with what is said of them, for terminal, page and files alike."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -14,7 +14,9 @@ from ..predictors import Model
 from ..predictors.ship_model import of_one_run, parameter_and_run
 from ..runs.run_constants import DIGITS
 from ..runs.sensors.constants import LEAST
+from ..search.conclusion import interval
 from ..search.findings import Finding
+from ..search.shortlist import TIE
 from ..session import Diagnosis
 from .finding_text import advice, equation, sentence, separation_note, unit
 
@@ -74,22 +76,34 @@ def reported_effects(d: Diagnosis) -> tuple[list[ReportedEffect], list[ReportedE
         fitted = d.start.ship.effects[f.id].search.by == "regression"
         (found if told else possible).append(_reported(d, f, share, unique, told or fitted))
     for f in d.dropped:
-        possible.append(_reported(d, f, f.share, None, all(is_fitted(d, n) for n in f.values)))
+        fitted = all(is_fitted(d, n) for n in f.values)
+        possible.append(_reported(d, _as_fitted(d, f) if fitted else f, f.share, None, fitted))
     return found, possible
 
 
-def fitted_beside(d: Diagnosis) -> list[str]:
-    """What a calibrated model has of the measurement and the water, in words, a sentence each.
+def _as_fitted(d: Diagnosis, f: Finding) -> Finding:
+    """An effect that was dropped, with the values that the learned model has all the same."""
+    values = {n: d.learned.model.value(n) - d.start.value(n) for n in f.values}
+    std = d.posterior.std
+    return replace(
+        f, values=values, ci95={n: interval(x, std[n]) for n, x in values.items() if n in std}
+    )
 
-    An angle that matters in no manoeuvre is left out.
+
+def fitted_beside(d: Diagnosis) -> list[str]:
+    """What a calibrated model has of actuators, measurement and water, in words, a sentence each.
+
+    An angle that matters in no manoeuvre is left out, and what is within its own uncertainty.
     """
-    told, learned = [], d.learned.model
+    told, learned, std = [], d.learned.model, d.posterior.std
     for effect in d.start.ship.effects.values():
         values = {n: learned.value(n) for n in effect.coefficients}
-        fitted = any(
-            is_fitted(d, n) and (unit(effect, n) != "rad" or abs(x) >= LEAST) for n, x in values.items()
+        known = any(
+            is_fitted(d, n)
+            and abs(x) >= max(TIE * std.get(n, 0.0), LEAST if unit(effect, n) == "rad" else 0.0)
+            for n, x in values.items()
         )
-        if effect.kind in ("measurement", "environment") and fitted:
+        if effect.kind in ("actuator", "measurement", "environment") and known:
             told.append(sentence(Found(effect, values, d.speeds)))
     return told
 

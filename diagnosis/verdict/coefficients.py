@@ -79,9 +79,10 @@ def calibrated(
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
     It also takes the place of effects than which it is as good. No effect follows from it.
-    Each training run is predicted without it; a current is in it where that shows beyond chance, and is
-    beyond its own uncertainty. Where ``coefficients``, the calibration of the nominal ones alone, is as
-    good, it is taken. Validation runs can reject either.
+    Each training run is predicted without it. Where coefficients leave a residual, usual imperfections
+    are in it, and a current, each if that shows beyond chance, and is beyond its own uncertainty. Where
+    ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken. Validation runs
+    can reject either.
     """
     train, start = data.train, data.start
     if len(train) < WHOLE_RUNS or not any(prior.std.values()):
@@ -92,12 +93,13 @@ def calibrated(
         return None
     best = calibrator.still()
     other, first = runs.losses(found if found.effects else start, start)
-    flowing = calibrator.flowing(best)
-    still, now = runs.losses(best.findings, flowing.findings)
-    if harm(still, now) and gain(still, now) > 0.0 and _flows(flowing):
-        best = flowing
-    else:
-        now = still
+    (now,) = runs.losses(best.findings)
+    left = remains(train, start, best.findings.model)
+    for further in filter(None, (calibrator.imperfections, calibrator.current) if left else ()):
+        fit = calibrator.plus(best, further)
+        (its,) = runs.losses(fit.findings)
+        if harm(now, its) and gain(now, its) > 0.0 and _differs(fit, further):
+            best, now = fit, its
     if coefficients is not None:
         (plain,) = runs.losses(coefficients.findings)
         best, now = (coefficients, plain) if as_good(plain, now) else (best, now)
@@ -176,11 +178,10 @@ def spoils(found: Findings, data: ValidationData) -> bool:
     return any(predicts_worse(its, first) for its, first in pairs)
 
 
-def _flows(fit: RefitOutcome) -> bool:
-    """Whether the current of a fit differs from zero by more than its uncertainty gives by chance."""
-    known, effects = fit.posterior, fit.findings.model.ship.effects
-    names = [f"vessel.{n}" for n in effects["current"].coefficients] if "current" in effects else []
-    at = [k for k, name in enumerate(known.names) if name in names]
+def _differs(fit: RefitOutcome, parameters: Collection[str]) -> bool:
+    """Whether parameters of a fit differ from zero by more than their uncertainty gives by chance."""
+    known = fit.posterior
+    at = [k for k, name in enumerate(known.names) if name.partition(".")[2] in parameters]
     if not at:
         return False
     V, C = known.mean[at], known.covariance[np.ix_(at, at)]

@@ -21,6 +21,7 @@ from ..predictors.windows import Windows
 from ..runs import Smoothed
 from ..runs.run_constants import NEGLIGIBLE
 from ..search.findings import Finding, Findings
+from ..search.prediction_fit.coefficient_calibration import HEADING
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
 from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
@@ -104,13 +105,29 @@ def is_finding(f: Finding) -> bool:
 
 
 def verdict_name(learned: Findings, refitted: bool, remainder: Remainder) -> VerdictName:
-    """The verdict in a word, by the one rule that JSON, terminal and page follow."""
+    """The verdict in a word, by the one rule that JSON, terminal and page follow.
+
+    Coefficients explain the data if the learned model has no imperfection and no current besides.
+    """
     first = next(filter(is_finding, learned.effects), None)
     if first is not None:
         return "found" if first.confidence >= FOUND else "ambiguous"
-    if refitted and learned.plausible and not remainder.significant:
+    if refitted and learned.plausible and not remainder.significant and not beside(learned):
         return "coefficients"
     return "unexplained" if remainder.significant or learned.effects or refitted else "none"
+
+
+def beside(learned: Findings) -> list[str]:
+    """Ids of the effects that a calibrated model has in addition to coefficients; it claims none.
+
+    The axis of the heading is part of what the coefficients are relative to.
+    """
+    at = learned.estimate
+    if at is None or learned.effects:
+        return []
+    others = {n for n in at.values if n != HEADING}
+    effects = at.start.ship.effects.values()
+    return [e.id for e in effects if e.kind != "force" and others.intersection(e.coefficients)]
 
 
 def judge(

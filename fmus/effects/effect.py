@@ -255,6 +255,8 @@ class Effect:
             coefficient that it adds to.
         needs: actuators that a ship must have for it, by their names.
         apart: whether it shows only where each of several units that may share commands has its own.
+        usual: standard deviation of its coefficients among ships, as far as they are imperfections that
+            every ship has to some degree, in their unit; 0: it is not such.
         memory: how it depends on the past; None: not at all.
         search, wording: see there.
     """
@@ -277,6 +279,7 @@ class Effect:
     search: Search = Search()
     wording: Wording = Wording()
     apart: bool = False
+    usual: float = 0.0
 
     def __call__(self, *arguments: object) -> Any:
         """What the function gives."""
@@ -344,14 +347,14 @@ def effect(
 
     Args:
         id, kind, axis, formula, symbol, sign, source, linear, settings: see :class:`Effect`.
-        more: further fields of :class:`Effect`: gives, needs, apart, memory, search, wording; and
+        more: further fields of :class:`Effect`: gives, needs, apart, usual, memory, search, wording; and
             parameters, where the function does not declare them in its signature, with description.
 
     Raises:
         DeclarationError: unknown kind, axis or field, or a parameter without unit, description or start.
     """
-    further = {"gives", "needs", "apart", "memory", "search", "wording", "parameters", "description"}
-    unknown = set(more) - further
+    further = {"gives", "needs", "apart", "usual", "memory", "search", "wording"}
+    unknown = set(more) - further - {"parameters", "description"}
     if unknown:
         raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
 
@@ -394,6 +397,7 @@ def effect(
             search,
             more.get("wording", Wording()),
             more.get("apart", False),
+            more.get("usual", 0.0),
         )
 
     return declare

@@ -16,6 +16,7 @@ INSTANT = 1e-9  # s; times that differ by less are the same
 SPEED_LOSSES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 15.0)
 # Shares of full force.
 DEADBANDS = (0.0086, 0.017, 0.026, 0.043, 0.06, 0.086, 0.11, 0.146, 0.19, 0.26)
+USUAL_DEADBAND = 0.1  # 1, share of full force, about the middle of those to try
 LIMITS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 
 
@@ -172,6 +173,7 @@ def deadband(d: Devices, parts: Sequence[Devices] = (), name: str = "") -> Effec
         source="7.2.5; static tests of the ship",
         linear=False,
         search=Search(tries=[{name: share * d.full} for share in DEADBANDS]),
+        usual=USUAL_DEADBAND * d.full,
         description=f"dead band of the {d.title}",
     )
     def function(f: Thrust, now: Running, least: Number) -> Thrust:

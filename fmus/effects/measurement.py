@@ -16,6 +16,8 @@ Pose = tuple[Number, Number, Number]
 ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
 # s, of a filter; receivers smooth over some samples, a chart plotter over seconds.
 LAGS = Range(0.0, 3.0)
+AXIS = 0.035  # rad, by which an instrument's axis is off that of the ship: two degrees; chosen
+LATE = 0.2  # s, by which a channel is usually late, by transport and by filters of some samples; chosen
 # Offsets of the clock to try [s]: some samples, and what a slow network gives.
 OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)
 
@@ -59,6 +61,7 @@ def heading_sentence(f: Found) -> str:
     sign="positive: measured to starboard of the true heading",
     source="4.3.1, bias",
     search=Search(differentiable=True),
+    usual=AXIS,
     wording=Wording(heading_sentence, MEASUREMENT),
 )
 def heading_offset(
@@ -108,6 +111,7 @@ def measured_behind(
     formula: str,
     symbol: str,
     source: str,
+    usual: float = 0.0,
 ) -> Effect:
     """The effect that a channel of the pose is measured behind a filter with one time.
 
@@ -115,7 +119,7 @@ def measured_behind(
         name: of the effect, and of the time.
         meaning: of the time.
         sentence: what is said of it, with {} in place of the time.
-        search, description, formula, symbol, source: see :class:`.Effect`.
+        search, description, formula, symbol, source, usual: see :class:`.Effect`.
     """
     return Effect(
         id=name,
@@ -129,6 +133,7 @@ def measured_behind(
         linear=False,
         parameters=(Variable(name, "s", meaning, 0.0, LAGS, False),),
         function=None,
+        usual=usual,
         search=search,
         wording=Wording(lambda f: sentence.format(f"{number(f[name])} s"), FILTER),
     )
@@ -174,6 +179,7 @@ def latency(channel: str, symbol: str, coordinates: str) -> Effect:
         formula=f"({coordinates})_m(t) = ({coordinates})(t - δ)",
         symbol=symbol,
         source="4.3.1; latency of a receiver",
+        usual=LATE,
     )
 
 

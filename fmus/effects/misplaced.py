@@ -9,6 +9,8 @@ from .devices import SHARE, Devices, declared, parameter, pushed, with_one
 from .effect import Effect, Running, Search, Thrust
 from .text import offset
 
+MOUNTED = 0.02  # rad, by which actuators are mounted in another direction: one degree; chosen
+
 
 def place_parameters(name: str, whose: str, scale: Scale) -> tuple[Variable, Variable]:
     """How far a force acts from the assumed place [m]."""
@@ -64,6 +66,7 @@ def turned(d: Devices) -> Effect:
         sign="positive: to starboard",
         linear=False,
         search=Search(differentiable=True),
+        usual=MOUNTED,
         description=f"the {d.title} acts in another direction than assumed",
     )
     def function(f: Thrust, now: Running, angle: Number) -> Thrust:

@@ -11,6 +11,7 @@ from .text import Found, number, percent
 
 # Additions to the exponent 1 to try: up to thrust by the square of a setting, as by a propeller's speed.
 EXPONENTS = (-0.5, 0.5, 1.0)
+CROSSED = 0.3  # 1, force of a cycloidal propeller across its command, by the command's; chosen
 
 
 def crossed_forces(d: Devices) -> Effect:
@@ -47,6 +48,7 @@ def crossed_forces(d: Devices) -> Effect:
         sign="k_sway: ahead commands give an outward force on both; k_surge: starboard commands give "
         "an ahead force on the port one",
         source="(2.12); measured runs of the ship",
+        usual=CROSSED,
         description="Force of each propeller across its command, mirrored between port and starboard.",
     )
     def function(f: Thrust, now: Running, sway: Number, surge: Number) -> Thrust:

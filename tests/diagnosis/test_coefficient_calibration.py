@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from diagnosis import Model
+from diagnosis.predictors.parameter_set import ship_with
 from diagnosis.predictors.shooting import UNKNOWN
+from diagnosis.search.findings import Findings
 from diagnosis.search.prediction_fit import coefficient_calibration
 from diagnosis.search.prediction_fit.coefficient_calibration import (
-    AXIS,
     LEAST,
     LEFT_OUT,
     STREAM,
+    Calibrator,
     as_missed,
     begin,
 )
@@ -111,7 +113,9 @@ def test_a_calibration_begins_with_the_terms_that_models_leave_out():
         for n in effects[i].coefficients
         if n in names
     ]
-    assert np.diag(at.precision) == pytest.approx([*(s**-2.0 for s in sizes), AXIS**-2.0])
+    assert np.diag(at.precision) == pytest.approx(
+        [*(s**-2.0 for s in sizes), effects["heading_offset"].usual ** -2.0]
+    )
     assert np.count_nonzero(at.precision) == len(at.values)
 
 
@@ -122,8 +126,10 @@ def test_a_current_begins_where_still_water_ended():
     ended = replace(
         still, offset=still.offset + 0.3, values={n: 0.1 * k for k, n in enumerate(still.values)}
     )
-    at = begin(start, prior, {"current": STREAM}, ended)
+    calibrator = Begins(Findings(), [], start, prior)
+    at = calibrator.plus(SimpleNamespace(findings=Findings(estimate=ended)), calibrator.current)
     assert isinstance(at, RefinedModel)
+    assert at.fitted == [*at.values]
     assert at.offset.tolist() == ended.offset.tolist()
     water = start.ship.effects["current"].coefficients
     assert {n: at.values[n] for n in ended.values} == ended.values
@@ -131,3 +137,29 @@ def test_a_current_begins_where_still_water_ended():
     at_water = [[*at.values].index(n) for n in water]
     units = [STREAM * start.unit(n) for n in water]
     assert np.diag(at.precision)[at_water] == pytest.approx(np.array(units) ** -2.0)
+    assert np.diag(at.precision)[: len(ended.values)].tolist() == np.diag(ended.precision).tolist()
+
+
+class Begins(Calibrator):
+    """Gives where each fit begins."""
+
+    def _fitted(self, at):
+        return at
+
+
+def test_imperfections_are_those_of_actuators_and_instruments_each_with_its_usual_size():
+    cse1 = Begins(Findings(), [], Model(), NominalPrior.of(Model(), 0.1)).imperfections
+    assert {*cse1} == {
+        "deadband",
+        "cross_vsp_sway",
+        "cross_vsp_surge",
+        "position_latency",
+        "heading_latency",
+    }
+    otter = Model(ship=ship_with((), "otter"))
+    boat = Begins(Findings(), [], otter, NominalPrior.of(otter, 0.1)).imperfections
+    assert {"deadband_port", "deadband_starboard", "angle_port", "heading_latency"} <= {*boat}
+    assert not {"heading_offset", "V_n"} & {*boat}
+    full = max(t["deadband_port"] for t in otter.ship.effects["deadband_port"].search.values({}))
+    assert 0.1 * full < boat["deadband_port"] < full
+    assert boat["heading_latency"] == cse1["heading_latency"], "no time of the ship's size"

@@ -1,5 +1,6 @@
 """When other coefficients take the place of effects (diagnosis/verdict/coefficients.py): each condition alone."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,12 +13,13 @@ from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import WHOLE_RUNS
 from diagnosis.verdict import coefficients
 from diagnosis.verdict.coefficients import (
-    _flows,
+    _differs,
     any_sure,
     calibrated,
 )
 
 START = Model()
+WATER = START.ship.effects["current"].coefficients
 
 
 def effect(name="X_u", confidence=0.5, interval=(-1.0, 1.0)):
@@ -48,7 +50,7 @@ def by_numbers(monkeypatch):
 
 
 def outcome(name, V=(0.0, 0.0), std=1.0):
-    names = ["vessel.X_u", *(f"vessel.{n}" for n in START.ship.effects["current"].coefficients)]
+    names = ["vessel.X_u", *(f"vessel.{n}" for n in WATER)]
     posterior = SimpleNamespace(
         names=names, mean=np.array([99.0, *V]), covariance=np.diag([1.0, std**2, std**2])
     )
@@ -61,13 +63,14 @@ def outcome(name, V=(0.0, 0.0), std=1.0):
 def test_a_current_flows_beyond_the_quantile_of_its_uncertainty(std, size, flows, course):
     """V^T C^-1 V is chi-square with two degrees of freedom."""
     V = size * std * np.sqrt(chi2.isf(CHANCE, 2)) * np.array([np.cos(course), np.sin(course)])
-    assert _flows(outcome("", V, std)) == flows
+    assert _differs(outcome("", V, std), WATER) == flows
 
 
-def test_without_a_current_nothing_flows():
+def test_what_a_fit_does_not_have_does_not_differ():
     still = outcome("", (9.0, 9.0))
     still.posterior.names = ["vessel.X_u", "vessel.X_uuu", "vessel.N_r"]
-    assert not _flows(still)
+    assert not _differs(still, WATER)
+    assert _differs(still, ["X_uuu"])
 
 
 CASE = {
@@ -79,7 +82,10 @@ CASE = {
     "first": 10.0,
     "found": 10.0,
     "still": 5.0,
+    "imperfect": 5.0,
     "flowing": 5.0,
+    "late": False,
+    "left": True,
     "plain": None,
     "V": (0.0, 0.0),
     "validate": [],
@@ -107,6 +113,13 @@ CASE = {
         ({"flowing": 4.5, "V": (9.0, 9.0)}, "still"),
         ({"still": 11.5, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
         ({"effects": [effect()], "found": 3.0, "flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
+        ({"imperfect": 4.0, "late": True}, "imperfect"),
+        ({"imperfect": 4.0}, "still"),  # imperfections that may be none
+        ({"imperfect": 4.5, "late": True}, "still"),
+        ({"imperfect": 3.0, "flowing": 1.0, "late": True, "V": (9.0, 9.0)}, "flowing"),
+        ({"imperfect": 3.0, "flowing": 2.5, "late": True, "V": (9.0, 9.0)}, "imperfect"),
+        ({"imperfect": 3.0, "late": True, "left": False}, "still"),  # coefficients leave nothing
+        ({"flowing": 3.0, "V": (9.0, 9.0), "left": False}, "still"),
         ({"plain": 5.0}, "plain"),  # as good, of fewer coefficients
         ({"plain": 4.0}, "plain"),
         ({"plain": 5.1}, "still"),
@@ -124,12 +137,23 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
     case = CASE | changes
     found = Findings(case["effects"])
     still, flowing = outcome("still"), outcome("flowing", case["V"])
+    still.findings = replace(still.findings, model=Model())
+    imperfect = outcome("imperfect")
+    imperfect.posterior.mean[0] *= case["late"]
+    fits = {"X_u": imperfect, **dict.fromkeys(WATER, flowing)}
+    began = []
+
+    def plus(fit, std):
+        began.append(fit)
+        return fits[next(iter(std))]
+
     plain = outcome("plain") if case["plain"] else None
     losses = {
         id(found): "found",
         id(START): "first",
         id(still.findings): "still",
         id(flowing.findings): "flowing",
+        id(imperfect.findings): "imperfect",
         id(plain and plain.findings): "plain",
     }
 
@@ -142,11 +166,19 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
             return [case[losses[id(m)]] for m in models]
 
     calibrator = SimpleNamespace(
-        windows=case["windows"], still=lambda: still, flowing=lambda near: flowing
+        windows=case["windows"],
+        still=lambda: still,
+        plus=plus,
+        imperfections={"X_u": 0.2},
+        current=dict.fromkeys(WATER, 0.05),
     )
     monkeypatch.setattr(coefficients, "ValidationData", Runs)
     monkeypatch.setattr(coefficients, "Calibrator", lambda *_: calibrator)
-    monkeypatch.setattr(coefficients, "remains", lambda *_: case["missing"])
+    monkeypatch.setattr(
+        coefficients,
+        "remains",
+        lambda runs, start, model: case["missing"] if model is START else case["left"],
+    )
     data = SimpleNamespace(
         train=[None] * case["runs"],
         validate=case["validate"],
@@ -154,4 +186,8 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
         losses=lambda model, start: [case["its"], case["others"]],
     )
     chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}), plain)
-    assert chosen is {"still": still, "flowing": flowing, "plain": plain, None: None}[taken]
+    known = {"still": still, "imperfect": imperfect, "flowing": flowing, "plain": plain, None: None}
+    assert chosen is known[taken]
+    if began:  # a current is added to imperfections that were taken
+        taken_before = case["late"] and case["imperfect"] <= case["still"] - 1.0
+        assert began == [still, imperfect if taken_before else still]

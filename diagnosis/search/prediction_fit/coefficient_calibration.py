@@ -2,11 +2,12 @@
 
 In addition to the nominal coefficients, each with the prior of where its value is from, those of all
 further products of speeds are fitted that the hull may have (lift by sway and yaw, drag in turns,
-resistance that is not quadratic, ...), zero give or take their size, and the axis of the heading. The
-windows are weighed by what the model misses in the run of each, as in :mod:`.fit`, and at each time
-since their start: errors of slow runs count as much as those of quick ones, early errors as much as late
-ones. Where the information is counted, the disturbance that the model error shows is scaled to what the
-windows miss: a part of that error does not add up over a window.
+resistance that is not quadratic, ...), zero give or take their size, and the axis of the heading. Usual
+imperfections of actuators and instruments can be added, and a current. The windows are weighed by what
+the model misses in the run of each, as in :mod:`.fit`, and at each time since their start: errors of
+slow runs count as much as those of quick ones, early errors as much as late ones. Where the information
+is counted, the disturbance that the model error shows is scaled to what the windows miss: a part of that
+error does not add up over a window.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
 from fmus.effects.force import CHANGES
@@ -37,10 +39,10 @@ from .refit import RefitOutcome, WindowSpread
 LIFT, FURTHER = 3.0, 0.5
 BY_LIFT = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr")
 LEFT_OUT = {e.id: LIFT if e.id in BY_LIFT else FURTHER for e in CHANGES}
-AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; chosen
 # 1, prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
 # for a ship of 34 m; chosen.
 STREAM = 0.05
+HEADING = "heading_offset"
 LEAST = 1e-4  # 1, factor of the variance of the disturbance, or one over it; chosen
 
 
@@ -83,10 +85,26 @@ class Calibrator:
         """The calibrated model in still water."""
         return self._fitted(begin(self.start, self.prior))
 
-    def flowing(self, still: RefitOutcome) -> RefitOutcome:
-        """The same with a current that all runs are in."""
-        near = still.findings.estimate
-        return self._fitted(begin(self.start, self.prior, {"current": STREAM}, near))
+    def plus(self, fit: RefitOutcome, std: Mapping[str, float]) -> RefitOutcome:
+        """A calibrated model with further parameters, by their prior standard deviations about zero."""
+        at = fit.findings.estimate
+        assert at is not None
+        values = dict(at.values) | dict.fromkeys(std, 0.0)
+        precision = block_diag(at.precision, np.diag([s**-2.0 for s in std.values()]))
+        return self._fitted(replace(at, values=values, precision=precision))
+
+    @property
+    def imperfections(self) -> dict[str, float]:
+        """What every ship has to some degree: parameter -> prior standard deviation."""
+        effects = self.start.ship.effects.values()
+        usual = {n: e.usual for e in effects if e.usual for n in e.coefficients}
+        return {n: std for n, std in usual.items() if n != HEADING}
+
+    @property
+    def current(self) -> dict[str, float]:
+        """The water's velocity: parameter -> prior standard deviation."""
+        flow = self.start.ship.effects.get("current")
+        return {n: STREAM * self.start.unit(n) for n in flow.coefficients} if flow else {}
 
     def coefficients(self) -> RefitOutcome:
         """The first model with other values of the nominal coefficients, and nothing else."""
@@ -143,29 +161,15 @@ def as_missed(
     return replace(fitted.push, size=fitted.push.size * np.sqrt(factor))
 
 
-def begin(
-    start: Model,
-    prior: NominalPrior,
-    further: Mapping[str, float] | None = None,
-    near: RefinedModel | None = None,
-) -> RefinedModel:
-    """The first model with coefficients that it leaves out, zero as yet, and their prior precision.
-
-    Args:
-        start, prior: the first model, and the prior of its coefficients.
-        further: effects beside those of LEFT_OUT, and their prior standard deviations.
-        near: where to begin; None: at the first model.
-    """
+def begin(start: Model, prior: NominalPrior) -> RefinedModel:
+    """The first model with coefficients that it leaves out, zero as yet, and their prior precision."""
     effects = start.ship.effects
     std = {
         n: size * start.unit(n)
-        for i, size in (LEFT_OUT | dict(further or {})).items()
+        for i, size in LEFT_OUT.items()
         if i in effects
         for n in effects[i].coefficients
         if n.removeprefix("delta_") not in prior.mean
-    } | ({"heading_offset": AXIS} if "heading_offset" in effects else {})
+    } | ({HEADING: effects[HEADING].usual} if HEADING in effects else {})
     precision = np.diag([s**-2.0 for s in std.values()])
-    values = dict.fromkeys(std, 0.0)
-    if near is None:
-        return RefinedModel(start, np.zeros(prior.size), values, precision)
-    return RefinedModel(start, near.offset, {**values, **near.values}, precision)
+    return RefinedModel(start, np.zeros(prior.size), dict.fromkeys(std, 0.0), precision)
