@@ -69,8 +69,8 @@ def nearest_share(own: float, others: Sequence[float], nothing: float) -> float:
         own, others: cross-validated losses with the effect, and with each candidate in its place.
         nothing: that without any.
     """
-    gained = max(nothing - own, np.finfo(float).tiny)
-    return float(np.clip((min(others, default=np.inf) - own) / gained, 0.0, 1.0))
+    left, gained = min(others, default=np.inf) - own, nothing - own
+    return float(np.clip(left / gained, 0.0, 1.0)) if gained > 0.0 else 1.0
 
 
 def credible(own: str, weights: Mapping[str, float]) -> list[str]:

@@ -79,8 +79,8 @@ def calibrated(
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
     It also takes the place of effects than which it is as good. No effect follows from it.
-    Each training run is predicted without it. Where coefficients leave a residual, usual imperfections
-    are in it, and a current, each if that shows beyond chance, and is beyond its own uncertainty. Where
+    Each training run is predicted without it. Where coefficients leave a residual, a current is in it,
+    and usual imperfections, each if that shows beyond chance, and is beyond its own uncertainty. Where
     ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken. Validation runs
     can reject either.
     """
@@ -95,7 +95,7 @@ def calibrated(
     other, first = runs.losses(found if found.effects else start, start)
     (now,) = runs.losses(best.findings)
     left = remains(train, start, best.findings.model)
-    for further in filter(None, (calibrator.imperfections, calibrator.current) if left else ()):
+    for further in filter(None, (calibrator.current, calibrator.imperfections) if left else ()):
         fit = calibrator.plus(best, further)
         (its,) = runs.losses(fit.findings)
         if harm(now, its) and gain(now, its) > 0.0 and _differs(fit, further):

@@ -15,6 +15,7 @@ from .text import Found, against_command, lost, number, offset
 SLOTS = 64  # commands that a delay keeps; a longer one is remembered in coarser steps
 FORGOTTEN = 12.0  # time constants after which e^-12 = 6e-6 of an earlier command is left
 LONGEST = Range(0.0, 60.0)  # s
+DEDUCTION = 0.2  # 1, share of thrust that the hull takes: 0.1 to 0.3 of most ships, by direction
 # s: from a sample or two to the longest that a ship of this size could be steered with.
 TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5)
 
@@ -123,6 +124,7 @@ def _axis_loss(axis: str, way: str, what: str, wording: Wording) -> Effect:
         sign=f"positive: {what} is lost",
         source="(2.39), (7.3)-(7.6)",
         parameters=(parameter(name, "1", f"share of {way} {what} lost", SHARE),),
+        usual=DEDUCTION,
         description=f"{what} lost in {way}",
         wording=wording,
     )

@@ -155,6 +155,9 @@ def test_imperfections_are_those_of_actuators_and_instruments_each_with_its_usua
         "cross_vsp_surge",
         "position_latency",
         "heading_latency",
+        "loss_surge",
+        "loss_sway",
+        "loss_yaw",
     }
     otter = Model(ship=ship_with((), "otter"))
     boat = Begins(Findings(), [], otter, NominalPrior.of(otter, 0.1)).imperfections

@@ -116,8 +116,8 @@ CASE = {
         ({"imperfect": 4.0, "late": True}, "imperfect"),
         ({"imperfect": 4.0}, "still"),  # imperfections that may be none
         ({"imperfect": 4.5, "late": True}, "still"),
-        ({"imperfect": 3.0, "flowing": 1.0, "late": True, "V": (9.0, 9.0)}, "flowing"),
-        ({"imperfect": 3.0, "flowing": 2.5, "late": True, "V": (9.0, 9.0)}, "imperfect"),
+        ({"imperfect": 1.0, "flowing": 3.0, "late": True, "V": (9.0, 9.0)}, "imperfect"),
+        ({"imperfect": 2.5, "flowing": 3.0, "late": True, "V": (9.0, 9.0)}, "flowing"),
         ({"imperfect": 3.0, "late": True, "left": False}, "still"),  # coefficients leave nothing
         ({"flowing": 3.0, "V": (9.0, 9.0), "left": False}, "still"),
         ({"plain": 5.0}, "plain"),  # as good, of fewer coefficients
@@ -188,6 +188,6 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
     chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}), plain)
     known = {"still": still, "imperfect": imperfect, "flowing": flowing, "plain": plain, None: None}
     assert chosen is known[taken]
-    if began:  # a current is added to imperfections that were taken
-        taken_before = case["late"] and case["imperfect"] <= case["still"] - 1.0
-        assert began == [still, imperfect if taken_before else still]
+    if began:  # imperfections are added to a current that was taken
+        flows = any(case["V"]) and case["flowing"] <= case["still"] - 1.0
+        assert began == [still, flowing if flows else still]
