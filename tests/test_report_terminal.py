@@ -329,6 +329,7 @@ def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
     (dead,) = said(deadband=0.3)
     assert "0.3 N" in dead
     assert said(SimpleNamespace(std={"deadband": 0.14}), deadband=0.3) == [dead]
+    assert said(plant_F_vsp=2.0) == [], "a coefficient of the file"
     assert said(SimpleNamespace(std={"deadband": 0.16}), deadband=0.3) == [], "it may be none"
 
 

@@ -96,14 +96,15 @@ def fitted_beside(d: Diagnosis) -> list[str]:
     An angle that matters in no manoeuvre is left out, and what is within its own uncertainty.
     """
     told, learned, std = [], d.learned.model, d.posterior.std
+    nominal = d.start.ship.coefficients
     for effect in d.start.ship.effects.values():
-        values = {n: learned.value(n) for n in effect.coefficients}
+        values = {n: learned.value(n) for n in effect.coefficients if n not in nominal}
         known = any(
             is_fitted(d, n)
             and abs(x) >= max(TIE * std.get(n, 0.0), LEAST if unit(effect, n) == "rad" else 0.0)
             for n, x in values.items()
         )
-        if effect.kind in ("actuator", "measurement", "environment") and known:
+        if effect.kind != "force" and known:
             told.append(sentence(Found(effect, values, d.speeds)))
     return told
 

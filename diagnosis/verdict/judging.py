@@ -126,8 +126,8 @@ def beside(learned: Findings) -> list[str]:
     if at is None or learned.effects:
         return []
     others = {n for n in at.values if n != HEADING}
-    effects = at.start.ship.effects.values()
-    return [e.id for e in effects if e.kind != "force" and others.intersection(e.coefficients)]
+    effects = [e for e in at.start.ship.effects.values() if e.usual or e.kind == "environment"]
+    return [e.id for e in effects if others.intersection(e.coefficients)]
 
 
 def judge(
