@@ -748,8 +748,13 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(sear
     for name, value in (("any_sure", False), ("needless", True), ("predicts_worse", False)):
         monkeypatch.setattr(judging, name, lambda *_, value=value: value)
 
-    def seen(other):
-        monkeypatch.setattr(judging, "better_calibration", lambda *_: other)
+    def seen(other, than_effects=None):
+        """With a calibration that takes the place of the initial model, and with one of the effects."""
+        monkeypatch.setattr(
+            judging,
+            "better_calibration",
+            lambda _, now, *more: other if now is session.start else than_effects,
+        )
         decided, _ = judge(
             found, data, session.known, session.harms, OPERATING, True, calibration, silent
         )
@@ -758,10 +763,13 @@ def test_what_takes_the_place_of_effects_keeps_the_candidates_of_the_search(sear
         assert decided.learned.ranking == found.ranking != []
         return decided
 
-    coefficients, nothing = seen(calibration), seen(None)
+    coefficients, nothing = seen(None, calibration), seen(None)
     assert (coefficients.refitted, nothing.refitted) == (True, False)
     assert (coefficients.changed, nothing.changed) == (True, False)
     assert nothing.learned.model == session.start
+    in_place_of_nothing = seen(calibration)
+    assert in_place_of_nothing.refitted
+    assert in_place_of_nothing.learned.model is coefficients.learned.model
 
 
 @pytest.mark.parametrize("calibrates", [True, False])

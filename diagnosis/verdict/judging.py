@@ -247,6 +247,9 @@ def _coefficients_alone(
 ) -> _Fitted | None:
     """The calibrated model, or the initial one, that takes the place of effects; None: these stay.
 
+    Of effects that do not stay the calibrated model has the place where it predicts better than the
+    initial one, even if it fits the data less than these effects do.
+
     Args:
         end: the end of the search.
         learned: its findings with their confidence.
@@ -263,11 +266,14 @@ def _coefficients_alone(
         other = better_calibration(calibration, now, data, drives, unshown, believed, gained)
     if other is not None:
         return _Fitted(other, data, True, True)
+    if not found.effects:
+        return None
     idle = needless(found, unshown) and not predicts_worse(*data.losses(data.start, end.predicting))
     if not idle and (any(map(is_finding, learned.effects)) or not spoils(found, data)):
         return None
     nothing = replace(found, effects=[], model=data.start, suspects=[], moved={})
-    return _Fitted(to_predictions(nothing, data.train, prior, False), data, False, False)
+    initial = _Fitted(to_predictions(nothing, data.train, prior, False), data, False, False)
+    return _coefficients_alone(initial, nothing, calibration, prior, drives, None, ()) or initial
 
 
 class _FindingsInDoubt(NamedTuple):
