@@ -25,7 +25,7 @@ from diagnosis.report.headline import (
 )
 from diagnosis.report.pictures import figures, tracks
 from diagnosis.report.pictures.chart import Chart, Panel
-from diagnosis.report.reported_effect import fitted_beside
+from diagnosis.report.reported_effect import fitted_beside, within_range
 from diagnosis.report.terminal import as_text, show_calibration, show_comparison, show_diagnosis, summary
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.measured_channels import UNUSED
@@ -331,6 +331,20 @@ def test_what_a_calibrated_model_has_of_water_and_compass_is_said():
     assert said(SimpleNamespace(std={"deadband": 0.14}), deadband=0.3) == [dead]
     assert said(plant_F_vsp=2.0) == [], "a coefficient of the file"
     assert said(SimpleNamespace(std={"deadband": 0.16}), deadband=0.3) == [], "it may be none"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "ends", "shown"),
+    [
+        ("position_tracker", 0.07, (-6.4, 6.6), (0.0, 3.0)),
+        ("position_tracker", 0.07, (0.05, 0.09), (0.05, 0.09)),
+        ("position_tracker", -0.1, (-0.2, 0.3), (-0.1, 0.3)),
+        ("delta_X_u", 1.0, (-99.0, 99.0), (-99.0, 99.0)),
+        ("bow_outage_end_1@run", 5.0, (-1.0, 6.0), (0.0, 6.0)),
+    ],
+)
+def test_an_interval_ends_where_its_parameter_cannot_be(name, value, ends, shown):
+    assert within_range(Model(), name, value, *ends) == shown
 
 
 def test_without_a_gain_nothing_is_said_of_it():

@@ -114,6 +114,16 @@ def is_fitted(d: Diagnosis, name: str) -> bool:
     return d.learned.model.value(name) != d.start.value(name)
 
 
+def within_range(start: Model, name: str, value: float, low: float, high: float) -> tuple[float, float]:
+    """The part of an interval about a value in which its parameter may be."""
+    limits = start.declared(name).range
+    if limits.min is not None:
+        low = max(low, min(limits.min, value))
+    if limits.max is not None:
+        high = min(high, max(limits.max, value))
+    return low, high
+
+
 def _reported(
     d: Diagnosis, f: Finding, share: float, unique: float | None, in_model: bool
 ) -> ReportedEffect:
@@ -122,7 +132,10 @@ def _reported(
     # Of a coefficient the addition counts, of any other parameter of the effect its value.
     present = {n: 0.0 if n in effect.coefficients else d.start.value(n) for n in f.values}
     values = {n: x + present[n] for n, x in f.values.items()}
-    ci95 = {n: (low + present[n], high + present[n]) for n, (low, high) in f.ci95.items()}
+    ci95 = {
+        n: within_range(d.start, n, values[n], low + present[n], high + present[n])
+        for n, (low, high) in f.ci95.items()
+    }
     coefficients = {
         _plain(n, f): ReportedCoefficient(
             x, unit(effect, n), ci95.get(n), parameter_and_run(n)[1] or None
