@@ -78,11 +78,11 @@ def calibrated(
 ) -> RefitOutcome | None:
     """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
 
-    It also takes the place of effects than which it is as good. No effect follows from it.
-    Each training run is predicted without it. Where coefficients leave a residual, a current is in it,
-    and usual imperfections, each if that shows beyond chance, and is beyond its own uncertainty. Where
-    ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken. Validation runs
-    can reject either.
+    It also takes the place of effects than which it is as good, or predicts better. No effect follows
+    from it. Each training run is predicted without it. Where coefficients leave a residual, a current is
+    in it, and usual imperfections, each if that shows beyond chance, and is beyond its own uncertainty.
+    Where ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken. Validation
+    runs can reject either.
     """
     train, start = data.train, data.start
     if len(train) < WHOLE_RUNS or not any(prior.std.values()):
@@ -103,7 +103,10 @@ def calibrated(
     if coefficients is not None:
         (plain,) = runs.losses(coefficients.findings)
         best, now = (coefficients, plain) if as_good(plain, now) else (best, now)
-    better = as_good(now, other) if found.effects else gain(other, now) > 0.0
+    if found.effects:
+        better = as_good(now, other) or predicts_better(now, other)
+    else:
+        better = gain(other, now) > 0.0
     if harm(now, first) or not better:
         return None
     its, others = data.losses(best.findings.model, start)

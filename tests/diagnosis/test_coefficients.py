@@ -86,6 +86,7 @@ CASE = {
     "flowing": 5.0,
     "late": False,
     "left": True,
+    "better": False,
     "plain": None,
     "V": (0.0, 0.0),
     "validate": [],
@@ -107,6 +108,9 @@ CASE = {
         ({"still": 11.5}, None),
         ({"effects": [effect()], "found": 5.0}, "still"),  # it is as good as the effects
         ({"effects": [effect()], "found": 4.9}, None),
+        ({"effects": [effect()], "found": 4.9, "better": True}, "still"),  # of the predictions alone
+        ({"effects": [effect()], "found": 4.9, "first": 3.5, "better": True}, None),
+        ({"still": 10.0, "better": True}, None),
         ({"effects": [effect()], "first": 3.5}, None),  # worse than the first
         ({"flowing": 3.0, "V": (9.0, 9.0)}, "flowing"),
         ({"flowing": 3.0}, "still"),  # a current that may be none
@@ -172,6 +176,7 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
         imperfections={"X_u": 0.2},
         current=dict.fromkeys(WATER, 0.05),
     )
+    monkeypatch.setattr(coefficients, "predicts_better", lambda its, other: case["better"])
     monkeypatch.setattr(coefficients, "ValidationData", Runs)
     monkeypatch.setattr(coefficients, "Calibrator", lambda *_: calibrator)
     monkeypatch.setattr(
