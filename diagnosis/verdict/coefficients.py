@@ -81,8 +81,8 @@ def calibrated(
     It also takes the place of effects than which it is as good, or predicts better. No effect follows
     from it. Each training run is predicted without it. Where coefficients leave a residual, a current is
     in it, and usual imperfections, each if that shows beyond chance, and is beyond its own uncertainty.
-    Where ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken. Validation
-    runs can reject either.
+    Where ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken.
+    Validation runs can reject either.
     """
     train, start = data.train, data.start
     if len(train) < WHOLE_RUNS or not any(prior.std.values()):
