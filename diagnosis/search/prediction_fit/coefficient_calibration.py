@@ -98,7 +98,7 @@ class Calibrator:
         """What every ship has to some degree: parameter -> prior standard deviation."""
         effects = self.start.ship.effects.values()
         usual = {n: e.usual for e in effects if e.usual for n in e.coefficients}
-        return {n: std for n, std in usual.items() if n != HEADING}
+        return {n: std for n, std in usual.items() if n != HEADING and n not in self.prior.mean}
 
     @property
     def current(self) -> dict[str, float]:
