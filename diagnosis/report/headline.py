@@ -234,7 +234,7 @@ def headline(r: ReportData) -> str:
         far = [f"{name} by {number(z, 2)}" for name, z in moved.items() if abs(z) > FAR_OFF]
         if far and d.refitted and not d.remainder.significant:
             return FAR.format(far=FAR_OFF, names=listed(far, "and"))
-        beyond = "" if d.refitted or not far else BEYOND.format(far=FAR_OFF, names=listed(far, "and"))
+        beyond = BEYOND.format(far=FAR_OFF, names=listed(far, "and")) if far else ""
         beside = fitted_beside(d) if d.calibrated else []
         further = BESIDE.format(" ".join(beside)) if beside else ""
         known = (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
