@@ -309,6 +309,8 @@ def test_a_calibrated_model_says_that_it_is_another_calibration():
     shown = " ".join(lines(show_diagnosis(calibrated, "out")))
     assert OTHER_CALIBRATION in shown
     assert OTHER_FIT not in shown
+    assert "N_r: in the learned model -2.35" in shown
+    assert "N_r: probably" not in shown
 
 
 def test_what_a_calibrated_model_has_of_water_and_compass_is_said():

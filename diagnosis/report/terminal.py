@@ -85,8 +85,9 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     if d.withdrawn:
         yield from _lines("Rejected", [f"{w.id}: {w.reason}" for w in d.withdrawn])
     if d.learned.suspects:
+        is_value = "in the learned model" if d.calibrated else "probably"
         suspects = [
-            f"{s.name}: probably {_number(s.value)} ({_number(s.z, 2)} standard deviations of "
+            f"{s.name}: {is_value} {_number(s.value)} ({_number(s.z, 2)} standard deviations of "
             f"the prior){WEIGH * (s.name == 'm')}"
             for s in d.learned.suspects
         ]

@@ -201,8 +201,6 @@ def judge(
         end.fit.posterior,
         end.fit.unrecorded,
     )
-    if decided.calibrated:  # its coefficients stand for what is missing
-        decided = replace(decided, learned=replace(decided.learned, suspects=[]))
     return decided, gain
 
 
