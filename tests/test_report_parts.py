@@ -193,6 +193,7 @@ def test_headline_of_each_verdict():
             start=start,
             learned=SimpleNamespace(model=model, moved=dict(moved)),
             refitted=calibrated,
+            speeds=(0.4, 0.1, 0.2),
             posterior=SimpleNamespace(std=dict.fromkeys(["m", "body_bias_N", *(shared or {})], 0.1)),
         )
         return headline.headline(report_data(None, d, [], possibilities, suspects=dict(suspects)))
@@ -210,7 +211,13 @@ def test_headline_of_each_verdict():
     beyond = said("unexplained", calibrated=True, left=False, moved=far)
     assert "explain these data" in beyond
     assert "X_u by −3.2 and N_r by 5." in beyond
-    assert said("unexplained", calibrated=True, moved=far) == headline.UNEXPLAINED + headline.CALIBRATED
+    known = headline.UNEXPLAINED + headline.CALIBRATED
+    limit = headline.BEYOND.format(far=3.0, names="X_u by −3.2 and N_r by 5")
+    assert said("unexplained", calibrated=True, moved=far) == known + limit
+    assert said("unexplained", calibrated=True, moved=near) == known
+    late = said("unexplained", calibrated=True, left=False, moved=far, shared={"position_latency": 0.4})
+    assert late.startswith(beyond)
+    assert late.endswith("without claiming a cause: The position is 0.4 s older than its time stamp.")
     assert said("unexplained", left=False, moved=far) == headline.NOT_BELIEVED
     doubted = said("unexplained", [effect("lag", 0.1)], left=False, moved=far)
     assert doubted.startswith(headline.NOT_BELIEVED)

@@ -232,11 +232,11 @@ def headline(r: ReportData) -> str:
         remains = d.remainder.significant and not r.possibilities
         moved = d.learned.moved if d.refitted or r.possibilities else {}
         far = [f"{name} by {number(z, 2)}" for name, z in moved.items() if abs(z) > FAR_OFF]
-        if far and d.refitted and not d.remainder.significant:
-            return FAR.format(far=FAR_OFF, names=listed(far, "and"))
-        beyond = BEYOND.format(far=FAR_OFF, names=listed(far, "and")) if far else ""
         beside = fitted_beside(d) if d.calibrated else []
         further = BESIDE.format(" ".join(beside)) if beside else ""
+        if far and d.refitted and not d.remainder.significant:
+            return FAR.format(far=FAR_OFF, names=listed(far, "and")) + further
+        beyond = BEYOND.format(far=FAR_OFF, names=listed(far, "and")) if far else ""
         known = (UNEXPLAINED if remains else NOT_BELIEVED) + CALIBRATED * d.calibrated
         return known + further + beyond
     return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
