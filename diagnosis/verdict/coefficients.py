@@ -92,8 +92,7 @@ def calibrated(
     if not remains(train, start, start) or not calibrator.windows:
         return None
     best = calibrator.still()
-    other, first = runs.losses(found if found.effects else start, start)
-    (now,) = runs.losses(best.findings)
+    now, other, first = runs.losses(best.findings, found if found.effects else start, start)
     left = remains(train, start, best.findings.model)
     for further in filter(None, (calibrator.current, calibrator.imperfections) if left else ()):
         fit = calibrator.plus(best, further)

@@ -107,27 +107,27 @@ def is_finding(f: Finding) -> bool:
 def verdict_name(learned: Findings, refitted: bool, remainder: Remainder) -> VerdictName:
     """The verdict in a word, by the one rule that JSON, terminal and page follow.
 
-    Coefficients explain the data if the learned model has no imperfection and no current besides.
+    Coefficients explain the data if the learned model has no imperfection and no current in addition.
     """
     first = next(filter(is_finding, learned.effects), None)
     if first is not None:
         return "found" if first.confidence >= FOUND else "ambiguous"
-    if refitted and learned.plausible and not remainder.significant and not beside(learned):
+    if refitted and learned.plausible and not remainder.significant and not has_more(learned):
         return "coefficients"
     return "unexplained" if remainder.significant or learned.effects or refitted else "none"
 
 
-def beside(learned: Findings) -> list[str]:
-    """Ids of the effects that a calibrated model has in addition to coefficients; it claims none.
+def has_more(learned: Findings) -> bool:
+    """Whether a calibrated model has imperfections or a current in addition to coefficients.
 
     The axis of the heading is part of what the coefficients are relative to.
     """
     at = learned.estimate
     if at is None or learned.effects:
-        return []
-    others = {n for n in at.values if n != HEADING}
-    effects = [e for e in at.start.ship.effects.values() if e.usual or e.kind == "environment"]
-    return [e.id for e in effects if others.intersection(e.coefficients)]
+        return False
+    others = at.values.keys() - {HEADING}
+    effects = at.start.ship.effects.values()
+    return any(others & {*e.coefficients} for e in effects if e.usual or e.kind == "environment")
 
 
 def judge(

@@ -354,7 +354,8 @@ def effect(
         DeclarationError: unknown kind, axis or field, or a parameter without unit, description or start.
     """
     further = {"gives", "needs", "apart", "usual", "memory", "search", "wording"}
-    unknown = set(more) - further - {"parameters", "description"}
+    further |= {"parameters", "description"}
+    unknown = set(more) - further
     if unknown:
         raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
 
