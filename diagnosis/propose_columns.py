@@ -83,8 +83,17 @@ def _seen(path: Path, run: "Run", craft: "Ship", anyway: bool, advance: Advance)
         f"'{path}': {s.counts.samples} samples in {_seconds(s):.4g} s, one each "
         f"{s.track.period:.3g} s; {s.counts.frozen} frozen, {s.counts.dropped} dropped, "
         f"{s.counts.spikes} spikes",
-        *s.track.notes,
+        *_found_in(s),
     ]
+
+
+def _found_in(s: "Smoothed") -> Iterator[str]:
+    """What is found in a measurement: by the pose and the commands, and by redundant channels."""
+    from .runs import sensor_lines
+
+    yield from s.notes
+    if s.sensors is not None:
+        yield from sensor_lines(s.sensors.findings)
 
 
 def _of_folder(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Done:
@@ -137,7 +146,7 @@ def _tabulated(
     from .report.terminal import channel_table, plain_table
     from .runs import channels_of
 
-    table, refused, channels = plain_table("file", "time", "every", *HEADS), [], []
+    table, lines, channels = plain_table("file", "time", "every", *HEADS), [], []
     for path in paths:
         cells = ["-"] * (2 + len(HEADS))
         try:
@@ -145,10 +154,11 @@ def _tabulated(
                 s = _smoothed(runs[path], craft, anyway, advance)
                 cells = [f"{_seconds(s):.4g} s", f"{s.track.period:.3g} s", *map(str, s.counts)]
                 channels.append((s.track.run.name, [*channels_of(s)]))
+                lines += [f"{s.track.run.name}: {line}" for line in _found_in(s)]
         except InputError as error:
-            refused.append(f"not usable yet: {error}")
+            lines.append(f"not usable yet: {error}")
         table.add_row(Text(printable(path.name)), *cells)
-    return [table, *channel_table(channels), *map(printable, refused)]
+    return [table, *channel_table(channels), *map(printable, lines)]
 
 
 def _refuse_there(options: argparse.Namespace, target: Path, there: "Layout | None") -> None:

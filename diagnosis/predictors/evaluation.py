@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -146,6 +147,11 @@ class Evaluation(ShortRepr):
     def held_out(self) -> bool:
         """Whether nothing was learned from the run, and nothing decided by it."""
         return self.use == "test"
+
+    @cached_property
+    def constant_velocities(self) -> WindowErrors | None:
+        """Errors of a ship that keeps its velocities; None without a window."""
+        return None if self.windows is None else self.windows.errors_at_constant_velocities()
 
     @property
     def smoothed(self) -> Smoothed:

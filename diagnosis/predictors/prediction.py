@@ -132,6 +132,24 @@ def at_rest(smoothed: Smoothed) -> bool:
     return bool((np.abs(smoothed.nu[first]) < still).all())
 
 
+def at_constant_velocities(starts: WindowStarts) -> np.ndarray:
+    """The pose of a ship that keeps its surge, sway and yaw rate: an arc of a circle, by no model.
+
+    Args:
+        starts: where to begin.
+
+    Returns:
+        (steps + 1, 3, 1, w), pose at each step [m, m, rad].
+    """
+    (x, y, psi), (x_dot, y_dot, r) = starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot)
+    t = starts.h * np.arange(starts.steps + 1)[:, None]
+    half = 0.5 * r * t
+    chord = t * np.sinc(half / np.pi)
+    ahead, aside = chord * np.cos(half), chord * np.sin(half)
+    place = x + x_dot * ahead - y_dot * aside, y + x_dot * aside + y_dot * ahead
+    return np.stack([*place, psi + r * t], axis=1)[:, :, None]
+
+
 def predict(starts: WindowStarts, model: Model) -> np.ndarray:
     """The measured pose as a model predicts it.
 

@@ -18,7 +18,7 @@ from fmus.ops import wrap
 from ..execution.short_text import ShortRepr
 from ..runs import Smoothed
 from ..runs.cleaning import BRIEF
-from .prediction import WindowStarts, by_measurement, predict, predict_each
+from .prediction import WindowStarts, at_constant_velocities, by_measurement, predict, predict_each
 from .ship_model import Model
 from .thrust import LONGEST_STEP
 from .uncertainty import NOISE_TOLERANCE
@@ -194,6 +194,10 @@ class Windows:
     def errors(self, model: Model | None = None) -> WindowErrors:
         """The window prediction error of a model, argument as of :meth:`residuals`."""
         return self.summary(self.residuals(model))
+
+    def errors_at_constant_velocities(self) -> WindowErrors:
+        """The window prediction error of a ship that keeps its velocities."""
+        return self.summary(self.residuals_by(at_constant_velocities)[0])
 
     def summary(self, residuals: np.ndarray) -> WindowErrors:
         """Root mean squares by window of the result (..., samples, 3) of :meth:`residuals`."""

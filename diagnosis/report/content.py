@@ -27,6 +27,7 @@ from .headline import (
     gain_of_calibration,
     gain_of_search,
     reading_of_commands,
+    worse_than_constant_velocities,
 )
 from .report_data import ReportData, seconds
 
@@ -47,6 +48,7 @@ STABILITY = (
 )
 CHANGE = "before after difference standard_error"
 UNRECORDED = "size=push.size time=push.time values=differing stretches sentence"
+BOTH = ("position", "heading")
 ERRORS = {
     "window_position_rmse": "position",
     "window_heading_rmse": "heading",
@@ -123,6 +125,7 @@ def file_content(r: ReportData) -> Content:
         "windows": {"prediction": prediction, "model_error": model_error},
         "sensors": [s for e in r.evaluations for s in sensor_results(e)],
         "errors": [*_errors(r)],
+        "constant_velocities": " ".join(worse_than_constant_velocities(r)),
         "where": _where(r.comparison.before),
     }
     names, fmu = [e.name for e in r.evaluations], fmu_result(r.comparison)
@@ -280,7 +283,9 @@ def _errors(r: ReportData) -> Iterator[dict[str, Any]]:
         rms = {name: part(e, f"before=before.{of} after=after.{of}") for name, of in ERRORS.items()}
         outputs = {name: {"rms_before": b, "rms_after": a} for name, (b, a) in measured.items()}
         coverage = None if e.bands is None else e.bands.coverage(e.after.residuals)
-        rest = {"measured": outputs, "coverage_90": coverage, "trial": trial}
+        steady = e.constant_velocities and dict(zip(BOTH, e.constant_velocities.over_all(), strict=True))
+        simplest = {"constant_velocities": steady}
+        rest = simplest | {"measured": outputs, "coverage_90": coverage, "trial": trial}
         yield {"run": e.name, "held_out": e.held_out} | use | rms | rest
 
 

@@ -9,6 +9,7 @@ from fmus.effects.force import CHANGES
 
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
+from ..predictors.uncertainty import NOISE_TOLERANCE
 from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
 from ..search.significance import lower_throughout
 from ..session import CalibratedModel, Diagnosis
@@ -64,6 +65,8 @@ FAR = (
     "deviations of their priors: {names}. Either these priors are wrong, or an effect acts like a "
     "change of them."
 )
+# Name of an error of prediction, the unit that it is shown in, and the factor to it.
+OF_BOTH = (("position", "mm", 1e3), ("heading", "°", degrees(1.0)))
 VERDICTS = {
     "found": "An effect is missing and was identified",
     "ambiguous": "An effect is missing, and several candidates explain it",
@@ -113,10 +116,8 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
     if gain is None:
         return []
     parts, worse = [], []
-    for name, unit, factor, change in (
-        ("position", "mm", 1e3, gain.position),
-        ("heading", "°", degrees(1.0), gain.heading),
-    ):
+    for name, unit, factor in OF_BOTH:
+        change = getattr(gain, name)
         errors = " → ".join(number(x, 3, factor) for x in (change.before, change.after))
         way = "falls" if change.difference >= 0.0 else "rises"
         by, std = (number(abs(x), 2, factor**2) for x in (change.difference, change.standard_error))
@@ -150,11 +151,10 @@ def contradicted_by_tests(r: ReportData) -> Iterator[str]:
     A run may be predicted worse than by the initial model, beyond chance. Or it may be predicted so much
     worse than all others that the difference is no chance: by more than three times.
     """
-    of_both = (("position", "mm", 1e3), ("heading", "°", degrees(1.0)))
     others = [e.after for e in r.evaluations if not e.held_out]
     for e in (e for e in r.evaluations if e.held_out and e.after.errors is not None):
         worse, far = [], []
-        for name, unit, factor in of_both:
+        for name, unit, factor in OF_BOTH:
             before, after = getattr(e.before, name), getattr(e.after, name)
             first, its = (np.square(getattr(of.errors, name)) for of in (e.before, e.after))
             if r.learned and lower_throughout(first, its):
@@ -172,6 +172,27 @@ def contradicted_by_tests(r: ReportData) -> Iterator[str]:
             yield (
                 f"The test run {e.name} is predicted worse than all other runs ({', '.join(far)}): "
                 "something acts in it that the others do not show, or it is another manoeuvre."
+            )
+
+
+def worse_than_constant_velocities(r: ReportData) -> Iterator[str]:
+    """Runs that constant velocities predict better than the model, beyond noise, a sentence each."""
+    for e in r.evaluations:
+        steady, own = e.constant_velocities, e.after.errors
+        if steady is None or own is None:
+            continue
+        worse = []
+        for k, (name, unit, factor) in enumerate(OF_BOTH):
+            its, others = (float(of.over_all()[k]) for of in (own, steady))
+            squares = (np.square(getattr(of, name)) for of in (steady, own))
+            if its > NOISE_TOLERANCE * others and lower_throughout(*squares):
+                shown = (number(x, 2, factor) for x in (its, others))
+                worse.append(f"{name} {' against '.join(shown)} {unit}")
+        if worse:
+            yield (
+                f"The {'learned ' if r.learned else ''}model predicts {r.called(e)} worse than constant "
+                f"velocities do: {listed(worse, 'and')}. If that is unexpected, check the ship and the "
+                "units, signs and columns of the file."
             )
 
 

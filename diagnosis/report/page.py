@@ -24,6 +24,7 @@ from .headline import (
     first_sentences,
     gain_of_search,
     page_title,
+    worse_than_constant_velocities,
 )
 from .pictures import figures, tracks
 from .pictures.chart import data_uri, themed
@@ -100,7 +101,7 @@ def write_report(
         title=page_title(data, date.today().isoformat()),
         sentence=first_sentences(data),
         gain=gain_of_search(data),
-        against=[*contradicted_by_tests(data)],
+        against=[*contradicted_by_tests(data), *worse_than_constant_velocities(data)],
         pictures=drawn,
         of_runs=of_runs,
         changes=[error_changes(data, k) for k in range(len(data.evaluations))],

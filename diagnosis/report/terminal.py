@@ -25,6 +25,7 @@ from .headline import (
     reading_of_commands,
     surest_first,
     verdict_title,
+    worse_than_constant_velocities,
 )
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
@@ -235,6 +236,8 @@ def _errors(r: ReportData) -> Iterator[RenderableType]:
     ):
         if table.row_count:
             yield from _titled(f"{title}{when}", table)
+    if simpler := [*worse_than_constant_velocities(r)]:
+        yield from _lines("Constant velocities", map(_plain, simpler))
     if against := [*contradicted_by_tests(r)]:
         yield from _lines("Test runs", map(_plain, against))
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import pinvh
 
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE
@@ -175,6 +176,8 @@ def blocked_fit(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Least squares where errors last, and the standard deviation by the jackknife over the run's parts.
 
+    It is no less than that by the noise of what is left, as if this were white.
+
     Args:
         columns: (d n, k), what one unit of each unknown gives.
         right: (d n,), d quantities one after the other.
@@ -192,4 +195,5 @@ def blocked_fit(
     value = solved(np.ones(right.size, bool))
     parts = np.array([solved(block != k) for k in range(FEWEST)])
     std = np.sqrt((FEWEST - 1) / FEWEST * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
-    return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
+    left = noise((right - columns @ value)[:, None])[0]
+    return value, np.maximum(std, left * np.sqrt(np.diag(pinvh(columns.T @ columns))))
