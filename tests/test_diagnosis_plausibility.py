@@ -45,6 +45,7 @@ from diagnosis.assessment.readings import (
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
+from diagnosis.runs import line_beside
 from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
 from fmus.signals import Force
 
@@ -533,6 +534,67 @@ def test_all_angles_may_have_the_wrong_sign(name, angles):
     assert [len(r.changes) for r in found] == [angles] * bool(angles)
 
 
+def read_as(ship, commands, mistake):
+    """Commands (k,) of a ship as a reading of them means them; None: there is none."""
+    run = replace(base(), ship=ship.description, signals=tuple(ship.commands))
+    run = replace(run, commands=np.tile(np.array(commands), (run.time.size, 1)))
+    found = [r for r in readings(run, Model(ship=ship)) if r.mistake.startswith(mistake)]
+    assert len(found) <= 1
+    return (run.commands @ found[0].commands.T + found[0].added)[0] if found else None
+
+
+def test_angles_may_count_from_elsewhere():
+    tanker, vessel = ship_with((), "kvlcc2"), ship_with((), "gunnerus")
+    limit = 0.62
+    for way, sign in (("port", 1.0), ("starboard", -1.0)):
+        mistake = f"rudder.delta counts from hard over to {way}"
+        for share in (0.0, 0.3, 1.0):
+            meant = read_as(tanker, [9.0, (1.0 + share) * limit], mistake)
+            np.testing.assert_allclose(meant, [9.0, sign * share * limit], atol=1e-12)
+        assert read_as(tanker, [9.0, -0.1], mistake) is None
+    assert read_as(tanker, [9.0, 0.1], "rudder.delta points the other way") is None
+    meant = read_as(vessel, [0.3, 2.0], "azimuth.alpha points the other way")
+    np.testing.assert_allclose(meant, [0.3 + np.pi, 2.0])
+    assert read_as(vessel, [0.3, 2.0], "azimuth.alpha counts from hard over") is None
+
+
+def test_what_may_be_dead_of_commands_that_are_meant_otherwise():
+    """Of an angle that counts from elsewhere the whole actuator, of another mistake the command alone."""
+    names = ("a.alpha", "a.n", "b.n")
+    flipped_angle = of_commands("", (-1.0, 1.0, 1.0), names)
+    turned = replace(of_commands("", (1.0, 1.0, 1.0), names), added=np.array([np.pi, 0.0, 0.0]))
+    for reading, kept in ((flipped_angle, [0.0, 1.0, 1.0]), (turned, [0.0, 0.0, 1.0])):
+        np.testing.assert_array_equal(reading.dead(names).commands, np.diag(kept))
+        assert reading.dead(names).added == 0.0
+    assert of_pose("", (1.0, -1.0, 1.0)).dead(names) is None
+
+
+@pytest.mark.parametrize("way", in_part(["port", "starboard"], keep=["port"]))
+def test_a_rudder_that_counts_from_hard_over_is_told_in_the_unit_of_its_column(way, tmp_path):
+    ship = ship_with((), "kvlcc2")
+    orders = ((9.0, delta) for delta in cycle([0.3] * 400 + [-0.3] * 300 + [0.1] * 200 + [-0.2] * 400))
+    nothing = causes(ship)["none"]
+    table = sail_of(ship, nothing, np.random.default_rng(0), None, orders, seconds=120.0)
+    right, limit = np.degrees(table["rudder.delta"]), np.degrees(0.62)
+    table["rudder.delta"] = right + limit if way == "port" else limit - right
+    path = tmp_path / "a.csv"
+    table.to_csv(path, index=False)
+    unit = {"columns": {"rudder.delta": {"name": "rudder.delta", "unit": "deg"}}}
+    (tmp_path / "a.csv.json").write_text(json.dumps(unit))
+    (w,) = diagnosis.gather([path], anyway=True, model=Model(ship=ship))
+    found = likeliest_mistake(w, Model(ship=ship))
+    assert found is not None
+    assert found.readings[0].mistake == f"rudder.delta counts from hard over to {way}"
+    line = line_beside(path, w.run.layout, found.readings[0].changes)
+    told = json.loads(re.search(r"put (\{.*\}) into", line)[1])["columns"]["rudder.delta"]
+    assert told["unit"] == "deg"
+    assert told["offset"] == pytest.approx(-limit if way == "port" else limit, abs=0.01)
+    assert told.get("flip", False) == (way == "starboard")
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"rudder.delta": told}}))
+    (mended,) = diagnosis.gather([path], model=Model(ship=ship))
+    np.testing.assert_allclose(mended.run.commanded["rudder.delta"], np.radians(right), atol=1e-3)
+
+
 @pytest.mark.parametrize("rudder", [0.3, 0.0])
 def test_a_rudder_that_goes_to_and_fro_at_one_shaft_speed_varies(rudder):
     """At rest it gives no force: a zig-zag has constant commands of force."""
@@ -581,6 +643,26 @@ def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
     (line,) = found.smoothed.doubted
     assert line.startswith("perhaps tau_Y has the wrong sign (odds 10^2 : 1); if so, put {")
     assert line in found.smoothed.notes
+
+
+def test_what_is_found_in_a_file_is_told_with_its_side_car(monkeypatch, tmp_path):
+    """Of one file and of several: likely mistakes, and faults that redundant channels show."""
+    feet = Mistake([Reading("y is in ft", {"y": Named(name="y", factor=0.3048)})], 5.0, sure=False)
+    table = otter()
+    r = np.gradient(np.unwrap(table["psi"]), table["time"])
+    for name, turning in (("a", r), ("b", -r)):
+        table.assign(r=turning).to_csv(tmp_path / f"{name}.csv", index=False)
+    ship = ("--ship", "otter")
+    clean = command(propose_columns.main, tmp_path / "a.csv", *ship).stdout
+    monkeypatch.setattr(plausibility, "likeliest_mistake", lambda *_: feet)
+    for files in (["b.csv"], ["a.csv", "b.csv"]):
+        done = command(propose_columns.main, *(tmp_path / name for name in files), *ship)
+        said = " ".join(done.stdout.split())
+        assert done.returncode == 0
+        assert said.count("perhaps y is in ft (odds 10^2 : 1); if so, put {") == len(files)
+        assert said.count("its sign is reversed") == 1
+    assert "perhaps" not in clean
+    assert "reversed" not in clean
 
 
 @pytest.mark.parametrize(("factor", "refused"), [(1.0, True), (0.1, False)])

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from support.cases import in_part
 from support.closed_form import Allocation, allocate
 from support.cse1 import ASIDE, FIVE, THRUSTERS
@@ -14,6 +15,7 @@ from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, read
 from diagnosis.predictors import DescribedShip, omega, weak_windows
+from diagnosis.predictors.prediction import at_constant_velocities
 from diagnosis.predictors.ship_model import SampledForce, parameters
 from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.predictors.weak_form import HORIZON
@@ -91,6 +93,38 @@ def test_hidden_drag_is_seen_through_noise():
 
 
 @pytest.mark.numerical
+def test_constant_velocities_are_an_arc():
+    """By the exponential of the twist, and by a ship that keeps its velocities indeed."""
+    ((starts, _),) = windows_of(base()).groups
+    found = at_constant_velocities(starts)[:, :, 0]
+    for k, ((smoothed_run, rows),) in enumerate([starts.runs] * 3):
+        x, y, psi = smoothed_run.eta[rows[k]]
+        u, v, r = smoothed_run.nu[rows[k]]
+        c, s = np.cos(psi), np.sin(psi)
+        first = np.array([[c, -s, x], [s, c, y], [0.0, 0.0, 1.0]])
+        twist = np.array([[0.0, -r, u], [r, 0.0, v], [0.0, 0.0, 0.0]])
+        for step in (0, 1, starts.steps):
+            there = first @ expm(starts.h * step * twist)
+            np.testing.assert_allclose(found[step, :2, k], there[:2, 2], atol=1e-9)
+            assert found[step, 2, k] == pytest.approx(psi + r * starts.h * step)
+
+
+@pytest.mark.parametrize("r", [0.0, 0.15])
+def test_a_ship_in_a_steady_turn_keeps_its_velocities_and_one_that_manoeuvres_does_not(r):
+    run = base()
+    psi = r * run.time
+    x = 0.3 * run.time * np.sinc(psi / np.pi)
+    y = 0.3 * run.time * np.sinc(0.5 * psi / np.pi) * np.sin(0.5 * psi)
+    noise = np.array(NOISE) * np.random.default_rng(0).standard_normal((run.time.size, 3))
+    steady = windows_of(replace(run, pose=np.column_stack([x, y, psi]) + noise))
+    position, heading = map(float, steady.errors_at_constant_velocities().over_all())
+    assert position < POSITION
+    assert heading < HEADING
+    sailed = windows_of(run).errors_at_constant_velocities().over_all()
+    assert sailed[0] > 10.0 * POSITION
+    assert sailed[1] > 10.0 * HEADING
+
+
 def test_several_models_at_once_are_each_one_alone():
     drag, lag = np.array([[-4.0], [0.0], [-1.0]]), np.array([[0.0], [0.3], [0.5]])
     many = windows_of(base()).errors(Model({"delta_X_u": drag}, {"lag": lag}))

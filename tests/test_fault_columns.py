@@ -378,8 +378,23 @@ def test_deviations_of_a_fit_are_of_the_jackknife_over_parts_of_the_run():
     np.testing.assert_allclose(value, np.linalg.pinv(A) @ y)
     part = np.tile(np.arange(60) // 3, 2)
     each = np.array([np.linalg.pinv(A[part != k]) @ y[part != k] for k in range(20)])
-    least = noise(y[:, None]) / 120**0.5  # what differs from row to row is no less
-    np.testing.assert_allclose(std, np.maximum(np.sqrt(19.0 * each.var(axis=0)), least))
+    np.testing.assert_allclose(std, np.sqrt(19.0 * each.var(axis=0)))
+    few = np.where(np.arange(120) < 3, 1e3, 1.0)[:, None] * A  # which parts of the run tell hardly shows
+    np.testing.assert_array_less(0.0, blocked_fit(few, few @ [2.0, -1.0] + 0.01 * y, t)[1])
+
+
+@settings(max_examples=20)
+@given(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3), st.integers(0, 99))
+def test_a_deviation_is_in_the_unit_of_its_unknown_and_of_what_is_left(unit, known, seed):
+    """Neither the unit of another unknown nor the size of what is explained changes it."""
+    rng = np.random.default_rng(seed)
+    t, A, e = np.arange(60.0), rng.normal(size=(120, 2)), rng.normal(size=120)
+    _, std = blocked_fit(A, e, t)
+    value, scaled = blocked_fit(A * [unit, 1.0], A @ [known, 1.0] + e, t)
+    np.testing.assert_allclose(scaled, std / [unit, 1.0], rtol=1e-6)
+    assert abs(value[0] * unit - known) < 6.0 * std[0] + 1e-9 * abs(known)
+    white = np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
+    assert (std > 0.6 * white).all(), "of white noise it is that of least squares at the least"
 
 
 @pytest.mark.parametrize("length", [1.0, 30.0])

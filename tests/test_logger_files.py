@@ -299,11 +299,23 @@ def test_cells_far_beyond_the_limit_of_a_command_are_missing(tmp_path: Path, mar
     expected[[20, 50, 51]] = expected[[19, 49, 49]]
     np.testing.assert_allclose(run.commanded["port.n"], expected)
     np.testing.assert_allclose(run.commanded["starboard.n"], 4.0)
-    assert "port.n: 3 cells far beyond its limit count as missing" in run.notes
+    assert "port.n: 3 cells far beyond its limits count as missing" in run.notes
     content.loc[:60, "port.n"] = 60.0 * content.loc[:60, "port.n"]  # in revolutions a minute
     as_written = content["port.n"].to_numpy()
     run = read(written(tmp_path / "a.csv", content), of=OTTER)
     np.testing.assert_allclose(run.commanded["port.n"], as_written)
+
+
+@pytest.mark.parametrize("speed", ["wind_speed", "wind_speed_relative"])
+def test_a_wind_speed_below_zero_is_missing(tmp_path: Path, speed: str) -> None:
+    measured = np.where(TIME == 7.5, -999.0, 3.0 + np.sin(TIME))
+    of = {speed: measured, speed.replace("speed", "direction"): 0.1 * TIME}
+    run = read(written(tmp_path / "a.csv", table(**of)))
+    expected = np.where(TIME == 7.5, np.nan, measured)
+    np.testing.assert_array_equal(run.measured[speed], expected)
+    assert f"{speed}: 1 cells far beyond its limits count as missing" in run.notes
+    calm = read(written(tmp_path / "b.csv", table(**of | {speed: np.abs(measured)})))
+    assert not calm.notes
 
 
 def test_the_length_of_a_field_is_no_internal_error(tmp_path: Path) -> None:

@@ -86,6 +86,27 @@ def test_test_runs_that_contradict_the_learned_model_are_told(before, after, lea
     ]
 
 
+@pytest.mark.parametrize(
+    ("model", "steady", "said"),
+    [
+        (0.05, 0.06, ""),
+        (0.05, 0.04, ""),  # within what is taken as noise
+        (0.05, 0.02, "position 50 against 20 mm and heading 2.9 against 1.1 °"),
+    ],
+)
+def test_a_run_that_constant_velocities_predict_better_is_told(model, steady, said):
+    e = evaluation("a", model, model, held_out=False)
+    e.constant_velocities = evaluation("", steady, steady, held_out=False).before.errors
+    unknown = SimpleNamespace(after=e.after, constant_velocities=None)
+    r = SimpleNamespace(evaluations=[e, unknown], learned=False, called=lambda e: e.name)
+    told = [*headline.worse_than_constant_velocities(r)]
+    assert [sentence.partition(". ")[0] for sentence in told] == (
+        [f"The model predicts a worse than constant velocities do: {said}"] if said else []
+    )
+    r.learned = True
+    assert all(s.startswith("The learned model") for s in headline.worse_than_constant_velocities(r))
+
+
 def test_numbers_have_their_digits_and_factor():
     assert formatting.number(0.12345, 2, 1000.0) == "123"
     assert formatting.number(1.2345, 2) == "1.2"

@@ -242,9 +242,8 @@ def likeliest_mistake(
     lawful = [Reading("", {"psi": Named(name="psi", offset=turn)}) for turn in TURNS]
     if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
         lawful = []
-    elif best.commands is not None:  # actuators that are dead show nothing of any command
-        same = (best.commands == np.eye(len(best.commands))).all(axis=1)
-        lawful.append(Reading("", commands=np.diag(same.astype(float))))
+    elif dead := best.dead(TAU if w.run.commands is None else w.run.signals):
+        lawful.append(dead)
     better = found.max() - max([as_read, *map(odds.log_density, lawful)])
     if better < asked:
         return None

@@ -24,6 +24,7 @@ class Reading:
         changes: signal -> what its column should be read as.
         motion: (3, 3), from the pose as it was read to the pose as it was meant.
         commands: (k, k), the same of the run's commands, or of its commanded force; None: as read.
+        added: (k,), what is added to the run's commands then.
 
     """
 
@@ -31,6 +32,19 @@ class Reading:
     changes: Mapping[str, Named] = field(default_factory=dict)
     motion: np.ndarray = field(default_factory=lambda: np.eye(3))
     commands: np.ndarray | None = None
+    added: np.ndarray | float = 0.0
+
+    def dead(self, signals: Sequence[str]) -> "Reading | None":
+        """The reading without the commands that are meant otherwise; None: all are as they were read.
+
+        Of an angle that counts from elsewhere it is the whole actuator: at zero it may act as meant.
+        """
+        if self.commands is None:
+            return None
+        same = (self.commands == np.eye(len(self.commands))).all(axis=1)
+        owners = np.array([signal.partition(".")[0] for signal in signals])
+        elsewhere = owners[np.broadcast_to(self.added != 0.0, owners.shape)]
+        return Reading("", commands=np.diag((same & ~np.isin(owners, elsewhere)).astype(float)))
 
     @property
     def turn(self) -> float:
@@ -59,6 +73,14 @@ def of_pose(mistake: str, factors: Sequence[float]) -> Reading:
 def of_commands(mistake: str, factors: Sequence[float], signals: Sequence[str] = TAU) -> Reading:
     """Commands with factors (k,) on their columns."""
     return Reading(mistake, _scaled(signals, factors), commands=np.diag(factors))
+
+
+def off_by(mistake: str, signal: str, factor: float, offset: float, signals: Sequence[str]) -> Reading:
+    """The command of a signal times a factor, plus an offset in SI."""
+    mine = np.array([name == signal for name in signals])
+    changes = {signal: Named(name=signal, factor=factor, offset=offset)}
+    factors = np.where(mine, factor, 1.0)
+    return Reading(mistake, changes, commands=np.diag(factors), added=np.where(mine, offset, 0.0))
 
 
 def _in_unit(unit: str, factors: Sequence[float], signals: Sequence[str]) -> Reading:
@@ -147,12 +169,27 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
             factors = np.where(unit == si, size, 1.0)
             if (factors != 1.0).any():
                 yield _in_unit(f"in {other}", factors.tolist(), names)
+    yield from _of_angles(run, commands, model)
     limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for whole, name in ((1.0, "shares"), (100.0, "percent")):
         meant = (np.abs(commands).max(axis=0) <= whole) & (limits > 1.0)
         factors = np.where(meant, limits / whole, 1.0)
         if meant.any():
             yield _in_unit(f"in {name} of the limits", factors.tolist(), names)
+
+
+def _of_angles(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
+    """Angles that count from elsewhere: the other way round, or from hard over."""
+    layout = model.ship.layout_of(commands)
+    ends, form = layout.limits(model.drive.params), model.ship.form_of(commands)
+    for k, (name, (low, high)) in enumerate(zip(run.signals, ends, strict=True)):
+        if form[name] != "rad":
+            continue
+        if layout.round and layout.round[k]:
+            yield off_by(f"{name} points the other way, by 180 deg", name, 1.0, np.pi, run.signals)
+        elif low < 0.0 <= commands[:, k].min():
+            for way, factor, offset in (("port", 1.0, low), ("starboard", -1.0, high)):
+                yield off_by(f"{name} counts from hard over to {way}", name, factor, offset, run.signals)
 
 
 def other_factors(run: Run, k: float, pace: float) -> Iterator[Reading]:
@@ -187,7 +224,7 @@ def reread(w: WeakWindows, reading: Reading, model: Model) -> WeakWindows:
     if reading.commands is not None and run.commands is None:
         run = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T)
     elif reading.commands is not None and run.commands is not None:
-        commands = run.commands @ reading.commands.T
+        commands = run.commands @ reading.commands.T + reading.added
         run = replace(run, commands=commands, tau_cmd=model.ship.commanded_force(commands, run.power))
     meant = replace(
         s,

@@ -65,7 +65,9 @@ def line_beside(
         if unit is None:
             changed |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
         if offset:
-            changed["offset"] += float(f"{offset / units.get(unit or '', 1.0):.4g}")
+            said = changed["unit"] or ""
+            size = next((sizes[said] for sizes in UNITS.values() if said in sizes), 1.0)
+            changed["offset"] += float(f"{offset / size:.4g}")
         columns[signal] = Column.model_validate(column.model_dump() | changed).model_dump(
             exclude_defaults=True
         )

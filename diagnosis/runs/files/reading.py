@@ -26,7 +26,9 @@ from ...execution.short_text import ShortRepr
 from ..columns.columns import (
     BESIDE,
     POSE,
+    RELATIVE_WIND,
     TAU,
+    TRUE_WIND,
     Column,
     Layout,
     degrees,
@@ -298,7 +300,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
         return np.column_stack([columns[s] for s in group]) if columns.keys() & group[:1] else None
 
-    false = _false_commands(columns, of)
+    false = _false_commands(columns, of) | _false_winds(columns)
     columns = columns | {s: np.where(cells, np.nan, columns[s]) for s, cells in false.items()}
     tau, commands, power = (_held(stack(group)) for group in (TAU, own, settings))
     power = None if power is None else np.maximum(power, 0.0)
@@ -327,7 +329,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         assert commands is not None
         tau = of.commanded_force(commands, power)
     notes = tuple(
-        f"{s}: {cells.sum()} cells far beyond its limit count as missing" for s, cells in false.items()
+        f"{s}: {cells.sum()} cells far beyond its limits count as missing" for s, cells in false.items()
     )
     notes += (f"commands are missing in {lost} columns; the last value is held",) if lost else ()
     notes += tuple(f"no column {signal}: zero is used" for signal in absent)
@@ -360,6 +362,12 @@ def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np
             if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
                 found[signal] = far
     return found
+
+
+def _false_winds(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Signal -> (n,), cells of a wind's speed below zero, as it is a magnitude."""
+    found = {s: columns[s] < 0.0 for s in (TRUE_WIND[0], RELATIVE_WIND[0]) if s in columns}
+    return {s: cells for s, cells in found.items() if cells.any()}
 
 
 def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
