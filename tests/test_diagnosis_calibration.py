@@ -24,7 +24,7 @@ from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.refit import prediction_bands
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel
-from diagnosis.verdict.coefficients import calibrated
+from diagnosis.verdict.coefficients import Calibrations
 from diagnosis.verdict.validation_data import ValidationData
 
 DRAG = -2.0  # N s/m, hidden
@@ -129,10 +129,17 @@ def test_bands_are_as_wide_as_predictions_of_runs_left_out_are_off():
     assert np.concatenate(squares).mean() == pytest.approx(1.0, rel=0.2)
 
 
+def in_place_of_nothing(data):
+    """The calibrated model of some runs in which no effect was found."""
+    found = nothing_found()
+    decides = ValidationData(data, [], Model(), np.ones(3))
+    return Calibrations(found, decides, PRIOR, None).in_place_of(found)
+
+
 @pytest.mark.slow
 def test_it_is_kept_where_runs_left_out_are_predicted_better():
     """Of three runs, the fewest that are left out whole."""
-    out = calibrated(nothing_found(), ValidationData(runs()[:3], [], Model(), np.ones(3)), PRIOR)
+    out = in_place_of_nothing(runs()[:3])
     assert out is not None
     assert not out.findings.effects
     assert out.findings.suspects
@@ -146,20 +153,19 @@ def test_it_is_kept_where_runs_left_out_are_predicted_better():
 @pytest.mark.slow
 @pytest.mark.parametrize("as_well", [True, False])
 def test_effects_none_of_which_is_a_finding_give_way_to_what_predicts_as_well(as_well):
-    data = ValidationData(runs()[:3], [], Model(), np.ones(3))
-    known = calibrated(nothing_found(), data, PRIOR)
+    data, nothing = ValidationData(runs()[:3], [], Model(), np.ones(3)), nothing_found()
+    calibrations = Calibrations(nothing, data, PRIOR, None)
+    known = calibrations.in_place_of(nothing)
     true = [Model().plus({"delta_X_u": DRAG, "body_bias_N": N}) for N in MOMENTS[:3]]
     folds = known.findings.fold_models if as_well else true
     found = Finding("lag", {"lag": 0.1}, {}, 0.0, [], 0.5, 0.5, Model())
-    out = calibrated(replace(nothing_found(), effects=[found], fold_models=folds), data, PRIOR)
-    assert (out is not None) == as_well
+    out = calibrations.in_place_of(replace(nothing, effects=[found], fold_models=folds))
+    assert out is (known if as_well else None), "it is fitted once"
 
 
 @pytest.mark.slow
 def test_a_current_is_in_the_calibrated_model_where_runs_left_out_show_it():
-    out = calibrated(
-        nothing_found(), ValidationData(runs(east=STREAM_EAST), [], Model(), np.ones(3)), PRIOR
-    )
+    out = in_place_of_nothing(runs(east=STREAM_EAST))
     assert out is not None
     water = [out.findings.model.value(n) for n in ("V_n", "V_e")]
     assert water == pytest.approx([0.0, STREAM_EAST], abs=0.15 * STREAM_EAST)
@@ -167,10 +173,8 @@ def test_a_current_is_in_the_calibrated_model_where_runs_left_out_show_it():
 
 @pytest.mark.slow
 def test_nothing_is_calibrated_without_a_remainder_or_of_few_runs():
-    assert calibrated(nothing_found(), ValidationData(runs(0.0), [], Model(), np.ones(3)), PRIOR) is None
-    assert (
-        calibrated(nothing_found(), ValidationData(runs()[:2], [], Model(), np.ones(3)), PRIOR) is None
-    )
+    assert in_place_of_nothing(runs(0.0)) is None
+    assert in_place_of_nothing(runs()[:2]) is None
 
 
 def test_the_misfit_is_twice_the_negative_log_density_of_the_residuals_of_all_windows():

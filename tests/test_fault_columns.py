@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from diagnosis import Run
 from diagnosis.runs import closure
-from diagnosis.runs.cleaning import noise
 from diagnosis.runs.sensors import further_channels
 from diagnosis.runs.sensors.constants import DEVIATIONS, columns, deviations, least_place
 from diagnosis.runs.sensors.evidence import (

@@ -1,7 +1,8 @@
 """Nominal coefficients in place of effects: where they alone explain the data, or predict better."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import as_good, gain, harm, predicts_better, predicts_worse
+from ..search.significance import Losses, as_good, gain, harm, predicts_better, predicts_worse
 from .confidence import FOUND, confidence_of, may_be_none
 from .pruning import judgeable, without
 from .validation_data import ValidationData
@@ -73,43 +74,72 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     return Conclusion(replace(found, model=start, suspects=[]), False, [])
 
 
-def calibrated(
-    found: Findings, data: ValidationData, prior: NominalPrior, coefficients: RefitOutcome | None = None
-) -> RefitOutcome | None:
-    """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
+@dataclass(frozen=True, eq=False)
+class Calibrations:
+    """Calibrated models of the training runs, fitted once they are asked for.
 
-    It also takes the place of effects than which it is as good, or predicts better. No effect follows
-    from it. Each training run is predicted without it. Where coefficients leave a residual, a current is
-    in it, and usual imperfections, each if that shows beyond chance, and is beyond its own uncertainty.
-    Where ``coefficients``, the calibration of the nominal ones alone, is as good, it is taken.
-    Validation runs can reject either.
+    Attributes:
+        searched: the end of the search.
+        data: the data that decide.
+        prior: of the nominal coefficients.
+        coefficients: the calibration of the nominal ones alone; None: there is none.
     """
-    train, start = data.train, data.start
-    if len(train) < WHOLE_RUNS or not any(prior.std.values()):
-        return None
-    runs = ValidationData(train, [], start, found.sigma)
-    calibrator = Calibrator(found, train, start, prior)
-    if not remains(train, start, start) or not calibrator.windows:
-        return None
-    best = calibrator.still()
-    now, other, first = runs.losses(best.findings, found if found.effects else start, start)
-    left = remains(train, start, best.findings.model)
-    for further in filter(None, (calibrator.current, calibrator.imperfections) if left else ()):
-        fit = calibrator.plus(best, further)
-        (its,) = runs.losses(fit.findings)
-        if harm(now, its) and gain(now, its) > 0.0 and _differs(fit, further):
-            best, now = fit, its
-    if coefficients is not None:
-        (plain,) = runs.losses(coefficients.findings)
-        best, now = (coefficients, plain) if as_good(plain, now) else (best, now)
-    if found.effects:
-        better = as_good(now, other) or predicts_better(now, other)
-    else:
-        better = gain(other, now) > 0.0
-    if harm(now, first) or not better:
-        return None
-    its, others = data.losses(best.findings.model, start)
-    return None if data.validate and harm(its, others) else best
+
+    searched: Findings
+    data: ValidationData
+    prior: NominalPrior
+    coefficients: RefitOutcome | None
+
+    @cached_property
+    def _training(self) -> ValidationData:
+        """Each training run, predicted without it."""
+        return ValidationData(self.data.train, [], self.data.start, self.searched.sigma)
+
+    @cached_property
+    def best(self) -> tuple[RefitOutcome, Losses] | None:
+        """The model that predicts each training run best without it; None: runs are too few, or right.
+
+        Where coefficients leave a residual, a current is in it, and usual imperfections, each if that
+        shows beyond chance, and is beyond its own uncertainty. Where the nominal coefficients alone
+        are as good, they are taken.
+        """
+        train, start, runs = self.data.train, self.data.start, self._training
+        if len(train) < WHOLE_RUNS or not any(self.prior.std.values()):
+            return None
+        calibrator = Calibrator(self.searched, train, start, self.prior)
+        if not remains(train, start, start) or not calibrator.windows:
+            return None
+        best = calibrator.still()
+        (now,) = runs.losses(best.findings)
+        left = remains(train, start, best.findings.model)
+        for further in filter(None, (calibrator.current, calibrator.imperfections) if left else ()):
+            fit = calibrator.plus(best, further)
+            (its,) = runs.losses(fit.findings)
+            if harm(now, its) and gain(now, its) > 0.0 and _differs(fit, further):
+                best, now = fit, its
+        if self.coefficients is None:
+            return best, now
+        (plain,) = runs.losses(self.coefficients.findings)
+        return (self.coefficients, plain) if as_good(plain, now) else (best, now)
+
+    def in_place_of(self, found: Findings) -> RefitOutcome | None:
+        """The best of them in place of findings than which it is as good, or predicts better.
+
+        No effect follows from it. None: it predicts no better than they or the initial model, or
+        validation runs reject it.
+        """
+        if self.best is None:
+            return None
+        (fit, now), start = self.best, self.data.start
+        other, first = self._training.losses(found if found.effects else start, start)
+        if found.effects:
+            better = as_good(now, other) or predicts_better(now, other)
+        else:
+            better = gain(other, now) > 0.0
+        if harm(now, first) or not better:
+            return None
+        its, others = self.data.losses(fit.findings.model, start)
+        return None if self.data.validate and harm(its, others) else fit
 
 
 def better_calibration(

@@ -28,10 +28,10 @@ from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_pre
 from ..search.prior import NominalPrior
 from ..search.significance import predicts_worse
 from .coefficients import (
+    Calibrations,
     any_finding,
     any_sure,
     better_calibration,
-    calibrated,
     concluded,
     needless,
     spoils,
@@ -180,7 +180,8 @@ def judge(
     advance("residual")
     doubted = _in_doubt(end, unshown)
     if calibrates:
-        other = _coefficients_alone(end, doubted.learned, calibration, prior, drives, gain, unshown)
+        calibrations = Calibrations(found, data, prior, calibration)
+        other = _coefficients_alone(end, doubted.learned, calibrations, drives, gain, unshown)
         if other is not None:
             dropped += fit.findings.effects
             ranked = replace(other.fit.findings, ranking=found.ranking)
@@ -239,8 +240,7 @@ class _Fitted:
 def _coefficients_alone(
     end: _Fitted,
     learned: Findings,
-    calibration: RefitOutcome | None,
-    prior: NominalPrior,
+    calibrations: Calibrations,
     drives: Callable[[Model, Model], bool],
     gain: PredictionGain | None,
     unshown: Collection[str],
@@ -253,17 +253,19 @@ def _coefficients_alone(
     Args:
         end: the end of the search.
         learned: its findings with their confidence.
-        calibration, prior, drives: see :func:`judge` and :func:`better_calibration`.
+        calibrations: models of other coefficients.
+        drives: see :func:`better_calibration`.
         gain: of the search over the calibration.
         unshown: ids of the findings that predictions do not show.
     """
     data, found = end.data, end.fit.findings
-    other = None if any_finding(found, data.start) else calibrated(found, data, prior, calibration)
+    other = None if any_finding(found, data.start) else calibrations.in_place_of(found)
     if other is None and not any_sure(learned):
         believed = not learned.effects or any(map(is_finding, learned.effects))
         gained = gain is None or gain.gained
         now = end.predicting
-        other = better_calibration(calibration, now, data, drives, unshown, believed, gained)
+        alone = calibrations.coefficients
+        other = better_calibration(alone, now, data, drives, unshown, believed, gained)
     if other is not None:
         return _Fitted(other, data, True, True)
     if not found.effects:
@@ -272,8 +274,9 @@ def _coefficients_alone(
     if not idle and (any(map(is_finding, learned.effects)) or not spoils(found, data)):
         return None
     nothing = replace(found, effects=[], model=data.start, suspects=[], moved={})
-    initial = _Fitted(to_predictions(nothing, data.train, prior, False), data, False, False)
-    return _coefficients_alone(initial, nothing, calibration, prior, drives, None, ()) or initial
+    fit = to_predictions(nothing, data.train, calibrations.prior, False)
+    initial = _Fitted(fit, data, False, False)
+    return _coefficients_alone(initial, nothing, calibrations, drives, None, ()) or initial
 
 
 class _FindingsInDoubt(NamedTuple):

@@ -13,9 +13,9 @@ from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import WHOLE_RUNS
 from diagnosis.verdict import coefficients
 from diagnosis.verdict.coefficients import (
+    Calibrations,
     _differs,
     any_sure,
-    calibrated,
 )
 
 START = Model()
@@ -190,7 +190,8 @@ def test_a_calibration_is_taken_where_it_predicts_better(changes, taken, by_numb
         start=START,
         losses=lambda model, start: [case["its"], case["others"]],
     )
-    chosen = calibrated(found, data, SimpleNamespace(std={"X_u": case["std"]}), plain)
+    prior = SimpleNamespace(std={"X_u": case["std"]})
+    chosen = Calibrations(found, data, prior, plain).in_place_of(found)
     known = {"still": still, "imperfect": imperfect, "flowing": flowing, "plain": plain, None: None}
     assert chosen is known[taken]
     if began:  # imperfections are added to a current that was taken
