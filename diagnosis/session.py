@@ -32,6 +32,7 @@ from .predictors import (
 from .predictors.evaluation import DataUse
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
+from .predictors.windows import WindowErrors
 from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
 from .search.prediction_fit.coefficient_calibration import Calibrator
@@ -340,6 +341,11 @@ class Session(ShortRepr):
         decide, runs = len(self.train) + len(self.validate), self.runs
         return _compared(predictor or self.predictor, runs[:decide], after, runs[decide:], self.advance)
 
+    def _calibrated_errors(self, e: Evaluation) -> WindowErrors | None:
+        """Errors of the calibrated model on a run; None: there is none, or the run has no window."""
+        fit = self.calibration
+        return None if fit is None or e.windows is None else e.windows.errors(fit.findings.model)
+
     def _concluded(
         self, verdict: DecidedFindings, region: OperatingRegion, gain: PredictionGain | None
     ) -> Diagnosis:
@@ -353,7 +359,12 @@ class Session(ShortRepr):
         ]
         uses = [use for use, runs in parts for _ in runs]
         evaluations = [
-            replace(e, bands=verdict.bands(e.smoothed, e.windows), use=use)
+            replace(
+                e,
+                bands=verdict.bands(e.smoothed, e.windows),
+                use=use,
+                calibrated=self._calibrated_errors(e) if use == "test" else None,
+            )
             for e, use in zip(found.evaluations, uses, strict=True)
         ]
         self.advance("stability")

@@ -55,7 +55,9 @@ def evaluation(name, before, after, held_out):
         errors = WindowErrors(np.zeros(10, int), np.arange(10.0), np.ones(10), position, position)
         return PredictionError(np.zeros((1, 3)), np.zeros((0, 3)), errors)
 
-    return SimpleNamespace(name=name, before=error(before), after=error(after), held_out=held_out)
+    return SimpleNamespace(
+        name=name, before=error(before), after=error(after), held_out=held_out, calibrated=None
+    )
 
 
 @pytest.mark.parametrize(
@@ -77,6 +79,11 @@ def test_test_runs_that_contradict_the_learned_model_are_told(before, after, lea
     assert bool(told) == bool(said)
     assert all("test run b" in sentence for sentence in told)
     assert said in " ".join(told)
+    # Calibration alone may predict better where the initial model does not.
+    tested.calibrated = evaluation("", 0.8 * after, 0.0, held_out=True).before.errors
+    better = " ".join(headline.contradicted_by_tests(r))
+    numbers = f"position {800 * after:.2g} → {1000 * after:.2g} mm"
+    assert learned == (f"test run b worse than calibration alone: {numbers} and" in better)
     # The same errors on a run that was learned from say nothing, nor does a test run alone.
     trained_too = SimpleNamespace(**{**vars(tested), "held_out": False})
     assert not [
@@ -91,7 +98,7 @@ def test_test_runs_that_contradict_the_learned_model_are_told(before, after, lea
     [
         (0.05, 0.06, ""),
         (0.05, 0.04, ""),  # within what is taken as noise
-        (0.05, 0.02, "position 50 against 20 mm and heading 2.9 against 1.1 °"),
+        (0.05, 0.02, "position 20 → 50 mm and heading 1.1 → 2.9 °"),
     ],
 )
 def test_a_run_that_constant_velocities_predict_better_is_told(model, steady, said):

@@ -54,6 +54,8 @@ def run(name, use, size=1.0, notes=(), faults=(), learned=True):
         name=name,
         use=use,
         held_out=use == "test",
+        calibrated=None,
+        constant_velocities=None,
         before=before,
         after=after if learned else before,
         smoothed=smoothed,

@@ -127,6 +127,7 @@ class Evaluation(ShortRepr):
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
         use: what the data were used for.
+        calibrated: errors of the calibrated model on a test run; None where that is not known.
     """
 
     predictor: Predictor
@@ -137,6 +138,7 @@ class Evaluation(ShortRepr):
     bands: Bands | None = None
     learned: Model | None = None
     use: DataUse = "train"
+    calibrated: WindowErrors | None = None
 
     @property
     def model(self) -> Model:

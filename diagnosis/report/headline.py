@@ -10,6 +10,7 @@ from fmus.effects.force import CHANGES
 from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN
 from ..predictors.uncertainty import NOISE_TOLERANCE
+from ..predictors.windows import WindowErrors
 from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
 from ..search.significance import lower_throughout
 from ..session import CalibratedModel, Diagnosis
@@ -148,26 +149,20 @@ def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]
 def contradicted_by_tests(r: ReportData) -> Iterator[str]:
     """What test runs say against the learned model, a sentence each; they decide nothing.
 
-    A run may be predicted worse than by the initial model, beyond chance. Or it may be predicted so much
-    worse than all others that the difference is no chance: by more than three times.
+    A run may be predicted worse than by the initial or by the calibrated model, beyond chance. Or it is
+    predicted so much worse than all others that the difference is no chance: by more than three times.
     """
     others = [e.after for e in r.evaluations if not e.held_out]
     for e in (e for e in r.evaluations if e.held_out and e.after.errors is not None):
-        worse, far = [], []
+        for other, of in (("the initial model", e.before.errors), ("calibration alone", e.calibrated)):
+            if r.learned and of is not None and (worse := larger_errors(e.after.errors, of)):
+                yield f"The learned model predicts the test run {e.name} worse than {other}: {worse}."
+        far = []
         for name, unit, factor in OF_BOTH:
-            before, after = getattr(e.before, name), getattr(e.after, name)
-            first, its = (np.square(getattr(of.errors, name)) for of in (e.before, e.after))
-            if r.learned and lower_throughout(first, its):
-                by = " → ".join(number(x, 2, factor) for x in (before, after))
-                worse.append(f"{name} {by} {unit}")
+            after = getattr(e.after, name)
             most = max((getattr(of, name) for of in others if of.errors is not None), default=np.inf)
             if after > FAR_OFF * most:
                 far.append(f"{name} {number(after, 2, factor)} against {number(most, 2, factor)} {unit}")
-        if worse:
-            yield (
-                f"The learned model predicts the test run {e.name} worse than the initial model: "
-                f"{listed(worse, 'and')}."
-            )
         if far:
             yield (
                 f"The test run {e.name} is predicted worse than all other runs ({', '.join(far)}): "
@@ -181,19 +176,26 @@ def worse_than_constant_velocities(r: ReportData) -> Iterator[str]:
         steady, own = e.constant_velocities, e.after.errors
         if steady is None or own is None:
             continue
-        worse = []
-        for k, (name, unit, factor) in enumerate(OF_BOTH):
-            its, others = (float(of.over_all()[k]) for of in (own, steady))
-            squares = (np.square(getattr(of, name)) for of in (steady, own))
-            if its > NOISE_TOLERANCE * others and lower_throughout(*squares):
-                shown = (number(x, 2, factor) for x in (its, others))
-                worse.append(f"{name} {' against '.join(shown)} {unit}")
-        if worse:
+        if worse := larger_errors(own, steady, NOISE_TOLERANCE):
             yield (
                 f"The {'learned ' if r.learned else ''}model predicts {r.called(e)} worse than constant "
-                f"velocities do: {listed(worse, 'and')}. If that is unexpected, check the ship and the "
-                "units, signs and columns of the file."
+                f"velocities do: {worse}. If that is unexpected, check the ship and the units, signs "
+                "and columns of the file."
             )
+
+
+def larger_errors(its: WindowErrors, others: WindowErrors, least: float = 1.0) -> str:
+    """What is larger than of another prediction beyond chance: position, heading, both, or nothing.
+
+    ``least`` is a ratio that the errors of both have at the least.
+    """
+    larger = []
+    for k, (name, unit, factor) in enumerate(OF_BOTH):
+        other, own = (float(of.over_all()[k]) for of in (others, its))
+        squares = (np.square(getattr(of, name)) for of in (others, its))
+        if own > least * other and lower_throughout(*squares):
+            larger.append(f"{name} {number(other, 2, factor)} → {number(own, 2, factor)} {unit}")
+    return " and ".join(larger)
 
 
 def reading_of_commands(found: CalibratedModel | Diagnosis) -> list[str]:
