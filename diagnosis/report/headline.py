@@ -153,9 +153,12 @@ def contradicted_by_tests(r: ReportData) -> Iterator[str]:
     predicted so much worse than all others that the difference is no chance: by more than three times.
     """
     others = [e.after for e in r.evaluations if not e.held_out]
-    for e in (e for e in r.evaluations if e.held_out and e.after.errors is not None):
+    for e in r.evaluations:
+        its = e.after.errors
+        if not e.held_out or its is None:
+            continue
         for other, of in (("the initial model", e.before.errors), ("calibration alone", e.calibrated)):
-            if r.learned and of is not None and (worse := larger_errors(e.after.errors, of)):
+            if r.learned and of is not None and (worse := larger_errors(its, of)):
                 yield f"The learned model predicts the test run {e.name} worse than {other}: {worse}."
         far = []
         for name, unit, factor in OF_BOTH:
