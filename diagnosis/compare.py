@@ -64,6 +64,10 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session
 
+        if criteria is not None:
+            from .acceptance import refuse_unknown_ranges
+
+            refuse_unknown_ranges(criteria.content, [w.smoothed for w in runs])
         with proposing():
             comparison = session.evaluate(runs, model, advance=advance)
         advance("where it fails")

@@ -19,6 +19,7 @@ from cosim.campaign import __main__ as conducting
 from cosim.campaign import shown_progress
 from cosim.campaign.__main__ import main
 from cosim.campaign.campaign_file import LoadedCampaign
+from cosim.campaign.case_scenarios import CaseScenarios
 from cosim.campaign.design import cases
 from cosim.campaign.run_table import JOURNAL
 
@@ -155,6 +156,19 @@ def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
     told = json.loads((base / "out" / "campaign.json").read_text())
     assert (told["status"], told["runs"], told["done"]) == ("done", 4, 4)
     assert told["versions"]["cybership"]
+
+
+def test_a_value_in_a_group_is_set_after_the_group(base):
+    """Whichever axis is first; and the value of the group stays as it is written."""
+    inner = {"set": "vessel.m", "values": [14.0, 30.0]}
+    group = [{"path": "vessel.fmu", "parameters": {"x_0": 5.0}}]
+    outer = {"set": "fmus.vessel", "values": group}
+    for axes in ({"m": inner, "o": outer}, {"o": outer, "m": inner}):
+        loaded = LoadedCampaign(campaign(base, axes))
+        scenarios = CaseScenarios(loaded, None, None)
+        made = [scenarios.scenario(case).fmus["vessel"].parameters for case in cases(loaded.campaign)]
+        assert made == [{"x_0": 5.0, "m": 14.0}, {"x_0": 5.0, "m": 30.0}]
+        assert loaded.campaign.axes["o"].values == group
 
 
 def test_compiled_fmus_that_are_reset_give_the_same_runs(base, native, monkeypatch):

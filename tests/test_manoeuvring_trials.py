@@ -26,6 +26,15 @@ from fmus.ship import ship
 from fmus.signals import Force, VelocityInCurrent
 from fmus.sizing import sized
 
+ORDERS = ("gauss_seidel", "jacobi")
+
+
+def load(name, algorithm):
+    """A shipped scenario with an order of exchange."""
+    content = json.loads((ROOT / "scenarios" / f"{name}.json").read_text())
+    return cosim.load_scenario(content | {"algorithm": algorithm})
+
+
 OTTER = SHIPS["otter"]
 DEG = math.radians(1.0)
 KINDS = ("circle", "spiral", "stop", "zigzag")
@@ -394,6 +403,22 @@ def conducted_stop(d, connect):
 
 
 # Runs
+
+
+def test_the_page_has_the_measures_of_this_version(tmp_path):
+    """The table of the first run, and the first overshoots by both orders of exchange."""
+    page = (ROOT / "docs" / "trials.md").read_text(encoding="utf-8")
+    block = page[page.index("measure            value") :].split("```")[0].splitlines()[1:-1]
+    told = {words[0]: words[1:3] for words in map(str.split, block)}
+    found = cosim.simulate("otter_circle", tmp_path / "circle").metrics
+    degrees = {name for name, (_, unit) in told.items() if "°" in unit}
+    assert {name: value for name, (value, _) in told.items()} == {
+        name: f"{math.degrees(x) if name in degrees else x:.4g}" for name, x in found.items()
+    }
+    row = page[page.index("| `otter_zigzag` |") :].splitlines()[0].replace("°", "").split("|")[2:6]
+    values = [cosim.simulate(load("otter_zigzag", how), tmp_path / how).metrics for how in ORDERS]
+    overshoots = [v[f"overshoot_{k}"] for k in (1, 2) for v in values]
+    assert [float(x) for x in row] == [round(math.degrees(x), 2) for x in overshoots]
 
 
 @pytest.mark.parametrize(

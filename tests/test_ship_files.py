@@ -261,6 +261,18 @@ def test_no_text_of_a_file_is_a_format(tmp_path: Path) -> None:
     assert made.is_file()
 
 
+@pytest.mark.parametrize("place", ['"the raft"', '"weighed"'])
+def test_a_text_that_xml_cannot_hold_is_refused(place: str, tmp_path: Path) -> None:
+    for escaped, right in (("\\u0007", False), ("\\u007f", False), ("\\t", True), ("é", True)):
+        path = written(tmp_path, RIGHT.replace(place, f'"a{escaped}"'))
+        if right:
+            (made,) = build("vessel", tmp_path / ascii(escaped).strip("'\\"), ship=read_ship(path))
+            assert made.is_file()
+        else:
+            with pytest.raises(DeclarationError, match="has the control character"):
+                read_ship(path)
+
+
 @pytest.mark.parametrize(
     "text",
     [

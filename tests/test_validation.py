@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import binom
-from support.measured import sail
+from support.measured import sail, table_of
 from support.project import ROOT
 
 import diagnosis
@@ -443,6 +443,18 @@ def test_a_key_is_read_before_the_work(tmp_path, capsys):
     given = ["--criteria", str(criteria), "--sign", "nothere.pem", "--out", str(tmp_path / "out")]
     assert compare.main(["nothere.csv", *given]) == 2
     assert "the key 'nothere.pem' cannot be read" in capsys.readouterr().err
+
+
+def test_an_operating_range_of_what_no_run_has_is_refused_before_anything_is_written(tmp_path, capsys):
+    log = tmp_path / "a.csv"
+    table_of(sail(40.0, 0.1)[0]).to_csv(log, index=False)
+    out = ["--out", str(tmp_path / "out")]
+    for name, code in (("w", 2), ("u", 0)):
+        ranges = {"horizon": 4.0, "operating_range": {name: [0.0, 1.0]}}
+        criteria = write_criteria(tmp_path / f"{name}.json", ranges)
+        assert compare.main([str(log), "--criteria", str(criteria), *out]) == code
+        assert (tmp_path / "out").exists() == (code == 0)
+    assert "operating_range: no run has 'w'" in capsys.readouterr().err
 
 
 def test_a_signature_is_of_criteria(tmp_path, capsys):

@@ -151,6 +151,7 @@ class LoadedCampaign:
         campaign: what the file says.
         base: the scenario.
         folder: to which paths in the campaign are relative.
+        outer_first: axis and path of each value that axes set; a group before what is in it.
 
     Raises:
         InputError: no such file, an unknown key, a value that cannot be, or a path that the scenario
@@ -165,6 +166,7 @@ class LoadedCampaign:
         self.base = base or load_scenario(find_scenario(self.campaign.scenario, self.folder))
         dumped = self.base.model_dump(mode="json", by_alias=True, exclude_unset=True)
         taken: dict[tuple[str, ...], str] = {}
+        places: dict[str, tuple[str, ...]] = {}
         for name, axis in self.campaign.axes.items():
             for path in axis.paths:
                 try:
@@ -176,6 +178,11 @@ class LoadedCampaign:
                         f"{shown}: axes {taken[place]} and {name} set the same value, {path}"
                     )
                 taken[place] = name
+                places[path] = place
+        self.outer_first = sorted(
+            ((name, path) for name, axis in self.campaign.axes.items() for path in axis.paths),
+            key=lambda axis: len(places[axis[1]]),
+        )
 
 
 def _special(_: str, location: Location, __: object) -> str:

@@ -37,11 +37,7 @@ class CaseScenarios:
         Raises:
             InputError: a value that its place cannot have.
         """
-        settings = [
-            (path, case.values[name])
-            for name, axis in self._loaded.campaign.axes.items()
-            for path in axis.paths
-        ]
+        settings = [(path, case.values[name]) for name, path in self._loaded.outer_first]
         try:
             return with_settings(self._loaded.base, settings, self._loaded.folder, told(case))
         except InputError as error:

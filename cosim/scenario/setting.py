@@ -8,6 +8,7 @@ A path is the keys from the top, joined by dots, with the number of an entry in 
 import json
 import os
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,7 @@ def set_value(content: dict[str, Any], path: str, value: Any, folder: Path) -> N
         last = _known(node, last, path)
     elif not isinstance(node, dict):
         raise InputError(f"'{path}': '{place[-2]}' is a value, and has no member '{last}'")
-    node[last] = _located(place, value, folder)
+    node[last] = _located(place, deepcopy(value), folder)
 
 
 def _known(node: Any, key: str, path: str) -> Any:

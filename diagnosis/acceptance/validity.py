@@ -4,12 +4,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cosim import InputError
+from cosim.errors import nearest
+
 from ..predictors import at_samples
 from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
 from ..runs.columns.unit_check import SI_UNIT
 from ..runs.run_constants import NEGLIGIBLE
-from .criterion import MOTION
+from .criterion import MOTION, Criteria
 from .predictions import Predictions
 
 QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
@@ -25,6 +28,19 @@ def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
     motion = {"u": u, "v": v, "r": r, "speed": speed, "drift": drift}
     known = {*motion, "x", "y", "psi"}
     return motion | {n: x for n, x in at_samples(smoothed).items() if n not in known}
+
+
+def refuse_unknown_ranges(criteria: Criteria, runs: Sequence[Smoothed]) -> None:
+    """Refuse criteria whose operating range names what no run has.
+
+    Raises:
+        InputError: with the nearest name.
+    """
+    known = {signal for run in runs for signal in signals(run)}
+    for c in criteria.criteria:
+        if unknown := next((signal for signal in c.operating_range if signal not in known), None):
+            hint = nearest(unknown, sorted(known))
+            raise InputError(f"criterion '{c.title}': operating_range: no run has '{unknown}'{hint}")
 
 
 def unit_of(signal: str, evaluation: Evaluation) -> str:

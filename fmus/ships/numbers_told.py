@@ -3,7 +3,16 @@
 import re
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PositiveFloat,
+    Tag,
+    model_validator,
+)
 
 from ..base_units import base_exponents
 from ..declare import DeclarationError
@@ -12,6 +21,16 @@ from ..ship_description import GUESSED, Value
 FACTOR = re.compile(r"\|[uvr]\||[uvr]")  # of a product of speeds
 
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+
+
+def _without_control(text: str) -> str:
+    """A text that an FMU's XML can hold."""
+    if wrong := next((c for c in text if not (c.isprintable() or c in "\n\t")), ""):
+        raise ValueError(f"has the control character {ascii(wrong)}")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_without_control)]
 
 
 class StrictTable(BaseModel):
@@ -25,7 +44,7 @@ class Number(StrictTable):
 
     value: Finite | None = Field(None, description="in SI units")
     prime: Finite | None = Field(None, description="in place of value: in prime units, see prime")
-    origin: str = Field(GUESSED, description="weighed, tank test, borrowed, guessed, or a publication")
+    origin: Text = Field(GUESSED, description="weighed, tank test, borrowed, guessed, or a publication")
     std: PositiveFloat | None = Field(
         None, description="standard deviation in the unit of the number", allow_inf_nan=False
     )

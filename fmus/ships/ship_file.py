@@ -29,7 +29,7 @@ from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
-from .numbers_told import Finite, Given, Number, Prime, StrictTable, Term, valued
+from .numbers_told import Finite, Given, Number, Prime, StrictTable, Term, Text, valued
 from .ship_doubts import doubts, line_of
 from .ship_warning import ShipWarning
 from .wind import by_regression, described_numbers
@@ -59,8 +59,8 @@ class ActuatorTable(BaseModel):
 
     name: Annotated[str, Field(pattern=NAME, max_length=30)]
     law: str
-    title: Annotated[str, Field(max_length=60)] = ""
-    label: Annotated[str, Field(max_length=60)] = ""
+    title: Annotated[Text, Field(max_length=60)] = ""
+    label: Annotated[Text, Field(max_length=60)] = ""
     command_group: Annotated[str, Field(pattern=NAME, max_length=30)] | None = None
     upstream_propeller: str = ""
 
@@ -86,8 +86,8 @@ class ShipTable(StrictTable):
     """The description of a ship."""
 
     name: Annotated[str, Field(pattern=NAME, max_length=40)]
-    title: Annotated[str, Field(min_length=1, max_length=100)]
-    source: str = ""
+    title: Annotated[Text, Field(min_length=1, max_length=100)]
+    source: Text = ""
     length: Annotated[Finite, Field(gt=0.01, lt=1000.0, description="L_pp [m]")]
     beam: Annotated[Finite, Field(gt=0.001, lt=200.0, description="[m]")]
     draft: Annotated[Finite, Field(gt=0.0, lt=100.0)] | None = Field(
