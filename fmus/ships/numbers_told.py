@@ -26,7 +26,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 def _without_control(text: str) -> str:
     """A text that an FMU's XML can hold."""
     if wrong := next((c for c in text if not (c.isprintable() or c in "\n\t")), ""):
-        raise ValueError(f"has the control character {ascii(wrong)}")
+        raise ValueError(f"has the control character {wrong!a}")
     return text
 
 
