@@ -47,6 +47,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
 from diagnosis.runs import line_beside
 from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
+from diagnosis.verdict.confidence import doubt_of_data
 from fmus.signals import Force
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -640,9 +641,11 @@ def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
             refuse_implausible([w], Model())
         return
     (found,) = refuse_implausible([w], Model())
-    (line,) = found.smoothed.doubted
+    line = found.smoothed.misread
     assert line.startswith("perhaps tau_Y has the wrong sign (odds 10^2 : 1); if so, put {")
     assert line in found.smoothed.notes
+    assert doubt_of_data([w]) == ""
+    assert "--anyway" in doubt_of_data([w, found]), "a finding of it is not sure"
 
 
 def test_what_is_found_in_a_file_is_told_with_its_side_car(monkeypatch, tmp_path):

@@ -63,8 +63,8 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> list[WeakWi
             remedy = line_beside(w.run.file, w.run.layout, doubt.changes or {}, doubt.name)
             if doubt.sure:
                 raise InputError(f"run '{w.run.name}': {doubt.seen}{remedy}; {GO_ON}")
-            doubted = (*w.smoothed.doubted, f"{doubt.seen}{remedy.replace('; ', '; if so, ', 1)}")
-            w = replace(w, smoothed=replace(w.smoothed, doubted=doubted))
+            misread = f"{doubt.seen}{remedy.replace('; ', '; if so, ', 1)}"
+            w = replace(w, smoothed=replace(w.smoothed, misread=misread))
         found.append(w)
     return found
 

@@ -34,6 +34,9 @@ EVEN_ODDS = 0.5
 MAY_BE_NONE = "the intervals of all its values include zero"
 MAY_BE_LAGS = "faster actuators than described, or measured states as commands, have the same effect"
 MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
+MAY_BE_MISREAD = (
+    "a run may be meant otherwise than it was read, as its note says; --anyway states that it is right"
+)
 RARE = "samples are too rare for fast forces: fewer than six in the averaging time of a force"
 IN_PARTS = "changes of one kind on the same axis make up a law of another shape as well"
 ON_ONE_LINE = "with another finding it makes up a force of another shape on the same line as well"
@@ -171,13 +174,16 @@ def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
     """What speaks against any finding of some runs, as a part of a sentence; empty: nothing.
 
     A clock may be so far off that it looks like another model: forces go with the square of its rate,
-    and it matters where that is more than what a measured coefficient is uncertain by. Samples may be
+    and it matters where that is more than what a measured coefficient is uncertain by. A file may be
+    read otherwise than it is meant: a unit or a sign acts like another model, too. Samples may be
     rarer than six in a window, so that a quick force is one sample's step.
     """
     found = [f for w in runs if w.smoothed.sensors for f in w.smoothed.sensors.findings]
     rates = [f.value for f in found if f.aside and "clock_rate" in f.alike]
     if any(abs(rate**2 - 1.0) > MEASURED for rate in rates):
         return MAY_BE_CLOCK
+    if any(w.smoothed.misread for w in runs):
+        return MAY_BE_MISREAD
     tracks = [w.smoothed.track for w in runs]
     return RARE if any(t.period > EVERY * t.scale.time + DIGITS for t in tracks) else ""
 

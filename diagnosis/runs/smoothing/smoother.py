@@ -93,6 +93,7 @@ class Smoothed(ShortRepr):
         late: whether the whole run agrees on that delay.
         pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
         doubted: lines on noise that was given and contradicts the samples.
+        misread: how the file may be meant otherwise than it was read, with the line that states it.
         sensors: what the run's channels say of each other; None where nobody asked.
         noise_rel_std: (3,), relative standard deviation of the noise; zero where it was given.
         noise_at_most: (3,), whether the noise is an upper bound, see :mod:`.likelihood`.
@@ -116,6 +117,7 @@ class Smoothed(ShortRepr):
     late: bool
     pose_only: PoseOnly
     doubted: tuple[str, ...] = ()
+    misread: str = ""
     sensors: Examined | None = None
     noise_rel_std: np.ndarray = field(default_factory=lambda: np.zeros(3))
     noise_at_most: np.ndarray = field(default_factory=lambda: np.zeros(3, bool))
@@ -154,7 +156,7 @@ class Smoothed(ShortRepr):
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on the data, a line each."""
-        notes = (*self.track.notes, *self.doubted)
+        notes = (*self.track.notes, *self.doubted, *filter(None, [self.misread]))
         # The pose alone does not tell a delay from the lag that the ship's file describes.
         if not (self.late and self.delay >= max(BRIEF * self.scale.time, self.track.lag)):
             return notes
