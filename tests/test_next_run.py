@@ -675,6 +675,7 @@ def test_a_planned_run_is_a_scenario_that_plays_its_table(names, tmp_path):
     rng, ship, h = np.random.default_rng(0), "kvlcc2" if names else None, 2.0 * LONGEST_STEP
     time = h * np.arange(51)
     eta, eta_dot, eta_ddot, tau = rng.standard_normal((4, time.size, 3))
+    eta += [7034000.0, 569000.0, 0.0]  # in map coordinates set points are as fine
     orders = rng.standard_normal((time.size, 2)) if names else None
     motions = {
         ("steps", 0.5, h): SimpleNamespace(
@@ -698,7 +699,8 @@ def test_a_planned_run_is_a_scenario_that_plays_its_table(names, tmp_path):
     shown = ["x", "y", "psi", *names] if names else [*moves, "tau_X", "tau_Y", "tau_N"]
     parts = [eta, orders] if names else [eta, eta_dot, eta_ddot, 3.0 * tau]
     assert [*table] == ["time", *shown]
-    np.testing.assert_allclose(table, np.column_stack([time, *parts]), rtol=1e-6)
+    np.testing.assert_allclose(table, np.column_stack([time, *parts]), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(table.iloc[:, 1:3], eta[:, :2], rtol=0.0, atol=1e-3)
     scenario = cosim.load_scenario(tmp_path / "scenario_7.json")
     assert (scenario.name, scenario.step, scenario.stop) == ("next_7", h, 2.0)
     assert [*scenario.fmus["vessel"].parameters.values()] == [*eta[0]]

@@ -115,7 +115,7 @@ def run_ensemble(
     poses[:, 2] = np.unwrap(poses[:, 2])
     found = bands(logs[0]["time"], poses)
     with atomic_write(folder / BANDS) as scratch:
-        found.to_csv(scratch, index=False, float_format="%.9g")
+        found.to_csv(scratch, index=False, float_format="%.10g")
     if pictures:
         from .charts import draw_bands
 

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from ..command import BAD_INPUT, command_parser, complain, printable, run_command
 from ..errors import InputError, SimulationError
+from ..interrupts import raise_if_interrupted
 from ..scenario.scenario_options import add_scenario_options, chosen_scenario
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
@@ -37,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         finally:
             system.close()
     except (InputError, SimulationError) as error:
+        raise_if_interrupted()  # an FMU may report the interrupt as an error of its own
         complain(error)
         return BAD_INPUT
     for warning in system.warnings:

@@ -15,7 +15,7 @@ from rich.console import Console, RenderableType
 
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name, positive
-from cosim.interrupts import Held
+from cosim.interrupts import Held, raise_if_interrupted
 from cybership.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
 from fmus.ships.ship_warning import ship_warnings_to
@@ -302,6 +302,7 @@ def run(work: Work, options: argparse.Namespace) -> int:
                     if done.more:
                         interrupts.allow()
         except InputError as error:
+            raise_if_interrupted()  # an FMU may report the interrupt as an error of its own
             complain(error)
             return BAD_INPUT
         interrupts.finish()

@@ -340,8 +340,9 @@ def limits_of(minutes: float, basin: str | Path | tuple[float, float] | None) ->
     Raises:
         InputError: a length that is not positive, or no such file.
     """
-    if not 0.0 < minutes < 1e4:
-        raise InputError(f"a run takes a positive number of minutes; got {minutes:g}")
+    most = 1e4  # a week
+    if not 0.0 < minutes < most:
+        raise InputError(f"a run takes more than 0 and less than {most:g} minutes; got {minutes:g}")
     if basin is None:
         return Limits(60.0 * minutes)
     if isinstance(basin, tuple):

@@ -275,6 +275,4 @@ def check_criterion(name: str) -> None:
         InputError: names the nearest one, and all.
     """
     if name not in CRITERIA:
-        raise InputError(
-            f"no criterion '{name}'{nearest(name, CRITERIA)}; there are {', '.join(CRITERIA)}"
-        )
+        raise InputError(f"no criterion '{name}'{nearest(name, CRITERIA)}")

@@ -52,7 +52,7 @@ def write_run(d: Designer, found: ScoredPlan, number: int, folder: Path, ship: s
         header = [*POSE, *names]
     table = np.column_stack([fine.time, fine.eta, *parts])
     header = ",".join(["time", *header])
-    np.savetxt(folder / commands_file(number), table, "%.7g", delimiter=",", header=header, comments="")
+    np.savetxt(folder / commands_file(number), table, "%.10g", delimiter=",", header=header, comments="")
     content = _without_guidance("ellipse" if orders is None else "kvlcc2_zigzag")
     if orders is None:
         content["roles"] = {"target": [f"controller.{n}" for n in TARGET[:3]]}

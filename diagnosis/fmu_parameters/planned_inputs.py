@@ -120,7 +120,7 @@ class FmuPlan:
             for r, name in zip(self.runs, tables, strict=True):
                 header = ",".join(["time", *r.inputs])
                 table = np.column_stack([r.time, *r.inputs.values()])
-                np.savetxt(new / name, table, "%.7g", delimiter=",", header=header, comments="")
+                np.savetxt(new / name, table, "%.10g", delimiter=",", header=header, comments="")
             text = [
                 "# What to run next",
                 "",
