@@ -8,7 +8,8 @@ from pydantic import BaseModel, ValidationError
 
 from .message_text import Location, brief, name_of, nearest, quoted
 
-TYPES = {"extra_forbidden": 0, "finite_number": 1}  # of faults that come before others
+# Of faults that come before others: of what a number may stand in place of, the number.
+TYPES = {"extra_forbidden": 0, "finite_number": 1, "float_type": 2}
 Special = Callable[[str, Location, object], str]
 
 
@@ -20,8 +21,8 @@ def no_special(*_: object) -> str:
 def first_fault(error: ValidationError, form: object, special: Special = no_special) -> str:
     """The first fault of a file in one line.
 
-    A key that is not known comes before the one that it leaves missing, and a number that is not finite
-    before what else could stand in its place.
+    A key that is not known comes before the one that it leaves missing, and a number, or one that is not
+    finite, before what else could stand in its place.
 
     Args:
         error: of the content.

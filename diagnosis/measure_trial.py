@@ -15,7 +15,7 @@ import numpy as np
 from cosim import InputError
 from cosim.command import command_parser, printable, run_command
 from cosim.results import read_options
-from cosim.trials import KINDS, TrialOutcome, draw_trial, executes, outcome, sheet, simulated_trial
+from cosim.trials import KINDS, TrialOutcome, draw_trial, outcome, sheet, simulated_trial
 
 from .commands.command_line import Done, anyway_option, out_options, run, ship_option
 from .execution.progress import Advance
@@ -78,9 +78,10 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutco
     whole = read(options.run, of=craft)
     kind = options.trial or whole.trial
     if kind is None:
+        beside = f', or put {{"trial": "zigzag"}} into \'{options.run}.json\''
         raise InputError(
-            f"'{options.run}' does not state its trial: give --trial, or put {{\"trial\": "
-            f"\"zigzag\"}} into '{options.run}.json'"
+            f"'{options.run}' does not state its trial: give --trial"
+            f"{'' if options.run.is_dir() else beside}"
         )
     low, high = options.start or -np.inf, np.inf if options.stop is None else options.stop
     inside = ((whole.time >= low) & (whole.time <= high)).astype(float)
@@ -92,12 +93,6 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[TrialOutco
     length = length_of(craft)
     passage = measured_passage(part.smoothed, craft)
     notes = [*sensor_lines(prepared.sensors.findings), *prepared.sensors.notes]
-    way = passage.along(passage.time[0], executes(passage)[0])
-    if way < length:
-        notes.append(
-            f"only {way:.3g} m before the first execute: initial heading and speed need one ship "
-            f"length, {length:.3g} m; begin the trial earlier"
-        )
     return outcome(kind, passage, length), notes
 
 

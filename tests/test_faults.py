@@ -71,6 +71,12 @@ def test_noise_has_its_standard_deviation_and_is_white():
     assert (arrived[:, 1] == 0.0).all()
 
 
+@pytest.mark.filterwarnings("error")
+def test_noise_beyond_all_numbers_warns_of_nothing():
+    arrived = np.array(play(make("noise", std=1e308), [(0.0,)] * 100))
+    assert np.isinf(arrived).any()
+
+
 def test_bias_adds():
     assert play(make("bias", 2, value=[1.0, -2.0]), [(0.5, 0.5)]) == [(1.5, -1.5)]
 

@@ -223,6 +223,13 @@ def test_files_that_have_no_clock_in_common_are_refused(tmp_path: Path) -> None:
         one_table([pose, tmp_path / "orders.csv"])
     with pytest.raises(InputError, match=r"no such file: 'gone\.csv'"):
         one_table([pose, Path("gone.csv")])
+    with pytest.raises(InputError, match="is a folder"):
+        one_table([pose, tmp_path])
+    with pytest.raises(InputError, match="is given more than once"):
+        one_table([pose, pose.parent / "." / pose.name])
+    (tmp_path / "twice.csv").write_text("time,a,a\n0,1,2\n1,2,3\n")
+    with pytest.raises(InputError, match="has more than one column 'a'"):
+        one_table([tmp_path / "twice.csv"])
 
 
 def test_the_command_writes_a_table_that_is_proposed_and_read(tmp_path: Path) -> None:

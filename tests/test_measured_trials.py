@@ -9,6 +9,7 @@ import pytest
 from support.cases import slow
 from support.command import command
 from support.measured import DATA, needs_data
+from support.project import ROOT
 
 import cosim
 import diagnosis
@@ -84,7 +85,9 @@ def test_a_part_without_an_approach_says_so(sailed, tmp_path):
         done = command(trial_main, file, "--ship", "otter", "--from", start, "--out", tmp_path / "out")
         assert done.returncode == 0, done.stderr
         told.append("before the first execute: initial heading and speed need one" in done.stdout)
-    assert told == [False, True]
+        log = command(trial_main, sailed / "circle", "--from", start, "--out", tmp_path / "out")
+        told.append("before the first execute: initial heading and speed need one" in log.stdout)
+    assert told == [False, False, True, True]
 
 
 @pytest.mark.parametrize(("stop", "said"), [(45.0, False), (21.0, True)])
@@ -108,7 +111,21 @@ def test_mistakes_are_one_line(sailed, tmp_path, trial, others, arguments, messa
     done = command(trial_main, file, "--ship", "otter", *arguments, "--out", tmp_path / "out")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert message in done.stderr
+    assert trial is not None or "zigzag.csv.json'" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_log_that_is_no_trial_needs_the_option(tmp_path):
+    """A file beside its folder is not read."""
+    content = json.loads((ROOT / "scenarios" / "ellipse.json").read_text()) | {
+        "stop": 1.0,
+        "metrics": {},
+    }
+    cosim.simulate(cosim.load_scenario(content), tmp_path / "log", pictures=False)
+    done = command(trial_main, tmp_path / "log", "--out", tmp_path / "out")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "give --trial" in done.stderr
+    assert ".json" not in done.stderr
 
 
 def errors(files, ship, learned=None) -> list[Any]:

@@ -121,6 +121,16 @@ def test_wrong_content_is_refused(ellipse, change, message):
     assert message in refused(ellipse | change)
 
 
+@pytest.mark.parametrize(("at", "late"), [([99.0, 98.0], True), ([0.5, 99.0], False), ([], False)])
+def test_a_fault_after_the_end_has_no_effect_and_says_so(ellipse, at, late):
+    fault = {"kind": "freeze", "signals": ["observer.x_m"], "duration": 1.0}
+    given = {"at": at} if at else {"rate": 0.1}
+    ellipse |= {"stop": 90.0, "faults": [fault | given]}
+    found = [w for w in prepare(load_scenario(ellipse)).warnings if "no effect" in w]
+    line = "faults[0] (freeze): no step starts at or after t = 98.0 s: no effect"
+    assert found == ([line] if late else [])
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
@@ -133,6 +143,10 @@ def test_wrong_content_is_refused(ellipse, change, message):
             "vessel.X_uu_ does not exist; did you mean",
         ),
         ({"path": "vessel.fmu", "parameters": {"x": 1.0}}, "vessel.x cannot be set"),
+        (
+            {"path": "vessel.fmu", "parameters": {"m": [1.0]}},
+            "fmus.vessel.parameters.m: Input should be a valid number",
+        ),
         ({"path": "vessel.fmu", "parameters": {"m": -1.0}}, "vessel.m = -1.0 is below its minimum 0.0"),
         ({"path": "vessel.fmu", "parameters": {"m": "heavy"}}, "needs a value of type Real"),
         ({"path": "vessel.fmu", "parameters": {"m": True}}, "needs a value of type Real"),

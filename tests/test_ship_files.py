@@ -121,6 +121,7 @@ CHANGES = [
     ("n_max = 10.0", "n_max = {vlue = 1.0}", "n_max: vlue: unknown key; did you mean 'value'?"),
     ("n_max = 10.0", "lag = 1e6", "lag = 1e+06 s is out of its range (0 to"),
     ("beam = 1.0", f"beam = {'1' * 5000}", "cannot be read as TOML: Exceeds the limit"),
+    ("beam = 1.0", 'beam = 1.0\nthrust_allocation = "no"', "thrust_allocation: Input should be a valid"),
     ("beam = 1.0", f"beam = {'1' * 4000}", "beam: Input should be"),
     ('law = "fixed_propeller"', f'law = "{"y " * 50_000}"', "there is no law 'y y y"),
     ('law = "fixed_propeller"', f'law = "{"y" * 100_000}"', f"there is no law '{'y' * 28}...{'y' * 28}'"),
@@ -209,6 +210,13 @@ def test_no_shipped_ship_has_a_warning(name: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         read_ship(tmp_path / "copy.toml")
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = written(tmp_path, RIGHT)
+    marked = tmp_path / "marked.toml"
+    marked.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert read_ship(marked) == read_ship(path)
 
 
 def test_a_command_shows_a_warning_once_and_goes_on(tmp_path: Path) -> None:

@@ -367,7 +367,8 @@ def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):
         svg = (tmp_path / "trajectory.svg").read_text()
         assert float(re.search(r'width="([\d.]+)pt"', svg)[1]) == pytest.approx(72.0 * width)
     with pytest.raises(cosim.InputError, match="no style 'gplot'; did you mean 'ggplot'"):
-        draw({"a": log}, tmp_path, options=PictureOptions(style="gplot"))
+        draw({"a": log}, tmp_path / "new", options=PictureOptions(style="gplot"))
+    assert not (tmp_path / "new").exists()
 
 
 def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):

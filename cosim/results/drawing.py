@@ -88,9 +88,9 @@ def draw(
         InputError: there is no such style, or no such size.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     written = []
     with options.applied():
+        folder.mkdir(parents=True, exist_ok=True)
         for name, figure in figures(runs, told):
             file = folder / f"{name}.{options.format}"
             save(options.sized(figure), file, options.dpi)

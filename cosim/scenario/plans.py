@@ -84,7 +84,10 @@ class WhiteNoise(PlanAhead):
         """Rows that have not been given, at least one."""
         left = np.concatenate([self._rows, self._drawn]) if self._drawn else self._rows
         self._rows, self._drawn = self._rows[:0], []
-        return left if len(left) else self._std * self._rng.standard_normal((DRAWN, len(self._std)))
+        if len(left):
+            return left
+        with np.errstate(over="ignore"):  # the run ends at a number that is not finite
+            return self._std * self._rng.standard_normal((DRAWN, len(self._std)))
 
     def __call__(self, t: float) -> Sequence[float]:
         if not self._drawn:

@@ -2,10 +2,13 @@
 
 from ..errors import InputError
 from ..fmu.fmu_model import NUMERIC
+from ..scenario.faults import Timed
 from ..scenario.schema import Event, Scenario
 from .recordings import Recorded, read_recording
 from .start_values import check_value
 from .system import Signal, System, causality_of
+
+NO_EFFECT = "no step starts at or after t = {} s: no effect"
 
 
 def check_processes(system: System) -> None:
@@ -90,6 +93,8 @@ def check_faults(system: System) -> None:
             raise InputError(
                 f"{where}: signals of one fault must be inputs, or outputs, of one instance"
             )
+        if isinstance(fault, Timed) and fault.at and min(fault.at) >= system.scenario.stop:
+            system.warnings.append(f"{where}: {NO_EFFECT.format(min(fault.at))}")
 
 
 def check_events(system: System) -> None:
@@ -105,7 +110,7 @@ def check_events(system: System) -> None:
             )
         _check_event_value(system, event, signal, where)
         if event.time >= system.scenario.stop:
-            system.warnings.append(f"{where}: no step starts at or after t = {event.time} s: no effect")
+            system.warnings.append(f"{where}: {NO_EFFECT.format(event.time)}")
 
 
 def _check_event_value(system: System, event: Event, signal: Signal, where: str) -> None:

@@ -62,6 +62,17 @@ class TrialOutcome(NamedTuple):
         angle = f"{math.degrees(check):.3g}°"
         return [f"no IMO limit at a check angle of {angle}, but at 10° and 20°"]
 
+    @property
+    def short_approach(self) -> list[str]:
+        """A sentence on an approach in which its speed and heading are not known; else none."""
+        way = self.passage.along(self.passage.time[0], executes(self.passage)[0])
+        if way >= self.length:
+            return []
+        return [
+            f"only {way:.3g} m before the first execute: initial heading and speed need one ship "
+            f"length, {self.length:.3g} m; begin the trial earlier"
+        ]
+
     def write(self, folder: Path) -> None:
         """Write ``trial.json``."""
         write_json(folder / TRIAL, self.content())
@@ -135,7 +146,10 @@ def sheet(found: TrialOutcome, title: str = "") -> Table:
     """A trial for the terminal, as in a trial report: angles in degrees, distances also in lengths."""
     shown = Table(title=title or f"Trial: {found.kind}", title_justify="left", box=None, pad_edge=False)
     notes = [NOTHING] if found.measures.keys() <= APPROACH else [LIMITS] if found.limits else []
-    shown.caption, shown.caption_justify = "\n".join([*notes, *found.without_limit]) or None, "left"
+    shown.caption, shown.caption_justify = (
+        "\n".join([*notes, *found.without_limit, *found.short_approach]) or None,
+        "left",
+    )
     shown.add_column("measure", style="bold", no_wrap=True)
     for name in ("value", "unit", "in L", "IMO limit"):
         shown.add_column(name, justify="left" if name == "unit" else "right", no_wrap=True)

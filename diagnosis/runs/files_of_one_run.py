@@ -1,5 +1,6 @@
 """Files of one run as one table: a file for each topic, and tables with one value in a row."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -41,8 +42,11 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
         A table with the column ``time``: seconds, or numbers whose unit no file states.
 
     Raises:
-        InputError: a file is no table, no column of its time is known, or files have no time in common.
+        InputError: a file is no table or is given twice, two columns of it have one name, none is known
+            as its time, or files have no time in common.
     """
+    if twice := next((p for p, count in Counter(map(Path.resolve, paths)).items() if count > 1), None):
+        raise InputError(f"'{twice}' is given more than once")
     parts = [_part(path) for path in paths]
     times = _times(parts)
     groups: dict[tuple[str, ...], list[pd.DataFrame]] = {}
@@ -66,10 +70,12 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
 def _part(path: Path) -> _Part:
     """A file's table, its time apart."""
     if not path.is_file():
-        raise InputError(f"no such file: '{path}'")
+        raise InputError(f"'{path}' is a folder" if path.is_dir() else f"no such file: '{path}'")
     stated = stated_layout(path) or Layout()
     text = text_of(path, stated)
     names = column_names(path, text)
+    if twice := next((name for name, count in Counter(filter(None, names)).items() if count > 1), ""):
+        raise InputError(f"'{path}' has more than one column '{twice}'; give each a name of its own")
     fields = message_fields(names)
     units = units_below(path, text, names)
     found = time_column(path, text, stated, names, units)

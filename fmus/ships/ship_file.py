@@ -96,7 +96,7 @@ class ShipTable(StrictTable):
     outline: list[tuple[Finite, Finite]] = Field(
         [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
     )
-    thrust_allocation: bool = Field(
+    thrust_allocation: Annotated[bool, Field(strict=True)] = Field(
         True, description="false: commands are the inputs of the thrusters; true: a force is"
     )
     inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
@@ -205,7 +205,7 @@ def _toml(path: Path) -> Any:
     else:
         import tomli as tomllib  # pyright: ignore[reportMissingImports]
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError, OSError) as error:  # ValueError also of a number of 5,000 digits
         raise DeclarationError(f"'{path}' cannot be read as TOML: {brief(str(error))}") from None
 
