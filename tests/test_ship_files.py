@@ -42,7 +42,7 @@ terms = [{ axis = "X", product = "u", value = -10.0, rel_std = 0.2 }]
 
 [hull.functions.cross_flow]
 cross_flow_length = 2.0
-
+cross_flow_draft = 0.1
 [[actuators]]
 name = "port"
 law = "fixed_propeller"
@@ -153,6 +153,10 @@ DOUBTS = [
     (
         "rel_std = 0.2 }]", 'rel_std = 0.2 }]\n[hull.functions.resistance]\ndrag_ahead = -0.1', 14,
         "resistance adds energy at 0.89 m/s in surge",
+    ),
+    (
+        "cross_flow_draft = 0.1", "", 15,
+        "cross_flow does not state all of its numbers; assumed: cross_flow_draft = 0.1 m",
     ),
     ("X_udot = -5.0", "X_udot = 5.0", 10, "X_udot = 5 kg is positive"),
     ("X_udot = -5.0", "Y_vdot = 5.0", 10, "Y_vdot = 5 kg is positive"),

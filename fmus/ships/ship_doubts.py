@@ -112,9 +112,13 @@ def _products(ship: Description) -> Iterator[ShipDoubt]:
 
 
 def _functions(ship: Description) -> Iterator[ShipDoubt]:
-    """Other functions of the hull that drive the ship along with a speed."""
+    """Other functions of the hull that drive the ship along with a speed, or lack numbers."""
     for part in ship.functions:
-        names = [v.name for v in parameters_of(part.law, 3, FUNCTIONS[part.law])]
+        needed = parameters_of(part.law, 3, FUNCTIONS[part.law])
+        if assumed := _assumed(part.values, needed):
+            text = f"{part.law} does not state all of its numbers; assumed: {assumed}"
+            yield ShipDoubt(f"hull.functions.{part.law}", 0, "", text)
+        names = [v.name for v in needed]
         numbers = {v.name: v.value for v in part.values if v.name in names}
         for axis, motion in enumerate(MOTIONS):
             base = AHEAD * _unit_of_speed(ship, 0) if axis else 0.0
