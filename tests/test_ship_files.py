@@ -151,7 +151,7 @@ DOUBTS = [
         "Y_vvv = 1 N.s3/m3 adds energy at 0.0044 m/s in sway",
     ),
     (
-        "rel_std = 0.2 }]", 'rel_std = 0.2 }]\n[hull.functions.resistance]\ndrag_ahead = -0.1', 14,
+        "rel_std = 0.2 }]", 'rel_std = 0.2 }]\n[hull.functions.resistance]\ndrag_area = 1.0\ndrag_ahead = -0.1', 14,
         "resistance adds energy at 0.89 m/s in surge",
     ),
     (
