@@ -121,6 +121,10 @@ CHANGES = [
     ("n_max = 10.0", "n_max = {vlue = 1.0}", "n_max: vlue: unknown key; did you mean 'value'?"),
     ("n_max = 10.0", "lag = 1e6", "lag = 1e+06 s is out of its range (0 to"),
     ("beam = 1.0", f"beam = {'1' * 5000}", "cannot be read as TOML: Exceeds the limit"),
+    (
+        "[inertia]", '[aliases]\nport_n = "a"\nstarboard_n = "a"\n[inertia]',
+        "aliases: port_n and starboard_n are both 'a'",
+    ),
     ("beam = 1.0", 'beam = 1.0\nthrust_allocation = "no"', "thrust_allocation: Input should be a valid"),
     ("beam = 1.0", f"beam = {'1' * 4000}", "beam: Input should be"),
     ('law = "fixed_propeller"', f'law = "{"y " * 50_000}"', "there is no law 'y y y"),

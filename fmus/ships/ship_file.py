@@ -13,6 +13,7 @@ from pydantic import (
     Field,
     TypeAdapter,
     ValidationError,
+    field_validator,
 )
 
 from cybership.message_text import Location, brief, quoted
@@ -115,6 +116,15 @@ class ShipTable(StrictTable):
         {},
         description="variable of an actuator, or the beginning of its name -> new name",
     )
+
+    @field_validator("aliases")
+    @classmethod
+    def _are_unique(cls, aliases: dict[str, str]) -> dict[str, str]:
+        first: dict[str, str] = {}
+        for name, new in aliases.items():
+            if (other := first.setdefault(new, name)) != name:
+                raise ValueError(f"{other} and {name} are both {quoted(new)}")
+        return aliases
 
 
 def json_schema() -> dict[str, Any]:
