@@ -32,7 +32,7 @@ class Reading:
     changes: Mapping[str, Named] = field(default_factory=dict)
     motion: np.ndarray = field(default_factory=lambda: np.eye(3))
     commands: np.ndarray | None = None
-    added: np.ndarray | float = 0.0
+    added: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def dead(self, signals: Sequence[str]) -> "Reading | None":
         """The reading without the commands that are meant otherwise; None: all are as they were read.

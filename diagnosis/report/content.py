@@ -29,7 +29,7 @@ from .headline import (
     reading_of_commands,
     worse_than_constant_velocities,
 )
-from .report_data import ReportData, seconds
+from .report_data import SHOWN_ERRORS, ReportData, seconds
 
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Attributes that the files hold; KEY=ATTRIBUTE where a key has another name.
@@ -48,7 +48,6 @@ STABILITY = (
 )
 CHANGE = "before after difference standard_error"
 UNRECORDED = "size=push.size time=push.time values=differing stretches sentence"
-BOTH = ("position", "heading")
 ERRORS = {
     "window_position_rmse": "position",
     "window_heading_rmse": "heading",
@@ -283,7 +282,10 @@ def _errors(r: ReportData) -> Iterator[dict[str, Any]]:
         rms = {name: part(e, f"before=before.{of} after=after.{of}") for name, of in ERRORS.items()}
         outputs = {name: {"rms_before": b, "rms_after": a} for name, (b, a) in measured.items()}
         coverage = None if e.bands is None else e.bands.coverage(e.after.residuals)
-        steady = e.constant_velocities and dict(zip(BOTH, e.constant_velocities.over_all(), strict=True))
+        names = [name for name, *_ in SHOWN_ERRORS]
+        steady = e.constant_velocities and dict(
+            zip(names, e.constant_velocities.over_all(), strict=True)
+        )
         simplest = {"constant_velocities": steady}
         rest = simplest | {"measured": outputs, "coverage_90": coverage, "trial": trial}
         yield {"run": e.name, "held_out": e.held_out} | use | rms | rest

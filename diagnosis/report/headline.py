@@ -1,7 +1,6 @@
 """The result in a few sentences: what is sure first, what is only possible below it."""
 
 from collections.abc import Iterator, Sequence
-from math import degrees
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from ..verdict.confidence import FOUND
 from ..verdict.prediction_gain import PredictionGain
 from .finding_text import listed
 from .formatting import number, percent
-from .report_data import ReportData
+from .report_data import SHOWN_ERRORS, ReportData
 from .reported_effect import ReportedEffect, fitted_beside, is_fitted
 
 SEARCH_GAINED = "The search for effects improves the predictions over calibration alone."
@@ -66,8 +65,6 @@ FAR = (
     "deviations of their priors: {names}. Either these priors are wrong, or an effect acts like a "
     "change of them."
 )
-# Name of an error of prediction, the unit that it is shown in, and the factor to it.
-OF_BOTH = (("position", "mm", 1e3), ("heading", "°", degrees(1.0)))
 VERDICTS = {
     "found": "An effect is missing and was identified",
     "ambiguous": "An effect is missing, and several candidates explain it",
@@ -117,7 +114,7 @@ def gain_sentences(gain: PredictionGain | None, gained: str, nothing: str, over:
     if gain is None:
         return []
     parts, worse = [], []
-    for name, unit, factor in OF_BOTH:
+    for name, unit, factor in SHOWN_ERRORS:
         change = getattr(gain, name)
         errors = " → ".join(number(x, 3, factor) for x in (change.before, change.after))
         way = "falls" if change.difference >= 0.0 else "rises"
@@ -161,7 +158,7 @@ def contradicted_by_tests(r: ReportData) -> Iterator[str]:
             if r.learned and of is not None and (worse := larger_errors(its, of)):
                 yield f"The learned model predicts the test run {e.name} worse than {other}: {worse}."
         far = []
-        for name, unit, factor in OF_BOTH:
+        for name, unit, factor in SHOWN_ERRORS:
             after = getattr(e.after, name)
             most = max((getattr(of, name) for of in others if of.errors is not None), default=np.inf)
             if after > FAR_OFF * most:
@@ -193,7 +190,7 @@ def larger_errors(its: WindowErrors, others: WindowErrors, least: float = 1.0) -
     ``least`` is a ratio that the errors of both have at the least.
     """
     larger = []
-    for k, (name, unit, factor) in enumerate(OF_BOTH):
+    for k, (name, unit, factor) in enumerate(SHOWN_ERRORS):
         other, own = (float(of.over_all()[k]) for of in (others, its))
         squares = (np.square(getattr(of, name)) for of in (others, its))
         if own > least * other and lower_throughout(*squares):

@@ -24,6 +24,8 @@ from .formatting import times
 from .reported_effect import ReportedEffect, reported_effects
 
 UNITS = {m.name.removesuffix("_1"): m.unit for m in MEASURES}
+# Name of an error of prediction, the unit that it is shown in, and the factor to it.
+SHOWN_ERRORS = (("position", "mm", 1e3), ("heading", "°", degrees(1.0)))
 # What the data of a run were used for.
 USES = {"train": "training", "validate": "validation", "test": "test"}
 
@@ -209,7 +211,7 @@ def error_changes(r: ReportData, k: int) -> list[ErrorChange]:
     error that stays within its uncertainty.
     """
     e, found = r.evaluations[k], []
-    for name, factor in (("position", 1e3), ("heading", degrees(1.0))):
+    for name, _, factor in SHOWN_ERRORS:
         before, after = getattr(e.before, name), getattr(e.after, name)
         errors = [x.errors for x in (e.before, e.after)]
         squares = [np.square(getattr(x, name)) for x in errors if x is not None]
