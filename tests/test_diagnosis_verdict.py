@@ -38,7 +38,7 @@ from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging
 from diagnosis.verdict.coefficients import spoils
-from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of
+from diagnosis.verdict.confidence import Confidence, Doubts, beyond_chance, confidence_of
 from diagnosis.verdict.judging import (
     differing,
     falls_by_axis,
@@ -829,7 +829,7 @@ def test_a_value_at_its_limit_is_reported_with_the_limit_and_what_to_measure(eff
     assert " and ".join(map(str, at_limit(Model(), effect, {effect: value}))) == text
 
 
-@pytest.mark.parametrize(("interval", "sure"), [((-0.01, 0.05), False), ((0.01, 0.05), True)])
+@pytest.mark.parametrize(("interval", "sure"), [((-0.01, 0.05), False), ((0.02, 0.04), True)])
 def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
     f = Finding("lag", {"lag": 0.02}, {"lag": interval}, 0.94, [], 0.9, 0.9, together=0.94)
     seen = confidence_of(f, Model())
@@ -837,7 +837,32 @@ def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
     assert ("include zero" in seen.doubt) != sure
 
 
-@pytest.mark.parametrize(("second", "sure"), [((-0.02, 0.005), False), ((0.01, 0.05), True)])
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e6])
+def test_of_many_candidates_one_is_far_from_zero_by_chance(unit):
+    """The less so the further, whatever their unit is."""
+    start = Model()
+    count = len(start.ship.candidates)
+
+    def most(*squares):
+        names = ("attack_point_dx", "attack_point_dy")[: len(squares)]
+        ends = [(unit * (z - 1.96), unit * (z + 1.96)) for z in map(np.sqrt, squares)]
+        values = dict.fromkeys(names, unit)
+        intervals = dict(zip(names, ends, strict=True))
+        f = Finding("attack_point", values, intervals, 0.99, [], 0.9, 0.9, together=0.99)
+        return beyond_chance(f, start), confidence_of(f, start)
+
+    for z in (2.1, 3.0, 3.5, 4.0, 5.0):
+        bound, seen = most(z**2)
+        assert bound == pytest.approx(max(0.5, 1.0 / (1.0 + count * np.exp(-0.5 * z**2))), rel=2e-3)
+        assert seen.own == pytest.approx(min(0.99, bound))
+        assert ("by chance" in seen.doubt) == (bound < 0.99)
+        assert most(0.5 * z**2, 0.5 * z**2)[0] == pytest.approx(bound, rel=1e-6), "both count"
+    assert most(100.0)[0] == pytest.approx(1.0)
+    unknown = Finding("lag", {"lag": 0.1}, {}, 0.99, [], 0.9, 0.9, together=0.99)
+    assert beyond_chance(unknown, start) == 1.0
+
+
+@pytest.mark.parametrize(("second", "sure"), [((-0.02, 0.005), False), ((0.02, 0.04), True)])
 def test_an_effect_of_two_values_that_may_both_be_nothing_is_no_sure_finding(second, sure):
     values = {"attack_point_dx": -0.04, "attack_point_dy": 0.02}
     intervals = {"attack_point_dx": (-0.16, 0.08), "attack_point_dy": second}

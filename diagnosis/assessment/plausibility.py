@@ -90,16 +90,18 @@ def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
         return Misreading(silent)
     given = gains(w, model)
     wrong = [f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong)]
-    seen = beyond or (
-        f"its accelerations follow {', '.join(wrong)}" if wrong else pushed_aside(w, model)
-    )
+    seen = beyond or (None if wrong else pushed_aside(w, model))
     # Where the samples contradict the stated noise, no motion follows from which readings have odds.
     readable = not w.smoothed.doubted
     found = likeliest_mistake(w, model, bool(beyond or wrong), given.mean) if readable else None
     if found and (found.sure or not seen):
         clause = f"{beyond}; {found.clause}" if beyond else found.clause
         return Misreading(clause, found.readings[0].changes, sure=found.sure)
-    return Misreading(seen) if seen else None
+    if seen:
+        return Misreading(seen)
+    # No other reading puts that right: it may be what the ship does, as in shallow water.
+    follow = f"perhaps misread, as its accelerations follow {', '.join(wrong)}"
+    return Misreading(follow, sure=False) if wrong else None
 
 
 def _late(w: WeakWindows, model: Model) -> Misreading | None:

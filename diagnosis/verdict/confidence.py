@@ -2,10 +2,10 @@
 
 It allows for causes outside of the list of candidates. A logistic regression makes it of the evidence of
 the search (:mod:`diagnosis.search.effect_evidence`). What the evidence does not know caps it: a value at
-the limit of its range, an interval that holds zero, an alternative that looks the same, laws that make
-up another one, effects and coefficients that explain as much without it, coefficients beyond their
-priors, a smoothing that is slower than a filter, two fits that disagree. A residual on the same axes
-does so by its size, beside what the nearest other candidate would leave.
+the limit of its range, an interval that holds zero or is near it, an alternative that looks the same,
+laws that make up another one, effects and coefficients that explain as much without it, coefficients
+beyond their priors, a smoothing that is slower than a filter, two fits that disagree. A residual on the
+same axes does so by its size, beside what the nearest other candidate would leave.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -17,6 +17,7 @@ from scipy.special import expit
 
 from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import MEASURED
+from ..runs.cleaning import Z95
 from ..runs.run_constants import DIGITS, EVERY
 from ..search.effect_evidence import EffectEvidence, beside_unknown
 from ..search.findings import Finding
@@ -32,6 +33,7 @@ FOUND = 0.8  # 1, confidence from which on an effect is found; contract
 # effects from which on the set is a finding, and not only a possibility; contract.
 EVEN_ODDS = 0.5
 MAY_BE_NONE = "the intervals of all its values include zero"
+NEAR_NONE = "its values are known so badly that of all candidates one may be as far from zero by chance"
 MAY_BE_LAGS = "faster actuators than described, or measured states as commands, have the same effect"
 MAY_BE_CLOCK = "a channel was not used that indicates another clock rate, which may have the same effect"
 MAY_BE_MISREAD = (
@@ -157,6 +159,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         NO_GAIN: f.id in doubts.without_gain,
     }
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
+    if (by_chance := beyond_chance(f, start)) < 1.0:
+        caps.setdefault(MAY_BE_NONE if may_be_none(f) else NEAR_NONE, by_chance)
     if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
         nearest = 0.0 if f.evidence is None else f.evidence.nearest
         caps[MENDED] = beside_unknown(doubts.mended[f.id], nearest)
@@ -186,6 +190,20 @@ def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
         return MAY_BE_MISREAD
     tracks = [w.smoothed.track for w in runs]
     return RARE if any(t.period > EVERY * t.scale.time + DIGITS for t in tracks) else ""
+
+
+def beyond_chance(f: Finding, start: Model) -> float:
+    """The probability at most, by the intervals of its values, that these are not zero but for chance.
+
+    The evidence of values z standard deviations from zero is at the most exp(z^2 / 2) times that of
+    zero, whatever is known of them before (Edwards, Lindman and Savage, Psychol. Rev. 70, 1963).
+    Before the data it is even odds that an effect is missing, which all candidates share.
+    """
+    squares = [(low + high) ** 2 / (high - low) ** 2 for low, high in f.ci95.values() if high > low]
+    if not squares or len(squares) < len(f.values):
+        return 1.0
+    evidence = 0.5 * Z95**2 * sum(squares)
+    return max(EVEN_ODDS, float(expit(evidence - np.log(len(start.ship.candidates)))))
 
 
 def may_be_none(f: Finding) -> bool:

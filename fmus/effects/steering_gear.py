@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from math import degrees, pi
-from typing import Any
+from typing import Any, Literal
 
 from ..declare import Range, Variable
 from ..ops import Number, clip, fmax
@@ -51,6 +51,7 @@ def gear(
     v: Variable,
     places: Sequence[int],
     turns: Sequence[bool],
+    of: Literal["command", "force"],
     move: Callable[..., tuple[Number, Number]],
     lasts: Callable[[Number], Number],
     **more: Any,
@@ -62,6 +63,7 @@ def gear(
         v: the parameter, by whose name the effect is called.
         places: of the angles among the commands of the ship.
         turns: for each of these whether it goes round.
+        of: see :class:`.Memory`.
         move: ``move(before, wanted, value, h, turns)``: an angle after a step, and its mean over it.
         lasts: of the memory.
         more: further arguments of :func:`declared`.
@@ -74,7 +76,7 @@ def gear(
         linear=False,
         memory=Memory(
             (0.0,) * len(places),
-            "command",
+            of,
             lasts,
             idle=lambda before, wanted: tuple([wanted[k] for k in places]),
             each=EachSignal(move, tuple(places), tuple(turns)),
@@ -116,6 +118,7 @@ def gears(d: Devices, places: Sequence[int], turns: Sequence[bool]) -> list[Effe
             ),
             places,
             turns,
+            "command",
             rate_limited,
             lambda rate: reach / fmax(rate, 1e-9),
             sentence=limited,
@@ -131,6 +134,7 @@ def gears(d: Devices, places: Sequence[int], turns: Sequence[bool]) -> list[Effe
             parameter(play, "rad", f"play of the {d.label} from end to end", Range(0.0, pi)),
             places,
             turns,
+            "force",  # behind the gear, whose rate is limited and which lags
             dragged,
             lambda play: USED * d.scale.time + 0.0 * play,
             sentence=loose,
