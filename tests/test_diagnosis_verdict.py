@@ -1008,7 +1008,7 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
     start = Model(ship=ship_with((), "kvlcc2"))
     values = {i: dict.fromkeys(start.ship.effects[i].coefficients, 0.1) for i in falls}
     made = [
-        Finding(i, v, dict.fromkeys(v, (0.05, 0.15)), 0.99, [], 0.9, 0.9, together=0.99)
+        Finding(i, v, dict.fromkeys(v, (0.08, 0.12)), 0.99, [], 0.9, 0.9, together=0.99)
         for i, v in values.items()
     ]
     by_axis, sure = np.array([*falls.values()], float), [Confidence(0.99, 0.99)] * len(made)
