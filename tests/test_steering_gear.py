@@ -101,3 +101,25 @@ def test_the_diagnosis_steps_a_play_as_the_thrusters_do():
         expected.append(angle)
     assert np.abs(arriving[3] - helm).max() > 0.09
     np.testing.assert_allclose(arriving[3], expected, atol=1e-9)
+
+
+def test_a_play_is_behind_the_rate_limit_of_the_file():
+    """Turned back, the gear goes through the play at its rate before the angle follows."""
+    of, h, play = ship_with((), "gunnerus"), 0.1, 0.2
+    wanted = np.repeat([0.6, 0.0, -0.4, 0.3], 100)
+    commands = np.column_stack([wanted, np.full(wanted.size, 2.0)])
+    time = h * np.arange(wanted.size)
+    pose = np.column_stack([5.0 * time, 0.0 * time, 0.0 * time])
+    run = Run("play", time, pose, of.commanded_force(commands), commands, ship=of.description)
+    model = Model(ship=of)
+    rate = model.value("plant_azimuth_alpha_rate")
+    model = model.plus({"play_azimuth": play, "lag_azimuth": -model.value("lag_azimuth")})
+    acting = Response(run, model).between_samples[-1][0]
+    gear, angle, expected = 0.0, 0.0, []
+    for x in wanted.tolist():
+        gear, mean = rate_limited(gear, x, rate, h, True)
+        angle, _ = dragged(angle, mean, play, h, True)
+        expected.append(angle)
+    np.testing.assert_allclose(acting, expected, atol=2e-3)
+    turned = np.flatnonzero(np.abs(acting - 0.5) < 1e-3)  # held at half of the play below 0.6 rad
+    assert turned[-1] - 100 == pytest.approx(play / rate / h, abs=1.5)
