@@ -36,6 +36,7 @@ from .settings import SETTINGS
 # a run as well. Chosen: 30 degrees apart, so that one is within 15 degrees, and less than a right angle,
 # to which the search for effects, which begins at zero, finds no way.
 TURNS = tuple(k * np.pi / 6.0 for k in range(-2, 3) if k)
+COMMANDED = ("surge force", "sway force", "yaw moment")  # that is commanded on each axis
 MOST = 6  # 1, power of ten of the odds that are stated; no model is true enough for more
 
 
@@ -89,7 +90,7 @@ def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
     if silent and beyond is None:
         return Misreading(silent)
     given = gains(w, model)
-    wrong = [f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong)]
+    wrong = [f"{given.value[k]:.3g} times the {COMMANDED[k]}" for k in np.flatnonzero(given.wrong)]
     seen = beyond or (None if wrong else pushed_aside(w, model))
     # Where the samples contradict the stated noise, no motion follows from which readings have odds.
     readable = not w.smoothed.doubted
@@ -99,9 +100,11 @@ def _doubt(w: WeakWindows, model: Model) -> Misreading | None:
         return Misreading(clause, found.readings[0].changes, sure=found.sure)
     if seen:
         return Misreading(seen)
+    if not wrong:
+        return None
     # No other reading puts that right: it may be what the ship does, as in shallow water.
     follow = f"perhaps misread, as its accelerations follow {', '.join(wrong)}"
-    return Misreading(follow, sure=False) if wrong else None
+    return Misreading(f"{follow}; a feedback of the motion may have the same effect", sure=False)
 
 
 def _late(w: WeakWindows, model: Model) -> Misreading | None:
