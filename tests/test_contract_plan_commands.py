@@ -228,11 +228,9 @@ def proposal(run="run", unused=(), blank=None):
 
 
 def smoothed(name):
-    track = SimpleNamespace(
-        period=0.05, run=SimpleNamespace(name=name, time=np.array([1.0, 7.5])), notes=["noted"]
-    )
+    track = SimpleNamespace(period=0.05, run=SimpleNamespace(name=name, time=np.array([1.0, 7.5])))
     counts = Counts(130, 4, 3, 2, 121)
-    return SimpleNamespace(track=track, counts=counts)
+    return SimpleNamespace(track=track, counts=counts, notes=["noted"], sensors=None)
 
 
 def text_of(parts):
@@ -327,6 +325,7 @@ def test_a_folder_has_one_table_of_its_measurements(tmp_path, monkeypatch):
     assert "not used: spare, more" in text
     assert "not yet usable" not in text
     assert "not usable yet: b has no samples" in text
+    assert text.count("a: noted") == 1
     rows = {
         line.split()[0]: line.split()[1:] for line in text.splitlines() if line[:2] in ("a.", "b.", "c.")
     }

@@ -39,6 +39,7 @@ terms = [{ axis = "X", product = "u", value = -10.0, rel_std = 0.2 }]
 
 [hull.functions.cross_flow]
 cross_flow_length = { value = 2.0, rel_std = 0.0 }
+cross_flow_draft = { value = 0.1, rel_std = 0.0 }
 
 [wind]
 frontal_area = { value = 0.5, rel_std = 0.3 }

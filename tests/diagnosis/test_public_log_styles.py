@@ -382,5 +382,6 @@ def test_a_broken_table_is_named(
     tmp_path: Path, name: str, content: bytes, look: Callable[[Path], object]
 ) -> None:
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=rf"{name}' cannot be read as a table"):
+    twice = "|has more than one column 'x'" if name == "b.txt" else ""
+    with pytest.raises(InputError, match=rf"{name}' (cannot be read as a table{twice})"):
         look(tmp_path / name)
