@@ -38,7 +38,7 @@ from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
 from diagnosis.verdict import judging
 from diagnosis.verdict.coefficients import spoils
-from diagnosis.verdict.confidence import Confidence, Doubts, beyond_chance, confidence_of
+from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of, most_by_intervals
 from diagnosis.verdict.judging import (
     differing,
     falls_by_axis,
@@ -849,7 +849,7 @@ def test_of_many_candidates_one_is_far_from_zero_by_chance(unit):
         values = dict.fromkeys(names, unit)
         intervals = dict(zip(names, ends, strict=True))
         f = Finding("attack_point", values, intervals, 0.99, [], 0.9, 0.9, together=0.99)
-        return beyond_chance(f, start), confidence_of(f, start)
+        return most_by_intervals(f, start), confidence_of(f, start)
 
     for z in (2.1, 3.0, 3.5, 4.0, 5.0):
         bound, seen = most(z**2)
@@ -859,7 +859,7 @@ def test_of_many_candidates_one_is_far_from_zero_by_chance(unit):
         assert most(0.5 * z**2, 0.5 * z**2)[0] == pytest.approx(bound, rel=1e-6), "both count"
     assert most(100.0)[0] == pytest.approx(1.0)
     unknown = Finding("lag", {"lag": 0.1}, {}, 0.99, [], 0.9, 0.9, together=0.99)
-    assert beyond_chance(unknown, start) == 1.0
+    assert most_by_intervals(unknown, start) == 1.0
 
 
 @pytest.mark.parametrize(("second", "sure"), [((-0.02, 0.005), False), ((0.02, 0.04), True)])

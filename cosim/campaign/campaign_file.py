@@ -1,5 +1,6 @@
 """The content of a campaign file, and its checks that need no FMU."""
 
+from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -166,7 +167,7 @@ class LoadedCampaign:
         self.base = base or load_scenario(find_scenario(self.campaign.scenario, self.folder))
         dumped = self.base.model_dump(mode="json", by_alias=True, exclude_unset=True)
         taken: dict[tuple[str, ...], str] = {}
-        places: dict[str, tuple[str, ...]] = {}
+        depths: list[tuple[int, str, str]] = []
         for name, axis in self.campaign.axes.items():
             for path in axis.paths:
                 try:
@@ -178,11 +179,8 @@ class LoadedCampaign:
                         f"{shown}: axes {taken[place]} and {name} set the same value, {path}"
                     )
                 taken[place] = name
-                places[path] = place
-        self.outer_first = sorted(
-            ((name, path) for name, axis in self.campaign.axes.items() for path in axis.paths),
-            key=lambda axis: len(places[axis[1]]),
-        )
+                depths.append((len(place), name, path))
+        self.outer_first = [(name, path) for _, name, path in sorted(depths, key=itemgetter(0))]
 
 
 def _special(_: str, location: Location, __: object) -> str:

@@ -146,10 +146,8 @@ def sheet(found: TrialOutcome, title: str = "") -> Table:
     """A trial for the terminal, as in a trial report: angles in degrees, distances also in lengths."""
     shown = Table(title=title or f"Trial: {found.kind}", title_justify="left", box=None, pad_edge=False)
     notes = [NOTHING] if found.measures.keys() <= APPROACH else [LIMITS] if found.limits else []
-    shown.caption, shown.caption_justify = (
-        "\n".join([*notes, *found.without_limit, *found.short_approach]) or None,
-        "left",
-    )
+    notes += [*found.without_limit, *found.short_approach]
+    shown.caption, shown.caption_justify = "\n".join(notes) or None, "left"
     shown.add_column("measure", style="bold", no_wrap=True)
     for name in ("value", "unit", "in L", "IMO limit"):
         shown.add_column(name, justify="left" if name == "unit" else "right", no_wrap=True)

@@ -1,9 +1,9 @@
 """Files of one run as one table: a file for each topic, and tables with one value in a row."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,7 @@ from .files.message_fields import message_fields
 from .files.tables import clock_seconds, column_names, date_stamps, numbers, table_of_file
 from .run_constants import NEGLIGIBLE
 
+Item = TypeVar("Item", str, Path)
 TIME = "time"  # the column of the time in the one table
 UNIT = frozenset(("unit", "units"))  # of that with their units
 NUMBER = frozenset(("id", "index", "channel", "instance"))  # of that with numbers in place of names
@@ -45,7 +46,7 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
         InputError: a file is no table or is given twice, two columns of it have one name, none is known
             as its time, or files have no time in common.
     """
-    if twice := next((p for p, count in Counter(map(Path.resolve, paths)).items() if count > 1), None):
+    if twice := _first_repeated(map(Path.resolve, paths)):
         raise InputError(f"'{twice}' is given more than once")
     parts = [_part(path) for path in paths]
     times = _times(parts)
@@ -67,6 +68,11 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
     return table.filter(items=[TIME, *(name for name in table if name != TIME)])
 
 
+def _first_repeated(items: Iterable[Item]) -> Item | None:
+    """The first of some items that is there more than once."""
+    return next((item for item, count in Counter(items).items() if count > 1), None)
+
+
 def _part(path: Path) -> _Part:
     """A file's table, its time apart."""
     if not path.is_file():
@@ -74,7 +80,7 @@ def _part(path: Path) -> _Part:
     stated = stated_layout(path) or Layout()
     text = text_of(path, stated)
     names = column_names(path, text)
-    if twice := next((name for name, count in Counter(filter(None, names)).items() if count > 1), ""):
+    if twice := _first_repeated(filter(None, names)):
         raise InputError(f"'{path}' has more than one column '{twice}'; give each a name of its own")
     fields = message_fields(names)
     units = units_below(path, text, names)

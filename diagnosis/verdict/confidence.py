@@ -159,8 +159,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         NO_GAIN: f.id in doubts.without_gain,
     }
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
-    if (by_chance := beyond_chance(f, start)) < 1.0:
-        caps.setdefault(MAY_BE_NONE if may_be_none(f) else NEAR_NONE, by_chance)
+    caps[NEAR_NONE] = most_by_intervals(f, start)
     if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
         nearest = 0.0 if f.evidence is None else f.evidence.nearest
         caps[MENDED] = beside_unknown(doubts.mended[f.id], nearest)
@@ -169,7 +168,7 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     # Waves are a residual themselves.
     if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
         caps[RESIDUAL] = EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown
-    most, rest = min(caps.values(), default=1.0), doubts.beside_possibility.get(f.id, 1.0)
+    most, rest = min(caps.values()), doubts.beside_possibility.get(f.id, 1.0)
     doubt = min(caps, key=caps.__getitem__) if own > most or of_set > most else ""
     return Confidence(min(own * rest, most), min(of_set * rest, most), doubt)
 
@@ -192,7 +191,7 @@ def doubt_of_data(runs: Sequence[WeakWindows]) -> str:
     return RARE if any(t.period > EVERY * t.scale.time + DIGITS for t in tracks) else ""
 
 
-def beyond_chance(f: Finding, start: Model) -> float:
+def most_by_intervals(f: Finding, start: Model) -> float:
     """The probability at most, by the intervals of its values, that these are not zero but for chance.
 
     The evidence of values z standard deviations from zero is at the most exp(z^2 / 2) times that of
