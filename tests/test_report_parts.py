@@ -168,7 +168,7 @@ def test_what_is_sure_is_a_fact_and_comes_first():
     assert headline.finding_sentence(sure) == "There is lag."
     assert headline.finding_sentence(unsure) == (
         "Possibly delay or lag or deadband (50 % for delay): There is delay. "
-        "However, it is at its limit. It is not in the learned model."
+        "However, it is at its limit. It is not in the learned model, which predicts as well without it."
     )
     assert headline.finding_sentence(effect("lag", np.nan)) == "Possibly lag: There is lag."
     small = effect("lag", 0.5, share_of_error=0.003)

@@ -58,6 +58,7 @@ CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
     "and predict data left out of the fit no worse. This does not identify a cause."
 )
+NOT_IN_MODEL = "It is not in the learned model, which predicts as well without it."
 BESIDE = " In addition it fits, without claiming a cause: {}"
 PRODUCTS = "small coefficients of further products of speeds"
 FAR = (
@@ -93,10 +94,11 @@ def finding_sentence(e: ReportedEffect) -> str:
     others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
     sure = f" ({percent(e.confidence)} for {e.id})" if np.isfinite(e.confidence) else ""
     doubt = f" However, {e.doubt}." if e.doubt else ""
-    if 0.0 <= e.share_of_error < NEGLIGIBLE:
+    if not e.in_model:
+        doubt += f" {NOT_IN_MODEL}"
+    elif 0.0 <= e.share_of_error < NEGLIGIBLE:
         doubt += f" It explains {percent(e.share_of_error)} of the squared error."
-    model = "" if e.in_model else " It is not in the learned model."
-    return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
+    return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}"
 
 
 def cause(r: ReportData) -> str:

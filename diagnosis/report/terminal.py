@@ -198,11 +198,11 @@ def channel_table(
 def _effect(e: ReportedEffect) -> Iterator[str]:
     yield finding_sentence(e)
     yield e.equation
-    share = _percent(e.share_of_error)
-    unique = f", unique contribution {_percent(e.share_unique)} (lost without this effect)"
-    alone = "" if e.share_unique is None else unique
-    explained = f"explains {share} {e.of}{alone}"
-    yield f"confidence {_percent(e.confidence)}, {explained}"
+    if e.in_model:  # of another one there is no share in the learned model
+        unique = f", unique contribution {_percent(e.share_unique)} (lost without this effect)"
+        alone = "" if e.share_unique is None else unique
+        explained = f"explains {_percent(e.share_of_error)} {e.of}{alone}"
+        yield f"confidence {_percent(e.confidence)}, {explained}"
     yield from filter(None, (e.separation, e.advice))
 
 
