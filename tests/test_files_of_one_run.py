@@ -109,6 +109,18 @@ def test_files_with_the_same_columns_follow_each_other(tmp_path: Path) -> None:
         table[rows].to_csv(tmp_path / f"{name}.csv", index=False)
     joined = one_table([tmp_path / f"{name}.csv" for name in "cab"])
     pd.testing.assert_frame_equal(joined, table)
+    table[190:450].to_csv(tmp_path / "b.csv", index=False)
+    joined = one_table([tmp_path / f"{name}.csv" for name in "cab"])
+    pd.testing.assert_frame_equal(joined, table)
+
+
+def test_files_with_the_same_columns_at_the_same_time_are_those_of_two_devices(tmp_path: Path) -> None:
+    bow = topic(tmp_path, "bow", table := sailed(), POSE)
+    stern = topic(tmp_path, "stern", table + 1.0, POSE, late=-0.98)
+    joined = one_table([bow, stern])
+    assert set(joined) == {"time", *POSE, *(f"stern.{name}" for name in POSE)}
+    assert joined[POSE].notna().any(axis=1).sum() == len(table)
+    assert (joined["stern.x"].dropna().to_numpy() == table["x"].to_numpy() + 1.0).all()
 
 
 @pytest.mark.parametrize("stamps", [False, True])

@@ -35,8 +35,9 @@ class _Part(NamedTuple):
 def one_table(paths: Sequence[Path]) -> pd.DataFrame:
     """The rows of several files of one run, in the order of their time.
 
-    Files with the same columns follow each other; others have rows of their own, in which the columns of
-    the rest are empty. A column whose name is there already has its file's name before it. A unit that
+    Files with the same columns follow each other, and rows that both have are there once. Others have
+    rows of their own, in which the columns of the rest are empty. So have files with the same columns
+    at the same time. A column whose name is there already has its file's name before it. A unit that
     stands below a name stands behind it. Of a table with one value in a row each name is a column.
 
     Returns:
@@ -50,13 +51,17 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
         raise InputError(f"'{twice}' is given more than once")
     parts = [_part(path) for path in paths]
     times = _times(parts)
-    groups: dict[tuple[str, ...], list[pd.DataFrame]] = {}
-    first: dict[tuple[str, ...], Path] = {}
+    groups: dict[Path, list[pd.DataFrame]] = {}
     for part, time in zip(parts, times, strict=True):
-        names = tuple(part.table)
-        groups.setdefault(names, []).append(part.table.assign(**{TIME: time}))
-        first.setdefault(names, part.path)
-    tables = {first[names]: pd.concat(group, ignore_index=True) for names, group in groups.items()}
+        table = part.table.assign(**{TIME: time})
+        for tables in groups.values():
+            new = _following(tables, table)
+            if new is not None:
+                tables.append(new)
+                break
+        else:
+            groups[part.path] = [table]
+    tables = {path: pd.concat(group, ignore_index=True) for path, group in groups.items()}
     _refuse_apart({path: table[TIME] for path, table in tables.items()})
     taken: set[str] = set()
     for path, table in tables.items():
@@ -66,6 +71,16 @@ def one_table(paths: Sequence[Path]) -> pd.DataFrame:
     table = pd.concat([*tables.values()], ignore_index=True)
     table = table.sort_values(TIME, kind="stable", ignore_index=True)
     return table.filter(items=[TIME, *(name for name in table if name != TIME)])
+
+
+def _following(tables: Sequence[pd.DataFrame], table: pd.DataFrame) -> pd.DataFrame | None:
+    """The rows of a table that others with the same columns lack; None: they are at the same time."""
+    if list(tables[0]) != list(table):
+        return None
+    known = pd.concat([*tables, table], ignore_index=True).duplicated().to_numpy()[-len(table) :]
+    new = table[~known]
+    low, high = new[TIME].min(), new[TIME].max()
+    return None if any(t[TIME].max() > low and high > t[TIME].min() for t in tables) else new
 
 
 def _first_repeated(items: Iterable[Item]) -> Item | None:
