@@ -28,8 +28,8 @@ OTHER_FIT = (
     "over several times then, so that its numbers differ from those of the calibration."
 )
 OTHER_CALIBRATION = (
-    "It found no effect to add. Its model is another calibration, with all products of speeds that the "
-    "hull may have and an offset of the heading, so that its numbers differ."
+    "It found no effect to add. Its model is another calibration, with further parameters that are "
+    "usually small, so that its numbers differ."
 )
 NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
@@ -56,7 +56,7 @@ DRIVEN_ON = (
 )
 CALIBRATED = (
     " The learned model is calibrated: all coefficients are fitted together within their priors, "
-    "and predict data left out of the fit no worse. This does not identify a cause."
+    "and predict data left out of the fit no worse, beyond chance. This does not identify a cause."
 )
 NOT_IN_MODEL = "It is not in the learned model, which predicts as well without it."
 BESIDE = " In addition it fits, without claiming a cause: {}"
