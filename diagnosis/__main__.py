@@ -5,7 +5,9 @@ if __name__ == "__main__":
 
     supervised()  # before all other imports, which take a while
 
-from cosim.command import run_command
+import sys
+
+from cosim.command import BAD_INPUT, complain, run_command
 
 COMMANDS = """Compare a ship model with measurements, and learn which effect it lacks.
 
@@ -17,6 +19,9 @@ COMMANDS = """Compare a ship model with measurements, and learn which effect it 
 
 def main() -> int:
     """Print them; returns the exit code."""
+    if wrong := [a for a in sys.argv[1:] if a not in ("-h", "--help")]:
+        complain(f"unknown argument '{wrong[0]}'; the commands are diagnosis.compare and diagnosis.learn")
+        return BAD_INPUT
     print(COMMANDS)
     return 0
 

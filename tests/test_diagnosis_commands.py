@@ -487,6 +487,9 @@ def test_commands_are_listed():
     )
     for command in ("compare", "learn"):
         assert f"python -m diagnosis.{command}" in listed.stdout
+    wrong = subprocess.run([*listed.args, "learn"], capture_output=True, text=True, check=False)
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert "'learn'; the commands are diagnosis.compare and diagnosis.learn" in wrong.stderr
 
 
 USERS = '''
