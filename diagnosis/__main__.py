@@ -20,7 +20,9 @@ COMMANDS = """Compare a ship model with measurements, and learn which effect it 
 def main() -> int:
     """Print them; returns the exit code."""
     if wrong := [a for a in sys.argv[1:] if a not in ("-h", "--help")]:
-        complain(f"unknown argument '{wrong[0]}'; the commands are diagnosis.compare and diagnosis.learn")
+        complain(
+            f"unknown argument '{wrong[0]}'; the commands are diagnosis.compare and diagnosis.learn"
+        )
         return BAD_INPUT
     print(COMMANDS)
     return 0
