@@ -1,18 +1,21 @@
 """Commands that are logged late: the column, the time and the line that mends it; else nothing."""
 
 import json
+import re
 from functools import cache
 
 import numpy as np
 import pandas as pd
 import pytest
 from support.measured import jumps, sail, slow_swings, table_of
+from support.project import ROOT
 
 import diagnosis
-from benchmarks.ship_effects import causes
+from benchmarks.ship_effects import Cause, causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model
 from diagnosis.assessment.gathering import gather
+from diagnosis.assessment.late_commands import Timing
 from diagnosis.predictors import ship_with
 
 H, LATE = 0.1, 4  # s, rows
@@ -109,6 +112,25 @@ def test_a_controller_that_commands_what_its_ship_has_just_done_is_not_late(tmp_
 @pytest.mark.parametrize("cause", ["lag", "current"])
 def test_effects_are_not_late_commands(cause, tmp_path):
     assert not lines(tmp_path, otter(cause), "otter")[1]
+
+
+@pytest.mark.parametrize("faster", [2.0, 4.0, None])
+def test_actuators_that_turn_faster_are_a_rival_of_late_commands(faster, tmp_path):
+    """Twice as fast as described, four times, or without a limit."""
+    text = (ROOT / "ships" / "otter.toml").read_text()
+    path = tmp_path / "limited.toml"
+    path.write_text(re.sub("^lag = .*$", "n_rate = 10.0", text, flags=re.M))
+    ship = ship_with((), path)
+    model = Model(ship=ship)
+    assert model.rates == {f"plant_{side}_n_rate": 10.0 for side in ("port", "starboard")}
+    real = dict.fromkeys(model.rates, 0.0 if faster is None else faster * 10.0)
+    table = sail_of(ship, Cause("", {}, real), np.random.default_rng(1), None, seconds=60.0)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    (w,) = gather([tmp_path / "a.csv"], model=model)
+    timing = Timing(w, model)
+    nearest = max(timing.rivals([0, 1], np.array([0.2])), key=lambda score: score.total)
+    true = timing.force((), 0.0, model.plus({n: v - 10.0 for n, v in real.items()}))
+    assert nearest.total == pytest.approx(timing.score(true).total)
 
 
 def test_a_pose_is_not_late(tmp_path):

@@ -7,11 +7,11 @@ the likelihood
 
     2 log L = -sum_axes n log sum (r^2 + s^2).
 
-A column is late if that is far likelier than commands as they are, later, or of actuators with a
-smaller lag than in the ship's file, and if the blocks of the run agree (Student's test). The factor of
-the force must be one to MEASURED, or nearer to one than as it is logged. A controller commands what its
-ship has just done, so that disturbances look like commands to come, with another factor. Of one column
-and all of them the first is reported, unless all are far likelier.
+A column is late if that is far likelier than commands as they are, later, or of actuators with smaller
+lags and faster rates than in the ship's file, and if the blocks of the run agree (Student's test). The
+factor of the force must be one to MEASURED, or nearer to one than as it is logged. A controller commands
+what its ship has just done, so that disturbances look like commands to come, with another factor. Of one
+column and all of them the first is reported, unless all are far likelier.
 """
 
 from collections.abc import Iterator, Sequence
@@ -136,10 +136,13 @@ class Timing:
         """Commands as they are, later by some times [s], or of actuators that follow faster."""
         yield self.score(self.as_logged)
         yield self.likeliest(columns, -times)[1]
-        lags = self.model.lags
-        for share in np.arange(1, PARTS + 1) / PARTS if lags else ():
-            faster = self.model.plus({n: -share * lag for n, lag in lags.items()})
-            yield self.score(self.force((), 0.0, faster))
+        lags, rates = self.model.lags, self.model.rates
+        for share in np.arange(1, PARTS + 1) / PARTS if lags or rates else ():
+            # At a rate of zero there is no limit.
+            more = share / (1.0 - share) if share < 1.0 else -1.0
+            sooner = {n: -share * lag for n, lag in lags.items()}
+            quicker = {n: more * rate for n, rate in rates.items()}
+            yield self.score(self.force((), 0.0, self.model.plus(sooner | quicker)))
 
 
 def slower(w: WeakWindows, model: Model) -> list[Model]:

@@ -212,6 +212,12 @@ class Model:
         return lags if any(lags.values()) else {}
 
     @property
+    def rates(self) -> dict[str, float]:
+        """Limits of the rates of commands, by name [the command's unit per s]; none where it is zero."""
+        named = (n for n in self.ship.coefficients if n.endswith("_rate"))
+        return {n: rate for n in named if (rate := self.value(n))}
+
+    @property
     def logging(self) -> Logging:
         """How the commands are logged."""
         return Logging(self.clock, self.measurement.get(COMMAND_LAG.id, 0.0))
