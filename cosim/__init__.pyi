@@ -10,8 +10,8 @@ from .formats.ssv import ParameterSet as ParameterSet
 from .formats.ssv import read_parameters as read_parameters
 from .formats.ssv import write_parameters as write_parameters
 from .master.ending import Result as Result
+from .results.log import log_frame as log_frame
 from .results.log import read_log as read_log
-from .results.log_table import log_frame as log_frame
 from .scenario.load import load_scenario as load_scenario
 from .scenario.schema import Scenario as Scenario
 from .scenario.shipped import shipped_folder as shipped_folder

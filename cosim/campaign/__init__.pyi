@@ -1,4 +1,3 @@
-from .campaign_file import campaign_schema as campaign_schema
 from .comparison import differences as differences
 from .comparison import pareto as pareto
 from .conduct import run_campaign as run_campaign

@@ -185,8 +185,3 @@ class LoadedCampaign:
 
 def _special(_: str, location: Location, __: object) -> str:
     return 'is "grid", "list", {"latin": N} or {"sobol": N}' if location[:1] == ("design",) else ""
-
-
-def campaign_schema() -> dict[str, Any]:
-    """The JSON Schema of a campaign file."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Campaign.model_json_schema()}

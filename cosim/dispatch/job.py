@@ -86,9 +86,10 @@ def job_of(scenario: Scenario, files: Files, task: Task) -> Job:
     """
     files.read([scenario])
     content = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    models = files.models(scenario)
     names: list[str] = []
     for name, entry in content["fmus"].items():
-        entry["path"] = files.fmu(scenario, name)
+        entry["path"] = f"{models[name].sha256}.fmu"
         names.append(entry["path"])
         if entry.get("table") is not None:
             entry["table"] = files.table(scenario.folder, entry["table"])

@@ -8,7 +8,7 @@ from cybership.scratch_folder import Scratch
 
 from ..errors import InputError
 from .job import Job, RunRow
-from .travelling_files import Files, copy_all
+from .travelling_files import Files, put
 from .workplace import Workplace
 
 ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9a-fA-F:.]+\]|[\w.-]+):\d{1,5}")
@@ -36,9 +36,10 @@ class ThisProcess:
 
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, RunRow], None, None]:
         for job in jobs:
-            copy_all(self._work.folder, [(name, self._files.paths[name]) for name in job.files])
-            for name in self._files.fmus.keys() & set(job.files):
-                self._work.pool.know(self._work.folder / name, self._files.fmus[name])
+            for name in job.files:
+                put(self._work.folder, name, self._files.paths[name].read_bytes())
+                if name in self._files.fmus:
+                    self._work.pool.know(self._work.folder / name, self._files.fmus[name])
             self._work.pool.resettable |= self._files.resettable
             yield job, self._work.run(job.content, job.task)
 

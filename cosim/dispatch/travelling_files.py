@@ -1,7 +1,7 @@
 """Files that travel to workers by the hash of their content: FMUs, and tables of parameters."""
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path, PurePath
 
 from cybership.scratch_folder import atomic_write
@@ -69,10 +69,6 @@ class Files:
         """The FMU of each instance; :meth:`read` has read them."""
         return {name: self._models[(e.path, *_kind(scenario))] for name, e in scenario.fmus.items()}
 
-    def fmu(self, scenario: Scenario, instance: str) -> str:
-        """The name by content of the FMU of an instance; :meth:`read` has read it."""
-        return f"{self.models(scenario)[instance].sha256}.fmu"
-
     def table(self, folder: Path, path: str) -> str:
         """The name by content of a table.
 
@@ -113,9 +109,3 @@ def put(folder: Path, name: str, content: bytes) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_write(folder / name) as scratch:
         scratch.write_bytes(content)
-
-
-def copy_all(folder: Path, paths: Iterable[tuple[str, Path]]) -> None:
-    """Put files of this computer into such a folder."""
-    for name, path in paths:
-        put(folder, name, path.read_bytes())

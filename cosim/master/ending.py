@@ -14,7 +14,6 @@ from ..errors import InputError, nearest, not_written
 from ..files import update_json, write_json
 from ..results import log as logs
 from ..results import performance
-from ..results.log_table import log_frame
 from ..results.picture_files import Drawn
 from ..results.run_options import RunOptions, read_options
 from ..system.system import System
@@ -66,7 +65,7 @@ class Result:
     @cached_property
     def log(self) -> pandas.DataFrame:
         """The log as a table, read when it is first asked for; see :func:`cosim.log_frame`."""
-        return log_frame(self.folder)
+        return logs.log_frame(self.folder)
 
     def plot(self, name: str = "trajectory") -> Drawn:
         """Draw one of the pictures of a run.

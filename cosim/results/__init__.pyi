@@ -1,8 +1,5 @@
 from .canvas import thin as thin
 from .drawing import draw as draw
-from .log import Log as Log
-from .log import read_log as read_log
-from .log_table import log_frame as log_frame
 from .performance import MetricsError as MetricsError
 from .performance import compute as compute
 from .performance import over_time as over_time

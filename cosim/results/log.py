@@ -2,6 +2,7 @@
 
 import csv
 import errno
+import json
 import os
 import re
 import warnings
@@ -9,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import orjson
@@ -19,6 +20,9 @@ from cybership.scratch_folder import atomic_write
 from ..errors import InputError, nearest
 from ..files import write_all
 from ..process.run_state import Owner
+
+if TYPE_CHECKING:
+    import pandas
 
 CSV = "log.csv"
 PARQUET = "log.parquet"
@@ -278,3 +282,29 @@ def _wanted(names: Sequence[str], columns: Sequence[str] | None, path: Path) -> 
         if column not in names:
             raise InputError(f"'{path}' has no column '{column}'{nearest(column, names)}")
     return ["time", *(c for c in columns if c != "time")]
+
+
+def log_frame(folder: str | Path) -> "pandas.DataFrame":
+    """The log of a run as a table of pandas: one row a logged step, one column a signal.
+
+    Args:
+        folder: results of a run.
+
+    Returns:
+        The columns of ``log.csv``; ``attrs["units"]`` and ``attrs["descriptions"]`` describe each.
+
+    Raises:
+        InputError: there is no log, or pandas is not installed.
+    """
+    try:
+        import pandas
+    except ImportError:
+        raise InputError("a log as a table needs pandas: pip install 'cybership[tables]'") from None
+    frame = pandas.DataFrame(read_log(folder))
+    try:
+        columns = json.loads((Path(folder) / SIDECAR).read_text(encoding="utf-8"))["columns"]
+    except (OSError, ValueError, KeyError):
+        columns = {}
+    for kind in ("unit", "description"):
+        frame.attrs[f"{kind}s"] = {name: told.get(kind, "") for name, told in columns.items()}
+    return frame
