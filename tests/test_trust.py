@@ -5,7 +5,6 @@ import json
 import os
 import stat
 import zipfile
-from dataclasses import replace
 
 import pytest
 from support.command import command
@@ -14,7 +13,8 @@ from support.project import ROOT
 
 import cosim
 from cosim.errors import InputError
-from cosim.fmu.archive_check import ArchiveLimits, check_archive, unpack
+from cosim.fmu import archive_check
+from cosim.fmu.archive_check import check_archive, unpack
 from cosim.formats.ssv import read_parameters
 from cosim.run import main as run_main
 from fmus.build.__main__ import main as build_main
@@ -95,21 +95,25 @@ def test_duplicates_backslashes_and_encryption_are_refused(tmp_path):
         check_archive(tmp_path / "c.fmu")
 
 
-def test_bombs_are_refused_before_anything_is_unpacked(tmp_path):
+def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch):
     zeros = bytes(1 << 20)
-    small = ArchiveLimits(files=10, size=8 << 20, ratio=100.0, always=1 << 20)
+    small = {"MOST_FILES": 10, "MOST_BYTES": 8 << 20, "MOST_RATIO": 100.0, "ALWAYS": 1 << 20}
+    for name, limit in small.items():
+        monkeypatch.setattr(archive_check, name, limit)
     high = archive(tmp_path / "ratio.fmu", *((f"{k}", zeros) for k in range(4)))
     with pytest.raises(InputError, match="100 times the size"):
-        unpack(high, tmp_path / "out", small)
+        unpack(high, tmp_path / "out")
     large = archive(tmp_path / "size.fmu", *((f"{k}", os.urandom(1000) * 1000) for k in range(9)))
     with pytest.raises(InputError, match="at most"):
-        unpack(large, tmp_path / "out", small)
+        unpack(large, tmp_path / "out")
     text = archive(tmp_path / "xml.fmu", ("modelDescription.xml", os.urandom(2000)))
-    with pytest.raises(InputError, match=r"modelDescription\.xml is larger than 1000 bytes"):
-        unpack(text, tmp_path / "out", replace(small, xml=1000))
+    with monkeypatch.context() as patched:
+        patched.setattr(archive_check, "LARGEST_XML", 1000)
+        with pytest.raises(InputError, match=r"modelDescription\.xml is larger than 1000 bytes"):
+            unpack(text, tmp_path / "out")
     many = archive(tmp_path / "many.fmu", *(f"{k}" for k in range(11)))
     with pytest.raises(InputError, match="11 entries are more than 10"):
-        unpack(many, tmp_path / "out", small)
+        unpack(many, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -1,6 +1,7 @@
 from .fmu_model import FmuModel as FmuModel
 from .fmu_model import FmuVariable as FmuVariable
-from .instance import Instance as Instance
+from .instance import DoubleMemory as DoubleMemory
+from .instance import Port as Port
 from .isolation.channel import FeedbackTerm as FeedbackTerm
 from .isolation.confined import ConfinedFmu as ConfinedFmu
 from .isolation.confinement import MEANS as MEANS
@@ -8,5 +9,3 @@ from .isolation.isolated import MOST_STEPS as MOST_STEPS
 from .isolation.isolated import IsolatedInstance as IsolatedInstance
 from .isolation.isolated import WholeRun as WholeRun
 from .local import LocalInstance as LocalInstance
-from .memory import DoubleMemory as DoubleMemory
-from .memory import Port as Port

@@ -12,7 +12,6 @@ import stat
 import unicodedata
 import zipfile
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
@@ -24,27 +23,12 @@ DEVICE = re.compile(
 )
 ENCRYPTED = 0x1  # bit of the general purpose flags of a zip entry
 XML = (".xml", ".ssd", ".ssv", ".ssm")
-
-
-@dataclass(frozen=True)
-class ArchiveLimits:
-    """How large an archive may become; the values are chosen well above the largest FMUs in use.
-
-    Attributes:
-        files: entries.
-        size: of all entries together, unpacked [bytes].
-        ratio: of that size to the size of the archive; does not count below ``always`` [bytes].
-        xml: of one XML file, which takes many times as much memory to read [bytes].
-    """
-
-    files: int = 50_000
-    size: int = 4 * 2**30
-    ratio: float = 200.0
-    always: int = 64 * 2**20
-    xml: int = 128 * 2**20
-
-
-LIMITS = ArchiveLimits()
+# How large an archive may become; chosen: well above the largest FMUs in use.
+MOST_FILES = 50_000  # entries
+MOST_BYTES = 4 * 2**30  # of all entries together, unpacked
+MOST_RATIO = 200.0  # of that size to the size of the archive; does not count below ALWAYS [bytes]
+ALWAYS = 64 * 2**20
+LARGEST_XML = 128 * 2**20  # bytes of one XML file, which takes many times as much memory to read
 # What zipfile raises for a file that is no archive, is damaged, or uses an unknown compression.
 DAMAGED = (
     zipfile.BadZipFile,
@@ -62,12 +46,11 @@ REAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 INTEGER = re.compile(r"[+-]?\d{1,30}", re.ASCII)
 
 
-def check_archive(path: Path, limits: ArchiveLimits = LIMITS) -> list[zipfile.ZipInfo]:
+def check_archive(path: Path) -> list[zipfile.ZipInfo]:
     """Entries of an archive that can be unpacked anywhere without harm.
 
     Args:
         path: a zip archive.
-        limits: how large it may become.
 
     Raises:
         InputError: not a zip archive; an entry leaves the folder, is a link, is encrypted, has a name
@@ -81,19 +64,19 @@ def check_archive(path: Path, limits: ArchiveLimits = LIMITS) -> list[zipfile.Zi
         raise InputError(f"no such file: '{path}'") from None
     except DAMAGED as error:
         raise InputError(f"'{path}' is not a zip archive: {error}") from None
-    if len(entries) > limits.files:
-        raise InputError(f"'{path}' is refused: {len(entries)} entries are more than {limits.files}")
+    if len(entries) > MOST_FILES:
+        raise InputError(f"'{path}' is refused: {len(entries)} entries are more than {MOST_FILES}")
     size = sum(entry.file_size for entry in entries)
     # Entries may share their bytes: only the size of the whole file is certain.
-    if size > limits.size or (size > limits.always and size > limits.ratio * packed):
+    if size > MOST_BYTES or (size > ALWAYS and size > MOST_RATIO * packed):
         raise InputError(
-            f"'{path}' is refused: {packed} bytes unpack to {size} (at most {limits.size}, and "
-            f"{limits.ratio:g} times the size of the archive)"
+            f"'{path}' is refused: {packed} bytes unpack to {size} (at most {MOST_BYTES}, and "
+            f"{MOST_RATIO:g} times the size of the archive)"
         )
     for entry in entries:
-        if entry.file_size > limits.xml and entry.filename.lower().endswith(XML):
+        if entry.file_size > LARGEST_XML and entry.filename.lower().endswith(XML):
             raise InputError(
-                f"'{path}' is refused: its {entry.filename[:100]} is larger than {limits.xml} bytes"
+                f"'{path}' is refused: its {entry.filename[:100]} is larger than {LARGEST_XML} bytes"
             )
         if reason := _fault(entry):
             raise InputError(f"'{path}' is refused: its entry {entry.orig_filename[:100]!r} {reason}")
@@ -148,13 +131,13 @@ def _key(name: str) -> str:
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
-def unpack(path: Path, folder: Path, limits: ArchiveLimits = LIMITS) -> None:
+def unpack(path: Path, folder: Path) -> None:
     """Unpack an archive into an empty folder, after :func:`check_archive`.
 
     Raises:
         InputError: refused, damaged, or the disk is full.
     """
-    entries = check_archive(path, limits)
+    entries = check_archive(path)
     try:
         with zipfile.ZipFile(path) as archive:
             for entry in entries:

@@ -11,8 +11,7 @@ from collections.abc import Callable, Sequence
 from ..errors import SimulationError
 from .component import DISCARD, FmuComponent
 from .fmu_model import INT_LIMIT
-from .instance import Access, DirectCalls, DirectTransfer
-from .memory import DoubleMemory, Port
+from .instance import Access, DirectCalls, DirectTransfer, DoubleMemory, Port
 from .stepping import redoing_steps, single_steps
 
 _SETTERS = {

@@ -1,15 +1,38 @@
-"""The interface of a running FMU: its calls, their order, and its guarantees."""
+"""The interface of a running FMU: its calls, their order, its guarantees, and the memory of values."""
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from .fmu_model import FmuModel, FmuVariable, Value
-from .memory import DoubleMemory, Port
 
 # Receives (instance, status, text) of each message that an FMU logs; the status is that of FMI.
 OnMessage = Callable[[str, int, str], None]
+
+
+class DoubleMemory:
+    """Doubles that FMUs read and write.
+
+    Args:
+        count: how many.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._memory = (ctypes.c_double * max(1, count))()
+        self.address = ctypes.addressof(self._memory)
+        self.octets = memoryview(self._memory).cast("B")
+        self.values = self.octets.cast("d")
+
+
+@dataclass(frozen=True)
+class Port:
+    """A variable and its place in a memory."""
+
+    variable: FmuVariable
+    slot: int
 
 
 class DirectTransfer(NamedTuple):

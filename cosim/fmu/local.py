@@ -1,7 +1,6 @@
 """An FMU that runs in this process."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from fmpy.fmi1 import FMICallException
 
@@ -10,16 +9,10 @@ from ..process.run_state import STATE
 from . import calls
 from .component import ERROR, FmuComponent
 from .fmu_model import FmuModel, FmuVariable, Value
-from .instance import Access, OnMessage
-from .memory import DoubleMemory, Port
+from .instance import Access, DoubleMemory, OnMessage, Port
 
-# Type of a variable -> how FMPy calls it, and what makes a value of it; an Enumeration is an Integer.
-KINDS: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
-    "Real": ("Real", float),
-    "Integer": ("Integer", int),
-    "Boolean": ("Boolean", bool),
-    "String": ("String", str),
-}
+# Type of a variable, as FMPy calls it -> what makes a value of it; an Enumeration is an Integer.
+KINDS: Mapping[str, type] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
 
 
 class LocalInstance:
@@ -72,15 +65,15 @@ class LocalInstance:
         )
 
     def set_value(self, variable: FmuVariable, value: Value) -> None:
-        kind, convert = KINDS.get(variable.type, KINDS["Integer"])
+        kind = variable.type if variable.type in KINDS else "Integer"
         put = getattr(self._slave, f"set{kind}")
         self._call(
-            f"setting {variable.name} = {value}", lambda: put([variable.reference], [convert(value)])
+            f"setting {variable.name} = {value}", lambda: put([variable.reference], [KINDS[kind](value)])
         )
 
     def get_value(self, variable: FmuVariable) -> float:
         values: list[float] = []
-        get = getattr(self._slave, f"get{KINDS.get(variable.type, KINDS['Integer'])[0]}")
+        get = getattr(self._slave, f"get{variable.type if variable.type in KINDS else 'Integer'}")
         self._call(f"getting {variable.name}", lambda: values.extend(get([variable.reference])))
         return float(values[0])
 

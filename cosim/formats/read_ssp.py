@@ -177,10 +177,8 @@ class _SspReader:
                 found["step"] = number(algorithm.get("baseStepSize"), "baseStepSize")
         for master in system.iterfind("ssd:SimulationInformation/ssd:FixedStepMaster", NAMES):
             found.setdefault("step", number(master.get("stepSize"), "stepSize"))
-        if "step" not in found:
-            experiments = [model.description.defaultExperiment for model in self.models.values()]
-            steps = [float(e.stepSize) for e in experiments if e is not None and e.stepSize]
-            if steps:
-                found["step"] = min(steps)
-                self.notes.append(f"no step is given; the FMUs suggest {min(steps):g} s")
+        own = (model.suggested_step for model in self.models.values())
+        if "step" not in found and (suggested := [step for step in own if step is not None]):
+            found["step"] = min(suggested)
+            self.notes.append(f"no step is given; the FMUs suggest {min(suggested):g} s")
         return found

@@ -12,7 +12,7 @@ from ..results.pending_rows import PendingRows
 from ..results.performance import needed, read
 from ..system.system import System
 from .algorithm import Master
-from .value_table import ValueTable
+from .stepper import ValueTable
 
 
 def demand_memory(system: System, pictures: bool) -> None:

@@ -1,20 +1,45 @@
-"""One FMU in the step loop: its inputs from the value table, its step, its outputs to the table."""
+"""The value table, and one FMU in the step loop: inputs from the table, a step, outputs to the table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from ..conversion import SAME
-from ..fmu.instance import Instance
-from ..fmu.memory import Port
+from ..fmu.instance import DoubleMemory, Instance, Port
 from ..scenario.faults import Effect
 from ..scenario.operations import Convert, Replace
-from ..system.system import Connection, System
+from ..system.system import Connection, Signal, System
 from .changes import Changes
-from .value_table import ValueTable
 
 # Adjacent connections that are copied as one slice; chosen: for fewer, single copies are faster.
 SHORTEST_SLICE = 4
+
+
+class ValueTable(DoubleMemory):
+    """One double for each signal, in a memory through which FMUs exchange values.
+
+    Each FMU reads its inputs from its own part of the table and writes its outputs there, with one
+    vector get and one vector set in each step. A row of the log is the table.
+
+    Args:
+        signals: all signals, by name.
+        order: instances in the order of their parts.
+        settable: names of the inputs that the master sets.
+    """
+
+    def __init__(self, signals: dict[str, Signal], order: Sequence[str], settable: set[str]) -> None:
+        def rank(signal: Signal) -> tuple[int, int, int]:
+            is_input = signal.variable.causality == "input"
+            group = 0 if signal.name in settable else 1 if is_input else 2
+            return order.index(signal.instance), group, int(signal.variable.type != "Real")
+
+        # sorted() is stable: within a part the order is that of the model description.
+        self.signals = sorted(signals.values(), key=rank)
+        self.slots = {signal.name: k for k, signal in enumerate(self.signals)}
+        super().__init__(len(self.signals))
+        self.row = np.asarray(self.values)
 
 
 class Stepper:

@@ -1,6 +1,7 @@
 """Scenarios from JSON, or from the formats of other tools, with messages for mistakes."""
 
 import math
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,8 @@ from typing import Any
 from cybership.message_text import Location
 
 from ..errors import InputError, nearest
-from ..formats.systems import is_system, read_system
+from ..formats.read_osp import read_osp
+from ..formats.read_ssp import read_ssp
 from . import faults
 from .json_files import checked, json_content
 from .schema import Scenario
@@ -34,8 +36,10 @@ def load_scenario(
     if isinstance(source, dict):
         return _validate(source | chosen, "scenario", Path.cwd())
     path = find_scenario(source)
-    if is_system(path):
-        system = read_system(path)
+    if path.suffix in (".ssp", ".xml") or os.path.isdir(path):
+        if not path.exists():
+            raise InputError(f"no such system: '{path}'")
+        system = read_ssp(path) if path.suffix == ".ssp" else read_osp(path)
         for key in ("step", "stop"):
             if key not in system.content | chosen:
                 raise InputError(f"'{path}' does not state its {key}; give --{key} SECONDS")

@@ -18,8 +18,7 @@ from ...process.call_watch import TIMEOUT, TIMES_USUAL
 from ...process.spawned import ending
 from ..component import WARNING
 from ..fmu_model import FmuModel, FmuVariable, Value
-from ..instance import Access, OnMessage
-from ..memory import DoubleMemory, Port
+from ..instance import Access, DoubleMemory, OnMessage, Port
 from .channel import (
     CALL,
     DONE,

@@ -19,8 +19,8 @@ from typing import Any
 from ...errors import InputError, SimulationError
 from ...process.spawned import end_with_parent
 from ..fmu_model import FmuModel, Value
+from ..instance import DoubleMemory, Port
 from ..local import LocalInstance
-from ..memory import DoubleMemory, Port
 from .channel import (
     DIVERGED,
     DONE,
