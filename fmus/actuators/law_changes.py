@@ -2,12 +2,35 @@
 
 from collections.abc import Sequence
 
-from ..declare import Fields, Range, Variable, variables
+from ..declare import Fields, Variable, variables
+from ..effects.devices import parameter
 from ..effects.effect import Effect, Search, Wording, effect
 from ..effects.text import Found
 from ..hull_functions import Change
 from ..ops import Number
 from .actuator import Actuator, twins
+
+
+def additions(
+    change: Change, known: Sequence[Variable], stem: str = "", of: str = ""
+) -> tuple[Variable, ...]:
+    """Parameters of an effect, one for each that may be otherwise than described: what is added to it.
+
+    Args:
+        change: which.
+        known: the parameters of the law, or of the function of the hull.
+        stem: of the names.
+        of: what descriptions end with.
+    """
+    by_name = {v.name: v for v in known}
+    found = [(f"delta_{stem}{name}", by_name[name]) for name in change.parameters]
+    return tuple([parameter(d, v.unit, f"addition to {v.description}{of}") for d, v in found])
+
+
+def differs(change: Change, parameters: Sequence[Variable], f: Found) -> str:
+    """The end of a finding: how much is added to what is described."""
+    told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
+    return f"{change.text} differs from the model by {', '.join(told)}."
 
 
 def changed(alike: Sequence[Actuator], change: Change) -> Effect:
@@ -20,31 +43,14 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
     a = alike[0]
     order = "_".join(dict.fromkeys([b.order for b in alike]))
     name, title = f"{change.stem}_{order}", " and ".join([b.part.title for b in alike])
-    known = {v.name: v for v in variables(a.law.Parameters)}
-    parameters = tuple(
-        [
-            Variable(
-                f"delta_{order}_{p}",
-                known[p].unit,
-                f"addition to {known[p].description}: {title}",
-                0.0,
-                Range(),
-                False,
-            )
-            for p in change.parameters
-        ]
-    )
-
-    def sentence(f: Found) -> str:
-        told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
-        return f"The {title}: {change.text} differs from the model by {', '.join(told)}."
+    parameters = additions(change, variables(a.law.Parameters), f"{order}_", f": {title}")
 
     @effect(
         name,
         "actuator",
         "XYN",
         parameters=parameters,
-        wording=Wording(sentence, a.devices.family),
+        wording=Wording(lambda f: f"The {title}: {differs(change, parameters, f)}", a.devices.family),
         gives="parameters",
         formula=f"{', '.join(change.parameters)} + δ, in the law {a.law.name}",
         symbol="δ",

@@ -4,10 +4,11 @@ One declaration for all, made for each function of a ship's hull, as
 :mod:`fmus.actuators.failings` has them for its actuators.
 """
 
-from ..declare import Range, Variable, parameters_of
+from ..actuators.law_changes import additions, differs
+from ..declare import parameters_of
 from ..effects.effect import Effect, Loaded, Wording, effect
 from ..effects.families import Family
-from ..effects.text import Found, capital
+from ..effects.text import capital
 from ..hull import Triple
 from ..hull_functions import CHANGES, FUNCTIONS, Change
 from ..ops import Number
@@ -19,19 +20,7 @@ HULL = Family("hull", "steady legs at several speeds, and turns of several radii
 
 def changed(function: str, change: Change) -> Effect:
     """Parameters of a function of the hull that are others than described."""
-    known = {v.name: v for v in parameters_of(function, 3, FUNCTIONS[function])}
-    parameters = tuple(
-        [
-            Variable(
-                f"delta_{p}", known[p].unit, f"addition to {known[p].description}", 0.0, Range(), False
-            )
-            for p in change.parameters
-        ]
-    )
-
-    def sentence(f: Found) -> str:
-        told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
-        return f"{capital(change.text)} differs from the model by {', '.join(told)}."
+    parameters = additions(change, parameters_of(function, 3, FUNCTIONS[function]))
 
     @effect(
         change.stem,
@@ -42,7 +31,7 @@ def changed(function: str, change: Change) -> Effect:
         sign="an addition to the described value",
         description=change.text,
         parameters=parameters,
-        wording=Wording(sentence, HULL),
+        wording=Wording(lambda f: capital(differs(change, parameters, f)), HULL),
     )
     def force(ship: Loaded, *additions: Number) -> Triple:
         p = getattr(ship.damping.functions, function)
