@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import cache
 
-from ..declare import POSITIVE, Fields, Range, Variable, group_of, variables
+from ..declare import POSITIVE, Fields, Variable, group_of, variables
 from ..effects import Thrust
 from ..hull import Triple
 from ..ops import Number, clip, wrap
@@ -97,8 +97,8 @@ def parameters(ship: Description, a: Actuator, prefix: str, known: bool) -> type
     """
     name, title = a.part.name, a.label
     place = [
-        Variable("x", "m", "place, forward of the body origin", 0.0, Range(), False),
-        Variable("y", "m", "place, to starboard", 0.0, Range(), False),
+        Variable("x", "m", "place, forward of the body origin", 0.0),
+        Variable("y", "m", "place, to starboard", 0.0),
     ]
     given = {v.name: v for v in a.part.values}
     found: list[Variable] = []

@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from ..declare import Fields, Range, Variable, group_of
+from ..declare import Fields, Variable, group_of
 from ..effects.curve import interpolate
 from ..ops import Number, clip, fmax
 from .law import Command, Flow, Law, Span
@@ -14,10 +14,7 @@ NODES = 11  # of the table, from command -1 to 1
 def _forces(way: str) -> type[Fields]:
     """The force at each node; a straight line of one newton as it starts."""
     at = [2.0 * k / (NODES - 1) - 1.0 for k in range(NODES)]
-    fields = [
-        Variable(f"F_{k}", "N", f"force {way} at command {c:g}", c, Range(), False)
-        for k, c in enumerate(at, 1)
-    ]
+    fields = [Variable(f"F_{k}", "N", f"force {way} at command {c:g}", c) for k, c in enumerate(at, 1)]
     return group_of("Forces", fields)
 
 

@@ -19,9 +19,7 @@ from .laws import TunnelThruster, VoithSchneider
 COMMANDS = 9
 SPEEDS = 3
 NODES = COMMANDS * SPEEDS
-TABLE_SPEED = Variable(
-    "table_speed", "m/s", "largest inflow speed of the table", 0.4, Range(min=0.01), False
-)
+TABLE_SPEED = Variable("table_speed", "m/s", "largest inflow speed of the table", 0.4, Range(min=0.01))
 
 
 def squared(line: type[Law]) -> type[Law]:
@@ -76,7 +74,7 @@ def _table(name: str) -> list[Variable]:
     """The table of one command, row by row."""
     text = "share of full force at command {:g}, speed {} of 2"
     return [
-        Variable(f"{name}_{i}_{j + 1}", "1", text.format(c, j), c, Range(), False)
+        Variable(f"{name}_{i}_{j + 1}", "1", text.format(c, j), c)
         for i, c in enumerate([2.0 * k / (COMMANDS - 1) - 1.0 for k in range(COMMANDS)], 1)
         for j in range(SPEEDS)
     ]

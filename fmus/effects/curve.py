@@ -37,8 +37,7 @@ def node_parameters(
         least: the smallest range.
     """
     nodes = [
-        Variable(f"{prefix}_{k}", unit, f"{what}, node {k} of {NODES}", 0.0, Range(), False)
-        for k in range(1, NODES + 1)
+        Variable(f"{prefix}_{k}", unit, f"{what}, node {k} of {NODES}", 0.0) for k in range(1, NODES + 1)
     ]
     span = f"reach of the nodes of {prefix}: {over}"
-    return (*nodes, Variable(f"{prefix}_range", over_unit, span, reach, Range(min=least), False))
+    return (*nodes, Variable(f"{prefix}_range", over_unit, span, reach, Range(min=least)))

@@ -125,7 +125,7 @@ def added(f: Thrust, members: Sequence[int], axis: str, extra: Number) -> Thrust
 
 def parameter(name: str, unit: str, text: str, limits: Range = ANY) -> Variable:
     """A parameter that is zero where there is no effect."""
-    return Variable(name, unit, text, 0.0, limits, False)
+    return Variable(name, unit, text, 0.0, limits)
 
 
 def declared(

@@ -353,10 +353,8 @@ def effect(
     Raises:
         DeclarationError: unknown kind, axis or field, or a parameter without unit, description or start.
     """
-    further = {"gives", "needs", "apart", "usual", "memory", "search", "wording"}
-    further |= {"parameters", "description"}
-    unknown = set(more) - further
-    if unknown:
+    further = {"gives", "apart", "usual", "memory", "search", "wording"}
+    if unknown := set(more) - further - {"needs", "parameters", "description"}:
         raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
 
     def declare(function: EffectFunction) -> Effect:
@@ -367,8 +365,7 @@ def effect(
         lines = (more.get("description") or docstring(function)).strip().splitlines()
         if not lines:
             raise DeclarationError(f"{id}: the first line of the docstring describes the effect")
-        memory = more.get("memory")
-        leading = 3 if memory is not None else 2 if kind == "actuator" else 1
+        leading = 3 if more.get("memory") is not None else 2 if kind == "actuator" else 1
         parameters = more.get("parameters") or parameters_of(id, leading, function)
         how = frozenset(settings)
         strengths = [p.name for p in parameters if p.start == 0.0 and p.name not in how]
@@ -392,13 +389,8 @@ def effect(
             parameters,
             function,
             how,
-            more.get("gives", "force"),
-            frozenset(more.get("needs", ())),
-            memory,
-            search,
-            more.get("wording", Wording()),
-            more.get("apart", False),
-            more.get("usual", 0.0),
+            needs=frozenset(more.get("needs", ())),
+            **{name: value for name, value in more.items() if name in further},
         )
 
     return declare

@@ -1,9 +1,8 @@
 """Forces by the ship's motion: a change of each damping coefficient, and a free curve over speed."""
 
-from collections.abc import Callable
 from math import degrees
 
-from ..declare import Range, Variable, variables
+from ..declare import Variable, variables
 from ..hull import Damping, Triple, product, term_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
@@ -54,12 +53,6 @@ MOTION = {
 }
 
 
-def change(coefficient: Variable) -> Effect:
-    """The effect that changes the coefficient of a product of speeds."""
-    name = coefficient.name
-    return _change(lambda ship, delta: term_force(name, delta, ship.u, ship.v, ship.r), coefficient)
-
-
 def damping_sentence(f: Found) -> str:
     """A damping-like term, as a force at the speeds that the ship reached."""
     axis, _, term = f.effect.id.partition("_")
@@ -86,13 +79,14 @@ def _at(moved: str, speeds: tuple[float, float, float], sides: bool = False) -> 
     return " and ".join(" ".join(parts[m][: 1 + sides]) for m in "uvr" if m in moved)
 
 
-def _change(function: Callable[[Motion, Number], Triple], coefficient: Variable) -> Effect:
-    """The effect that changes one damping coefficient, by the force of an addition to it."""
+def change(coefficient: Variable) -> Effect:
+    """The effect that changes the coefficient of a product of speeds."""
     axis, term = coefficient.name[0], product(coefficient.name)
     name = f"{axis}_{term}"
     text = f"addition to {coefficient.name}"
-    delta = Variable(f"delta_{coefficient.name}", coefficient.unit, text, 0.0, Range(), False)
-    return effect(
+    delta = Variable(f"delta_{coefficient.name}", coefficient.unit, text, 0.0)
+
+    @effect(
         name,
         "force",
         axis,
@@ -104,7 +98,11 @@ def _change(function: Callable[[Motion, Number], Triple], coefficient: Variable)
         parameters=(delta,),
         gives=coefficient.name,
         wording=Wording(damping_sentence, FAMILY.get(name, UNKNOWN), APART.get(name, {})),
-    )(function)
+    )
+    def force(ship: Motion, delta: Number) -> Triple:
+        return term_force(coefficient.name, delta, ship.u, ship.v, ship.r)
+
+    return force
 
 
 # In the order of Damping.

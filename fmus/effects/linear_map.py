@@ -4,7 +4,7 @@ A regression of the model error on velocity and force (PLS, SysID) goes back to 
 B_tau that multiplies the thrusters' force makes their effective force (I + B_tau) tau.
 """
 
-from ..declare import Range, Variable
+from ..declare import Variable
 from ..hull import Triple
 from ..ops import Number, Series
 from .effect import Loaded, Search, Wording, effect
@@ -54,15 +54,9 @@ def parameter(axis: str, regressor: str) -> str:
 
 
 def _parameters() -> tuple[Variable, ...]:
+    text = "linear map: force in {} by {}"
     return tuple(
-        Variable(
-            parameter(axis, name),
-            UNITS[unit][axis == "N"],
-            f"linear map: force in {axis} by {name}",
-            0.0,
-            Range(),
-            False,
-        )
+        Variable(parameter(axis, name), UNITS[unit][axis == "N"], text.format(axis, name), 0.0)
         for axis in AXES
         for name, unit in REGRESSORS.items()
     )
