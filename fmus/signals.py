@@ -35,25 +35,12 @@ class ForceInWind(NamedTuple):
     ] = 0.0
 
 
-Surge = Annotated[float, "m/s", "surge velocity, forward"]
-Sway = Annotated[float, "m/s", "sway velocity, to starboard"]
-YawRate = Annotated[float, "rad/s", "yaw rate, bow to starboard"]
-
-
-class Velocity(NamedTuple):
-    """Body-fixed velocity over ground, nu."""
-
-    u: Surge = 0.0
-    v: Sway = 0.0
-    r: YawRate = 0.0
-
-
 class VelocityInCurrent(NamedTuple):
-    """The same, and the velocity of the water along the ship's axes (Fossen 2021, 8.3)."""
+    """Body-fixed velocity over ground, nu, and that of the water along its axes (Fossen 2021, 8.3)."""
 
-    u: Surge = 0.0
-    v: Sway = 0.0
-    r: YawRate = 0.0
+    u: Annotated[float, "m/s", "surge velocity, forward"] = 0.0
+    v: Annotated[float, "m/s", "sway velocity, to starboard"] = 0.0
+    r: Annotated[float, "rad/s", "yaw rate, bow to starboard"] = 0.0
     u_c: Annotated[float, "m/s", "velocity of the water, forward"] = 0.0
     v_c: Annotated[float, "m/s", "velocity of the water, to starboard"] = 0.0
 

@@ -5,12 +5,13 @@ import pytest
 from support.cases import slow
 from support.cse1 import VESSEL
 from support.loops import closed_loop, ellipse_target, multisine_target, unlimited
+from support.parametrisations import PARAMETRISATIONS
 from support.project import COMPONENTS
 
 from fmus.controller.adaptive import Disturbance, adaptive, to_body
 from fmus.controller.concurrent import explained
 from fmus.controller.learning import Drive, learned, remembered
-from fmus.controller.models import PARAMETRISATIONS, ROTATIONAL, SURGE
+from fmus.controller.models import ROTATIONAL, SURGE
 from fmus.controller.smoothing import LearningSample
 from fmus.controller.store import SIZE, StoredSample, StoreOptions, empty_store, summed
 from fmus.declare import variables

@@ -5,9 +5,10 @@ import pytest
 from fmpy.validation import validate_fmu
 from support.cse1 import VESSEL
 from support.loops import acting, closed_loop, multisine_target
+from support.parametrisations import PARAMETRISATIONS
 
 from fmus.build import build
-from fmus.controller.models import ALL_UNKNOWN, PARAMETRISATIONS, ROTATIONAL, SCALED, SURGE
+from fmus.controller.models import ALL_UNKNOWN, ROTATIONAL, SCALED, SURGE
 from fmus.declare import Component, packer, variables
 from fmus.hull import Damping, Inertia, RotationalDamping, Terms, TowedDamping, motion
 from fmus.signals import Force

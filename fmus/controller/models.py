@@ -187,11 +187,3 @@ SCALED = Parametrisation(
     loss=(2, 2, 2),
     by_acceleration=True,
 )
-
-PARAMETRISATIONS: dict[str, Parametrisation] = {
-    "rotational": ROTATIONAL,
-    "surge": SURGE,
-    "surge damping": SURGE_DAMPING,
-    "all": ALL_UNKNOWN,
-    "scaled": SCALED,
-}

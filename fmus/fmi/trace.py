@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
 from .. import ops
-from ..declare import Component, Declared, flatten, packer, rebuild, variables
+from ..declare import Component, flatten, packer, rebuild, variables, width
 
 OPERATIONS = {
     "sin": ops.sin,
@@ -136,7 +136,7 @@ def trace_init(component: Component) -> Trace:
 
 def trace_step(component: Component, h: ops.Number | None = None) -> Trace:
     """State and outputs after a step of ``h`` (default: a symbol) from a state of symbols."""
-    start = component.init(packer(component.inputs)(_starts(component.inputs)), component.params())
+    start = component.init(component.inputs(), component.params())
     symbols = _symbols("state", len(flatten(start)))
     state, outputs = component.step(
         rebuild(start, symbols),
@@ -147,12 +147,8 @@ def trace_step(component: Component, h: ops.Number | None = None) -> Trace:
     return Trace(flatten(state), flatten(outputs))
 
 
-def _starts(cls: Declared) -> list[float]:
-    return flatten(cls())
-
-
 def _pack(cls: type[T], group: str) -> T:
-    return packer(cls)(_symbols(group, len(_starts(cls))))
+    return packer(cls)(_symbols(group, width(cls)))
 
 
 def ordered(results: Iterable[object]) -> list[Symbol]:
