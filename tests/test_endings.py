@@ -25,7 +25,7 @@ from cosim.campaign.run_table import JOURNAL, TABLE
 from cosim.compiled.library import entry_of
 from cosim.export.__main__ import main as export_main
 from cosim.master.recorder import demand_memory
-from cosim.results.performance import needed, read
+from cosim.results.performance import read_columns
 from cosim.system import prepare
 from fmus.build.__main__ import main as build_main
 
@@ -486,8 +486,9 @@ def test_more_steps_than_memory_are_told_before_anything_is_written(ellipse, tmp
 def test_memory_is_demanded_for_what_is_kept(ellipse, monkeypatch):
     """Eight bytes for time and each column that metrics, or pictures, too, read, at every step."""
     with closing(prepare(cosim.load_scenario(ellipse | {"stop": 5.0}))) as system:
-        for pictures, reads in ((False, read), (True, needed)):
-            columns = {*reads(list(system.signals), system.scenario.roles)} & {*system.signals}
+        roles = system.scenario.roles
+        for pictures, reads in ((False, read_columns(system.signals, roles)), (True, roles.columns)):
+            columns = {*reads} & {*system.signals}
             memory = {"SC_PHYS_PAGES": (1 + len(columns)) * 501, "SC_PAGE_SIZE": 8}
             monkeypatch.setattr(os, "sysconf", memory.__getitem__)
             demand_memory(system, pictures)

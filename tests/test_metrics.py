@@ -221,14 +221,10 @@ class TestOverTime:
             assert np.all(np.diff(grown[name]) >= 0.0)
 
 
-def test_needed_keeps_order():
-    names = ["time", "vessel.u_dot", "controller.tau_X", "vessel.x", "observer.x_m"]
-    assert performance.needed(names) == ["time", "controller.tau_X", "vessel.x"]
-
-
-def test_needed_is_enough():
-    log = wild()
-    names = performance.needed([*log, "vessel.other"])
+@pytest.mark.parametrize("limited", [True, False])
+def test_columns_that_are_read_are_enough(limited):
+    log = {name: values for name, values in wild().items() if limited or name not in ROLES.force}
+    names = performance.read_columns(log, ROLES)
     assert compute({name: log[name] for name in names}) == compute(log)
 
 
@@ -594,9 +590,6 @@ class TestRoles:
         first, last = found["from"], found["to"]
         assert found["energy"] == pytest.approx(2.0 * (last - first) + 1.5 * (last**2 - first**2))
         assert {k: v for k, v in found.items() if k != "energy"} == compute(log, 1.0, 5.0)
-
-    def test_needed_follows_roles(self):
-        assert performance.needed(["vessel.x", "boat.n", "u.b"], self.OTHER) == ["boat.n", "u.b"]
 
     def test_commands_find_the_roles_of_a_run(self, folder, capsys):
         log = self.renamed(wild())

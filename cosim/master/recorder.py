@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError, SimulationError
 from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
-from ..results.performance import needed, read
+from ..results.performance import read_columns
 from ..system.system import System
 from .algorithm import Master
 from .stepper import ValueTable
@@ -32,7 +32,8 @@ def demand_memory(system: System, pictures: bool) -> None:
 
 def _kept_names(system: System, names: Sequence[str], pictures: bool) -> list[str]:
     """Those of some columns that are kept until the end."""
-    known = {*(needed if pictures else read)(names, system.scenario.roles)}
+    roles = system.scenario.roles
+    known = {*(roles.columns if pictures else read_columns(names, roles))}
     known |= set() if system.trial is None else {system.trial.order}
     known |= {*system.commands} if pictures else set()
     return [name for name in names if name in known]

@@ -4,7 +4,7 @@ The error is that of the true ship, not of its measurement. The scenario names t
 the target and the force (:class:`cosim.scenario.Roles`).
 """
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,19 +48,6 @@ class MetricsError(Exception):
     """A log from which the metrics cannot be computed; the message says why."""
 
 
-def needed(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
-    """Those of the given column names that metrics and pictures use, in the given order."""
-    known = set(roles.columns)
-    return [name for name in names if name in known]
-
-
-def read(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
-    """Those of the given column names that metrics use, in the given order."""
-    given = list(names)
-    known = {*roles.of("pose", "velocity", "target", "power"), *_commanded(given, roles)}
-    return [name for name in given if name in known]
-
-
 def wrap(angle: np.ndarray) -> np.ndarray:
     """Angles [rad] brought to (-pi, pi]."""
     return angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
@@ -82,9 +69,14 @@ def _commanded(log: Container[str], roles: Roles) -> tuple[str, ...]:
     return roles.force if all(name in log for name in roles.force) else roles.requested_force
 
 
+def read_columns(log: Container[str], roles: Roles) -> tuple[str, ...]:
+    """The columns that the metrics read of a log with such columns."""
+    return ("time", *roles.of("pose", "velocity", "target", "power"), *_commanded(log, roles))
+
+
 def _require(log: Log, roles: Roles) -> tuple[str, ...]:
     """The columns that the metrics read, all present."""
-    names = ("time", *roles.of("pose", "velocity", "target", "power"), *_commanded(log, roles))
+    names = read_columns(log, roles)
     missing = [name for name in names if name not in log]
     if missing:
         raise MetricsError(f"the log lacks {', '.join(missing)}")
