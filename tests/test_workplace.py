@@ -174,7 +174,7 @@ def test_a_plain_script_is_not_run_again_by_its_processes(tmp_path):
         "from concurrent.futures import ProcessPoolExecutor\n"
         "from multiprocessing import get_context\n"
         "from operator import neg\n"
-        "from cosim.process import without_program\n"
+        "from cosim.process.spawned import without_program\n"
         "with without_program(), ProcessPoolExecutor(1, get_context('spawn')) as pool:\n"
         "    print(pool.submit(neg, 3).result())\n"
     )

@@ -1,6 +1,7 @@
 from .fmu_model import FmuModel as FmuModel
 from .fmu_model import FmuVariable as FmuVariable
 from .instance import DoubleMemory as DoubleMemory
+from .instance import Instance as Instance
 from .instance import Port as Port
 from .isolation.channel import FeedbackTerm as FeedbackTerm
 from .isolation.confined import ConfinedFmu as ConfinedFmu
