@@ -8,7 +8,7 @@ from ..ops import Number, exp, floor, fmax, pick, when, where, wrap
 from ..scale import REFERENCE
 from .devices import SHARE, Devices, declared, parameter
 from .effect import Effect, Memory, Running, Search, Thrust, Wording, effect
-from .families import PROPELLERS, SIDE_THRUST, SYNC_PULSE, TIMING
+from .families import PROPELLERS, SIDE_THRUST, SYNC_PULSE, TIMING, Family
 from .misplaced import place_parameters
 from .text import Found, against_command, lost, number, offset
 
@@ -100,20 +100,17 @@ def slow(
     return function
 
 
-def _axis_sentence(way: str, what: str) -> Callable[[Found], str]:
-    return lost(
-        f"loss_{way}",
+def _axis_loss(axis: str, way: str, what: str, family: Family, apart: dict[str, str]) -> Effect:
+    """A share of tau that is lost on one axis."""
+    name, field = f"loss_{way}", f"loss_{axis}"
+    sentence = lost(
+        name,
         lambda size, than: (
             f"The thrusters lose {size} of the commanded {way} {what}."
             if than == "less"
             else f"The {way} {what} is {size} larger than commanded."
         ),
     )
-
-
-def _axis_loss(axis: str, way: str, what: str, wording: Wording) -> Effect:
-    """A share of tau that is lost on one axis."""
-    name, field = f"loss_{way}", f"loss_{axis}"
 
     @effect(
         name,
@@ -126,7 +123,7 @@ def _axis_loss(axis: str, way: str, what: str, wording: Wording) -> Effect:
         parameters=(parameter(name, "1", f"share of {way} {what} lost", SHARE),),
         usual=DEDUCTION,
         description=f"{what} lost in {way}",
-        wording=wording,
+        wording=Wording(sentence, family, apart, measured=against_command),
     )
     def function(f: Thrust, now: Running, share: float) -> Thrust:
         return f._replace(**{field: getattr(f, field) + share})
@@ -134,42 +131,15 @@ def _axis_loss(axis: str, way: str, what: str, wording: Wording) -> Effect:
     return function
 
 
-loss_surge = _axis_loss(
-    "X",
-    "surge",
-    "force",
-    Wording(
-        _axis_sentence("surge", "force"),
-        PROPELLERS,
-        {
-            "X_u": "change the speed often, instead of holding it",
-            "mass": "run steady and accelerating legs",
-        },
-        measured=against_command,
-    ),
-)
-loss_sway = _axis_loss(
-    "Y",
-    "sway",
-    "force",
-    Wording(
-        _axis_sentence("sway", "force"),
-        SIDE_THRUST,
-        {"Y_r": "crab to both sides with no turn"},
-        measured=against_command,
-    ),
-)
-loss_yaw = _axis_loss(
-    "N",
-    "yaw",
-    "moment",
-    Wording(
-        _axis_sentence("yaw", "moment"),
-        SIDE_THRUST,
-        {"N_r": "turn on the spot, with starts and stops of the turn"},
-        measured=against_command,
-    ),
-)
+APART_SURGE = {
+    "X_u": "change the speed often, instead of holding it",
+    "mass": "run steady and accelerating legs",
+}
+APART_SWAY = {"Y_r": "crab to both sides with no turn"}
+APART_YAW = {"N_r": "turn on the spot, with starts and stops of the turn"}
+loss_surge = _axis_loss("X", "surge", "force", PROPELLERS, APART_SURGE)
+loss_sway = _axis_loss("Y", "sway", "force", SIDE_THRUST, APART_SWAY)
+loss_yaw = _axis_loss("N", "yaw", "moment", SIDE_THRUST, APART_YAW)
 
 
 @effect(

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Annotated
 
-from ..declare import Range
+from ..declare import Range, Variable
 from ..hull import Inertia
-from .effect import Search, Values, Wording, effect
+from .effect import Effect, Search, Values, Wording, effect
 from .families import INERTIA
 from .text import Found, number
 
@@ -16,15 +16,6 @@ _SOURCE = "(2.5)-(2.7), corrected"
 def half(name: str, moving: Callable[[Values], float]) -> Search:
     """A much heavier ship is not a little heavier one many times: tried is half of what moves, too."""
     return Search(differentiable=True, tries=lambda nominal: [{name: 0.5 * moving(nominal)}])
-
-
-def water_sentence(name: str, how: str, unit: str) -> Callable[[Found], str]:
-    def sentence(f: Found) -> str:
-        sense = "larger" if f[name] > 0.0 else "smaller"
-        size = f"{number(f[name])} {unit}"
-        return f"The added mass in {how} is {size} {sense} than in the model."
-
-    return sentence
 
 
 @effect(
@@ -79,58 +70,43 @@ def centre_of_gravity(
     return i._replace(x_g=i.x_g + centre_of_gravity)
 
 
-@effect(
-    "added_mass_X",
-    "inertia",
-    "XN",
-    formula="X_udot - Δ, in M and C(nu)",
-    symbol="Δ",
-    sign=_SIGN,
-    source=_SOURCE,
-    search=half("added_mass_X", lambda p: p["m"] - p["X_udot"]),
-    wording=Wording(water_sentence("added_mass_X", "surge", "kg"), INERTIA),
-)
-def added_mass_X(
-    i: Inertia,
-    added_mass_X: Annotated[float, "kg", "additional added mass in surge", Range(-5.0, 100.0)] = 0.0,
-) -> Inertia:
-    """More water that moves along in surge."""
-    return i._replace(X_udot=i.X_udot - added_mass_X)
+def _water(
+    axis: str, axes: str, own: str, derivative: str, where: str, unit: str, text: str, least: float
+) -> Effect:
+    """More water that moves along on one axis.
+
+    Args:
+        axis, axes: the axis, and those on which its force acts.
+        own, derivative: names of the ship's own inertia and of the added one, which is negative.
+        where: the matrices that it is in.
+        unit, text, least: of the parameter, with its lowest value.
+    """
+    name, how = f"added_mass_{axis}", {"X": "surge", "Y": "sway", "N": "yaw"}[axis]
+
+    def sentence(f: Found) -> str:
+        sense = "larger" if f[name] > 0.0 else "smaller"
+        size = f"{number(f[name])} {unit.replace('.', ' ')}"
+        return f"The added mass in {how} is {size} {sense} than in the model."
+
+    @effect(
+        name,
+        "inertia",
+        axes,
+        formula=f"{derivative} - Δ, in {where}",
+        symbol="Δ",
+        sign=_SIGN,
+        source=_SOURCE,
+        search=half(name, lambda p: p[own] - p[derivative]),
+        wording=Wording(sentence, INERTIA),
+        parameters=(Variable(name, unit, f"additional {text} in {how}", 0.0, Range(least, 100.0)),),
+        description=f"More water that {'turns' if axis == 'N' else 'moves'} along in {how}.",
+    )
+    def function(i: Inertia, extra: float) -> Inertia:
+        return i._replace(**{derivative: getattr(i, derivative) - extra})
+
+    return function
 
 
-@effect(
-    "added_mass_Y",
-    "inertia",
-    "XYN",
-    formula="Y_vdot - Δ, in M and C(nu)",
-    symbol="Δ",
-    sign=_SIGN,
-    source=_SOURCE,
-    search=half("added_mass_Y", lambda p: p["m"] - p["Y_vdot"]),
-    wording=Wording(water_sentence("added_mass_Y", "sway", "kg"), INERTIA),
-)
-def added_mass_Y(
-    i: Inertia,
-    added_mass_Y: Annotated[float, "kg", "additional added mass in sway", Range(-10.0, 100.0)] = 0.0,
-) -> Inertia:
-    """More water that moves along in sway."""
-    return i._replace(Y_vdot=i.Y_vdot - added_mass_Y)
-
-
-@effect(
-    "added_mass_N",
-    "inertia",
-    "N",
-    formula="N_rdot - Δ, in M",
-    symbol="Δ",
-    sign=_SIGN,
-    source=_SOURCE,
-    search=half("added_mass_N", lambda p: p["I_z"] - p["N_rdot"]),
-    wording=Wording(water_sentence("added_mass_N", "yaw", "kg m2"), INERTIA),
-)
-def added_mass_N(
-    i: Inertia,
-    added_mass_N: Annotated[float, "kg.m2", "additional added inertia in yaw", Range(-1.0, 100.0)] = 0.0,
-) -> Inertia:
-    """More water that turns along in yaw."""
-    return i._replace(N_rdot=i.N_rdot - added_mass_N)
+surge_water = _water("X", "XN", "m", "X_udot", "M and C(nu)", "kg", "added mass", -5.0)
+sway_water = _water("Y", "XYN", "m", "Y_vdot", "M and C(nu)", "kg", "added mass", -10.0)
+yaw_water = _water("N", "N", "I_z", "N_rdot", "M", "kg.m2", "added inertia", -1.0)

@@ -1,7 +1,7 @@
 """Faults of the measurement chain that pass for physics."""
 
 from math import degrees
-from typing import Annotated
+from typing import Annotated, Any
 
 from ..declare import Range, Variable
 from ..frames import rotate_to_earth
@@ -99,41 +99,26 @@ CLOCK_OFFSET = Effect(
 )
 
 
-def measured_behind(
-    name: str,
-    meaning: str,
-    sentence: str,
-    search: Search,
-    *,
-    description: str,
-    formula: str,
-    symbol: str,
-    source: str,
-    usual: float = 0.0,
-) -> Effect:
+def measured_behind(name: str, meaning: str, sentence: str, search: Search, **more: Any) -> Effect:
     """The effect that a channel of the pose is measured behind a filter with one time.
 
     Args:
         name: of the effect, and of the time.
         meaning: of the time.
         sentence: what is said of it, with {} in place of the time.
-        search, description, formula, symbol, source, usual: see :class:`.Effect`.
+        search, more: see :class:`.Effect`.
     """
     return Effect(
-        id=name,
-        kind="measurement",
-        axis="XYN",
-        description=description,
-        formula=formula,
-        symbol=symbol,
+        name,
+        "measurement",
+        "XYN",
         sign="0: none",
-        source=source,
         linear=False,
         parameters=(Variable(name, "s", meaning, 0.0, LAGS),),
         function=None,
-        usual=usual,
         search=search,
         wording=Wording(lambda f: sentence.format(f"{number(f[name])} s"), FILTER),
+        **more,
     )
 
 
