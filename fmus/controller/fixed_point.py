@@ -39,24 +39,20 @@ class FilteredAxis(NamedTuple):
     d: Number = 0.0
 
 
+Axes = tuple[FilteredAxis, FilteredAxis, FilteredAxis]
+AXES = (FilteredAxis(), FilteredAxis(), FilteredAxis())
+
+
 class FixedPoint(NamedTuple):
     """The filter, how long it has run [s], and the sample that is being smoothed, of age ``age`` [s]."""
 
-    axes: tuple[FilteredAxis, FilteredAxis, FilteredAxis] = (
-        FilteredAxis(),
-        FilteredAxis(),
-        FilteredAxis(),
-    )
+    axes: Axes = AXES
     ran: Number = 0.0
     age: Number = 0.0
     time: Number = 0.0
     tau: Triple = STILL
     driven: Triple = STILL
-    smooth: tuple[FilteredAxis, FilteredAxis, FilteredAxis] = (
-        FilteredAxis(),
-        FilteredAxis(),
-        FilteredAxis(),
-    )
+    smooth: Axes = AXES
     sigma: tuple[Triple, Triple, Triple] = (STILL, STILL, STILL)
 
 
