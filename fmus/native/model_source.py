@@ -103,9 +103,6 @@ def _words(text: str) -> str:
 def _source(recorded: Program) -> str:
     c = recorded.component
     heads, writer = _heads(c.name), Writer()
-    cut = recorded.states
-    after, outputs = recorded.step.results[:cut], recorded.step.results[cut:]
-    prepared = recorded.prepare.results
     parameters = width(c.params)
     starts = [number(v.start) for v in c.variables[: parameters + width(c.inputs)]]
     return "\n".join(
@@ -119,9 +116,7 @@ def _source(recorded: Program) -> str:
             *[f"    params[{k}] = {x};" for k, x in enumerate(starts[:parameters])],
             *[f"    inputs[{k}] = {x};" for k, x in enumerate(starts[parameters:])],
             "}\n",
-            writer.function(heads["prepare"], recorded.prepare, [("prepared", prepared)]),
-            writer.function(heads["init"], recorded.init, [("state", recorded.init.results)]),
-            writer.function(heads["step"], recorded.step, [("after", after), ("outputs", outputs)]),
+            *[writer.function(heads[name], *written) for name, written in recorded.written.items()],
         ]
     )
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import is_
 from typing import Any, TypeVar, cast
 
 from ..declare import Component, flatten, packer, rebuild, width
-from ..fmi.trace import Symbol, TraceError
+from ..fmi.trace import Operand, TraceError
 from ..ops import Number
 from .tape import Kernels, RecordedFunction, RecordedValue, Tape, is_condition, like
 
 T = TypeVar("T", bound=tuple[object, ...])
+# What a function does, and (array, the results that it gets), together all results.
+Written = tuple[RecordedFunction, Sequence[tuple[str, Sequence[Operand]]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,16 @@ class Program:
     step: RecordedFunction
     kernels: list[RecordedFunction]
     states: int
+
+    @property
+    def written(self) -> dict[str, Written]:
+        """The functions, with the arrays that they write."""
+        after, outputs = self.step.results[: self.states], self.step.results[self.states :]
+        return {
+            "prepare": (self.prepare, [("prepared", self.prepare.results)]),
+            "init": (self.init, [("state", self.init.results)]),
+            "step": (self.step, [("after", after), ("outputs", outputs)]),
+        }
 
 
 def program(component: Component) -> Program:
@@ -93,15 +106,7 @@ def _mapped(part: object, function: Callable[[RecordedValue], RecordedValue]) ->
         return function(part)
     if isinstance(part, dict):
         return {key: _mapped(x, function) for key, x in part.items()}
-    if isinstance(part, (tuple, list)) and not _plain(part):
-        return like(part, [_mapped(x, function) for x in part])
-    return part
-
-
-def _plain(part: object) -> bool:
-    """Whether no symbol is inside, so that the object itself can stay."""
-    if isinstance(part, dict):
-        return all(map(_plain, part.values()))
     if isinstance(part, (tuple, list)):
-        return all(map(_plain, part))
-    return not isinstance(part, Symbol)
+        items = [_mapped(x, function) for x in part]
+        return part if all(map(is_, part, items)) else like(part, items)
+    return part

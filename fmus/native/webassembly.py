@@ -22,7 +22,7 @@ from ..declare import Component
 from ..fmi.trace import Operand
 from .c_text import Body, may_fail
 from .model_source import sizes
-from .program import Program, program
+from .program import Program, Written, program
 from .tape import Branch, Call, RecordedFunction, RecordedValue
 
 MAGIC = b"\0asm\1\0\0\0"
@@ -50,9 +50,6 @@ _FORMS = {
     "where": "{1} {2} {0} select",
 }
 
-# What a function does, and (array, the results that it gets), together all results.
-Written = tuple[RecordedFunction, Sequence[tuple[str, Sequence[Operand]]]]
-
 
 def component_module(recorded: Program) -> bytes:
     """The functions ``prepare``, ``init`` and ``step`` of a component, as in its C.
@@ -62,13 +59,7 @@ def component_module(recorded: Program) -> bytes:
     """
     counts = sizes(recorded)
     states = counts.pop("states")
-    after, outputs = recorded.step.results[:states], recorded.step.results[states:]
-    functions: dict[str, Written] = {
-        "prepare": (recorded.prepare, [("prepared", recorded.prepare.results)]),
-        "init": (recorded.init, [("state", recorded.init.results)]),
-        "step": (recorded.step, [("after", after), ("outputs", outputs)]),
-    }
-    return module(functions, {**counts, "state": states, "after": states, "h": 1})
+    return module(recorded.written, {**counts, "state": states, "after": states, "h": 1})
 
 
 def exported_webassembly(components: Iterable[Component]) -> dict[str, str]:
