@@ -161,26 +161,6 @@ def _fields_class(
     return made
 
 
-def vector(
-    typename: str, fields: Sequence[tuple[Any, ...]], extra: Sequence[object] = ()
-) -> type[Fields]:
-    """A NamedTuple class of scalars that are made rather than written out.
-
-    Args:
-        typename: name of the class.
-        fields: (name, unit, description, start, and what stands behind the description) of each scalar.
-        extra: what stands behind the description of every field, such as a Range.
-
-    Returns:
-        The class, declared like a hand-written one.
-    """
-    annotations = {
-        name: Annotated[(float, unit, description, *own, *extra)]
-        for name, unit, description, _, *own in fields
-    }
-    return _fields_class(typename, {f[0]: f[3] for f in fields}, annotations)
-
-
 def bundle(typename: str, base: Declared | None = None, **groups: tuple[object, ...]) -> type[Fields]:
     """A NamedTuple class that nests declared NamedTuples, for classes that differ only in a part.
 

@@ -14,7 +14,7 @@ from support.ships import PARTS
 from support.ships import component as part_of_ship
 
 from fmus.build.__main__ import main
-from fmus.declare import Component, flatten, packer, variables, vector
+from fmus.declare import Component, Variable, flatten, group_of, packer, variables
 from fmus.fmi.trace import TraceError
 from fmus.native.c_text import number
 from fmus.native.program import program
@@ -98,7 +98,7 @@ def test_c_gives_the_same_bits(name):
             state = found[0]
 
 
-Given = vector("Given", [(name, "1", "an input", 0.0) for name in "abc"])
+Given = group_of("Given", [Variable(name, "1", "an input", 0.0) for name in "abc"])
 
 
 def of_inputs(function):

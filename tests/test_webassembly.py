@@ -9,7 +9,7 @@ import pytest
 from support.chromium import opened
 from support.project import COMPONENTS
 
-from fmus.declare import Component, flatten, packer, variables, vector
+from fmus.declare import Component, Variable, flatten, group_of, packer, variables
 from fmus.native.program import program
 from fmus.native.webassembly import component_module
 from fmus.ops import exp, floor, fmax, fmin, kernel, log, not_, when, where
@@ -93,9 +93,9 @@ def everything(a, b):
 
 def test_operations_are_those_of_python(tmp_path):
     """Zeros keep their signs, NaN is not folded away, a division by zero fails where Python fails."""
-    names = [(f"y{k}", "1", "an output", 0.0) for k in range(8)]
-    given = vector("GivenTwo", [(name, "1", "an input", 0.0) for name in "ab"])
-    results = vector("GotEight", names)
+    outputs = [Variable(f"y{k}", "1", "an output", 0.0) for k in range(8)]
+    given = group_of("GivenTwo", [Variable(name, "1", "an input", 0.0) for name in "ab"])
+    results = group_of("GotEight", outputs)
     component = Component(
         "tried", "", Nothing, tuple, given, results,
         lambda i, p: (0.0,), lambda s, i, p, h: ((s[0] + 1.0,), results(*everything(*i))),

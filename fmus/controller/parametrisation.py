@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from ..declare import Fields, FirstEstimate, Range, vector
+from ..declare import Fields, FirstEstimate, Range, Variable, group_of
 from ..hull import Inertia, TowedDamping, Triple, inertia_force
 from ..ops import Number, clip, cos, sin
 
@@ -95,19 +95,19 @@ class Parametrisation(Generic[B]):
         stem: str,
         text: str,
         start: Callable[[LearnedCoefficient], float],
-        extra: Callable[[LearnedCoefficient], Sequence[object]] = lambda c: (),
+        estimate: Callable[[LearnedCoefficient], FirstEstimate | None] = lambda c: None,
     ) -> type[Fields]:
         """A NamedTuple class with one scalar for each parameter."""
         name = stem.title().replace("_", "")
         fields = [
-            (f"{stem}_{k}", c.unit, f"{text} {c.name}", start(c), *extra(c))
+            Variable(f"{stem}_{k}", c.unit, f"{text} {c.name}", start(c), estimate=estimate(c))
             for k, c in enumerate(self.coefficients, 1)
         ]
-        return vector(name, fields)
+        return group_of(name, fields)
 
     @cached_property
     def start(self) -> type[Fields]:
-        return self._vector("phi_0", "estimate at the start of", lambda c: 0.0, lambda c: (c.estimate,))
+        return self._vector("phi_0", "estimate at the start of", lambda c: 0.0, lambda c: c.estimate)
 
     @cached_property
     def hat(self) -> type[Fields]:
@@ -120,10 +120,10 @@ class Parametrisation(Generic[B]):
     @cached_property
     def gamma(self) -> type[Fields]:
         fields = [
-            (f"gamma_{k}", "1", f"adaptation gain of {c.name}", c.gain)
+            Variable(f"gamma_{k}", "1", f"adaptation gain of {c.name}", c.gain, GAIN)
             for k, c in enumerate(self.coefficients, 1)
         ]
-        return vector("Gamma", fields, [GAIN])
+        return group_of("Gamma", fields)
 
     @cached_property
     def force(self) -> Callable[[Regressors, Sequence[Number]], Triple]:

@@ -11,7 +11,7 @@ A leg straight back on the one before leaves no room to turn: the target then tu
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Fields, Range, component, vector
+from ..declare import FIXED, Fields, Range, Variable, component, group_of
 from ..ops import Number, floor, where, wrap
 from ..signals import Nothing, Target
 from .pace import PathTiming, PulseClock, tick
@@ -24,10 +24,13 @@ NORTHS = (5.0, 6.5, 6.5, 5.0)
 EASTS = (2.0, 2.0, -1.0, -1.0)
 
 
-def _column(name: str, unit: str, text: str, start: tuple[float, ...], *extra: object) -> type[Fields]:
+def _column(name: str, unit: str, text: str, start: tuple[float, ...], **more: Any) -> type[Fields]:
     padded = start + start[-1:] * (SIZE - len(start))
-    fields = [(f"{name}_{k}", unit, f"{text} {k}", padded[k - 1]) for k in range(1, SIZE + 1)]
-    return vector(f"Column_{name}", fields, (*extra, FIXED))
+    fields = [
+        Variable(f"{name}_{k}", unit, f"{text} {k}", x, fixed=True, **more)
+        for k, x in enumerate(padded, 1)
+    ]
+    return group_of(f"Column_{name}", fields)
 
 
 SPEED = Range(0.001, 2.0)
@@ -35,11 +38,12 @@ FLAG = Range(0.0, 1.0)
 Norths = _column("x", "m", "north position of way point", NORTHS)
 Easts = _column("y", "m", "east position of way point", EASTS)
 Headings = _column("psi", "rad", "heading from way point", (0.0,))
-Speeds = _column("u", "m/s", "speed from way point", (0.06,), SPEED)
+Speeds = _column("u", "m/s", "speed from way point", (0.06,), range=SPEED)
 
 
 # A class that is made, because ``count`` is also a method of every tuple.
-Size = vector("Size", [("count", "1", "number of way points", 4.0)], (Range(2.0, SIZE), FIXED))
+COUNT = Variable("count", "1", "number of way points", 4.0, Range(2.0, SIZE), fixed=True)
+Size = group_of("Size", [COUNT])
 
 
 class Params(NamedTuple):

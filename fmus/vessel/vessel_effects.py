@@ -3,7 +3,7 @@
 from functools import cache
 from typing import NamedTuple
 
-from ..declare import Declared, Fields, variables, vector
+from ..declare import Declared, Fields, Variable, group_of, variables
 from ..effects import Effect, EffectSet, Loaded, Motion
 from ..effects.group import Group, group
 from ..hull import Damping
@@ -52,17 +52,17 @@ def vessel_effects(
             "MeasurementEffects",
             [e for e in effects.of_kind("measurement") if e.function is not None],
         ),
-        vector("ChangeForces", [o for e in changes for o in _outputs_of(e)]),
-        vector("OutsideForces", [o for e in outside for o in _outputs_of(e)]),
+        group_of("ChangeForces", [o for e in changes for o in _outputs_of(e)]),
+        group_of("OutsideForces", [o for e in outside for o in _outputs_of(e)]),
         [e.id for e in outside].index("wind") if wind_measured else -1,
     )
 
 
-def _outputs_of(e: Effect) -> list[tuple[str, str, str, float]]:
+def _outputs_of(e: Effect) -> list[Variable]:
     """The force outputs of an effect, one for each axis that it acts on."""
     names = [f"force_{e.slug}"] if len(e.axis) == 1 else [f"force_{e.slug}_{a}" for a in e.axis]
     return [
-        (name, "N.m" if axis == "N" else "N", f"force of the effect {e.id}, {axis}", 0.0)
+        Variable(name, "N.m" if axis == "N" else "N", f"force of the effect {e.id}, {axis}", 0.0)
         for name, axis in zip(names, e.axis, strict=True)
     ]
 
