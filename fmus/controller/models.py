@@ -185,5 +185,4 @@ SCALED = Parametrisation(
     blocks=((0, 1, 2),),
     controller_model=FullControllerModel(),
     loss=(2, 2, 2),
-    by_acceleration=True,
 )

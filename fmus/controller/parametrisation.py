@@ -78,7 +78,6 @@ class Parametrisation(Generic[B]):
         blocks: groups of axes that share parameters; of equal groups one is enough.
         controller_model: known beforehand; has a field ``inertia``.
         loss: index of the thruster loss of each axis, where it is learned.
-        by_acceleration: True where F depends on the acceleration.
     """
 
     coefficients: Sequence[LearnedCoefficient]
@@ -88,7 +87,6 @@ class Parametrisation(Generic[B]):
     blocks: tuple[tuple[int, ...], ...]
     controller_model: B = field(default_factory=ControllerModel)  # pyright: ignore[reportAssignmentType]
     loss: tuple[int, int, int] | None = None
-    by_acceleration: bool = False
 
     def _vector(
         self,
