@@ -140,8 +140,3 @@ def tables(recorded: Program, guid: str) -> str:
             "",
         ]
     )
-
-
-def fmu_source(recorded: Program, guid: str) -> dict[str, str]:
-    """All source of a component's FMU but its face, which is the same for all: file name -> text."""
-    return {**model_source(recorded), TABLES: tables(recorded, guid)}
