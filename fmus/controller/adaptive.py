@@ -6,9 +6,10 @@ measurement is frozen.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
-from ..declare import FIXED, Component, Fields, Range, bundle
+from ..declare import FIXED, Component, Fields, Range, bundle, redeclared
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple
 from ..ops import Condition, Number, choose, not_, where
@@ -36,12 +37,8 @@ class Disturbance(NamedTuple):
     gamma_omega_psi: Annotated[float, "N.m/rad", "adaptation gain of the yaw moment", GAIN] = 0.0
 
 
-class DisturbanceByError(NamedTuple):
-    """The same by eps, which is a force."""
-
-    gamma_omega_x: Annotated[float, "1/s", "adaptation gain of the north force", GAIN] = 0.0
-    gamma_omega_y: Annotated[float, "1/s", "adaptation gain of the east force", GAIN] = 0.0
-    gamma_omega_psi: Annotated[float, "1/s", "adaptation gain of the yaw moment", GAIN] = 0.0
+# The same by eps, which is a force.
+DisturbanceByError = redeclared(Disturbance, lambda v: replace(v, unit="1/s"))
 
 
 class OmegaTrue(NamedTuple):

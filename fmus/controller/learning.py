@@ -18,7 +18,7 @@ from typing import NamedTuple
 from ..declare import Fields
 from ..hull import Triple
 from ..ops import Condition, Number, fmax, sqrt, when, where
-from .adaptive import Disturbance, DisturbanceByError, climb, to_earth
+from .adaptive import Disturbance, climb, to_earth
 from .eigen import dot
 from .parametrisation import Parametrisation, Regressors
 from .store import StoredSample, StoreOptions, Sums, plus, times
@@ -112,7 +112,7 @@ class Drive(NamedTuple):
 def learned(
     model: Parametrisation,
     estimates: tuple[Fields, Triple],
-    gains: tuple[Fields, Disturbance | DisturbanceByError],
+    gains: tuple[Fields, Disturbance | Fields],
     drive: Drive,
     by_eps: Number,
     sums: Sums,
