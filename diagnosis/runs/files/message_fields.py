@@ -26,7 +26,7 @@ class MessageField(NamedTuple):
 
     columns: Sequence[str]
     value: Callable[..., np.ndarray]
-    is_ros: bool = True
+    is_ros: bool
 
 
 def heading(x: np.ndarray, y: np.ndarray, z: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -35,22 +35,18 @@ def heading(x: np.ndarray, y: np.ndarray, z: np.ndarray, w: np.ndarray) -> np.nd
     return np.where(x * x + y * y + z * z + w * w > 0.0, about, np.nan)
 
 
-def heading_of_array(w: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """The same of a quaternion that is an array, as PX4 logs it: its real part is first."""
-    return heading(x, y, z, w)
-
-
 def stamp(whole: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """A time [s] by its whole seconds and the nanoseconds after them."""
     return whole + nano * rest
 
 
+ARRAY = ("[1]", "[2]", "[3]", "[0]")  # of a quaternion as PX4 logs it: its real part is first
 PARTS: Mapping[tuple[str, ...], Callable[..., np.ndarray]] = {
     ("x", "y", "z", "w"): heading,
     ("sec", "nanosec"): stamp,
     ("secs", "nsecs"): stamp,
+    ARRAY: heading,
 }
-ARRAY = ("[0]", "[1]", "[2]", "[3]")
 QUATERNION = frozenset(("q", "quat", "quaternion"))  # last words of the names of such an array
 
 
@@ -61,14 +57,12 @@ def message_fields(names: Collection[str]) -> dict[str, MessageField]:
         for name in names:
             begin = name.removesuffix(parts[-1])
             columns = [begin + part for part in parts]
-            if (field := begin.rstrip(MARKS)) and begin != name and set(columns) <= set(names):
-                found[field] = MessageField(columns, value)
-    for name in names:
-        field = name.removesuffix(ARRAY[-1])
-        columns = [field + part for part in ARRAY]
-        is_called_so = not QUATERNION.isdisjoint(words_of(field)[-1:])
-        if field != name and is_called_so and set(columns) <= set(names):
-            found[field] = MessageField(columns, heading_of_array, is_ros=False)
+            if begin == name or not set(columns) <= set(names):
+                continue
+            if parts is not ARRAY and (field := begin.rstrip(MARKS)):
+                found[field] = MessageField(columns, value, is_ros=True)
+            elif parts is ARRAY and not QUATERNION.isdisjoint(words_of(begin)[-1:]):
+                found[begin] = MessageField(columns, value, is_ros=False)
     return found
 
 
