@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from .files.reading import Run
+from .files.telegrams import groups_of
 from .run_constants import CHANCE, DIGITS, FEWEST, IN_A_ROW, LONG
 
 
@@ -37,7 +38,7 @@ def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
         if not moves.size:
             continue
         usual = float(np.quantile(moves, 1.0 - CHANCE))
-        for first, last in _stretches(step == 0.0):
+        for first, last in groups_of(step == 0.0):
             at_end = last == step.size
             jump = float(step[last]) if not at_end else np.inf if first and not coarse[last] else 0.0
             if last - first >= IN_A_ROW and jump > max(usual, 1.5 * coarse[last]):
@@ -48,11 +49,6 @@ def stuck(run: Run, seen: np.ndarray) -> tuple[np.ndarray, list[str]]:
                     "start: the position is not used there"
                 )
     return found, lines
-
-
-def _stretches(true: np.ndarray) -> list[list[int]]:
-    """First row, and the one after the last, of each stretch of rows that are true (n,)."""
-    return np.flatnonzero(np.diff(true, prepend=False, append=False)).reshape(-1, 2).tolist()
 
 
 def without_frozen(run: Run) -> Run:
@@ -116,7 +112,7 @@ def goes_straight(run: Run, seen: np.ndarray, held: np.ndarray, least: float) ->
         least: length of a stretch of these rows from which on it is looked at [s].
     """
     found = np.zeros_like(held)
-    for first, last in _stretches(held):
+    for first, last in groups_of(held):
         rows = first + np.flatnonzero(seen[first:last])
         if run.time[last - 1] - run.time[first] < least or rows.size < IN_A_ROW:
             continue

@@ -58,7 +58,6 @@ def _often(mask: np.ndarray, longest: int) -> bool:
     return bool(np.mean([end - begin > longest for begin, end in groups_of(mask)] or [False]) > 0.1)
 
 
-def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:
+def groups_of(mask: np.ndarray) -> list[list[int]]:
     """First index, and the one after the last, of each group of successive true values (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]).astype(int))).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
+    return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2).tolist()
