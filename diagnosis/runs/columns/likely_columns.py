@@ -13,18 +13,22 @@ from .columns import OUTPUTS, POSE
 from .name_words import PLAIN, words_of
 from .unit_check import SI_UNIT, UNITS, doubts, largest
 
+# Words of a speed, which an angle is not.
+CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
+ORDERS = frozenset(("order", "command", "cmd"))  # words of a reference, which is no measurement
+# Words of a column that holds the sign of another one, and its cells of a negative value.
+SIGN = frozenset(("dir", "direction", "sign", "gear", "side"))
+ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
-FILLERS = frozenset(
-    (
-        *("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
-        *("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "dir", "direction"),
-        *("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"),
-        *("order", "command", "cmd", "actual", "thruster", "thrusters", "actuator", "actuators"),
-        *("sign", "gear", "side", "data", "value"),
-        *("gyro", "compass", "utm", "track", "azimuth", "gps", "gnss", "distance"),
-        *("de", "du", "di", "do", "van", "der", "burta"),
-        *("gga", "rmc", "hdt", "rsa", "me", "sg"),  # sentences of NMEA 0183, tags of plants
-    )
+FILLERS = CHANGES.union(
+    ORDERS,
+    SIGN,
+    ("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
+    ("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "distance", "data", "value"),
+    ("actual", "thruster", "thrusters", "actuator", "actuators", "azimuth"),
+    ("gyro", "compass", "utm", "track", "gps", "gnss"),
+    ("de", "du", "di", "do", "van", "der", "burta"),
+    ("gga", "rmc", "hdt", "rsa", "me", "sg"),  # sentences of NMEA 0183, tags of plants
 )
 # Quantity -> word that is left of a name -> signal.
 WORDS = {
@@ -40,13 +44,8 @@ WORDS = {
 # Grid coordinates: x to east, y to north.
 OF_UTM = {"length": WORDS["length"] | {"x": "y", "y": "x"}}
 REVOLUTIONS = frozenset(("n", "rpm", "rps", "revolutions", "shaft"))
-# Quantity of a command -> words that tell it; words of a speed, which an angle is not.
+# Quantity of a command -> words that tell it.
 KINDS = {"angle": frozenset(("angle", "ang")), "shaft speed": REVOLUTIONS | {"speed"}}
-CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
-ORDERS = frozenset(("order", "command", "cmd"))  # words of a reference, which is no measurement
-# Words of a column that holds the sign of another one, and its cells of a negative value.
-SIGN = frozenset(("dir", "direction", "sign", "gear", "side"))
-ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
 # What a signal is compared with of the motion; other commands with all of it.
 MOVES = {"tau_X": ("surge",), "tau_Y": ("sway",), "tau_N": ("yaw",), "psi": ("course",)}
 MOVED = {"shaft speed": ("surge",), "angle": ("yaw",), "time": ()}

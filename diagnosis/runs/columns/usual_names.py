@@ -6,48 +6,43 @@ from collections.abc import Iterable
 from .columns import QUANTITY
 from .name_words import words_of
 
-QUATERNION = ("orientation", "quaternion", "quat", "q")  # a heading, if it has four parts
+QUATERNION = "orientation quaternion quat q"  # a heading, if it has four parts
 # Other names of signals that files use, without case, blanks and marks between words.
-CALLED: dict[str, tuple[str, ...]] = {
+CALLED = {
     "time": (
-        *("t", "timestamp", "datetime", "utc", "utctime", "timeutc", "datetimeutc", "utcdatetime"),
-        *("timestamputc", "gpstime", "elapsedtime", "seconds", "stamp", "epoch", "unixtime"),
-        *("timesincestart", "xvalue", "gpst", "logtime", "timeofweek", "gpstimeofweek", "tow"),
-        *("gpstow", "itow", "secondsofweek"),
+        "t timestamp datetime utc utctime timeutc datetimeutc utcdatetime timestamputc gpstime "
+        "elapsedtime seconds stamp epoch unixtime timesincestart xvalue gpst logtime timeofweek "
+        "gpstimeofweek tow gpstow itow secondsofweek"
     ),
     "x": (
-        *("north", "northing", "n", "posx", "positionx", "xn", "posn", "positionnorth", "posnorth"),
-        *("utmn", "northings", "xnorth", "ynorth", "posxnorth", "posynorth", "x0"),
+        "north northing n posx positionx xn posn positionnorth posnorth utmn northings xnorth ynorth "
+        "posxnorth posynorth x0"
     ),
     "y": (
-        *("east", "easting", "e", "posy", "positiony", "ye", "pose", "positioneast", "poseast"),
-        *("utme", "eastings", "xeast", "yeast", "posxeast", "posyeast", "y0"),
+        "east easting e posy positiony ye pose positioneast poseast utme eastings xeast yeast "
+        "posxeast posyeast y0"
     ),
     "psi": (
-        *("heading", "yaw", "hdg", "headingangle", "yawangle", "trueheading", "hdt", "magneticheading"),
-        *("hdm", "compass", "gyro", "gyrocompass", *QUATERNION),
-        *("compassheading", "gyroheading", "headingtrue", "headingmagnetic"),
+        "heading yaw hdg headingangle yawangle trueheading hdt magneticheading hdm compass gyro "
+        f"gyrocompass {QUATERNION} compassheading gyroheading headingtrue headingmagnetic"
     ),
-    "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
-    "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
-    "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
-    "u": ("surgespeed", "surgevelocity", "velocitysurge"),
-    "v": ("swayspeed", "swayvelocity", "velocitysway"),
-    "r": ("yawrate", "rateofturn", "rot", "psidot", "headingrate"),
-    "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
-    "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
-    "speed": ("sog", "speedoverground"),
-    "course": ("cog", "courseoverground", "courseovergroundtrue"),
-    "u_water": ("stw", "speedthroughwater"),
-    "wind_speed": ("truewindspeed", "tws"),
-    "wind_direction": ("truewinddirection", "truewinddir", "truewindangle", "twd"),
-    "wind_speed_relative": (
-        *("relativewindspeed", "relwindspeed", "windspeedrel", "apparentwindspeed", "rws", "aws"),
-    ),
+    "tau_X": "surgeforce forcex forcesurge fx taux tausurge tau1",
+    "tau_Y": "swayforce forcey forcesway fy tauy tausway tau2",
+    "tau_N": "yawmoment momentyaw momentz mz taun tauyaw taupsi tau3",
+    "u": "surgespeed surgevelocity velocitysurge",
+    "v": "swayspeed swayvelocity velocitysway",
+    "r": "yawrate rateofturn rot psidot headingrate",
+    "x_dot": "velocitynorth northvelocity xdot vn",
+    "y_dot": "velocityeast eastvelocity ydot ve",
+    "speed": "sog speedoverground",
+    "course": "cog courseoverground courseovergroundtrue",
+    "u_water": "stw speedthroughwater",
+    "wind_speed": "truewindspeed tws",
+    "wind_direction": "truewinddirection truewinddir truewindangle twd",
+    "wind_speed_relative": "relativewindspeed relwindspeed windspeedrel apparentwindspeed rws aws",
     "wind_direction_relative": (
-        *("relativewinddirection", "relativewinddir", "relativewindangle", "relwinddirection"),
-        *("relwinddir", "relwindangle", "winddirectionrel", "apparentwinddirection"),
-        *("apparentwindangle", "rwd", "rwa", "awa"),
+        "relativewinddirection relativewinddir relativewindangle relwinddirection relwinddir "
+        "relwindangle winddirectionrel apparentwinddirection apparentwindangle rwd rwa awa"
     ),
 }
 VALUE = frozenset(("value", "val", "reading", "data"))  # of all values, of a table with one in a row
@@ -63,14 +58,14 @@ def _folded(name: str) -> str:
 # What a column may be called -> signal, and whether its axis points the other way.
 MEANT = (
     {_folded(name): (signal, True) for name, signal in OPPOSITE.items()}
-    | {_folded(name): (signal, False) for signal, names in CALLED.items() for name in names}
+    | {_folded(name): (signal, False) for signal, names in CALLED.items() for name in names.split()}
     | {_folded(signal): (signal, False) for signal in QUANTITY}
 )
 
 
 def is_quaternion(name: str) -> bool:
     """Whether the last part of a name is that of a quaternion."""
-    return _folded(re.split("[/.]", name)[-1]) in QUATERNION
+    return _folded(re.split("[/.]", name)[-1]) in QUATERNION.split()
 
 
 def value_column(names: Iterable[str]) -> str | None:
