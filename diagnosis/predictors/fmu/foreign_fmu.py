@@ -1,6 +1,5 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -100,7 +99,7 @@ class Fmu:
     @property
     def sha256(self) -> str:
         """Of the file."""
-        return hashlib.sha256(self._given.read_bytes()).hexdigest()
+        return sha256(self._given)
 
     @cached_property
     def learned_from(self) -> tuple[Fingerprint, ...]:

@@ -19,15 +19,9 @@ import re
 from collections.abc import Iterable, Mapping
 from math import pi
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
-from pydantic import (
-    AllowInfNan,
-    BaseModel,
-    ConfigDict,
-    Field,
-    NonNegativeFloat,
-)
+from pydantic import AllowInfNan, BaseModel, ConfigDict, Field, NonNegativeFloat
 
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
@@ -53,7 +47,6 @@ BEFORE = re.compile(r"(initial|init|start)_?(?P<core>.+)")
 BEHIND = re.compile(r"(?P<core>.+?)_?(0|initial|init|start)")
 
 
-Map = TypeVar("Map", bound=BaseModel)
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 

@@ -22,16 +22,13 @@ from .unit_check import UNITS
 
 EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
-NONE_STATED: Mapping[str, str] = {}
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 # Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
 
-def geographic_pair(
-    named: Mapping[str, tuple[str, str]], stated: Mapping[str, str] = NONE_STATED
-) -> dict[str, str]:
+def geographic_pair(named: Mapping[str, tuple[str, str]], stated: Mapping[str, str]) -> dict[str, str]:
     """Signals x and y -> names of the columns of latitude and longitude; empty without one of each.
 
     Of several that one counts which is stated, whose name has no other word, or the last part of it, as
