@@ -7,7 +7,6 @@ parameters.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from fmus.vessel import vessel
 from ..runs import Smoothed, idle
 from ..runs.cleaning import WIDTH
 from ..runs.run_constants import DIGITS, FAR_OFF
-from .filters import FilterStart
+from .filters import BeforeFilters
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
 from .traced.compiled_law import compiler
@@ -315,13 +314,9 @@ def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) ->
     filters = model.filters
     if not filters:
         return poses
-    start = FilterStart(
-        between=starts.first(lambda s: filters.undone(s).between),
-        timely=starts.first(lambda s: filters.undone(s).timely),
-        timely_rate=starts.first(lambda s: filters.undone(s).timely_rate),
-        measured=starts.first(attrgetter("eta")),
-    )
-    return filters.behind(poses, start, h)
+    parts = range(len(BeforeFilters._fields))
+    start = BeforeFilters._make(starts.first(lambda s, k=k: filters.undone(s)[k]) for k in parts)
+    return filters.behind(poses, start, starts.first(lambda s: s.eta), h)
 
 
 def before_filters(s: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
