@@ -100,10 +100,11 @@ class Windows:
             raise InputError(f"no window of {self.length:.3g} s has enough samples")
         before = np.cumsum([0, *counts[:-1]])
         self.run = np.repeat(np.arange(len(parts)), counts)
-        self.start = np.concatenate([p.time[p.first_rows] for p in parts])
+        self.start = np.concatenate([p.smoothed.time[p.first_rows] for p in parts])
         self.sample_window = np.concatenate([p.window + a for p, a in zip(parts, before, strict=True)])
         self.measured = np.concatenate([p.smoothed.track.pose[p.rows] for p in parts])
-        self.since = np.concatenate([p.time[p.rows] for p in parts]) - self.start[self.sample_window]
+        time = np.concatenate([p.smoothed.time[p.rows] for p in parts])
+        self.since = time - self.start[self.sample_window]
         self._groups: list[tuple[WindowStarts, np.ndarray]] = []
         kinds = [(step_of(s), s.track.run.signals) for s in runs]
         for kind in sorted({kinds[k] for k in np.unique(self.run)}):
@@ -223,10 +224,6 @@ class RunWindows(NamedTuple):
     first_rows: np.ndarray
     rows: np.ndarray
     window: np.ndarray
-
-    @property
-    def time(self) -> np.ndarray:
-        return self.smoothed.time
 
 
 def step_of(smoothed: Smoothed) -> float:

@@ -27,7 +27,7 @@ estimate is an upper bound.
 """
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -188,34 +188,26 @@ def running_mean(x: np.ndarray, width: int) -> np.ndarray:
     return np.cumsum(np.vstack([longer[:width].mean(axis=0), steps]), axis=0)
 
 
-class NoiseUncertainty(NamedTuple):
-    """What is known of an estimated noise.
-
-    Attributes:
-        rel_std: (3,), relative standard deviation; infinite where the samples say nothing of the noise.
-        at_most: (3,), whether it is an upper bound, as the residuals are not of a constant noise.
-    """
-
-    rel_std: np.ndarray
-    at_most: np.ndarray
-
-
 def noise_uncertainty(
     p: Problem, smoothness: np.ndarray, weights: np.ndarray, fit: Fit
-) -> NoiseUncertainty:
-    """How well the noise of a run is known.
+) -> tuple[np.ndarray, np.ndarray]:
+    """How well the estimated noise of a run is known.
 
     Args:
         p: the problem, its noise estimated.
         smoothness: (3,).
         weights: (n, 3), of the samples.
         fit: of these.
+
+    Returns:
+        (3,), its relative standard deviation, infinite where the samples say nothing of the noise; and
+        (3,), whether it is an upper bound, as the residuals are not of a constant noise.
     """
     leverage = p.share * weights * p.spline.b.variance(fit.covariance) / p.sigma**2
     off = p.share * weights * (p.z - p.spline.b(fit.coefficients)) ** 2 / p.sigma**2
     # Of as many intervals as the jerk is averaged over, when the penalty is adapted to it.
     part = p.spline.b.first // p.average
-    found = NoiseUncertainty(np.full(3, np.inf), np.zeros(3, bool))
+    rel_std, at_most = np.full(3, np.inf), np.zeros(3, bool)
     for k, e in enumerate(p.equations(weights)):
         low, high = (
             LinearSystem(e, p.precision(k, float(smoothness[k] * np.exp(step)))).trace(POSE)
@@ -231,11 +223,9 @@ def noise_uncertainty(
             continue
         free, squares = free[counted], np.bincount(part, off[:, k])[counted]
         by_part = float(np.average((squares / free - 1.0) ** 2 - 2.0 / free, weights=free))
-        found.rel_std[k] = 0.5 * np.sqrt(1.0 / information + max(by_part, 0.0))  # of sigma
-        found.at_most[k] = (
-            equal_variances(squares, free, excess_kurtosis(off[:, k], part)) < CHANCE / 3.0
-        )
-    return found
+        rel_std[k] = 0.5 * np.sqrt(1.0 / information + max(by_part, 0.0))  # of sigma
+        at_most[k] = equal_variances(squares, free, excess_kurtosis(off[:, k], part)) < CHANCE / 3.0
+    return rel_std, at_most
 
 
 def excess_kurtosis(squares: np.ndarray, part: np.ndarray) -> float:

@@ -317,7 +317,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     fit = solve(p, smoothness, weights)
     covariance = fit.covariance
     estimated = np.isnan(given_noise(track))
-    uncertain = noise_uncertainty(p, smoothness, weights, fit)
+    rel_std, at_most = noise_uncertainty(p, smoothness, weights, fit)
     spikes = track.valid.copy()  # those of parts that agree with nothing
     spikes[rows] = False
     spikes[dense] = track.valid[dense] & (weights[:, 0] == 0.0)
@@ -343,8 +343,8 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         response.sure,
         pose_only,
         tuple(_doubted(track, alone, even)),
-        noise_rel_std=np.where(estimated, uncertain.rel_std, 0.0),
-        noise_at_most=estimated & uncertain.at_most,
+        noise_rel_std=np.where(estimated, rel_std, 0.0),
+        noise_at_most=estimated & at_most,
         covariance=SplineCovariance(
             grid, np.array([system.factor for system in fit.systems]), float(track.run.time[0])
         ),
