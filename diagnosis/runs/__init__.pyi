@@ -10,9 +10,7 @@ from .columns.columns import Column as Column
 from .columns.columns import Layout as Layout
 from .columns.columns import Named as Named
 from .columns.columns import beside as beside
-from .columns.columns import side_cars as side_cars
 from .columns.columns import stated_layout as stated_layout
-from .columns.columns import to_si as to_si
 from .columns.likely_columns import LikelyColumn as LikelyColumn
 from .columns.proposal import Proposal as Proposal
 from .columns.proposal import common_layout as common_layout
@@ -38,7 +36,6 @@ from .prepared_run import PreparedRun as PreparedRun
 from .prepared_run import examine as examine
 from .prepared_run import prepare as prepare
 from .prepared_run import read_each as read_each
-from .row_order import in_order as in_order
 from .sensors.path_closure import Closure as Closure
 from .sensors.path_closure import closure as closure
 from .sensors.sensor_finding import Examined as Examined

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fmus.frames import rotate_to_body
+
 from ...execution.short_text import SHOWN
 from ..files.reading import held_values
 from ..run_constants import EVERY, FEWEST
@@ -196,12 +198,8 @@ def motion_of(known: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
             rows = np.isfinite(pose).all(axis=1) & np.isfinite(t)
             degrees = any("psi" in doubt.signals for doubt in doubts(t[rows], pose[rows]))
             psi = _unwrapped(np.radians(held["psi"]) if degrees else held["psi"])
-            cos, sin = np.cos(psi), np.sin(psi)
-            speeds = {
-                "surge": cos * north + sin * east,
-                "sway": cos * east - sin * north,
-                "yaw": rate(psi),
-            }
+            surge, sway = rotate_to_body(psi, north, east)
+            speeds = {"surge": surge, "sway": sway, "yaw": rate(psi)}
             found |= {f"{axis} speed": speed for axis, speed in speeds.items()}
             found |= {f"{axis} acceleration": rate(speed) for axis, speed in speeds.items()}
     return found

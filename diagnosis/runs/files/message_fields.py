@@ -3,11 +3,10 @@
 Such a field has the name that its columns begin with: ``pose.orientation`` of ``pose.orientation.x``.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from scipy.constants import nano
 
 from ..columns.name_words import words_of
@@ -64,16 +63,3 @@ def message_fields(names: Collection[str]) -> dict[str, MessageField]:
             elif parts is ARRAY and not QUATERNION.isdisjoint(words_of(begin)[-1:]):
                 found[begin] = MessageField(columns, value, is_ros=False)
     return found
-
-
-def with_fields(
-    table: pd.DataFrame, fields: Mapping[str, MessageField], wanted: Iterable[str]
-) -> pd.DataFrame:
-    """A table with the values of those of its fields that are wanted."""
-    values = {name: fields[name] for name in wanted if name in fields}
-    return table.assign(
-        **{
-            name: field.value(*(pd.to_numeric(table[c], errors="coerce") for c in field.columns))
-            for name, field in values.items()
-        }
-    )

@@ -26,7 +26,7 @@ from ..columns.side_car import (
 )
 from ..run_constants import CHANCE, DIGITS
 from .matlab_files import matlab_table
-from .message_fields import message_fields, with_fields
+from .message_fields import message_fields
 from .text_layout import STAMP, is_marked
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
@@ -110,7 +110,12 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
         table = csv_table(path, layout, own)
         refuse_units(path, layout, table)
         refuse_long_rows(path, layout, len(names))
-    return with_fields(table, fields, wanted)
+    values = {
+        name: field.value(*(pd.to_numeric(table[c], errors="coerce") for c in field.columns))
+        for name, field in fields.items()
+        if name in wanted
+    }
+    return table.assign(**values)
 
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
