@@ -183,9 +183,8 @@ class BlackBox(ABC):
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
     ) -> list[str]:
-        return (
-            [] if learned is None else [f"The findings are not written: {self.name} has no parameters."]
-        )
+        told = f"The findings are not written: {self.name} has no parameters."
+        return [] if learned is None else [told]
 
     def _sentences(self, wait: float) -> Iterator[str]:
         if not self.whole:

@@ -36,8 +36,7 @@ class DescribedShip:
 
     @property
     def files(self) -> list[tuple[str, Path, str]]:
-        """What decides its predictions: what each file is for, its path, its SHA-256 when it was "
-        "read."""
+        """What decides its predictions: role and path of each file, and its SHA-256 when it was read."""
         return [] if self.file is None else [("model", self.file, self.sha256)]
 
     def learning_from(self, runs: Sequence[WeakWindows]) -> "DescribedShip":

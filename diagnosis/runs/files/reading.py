@@ -118,16 +118,11 @@ class Run(ShortRepr):
     def commanded(self) -> dict[str, np.ndarray]:
         """Signal -> (n,), the commands in the form in which they were given."""
         settings = ship(description=self.ship).power_settings
-        forms = [
-            (names, c)
-            for names, c in ((self.signals, self.commands), (settings, self.power))
-            if c is not None
-        ]
-        return {
-            s: c
-            for names, table in forms or [(TAU, self.tau_cmd)]
-            for s, c in zip(names, table.T, strict=True)
-        }
+        found: dict[str, np.ndarray] = {}
+        for names, table in ((self.signals, self.commands), (settings, self.power)):
+            if table is not None:
+                found |= zip(names, table.T, strict=True)
+        return found or dict(zip(TAU, self.tau_cmd.T, strict=True))
 
     @property
     def given(self) -> np.ndarray:
@@ -187,9 +182,8 @@ def read(
         return replace(_run(name, read_matlab(path, of), f"'{path}'", of), file=path, hashes=hashes)
     table, layout = _tabular(path, layout, of, set(also))
     run = _of_table(name, table, layout, path, f"'{path}'", of)
-    run = replace(run, file=path, hashes=hashes)
-    others = {n: pd.to_numeric(table[n], errors="coerce") for n in also if n in table}
-    run = replace(run, measured={**run.measured, **{n: np.asarray(c, float) for n, c in others.items()}})
+    others = {n: np.asarray(pd.to_numeric(table[n], errors="coerce"), float) for n in also if n in table}
+    run = replace(run, file=path, hashes=hashes, measured={**run.measured, **others})
     trial = read_options(path.parent).trial if is_log else None
     return run if trial is None else replace(run, trial=trial.kind)
 
@@ -285,15 +279,8 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
     """A run of its signals, commands without a gap."""
-    own, units = next(
-        (
-            (tuple(form), set(form.values()))
-            for form in reversed(of.command_forms)
-            if next(iter(form), "") in columns
-        ),
-        (tuple(of.commands), set()),
-    )
-    settings = of.power_settings
+    form = next((f for f in reversed(of.command_forms) if next(iter(f), "") in columns), {})
+    own, settings = tuple(form or of.commands), of.power_settings
     absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
     columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
 
@@ -304,7 +291,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     columns = columns | {s: np.where(cells, np.nan, columns[s]) for s, cells in false.items()}
     tau, commands, power = (_held(stack(group)) for group in (TAU, own, settings))
     power = None if power is None else np.maximum(power, 0.0)
-    if units == {"1"} and commands is not None:
+    if set(form.values()) == {"1"} and commands is not None:
         most = float(np.abs(commands).max(initial=0.0))
         if most > largest("command"):  # far beyond rounding they are in another unit
             raise InputError(

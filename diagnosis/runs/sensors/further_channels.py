@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.frames import rotate_to_body
+from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.scale import Scale
 
 from ..cleaning import WIDTH
@@ -59,14 +59,11 @@ def receivers(run: Run, scale: Scale) -> Examined:
         if there.sum() >= FEWEST:
             found += _places(run.rows(there), scale)
             value = {(f.channel, f.kind): f.value for f in found}
-            ahead, aside, late = (
-                value.get(key, 0.0) for key in (("x_2", "place"), ("y_2", "place"), ("x_2", "delay"))
-            )
-            x, y = (
-                np.interp(run.time + late, run.time, two[n]) if late else two[n] for n in ("x_2", "y_2")
-            )
-            c, s = np.cos(psi), np.sin(psi)
-            repaired |= {"x_2": x - c * ahead + s * aside, "y_2": y - s * ahead - c * aside}
+            late = value.get(("x_2", "delay"), 0.0)
+            arm = rotate_to_earth(psi, *(value.get((n, "place"), 0.0) for n in ("x_2", "y_2")))
+            for name, off in zip(("x_2", "y_2"), arm, strict=True):
+                x = np.interp(run.time + late, run.time, two[name]) if late else two[name]
+                repaired[name] = x - off
     if "psi_2" in two:
         apart = np.angle(np.exp(1j * (two["psi_2"] - psi)))
         there = np.isfinite(apart)
