@@ -84,25 +84,17 @@ def thinned(track: Track) -> Track:
         f"{run.time.size} rows, {row:.3g} s apart, thinned to {time.size}, {width:.3g} s apart: "
         "medians of the pose, means of the commands"
     )
-    return Track(
-        replace(
-            run,
-            time=time,
-            pose=pose,
-            resolution=None,
-            held=held,
-            measured=measured,
-            **commands,
-        ),
-        pose,
-        fresh,
-        frozen,
-        dropped,
-        gone & ~frozen & ~dropped,
-        max(track.period, width),
-        track.out,
-        (*track.notes, note),
-        track.scale,
+    run = replace(run, time=time, pose=pose, resolution=None, held=held, measured=measured, **commands)
+    return replace(
+        track,
+        run=run,
+        pose=pose,
+        fresh=fresh,
+        frozen=frozen,
+        dropped=dropped,
+        between=gone & ~frozen & ~dropped,
+        period=max(track.period, width),
+        notes=(*track.notes, note),
     )
 
 

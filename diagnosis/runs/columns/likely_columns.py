@@ -250,29 +250,27 @@ def _evidence(
     means = any(known.get(word) == signal for word in words) or (
         quantity == "shaft speed" and not REVOLUTIONS.isdisjoint(words)
     )
-    reasons, score, like = [], 0.0, 1.0 if means else _likeness(signal, bare)
+    found: dict[str, float] = {}  # reason -> how much it counts
+    like = 1.0 if means else _likeness(signal, bare)
     if quantity == "time":
         steps = np.diff(numbers)  # rows may be repeated
         if not (np.all(steps >= 0.0) and np.median(steps) > 0.0):
             return None
-        reasons, score = ["increases from row to row"], 1.0
+        found["increases from row to row"] = 1.0
     if like >= LIKELY:
-        reasons, score = [*reasons, "by its name"], score + like
+        found["by its name"] = like
     if unit in UNITS[quantity]:
-        reasons, score = [*reasons, f"by its unit {unit}"], score + 0.5
-    elif unit == "%" and reasons:
-        reasons.append(f'in %: of its limit, or state the "factor" to {SI_UNIT[quantity]}')
+        found[f"by its unit {unit}"] = 0.5
+    elif unit == "%" and found:
+        found[f'in %: of its limit, or state the "factor" to {SI_UNIT[quantity]}'] = 0.0
     axes = MOVES.get(signal) or MOVED.get(quantity, ("surge", "sway", "yaw"))
     if quantity == "angle":  # it may wrap
         values = _unwrapped(values if np.abs(numbers).max() <= 2.0 * np.pi else np.radians(values))
     pairs = {n: _correlation(values, m) for n, m in motion.items() if n.partition(" ")[0] in axes}
     best = max(pairs, key=lambda name: abs(pairs[name]), default="")
     if best and abs(pairs[best]) >= LIKELY:
-        reasons, score = (
-            [*reasons, f"correlates {pairs[best]:+.2f} with the {best}"],
-            score + abs(pairs[best]),
-        )
-    return (reasons, score) if reasons else None
+        found[f"correlates {pairs[best]:+.2f} with the {best}"] = abs(pairs[best])
+    return ([*found], sum(found.values())) if found else None
 
 
 def _is_possible(signal: str, quantity: str, unit: str, numbers: np.ndarray) -> bool:
