@@ -74,13 +74,13 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     """
     there = np.isfinite(degrees["x"]) & np.isfinite(degrees["y"])
     there &= (degrees["x"] != 0.0) | (degrees["y"] != 0.0)
-    origin = {s: float(np.median(values[there])) for s, values in degrees.items() if there.any()}
-    scale = _scale(*(degrees[signal][there] for signal in ("x", "y")))
-    origin = {s: scale * value for s, value in origin.items()}
-    largest = {
-        s: np.radians(scale * np.abs(values[there]).max(initial=0.0)) for s, values in degrees.items()
-    }
-    if not origin or largest["x"] > np.pi / 2 or largest["y"] > np.pi:
+    if not there.any():
+        return {}
+    known = {s: values[there] for s, values in degrees.items()}
+    scale = _scale(known["x"], known["y"])
+    origin = {s: scale * float(np.median(values)) for s, values in known.items()}
+    largest = {s: np.radians(scale * np.abs(values).max()) for s, values in known.items()}
+    if largest["x"] > np.pi / 2 or largest["y"] > np.pi:
         return {}
     latitude = np.radians(origin["x"])
     flat = 1.0 - SQUARED_ECCENTRICITY * np.sin(latitude) ** 2
@@ -103,9 +103,9 @@ def _scale(latitude: np.ndarray, longitude: np.ndarray) -> float:
     in degrees that is the Gulf of Guinea. Next to zero, where simulations start, they are in degrees.
     """
     values = np.concatenate([latitude, longitude])
-    if (values == np.round(values)).all() and np.abs(values).max(initial=0.0) > 1e6:
+    if (values == np.round(values)).all() and np.abs(values).max() > 1e6:
         return WHOLE
-    reach = [np.abs(angle).max(initial=0.0) for angle in (latitude, longitude)]
+    reach = [np.abs(angle).max() for angle in (latitude, longitude)]
     is_rad = reach[0] <= np.pi / 2 and reach[1] <= np.pi and max(reach) > NEAR_ZERO
     return float(np.degrees(1.0)) if is_rad else 1.0
 

@@ -284,12 +284,15 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
     columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
 
-    def stack(group: tuple[str, ...]) -> np.ndarray | None:
-        return np.column_stack([columns[s] for s in group]) if columns.keys() & group[:1] else None
+    def held(group: tuple[str, ...]) -> np.ndarray | None:
+        """Commands that keep their last value where one is missing, zero before the first."""
+        if columns.keys().isdisjoint(group[:1]):
+            return None
+        return np.nan_to_num(held_values(np.column_stack([columns[s] for s in group])), nan=0.0)
 
     false = _false_commands(columns, of) | _false_winds(columns)
     columns = columns | {s: np.where(cells, np.nan, columns[s]) for s, cells in false.items()}
-    tau, commands, power = (_held(stack(group)) for group in (TAU, own, settings))
+    tau, commands, power = map(held, (TAU, own, settings))
     power = None if power is None else np.maximum(power, 0.0)
     if set(form.values()) == {"1"} and commands is not None:
         most = float(np.abs(commands).max(initial=0.0))
@@ -370,13 +373,6 @@ def _earlier(command: np.ndarray, time: np.ndarray, late: float) -> np.ndarray:
     part = np.clip((time + late - t[at]) / row, 0.0, 1.0)
     mean = (1.0 - part) * held[at] + part * held[after]
     return np.where((part > DIGITS) & np.isfinite(mean), mean, held[at])
-
-
-def _held(commands: np.ndarray | None) -> np.ndarray | None:
-    """Commands that keep their last value where one is missing, zero before the first."""
-    if commands is None:
-        return None
-    return np.nan_to_num(held_values(commands), nan=0.0)
 
 
 def held_values(values: np.ndarray) -> np.ndarray:
