@@ -102,19 +102,17 @@ def _by_words(
         bare, unit = without_unit(name, below)
         unit = unit or unit_in(bare)
         parts = PATH.split(bare)
-        own = parts[len(common) :] if parts[: len(common)] == common else parts
+        own = " ".join(parts[len(common) :] if parts[: len(common)] == common else parts)
         is_sign = not unit and not SIGN.isdisjoint(words_of(bare))  # shaft_dir is no speed of a shaft
-        signal = signal_of_symbol(bare, unit, quantity) or meaning_of_words(
-            " ".join(own), unit, quantity
-        )
-        if is_sign and (quantity.get(signal) in SIGNED or is_of_shaft(" ".join(own), unit)):
+        signal = signal_of_symbol(bare, unit, quantity) or meaning_of_words(own, unit, quantity)
+        if is_sign and (quantity.get(signal) in SIGNED or is_of_shaft(own, unit)):
             continue
         if signal:
             is_si = UNITS[quantity[signal]].get(unit, 1.0) == 1.0
             found.setdefault(signal, []).append(Column(name=name, unit=None if is_si else unit))
-        elif is_of_shaft(" ".join(own), unit):
+        elif is_of_shaft(own, unit):
             only["shaft speed"].append(Column(name=name, unit=unit))
-        elif unit in UNITS["angle"] and is_steering(" ".join(own)):
+        elif unit in UNITS["angle"] and is_steering(own):
             only["angle"].append(Column(name=name, unit=unit))
     for kind, told in only.items():
         left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]

@@ -56,22 +56,18 @@ def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship
         limits = largest_commands(commands, of, math.tau)
         for si in dict.fromkeys(form.values()):
             own = {s: x for (s, unit), x in zip(form.items(), limits, strict=True) if unit == si}
-            own = {s: limit for s, limit in own.items() if layout.column(s).name in names}
-            columns = {s: layout.column(s) for s in own}
-            if own and not any(column.unit or column.factor != 1.0 for column in columns.values()):
-                table = table_of_file(path, layout, names_of(columns))
-                most = {
-                    s: float(np.nanmax(np.abs(numbers_of(table[column.name], "")), initial=0.0))
-                    for s, column in columns.items()
-                }
-                if OF_UNIT[si] != "command" and all(_is_percent(c.name) for c in columns.values()):
-                    found |= {
-                        s: c.model_copy(update={"factor": float(f"{own[s] / 100.0:.6g}")})
-                        for s, c in columns.items()
-                    }
-                    continue
-                unit = _unit_within(most, own, OF_UNIT[si])
-                found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
+            columns = {s: c for s in own if (c := layout.column(s)).name in names}
+            if not columns or any(c.unit or c.factor != 1.0 for c in columns.values()):
+                continue
+            if OF_UNIT[si] != "command" and all(_is_percent(c.name) for c in columns.values()):
+                factors = {s: float(f"{own[s] / 100.0:.6g}") for s in columns}
+                found |= {s: c.model_copy(update={"factor": factors[s]}) for s, c in columns.items()}
+                continue
+            table = table_of_file(path, layout, names_of(columns))
+            size = {s: np.abs(numbers_of(table[c.name], "")) for s, c in columns.items()}
+            most = {s: float(np.nanmax(x, initial=0.0)) for s, x in size.items()}
+            unit = _unit_within(most, own, OF_UNIT[si])
+            found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
     return found
 
 
