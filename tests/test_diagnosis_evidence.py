@@ -158,7 +158,7 @@ def test_poses_between_steps_are_on_a_cubic_and_headings_on_the_short_way():
 
 # The remainder in words
 
-LEFT = AxisRemainder(0.5, 0.1, 0.04, 0.3, 1e-9, 0.2, True)
+LEFT = AxisRemainder(0.5, 0.1, 0.04, 0.3, 1e-9, 0.2, True, 0.03)
 SLIGHT = replace(LEFT, significant=False)
 NOTHING = replace(SLIGHT, p_value=0.5)
 
@@ -201,10 +201,10 @@ def repeats(best=None, lasts=10.0, in_part=False):
     ],
 )
 def test_what_a_remainder_repeats_with_suggests_its_cause(how, scale, comes, cause):
-    axes = {"X": LEFT, "Y": NOTHING, "N": replace(LEFT, share=1.0)}
+    axes = {"X": LEFT, "Y": NOTHING, "N": replace(LEFT, share=1.0, of_command=np.nan)}
     place = SimpleNamespace(axis="N", phrase="in the north")
     text = remainder.remainder_sentence(axes, [how] * 3, [place], False, Scale(scale))
-    assert text.startswith("Surge: 0.5 N (uncertainty 0.1, 20 % of the initial model error) and Yaw: 0.5 N m (uncertainty 0.1)")  # fmt: skip
+    assert text.startswith("Surge: 0.5 N (uncertainty 0.1, 20 % of the initial model error, 3 % of the commanded force) and Yaw: 0.5 N m (uncertainty 0.1)")  # fmt: skip
     assert "not explained, most in the north. It " in text
     assert "Sway" not in text
     assert comes in text

@@ -87,7 +87,10 @@ def test_noise_alone_is_no_remainder(noise):
 
 def test_true_model_leaves_no_remainder():
     runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
-    assert left(runs)["X"].significant
+    drag = left(runs)["X"]
+    assert drag.significant
+    force = np.sqrt(np.mean(commanded(runs, Model())[:, 0] ** 2))
+    assert drag.of_command == pytest.approx(drag.rms / force)
     assert not any(a.significant for a in left(runs, Model().plus({"delta_X_u": -3.0})).values())
 
 
@@ -434,7 +437,9 @@ def test_fit_to_predictions_is_judged_by_the_run_that_it_has_not_seen(fitted, be
 
 def left_on(**significant):
     """A remainder that is significant on some axes."""
-    axes = {a: AxisRemainder(1.0, 0.1, 0.5, 1.0, 0.5, 0.1, significant.get(a, False)) for a in "XYN"}
+    axes = {
+        a: AxisRemainder(1.0, 0.1, 0.5, 1.0, 0.5, 0.1, significant.get(a, False), 0.1) for a in "XYN"
+    }
     return Remainder(axes, "")
 
 
@@ -513,7 +518,7 @@ def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does
 @pytest.mark.parametrize(("slow", "unexplained"), [(0.9, {"X"}), (0.5, set())])
 def test_waves_account_for_a_quick_remainder_and_not_for_a_slow_one(slow, unexplained):
     waves = Finding("waves", {"wave_peak": 1.0}, {}, 0.9, [], 0.9, 0.9, together=0.9)
-    axes = {"X": AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True)}
+    axes = {"X": AxisRemainder(1.0, 0.1, 0.5, slow, 1e-9, 0.1, True, 0.1)}
     assert unexplained_axes(Findings([waves]), Remainder(axes, ""), Model()) == unexplained
 
 
@@ -531,7 +536,7 @@ def test_waves_that_account_for_half_of_a_residual_are_even_odds(axis, rms, forc
     waves = Finding(
         "waves", {"wave_peak": 1.0, "wave_force": force}, {}, 0.9, [], 0.9, 0.9, together=0.9
     )
-    left = Remainder({axis: AxisRemainder(rms, 0.0, 0.5, 0.1, 1e-9, 0.1, True)}, "")
+    left = Remainder({axis: AxisRemainder(rms, 0.0, 0.5, 0.1, 1e-9, 0.1, True, 0.1)}, "")
     doubts = Doubts(more_than_waves=more_than_waves(Findings([waves]), left, Model()))
     assert confidence_of(waves, Model(), doubts).own == pytest.approx(own)
     other = replace(waves, id="X_u", values={"delta_X_u": 1.0})

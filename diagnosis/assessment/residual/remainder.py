@@ -106,6 +106,7 @@ class AxisRemainder:
         p_value: of the clearer of the two tests, not corrected for their number.
         least: from which on a remainder matters [N or N m].
         significant: whether it is more than chance, and matters.
+        of_command: the RMS over that of the commanded force; NaN where nothing is commanded.
     """
 
     rms: float
@@ -115,6 +116,7 @@ class AxisRemainder:
     p_value: float
     least: float
     significant: bool
+    of_command: float
 
     @property
     def beyond_chance(self) -> bool:
@@ -163,12 +165,14 @@ def axis_remainders(
         by_size = chance(dof, size**2, freedom[k])
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups, freedom[k])
         rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
-        least = max(SETTINGS.negligible * start, SHARE_OF_COMMAND * _rms(command[:, k]))
+        force = _rms(command[:, k])
+        least = max(SETTINGS.negligible * start, SHARE_OF_COMMAND * force)
         beyond = rms**2 - uncertainty**2 > least**2  # without the noise, as the slow part is
         matters = (by_size < level() and beyond) or (by_slowness < level() and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
+        of_command = rms / force if force > 0.0 else np.nan
         p_value = min(by_size, by_slowness)
-        found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters)
+        found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters, of_command)
     return found
 
 
@@ -299,8 +303,10 @@ def remainder_sentence(
 def _amount(axis: str, r: AxisRemainder) -> str:
     share = 100.0 * np.sqrt(r.share)
     of_first = f", {share:.2g} % of the initial model error" if share < 99.5 else ""
+    percent = 100.0 * r.of_command
+    of_command = f", {percent:.2g} % of the commanded force" if percent < 99.5 else ""
     size = f"{NAMES[axis]}: {number(r.rms, 2)} {UNITS[axis]}"
-    return f"{size} (uncertainty {number(r.uncertainty, 1)}{of_first})"
+    return f"{size} (uncertainty {number(r.uncertainty, 1)}{of_first}{of_command})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
