@@ -324,22 +324,15 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     return kept
 
 
-class _OnPaths(NamedTuple):
-    """What the reference paths say of a model.
+def _on_paths(
+    model: Model, nominal: Model, advance: Advance, notes: list[str]
+) -> tuple[bool, bool, bool]:
+    """Let the reference controller steer a model along every path; adds to the notes how well.
 
-    Attributes:
-        bounded: whether the reference controller keeps the ship on every path.
-        nor_nominal: whether it does not, and the nominal ship is lost wherever this one is.
-        weak: see :class:`Stability`.
+    Returns:
+        Whether it keeps the ship on every path; whether it does not, and the nominal ship is lost
+        wherever this one is; and whether the model is weak, see :class:`Stability`.
     """
-
-    bounded: bool
-    nor_nominal: bool
-    weak: bool
-
-
-def _on_paths(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> _OnPaths:
-    """Let the reference controller steer a model along every path; adds to the notes how well."""
     bounded, both, weak, bound = True, True, False, bound_of(model)
     advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
     distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
@@ -360,4 +353,4 @@ def _on_paths(model: Model, nominal: Model, advance: Advance, notes: list[str]) 
             notes.append(NOT_HELD)
         else:
             both, by_hull = False, True
-    return _OnPaths(bounded, both and not bounded, weak and not by_hull)
+    return bounded, both and not bounded, weak and not by_hull

@@ -54,10 +54,8 @@ def show_calibration(
     calibrated: CalibratedModel, r: ReportData, out: str = ""
 ) -> Iterator[RenderableType]:
     """Output of the second answer of ``diagnosis.learn``."""
-    if read := reading_of_commands(calibrated):
-        yield from _lines("Commands", read)
-    if gain := gain_of_calibration(calibrated, r):
-        yield from _lines("Gain of the calibration", map(_plain, gain))
+    yield from _lines("Commands", reading_of_commands(calibrated))
+    yield from _lines("Gain of the calibration", map(_plain, gain_of_calibration(calibrated, r)))
     moved = calibrated.learned.moved
     furthest = sorted(moved, key=lambda name: -abs(moved[name]))[:SHOWN]
     by = (f"{n} is {_number(calibrated.model.value(n))} ({_number(moved[n], 2)})" for n in furthest)
@@ -71,10 +69,8 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     """Output of the third answer of ``diagnosis.learn``; the first one has shown the data."""
     d = r.diagnosis
     assert d is not None
-    if read := reading_of_commands(d):
-        yield from _lines("Commands", read)
-    if gain := gain_of_search(r):
-        yield from _lines("Gain of the search", map(_plain, gain))
+    yield from _lines("Commands", reading_of_commands(d))
+    yield from _lines("Gain of the search", map(_plain, gain_of_search(r)))
     yield from _lines("Residual without explanation", [d.remainder.sentence])
     if not r.effects:
         yield from _lines("Finding", [headline(r)])
@@ -83,16 +79,14 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
         yield from _lines(title, _effect(effect))
     for effect in r.possibilities:
         yield from _lines(f"Possibility: {effect.id}", _effect(effect))
-    if d.withdrawn:
-        yield from _lines("Rejected", [f"{w.id}: {w.reason}" for w in d.withdrawn])
-    if d.learned.suspects:
-        is_value = "in the learned model" if d.calibrated else "probably"
-        suspects = [
-            f"{s.name}: {is_value} {_number(s.value)} ({_number(s.z, 2)} standard deviations of "
-            f"the prior){WEIGH * (s.name == 'm')}"
-            for s in d.learned.suspects
-        ]
-        yield from _lines("Suspect coefficients", suspects)
+    yield from _lines("Rejected", [f"{w.id}: {w.reason}" for w in d.withdrawn])
+    is_value = "in the learned model" if d.calibrated else "probably"
+    suspects = [
+        f"{s.name}: {is_value} {_number(s.value)} ({_number(s.z, 2)} standard deviations of "
+        f"the prior){WEIGH * (s.name == 'm')}"
+        for s in d.learned.suspects
+    ]
+    yield from _lines("Suspect coefficients", suspects)
     together = [f"Identifiable only together: {', '.join(group)}." for group in d.posterior.together]
     sure = [d.unrecorded.sentence, *together, *(f"Warning: {x}" for x in r.inseparable)]
     yield from _lines("Uncertainty of the values", sure)
@@ -133,7 +127,9 @@ def _titled(title: str, body: RenderableType) -> Iterator[RenderableType]:
 
 
 def _lines(title: str, lines: Iterable[str]) -> Iterator[RenderableType]:
-    yield from _titled(title, Text("\n".join(lines)))
+    """Lines under a title; nothing where there is no line."""
+    if text := "\n".join(lines):
+        yield from _titled(title, Text(text))
 
 
 def _files(r: ReportData, out: str) -> Iterator[RenderableType]:
@@ -157,12 +153,10 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     yield from _titled("Data", table)
     yield from channel_table(r.channels)
     notes = [f"{e.name}: {note}" for e in r.evaluations for note in e.smoothed.notes]
-    if notes:
-        yield from _lines("Found in the data", notes)
+    yield from _lines("Found in the data", notes)
     examined = [(e.name, e.smoothed.sensors) for e in r.evaluations]
     faults = [f"{run}: {line}" for run, x in examined if x for line in sensor_lines(x.findings)]
-    if faults:
-        yield from _lines("Faults that redundant channels show", faults)
+    yield from _lines("Faults that redundant channels show", faults)
     kind, sentences = r.how_it_predicts
     if kind:
         yield from _lines(f"Predictions of the {kind}", sentences)
@@ -236,10 +230,8 @@ def _errors(r: ReportData) -> Iterator[RenderableType]:
     ):
         if table.row_count:
             yield from _titled(f"{title}{when}", table)
-    if simpler := [*worse_than_constant_velocities(r)]:
-        yield from _lines("Constant velocities", map(_plain, simpler))
-    if against := [*contradicted_by_tests(r)]:
-        yield from _lines("Test runs", map(_plain, against))
+    yield from _lines("Constant velocities", map(_plain, worse_than_constant_velocities(r)))
+    yield from _lines("Test runs", map(_plain, contradicted_by_tests(r)))
 
 
 def _stability(s: Stability) -> Iterator[str]:
