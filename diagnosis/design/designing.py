@@ -61,13 +61,11 @@ class Limits:
         seconds: length of a run [s].
         basin: for the whole hull; None: as far as the measured runs reach, and a ship's length more.
         size: north and east length of a basin about the middle of the measured tracks [m].
-        margin: least distance of the hull from the walls [m]; None: a tenth of the ship.
     """
 
     seconds: float
     basin: Basin | None = None
     size: tuple[float, float] | None = None
-    margin: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +134,8 @@ class Designer:
 
     @property
     def margin(self) -> float:
-        """Least distance from the walls [m]."""
-        return 0.1 * np.ptp(self.outline[:, 0]) if self.limits.margin is None else self.limits.margin
+        """Least distance of the hull from the walls [m]: a tenth of the ship."""
+        return 0.1 * np.ptp(self.outline[:, 0])
 
     @cached_property
     def measured(self) -> tuple[np.ndarray, np.ndarray]:

@@ -99,7 +99,7 @@ def plan_next(q: Question, runs: int = 1, seed: int = 0, advance: Advance = sile
             f"One candidate is left ({k.hypotheses[0].name}): the run narrows the intervals of "
             "all values (D-optimality)."
         )
-    return Plan(planned, k, designer.space, named, advice, seed, designer.criterion, q.ship)
+    return Plan(planned, k, named, advice, seed, designer.criterion, q.ship)
 
 
 def _advice(start: Model, a: Sequence[str], b: Sequence[str]) -> str:

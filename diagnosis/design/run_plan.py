@@ -13,7 +13,6 @@ from ..report.formatting import write_json
 from ..runs.cleaning import Z95
 from ..search.most_likely import LEVEL
 from .designing import Designer, ScoredPlan
-from .hypotheses import Space
 from .information import CRITERIA, Knowledge, pairs, projected
 from .manoeuvre_library import TEXTS
 from .run_files import commands_file, draw, picture_file, scenario_file, write_run
@@ -127,7 +126,6 @@ class Plan:
     Attributes:
         runs: in their order; none: there is nothing that a run can decide.
         knowledge: the hypotheses and their weights before all of them.
-        space: the parameters.
         inseparable: pairs of names that no manoeuvre within the limits separates.
         advice: what would separate them, or what to do where no run is designed, a line each.
         seed, criterion: by which it was found.
@@ -136,7 +134,6 @@ class Plan:
 
     runs: Sequence[PlannedRun]
     knowledge: Knowledge
-    space: Space
     inseparable: Sequence[tuple[tuple[str, ...], tuple[str, ...]]]
     advice: Sequence[str]
     seed: int
