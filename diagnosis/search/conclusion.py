@@ -151,8 +151,7 @@ class Selection:
                 at = at.without(later)
                 nuisance = self._of(at)
                 at = refit(t, at, nuisance).estimate
-                theta = [*[at.values[n] for n in at.fitted], *at.offset]
-                nuisance = replace(nuisance, offset=np.array(theta))
+                nuisance = replace(nuisance, offset=at.theta(at.fitted))
             left = float(self._scored(at, nuisance).blocks.sum())
             models.append(at.model(t.prior))
             shares.append((before - left) / total)

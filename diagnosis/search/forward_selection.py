@@ -175,8 +175,7 @@ def searched_again(
         beside = at.without(found[k].names)
         nuisance = nuisance_of(t, beside, t.error(beside))
         beside = refit(t, beside, nuisance).estimate
-        theta = [*[beside.values[n] for n in beside.fitted], *beside.offset]
-        nuisance = replace(nuisance, offset=np.array(theta))
+        nuisance = replace(nuisance, offset=beside.theta(beside.fitted))
         ranking = rank(t, beside, {p.id for p in others}, made, nuisance)
         if leads(t, ranking, found[k].id):
             continue

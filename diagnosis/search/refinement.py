@@ -5,7 +5,7 @@ change on the way and are taken once; those of a new effect anew at each step. T
 slope: they are found by segmentation, anew at each fit of all else.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -94,6 +94,10 @@ class RefinedModel:
         """Those values that are fitted by slopes."""
         ship = self.start.ship
         return [n for n in self.values if n not in self.held and timed(ship, n) is None]
+
+    def theta(self, names: Iterable[str]) -> np.ndarray:
+        """(q,), some of the values, then the offsets of the nominal coefficients."""
+        return np.array([*[self.values[n] for n in names], *self.offset])
 
     def without(self, names: Collection[str]) -> "RefinedModel":
         """The estimate without the values of some effects."""
@@ -184,9 +188,8 @@ def nuisance_of(t: TrainingSet, at: RefinedModel, base: np.ndarray) -> Nuisance:
         none = np.zeros_like(base)
         columns.append(std * slope(t, model, base, n, t.prior.mean[n]) if std else none)
     precision = np.asarray(block_diag(at.precision, np.eye(t.prior.size)))
-    offset = np.array([*[at.values[n] for n in fitted], *at.offset])
     unit = np.array([*[model.unit(n) for n in fitted], *[1.0] * t.prior.size])
-    return Nuisance(np.stack(columns, axis=2), precision, offset, unit)
+    return Nuisance(np.stack(columns, axis=2), precision, at.theta(fitted), unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +266,7 @@ class Refinement:
 
     def theta(self, of: RefinedModel) -> np.ndarray:
         """(q,), all that is fitted: the candidate's, effects found before, nominal coefficients."""
-        return np.array([*[of.values[n] for n in (*self.start.fitted, *self.at.fitted)], *of.offset])
+        return of.theta((*self.start.fitted, *self.at.fitted))
 
     def begin(self) -> Refined:
         """The candidate as it begins."""
@@ -316,8 +319,7 @@ def _with_intervals(
         estimate = found.estimate
         without = {n: v for n, v in estimate.values.items() if n not in present}
         model = replace(estimate, values=without).model(t.prior)
-        theta = np.array([*[estimate.values[n] for n in at.fitted], *estimate.offset])
-        parts = nuisance.columns, nuisance.precision, theta, nuisance.unit
+        parts = nuisance.columns, nuisance.precision, estimate.theta(at.fitted), nuisance.unit
         whole = problem(t.data, model, model_error(t.data, model), e, parts)
         if whole is None:
             break
@@ -336,8 +338,7 @@ def as_shape(
 ) -> CandidateShape:
     """A refined candidate as a shape, seen from the model ``at`` with the error ``base``."""
     given = r.own(at)
-    fitted = [r.estimate.values[n] for n in at.fitted]
-    offset = np.array([*fitted, *r.estimate.offset])
+    offset = r.estimate.theta(at.fitted)
     unit = np.array([at.start.unit(n) for n in start.fitted])
     noise = quieted(t.data, at.model(t.prior), r.estimate.model(t.prior))
     return CandidateShape(

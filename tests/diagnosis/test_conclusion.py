@@ -35,6 +35,9 @@ class Point:
     def fitted(self):
         return [*self.values]
 
+    def theta(self, names):
+        return np.array([*(self.values[n] for n in names), *self.offset])
+
     def without(self, names):
         return Point({n: x for n, x in self.values.items() if n not in names}, self.offset)
 

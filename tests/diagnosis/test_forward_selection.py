@@ -330,6 +330,9 @@ class FakeModel:
         self.start = SimpleNamespace(ship=SimpleNamespace(effects=laws))
         self.values, self.fitted, self.offset = {}, (), np.zeros(0)
 
+    def theta(self, names):
+        return self.offset
+
     def without(self, names):
         return FakeModel(self.effects - set(names))
 

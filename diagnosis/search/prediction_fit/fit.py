@@ -202,7 +202,7 @@ class PredictionFit:
         """(q,), fitted parameters about their prior means, in units of the ship's size; coefficients in
         prior standard deviations.
         """
-        return (np.array([*[at.values[n] for n in at.fitted], *at.offset]) / self._own)[self._kept]
+        return (at.theta(at.fitted) / self._own)[self._kept]
 
     def moved(self, at: RefinedModel, step: np.ndarray) -> RefinedModel:
         """The estimate after a step (q,)."""
