@@ -40,7 +40,7 @@ def report(verdict="found", moved=(True, True), forces=True, rejected="", togeth
         CalibratedValue(p, p.at(z), (p.at(z) - 1.0, p.at(z) + 1.0), z, m)
         for p, z, m in zip((K, D), Z, moved, strict=True)
     ]
-    accepted = [Accepted(FORCE, 0.85, 0.95, alike, 10.0)] if forces else []
+    accepted = [Accepted(FORCE, 0.85, 0.95, alike)] if forces else []
     setting = Setting(Z, (FORCE,) if forces else ())
     remainder = SystemRemainder(
         [
@@ -176,10 +176,10 @@ def test_tables_have_a_row_for_each():
 
 def test_advice_names_the_run_that_discriminates():
     force = AdditionalForce("f", "v", 1)
-    assert advice(Accepted(force, 0.5, 0.9, (), 1.0)) == ""
-    told = advice(Accepted(force, 0.5, 0.9, ("f:1", "g:1"), 1.0))
+    assert advice(Accepted(force, 0.5, 0.9, ())) == ""
+    told = advice(Accepted(force, 0.5, 0.9, ("f:1", "g:1")))
     assert told == "f:v is indistinguishable from f:1, g:1: run with other levels of v."
-    told = advice(Accepted(AdditionalForce("f"), 0.5, 0.9, ("f:v",), 1.0))
+    told = advice(Accepted(AdditionalForce("f"), 0.5, 0.9, ("f:v",)))
     assert told == "f:1 is indistinguishable from f:v: run with more motion."
 
 

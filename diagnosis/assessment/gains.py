@@ -61,12 +61,6 @@ class ThrustGains:
         weights = (self.value[known] / self.error[known]) ** 2
         return float(np.exp(np.average(np.log(self.value[known]), weights=weights)))
 
-    @property
-    def close(self) -> bool:
-        """Whether all that are told are within a factor of one."""
-        near = (self.value * SETTINGS.most_gain > 1.0) & (self.value < SETTINGS.most_gain)
-        return bool(self.told.any() and near[self.told].all())
-
 
 def gains(w: WeakWindows, model: Model) -> ThrustGains:
     """The acceleration that the commands of a run give, as shares of what they give by a model."""

@@ -27,14 +27,12 @@ class Accepted:
         probability: that it is the cause, of all candidates and of none.
         together: the same of it and of those that cannot be told from it.
         alike: these.
-        gain: by which the cost falls.
     """
 
     force: AdditionalForce
     probability: float
     together: float
     alike: tuple[str, ...]
-    gain: float
 
 
 def candidates(
@@ -114,9 +112,8 @@ def search(
     first, (_, one, force) = float(own[0]), fits[0]
     near = [f.id for w, (_, _, f) in zip(own, fits, strict=True) if f.id != force.id and w > unlikely]
     alike = (*dict.fromkeys((*best[force.id][2], *near)),)
-    end = one.setting.forces[-1]
-    gained = Accepted(end, first, float(own[own > unlikely].sum()), alike, at.cost - one.cost)
-    return one, gained
+    together = float(own[own > unlikely].sum())
+    return one, Accepted(one.setting.forces[-1], first, together, alike)
 
 
 def _promising(

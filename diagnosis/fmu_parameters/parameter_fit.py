@@ -27,7 +27,6 @@ class ParameterFit:
         sizes: unit of each force's coefficient.
         residuals: (n,), whitened.
         slopes: (n, q), by z and by the coefficients in their units.
-        fixed: whether the parameters kept their start values.
         faults: values of which no slope is known, and why.
     """
 
@@ -35,7 +34,6 @@ class ParameterFit:
     sizes: tuple[float, ...]
     residuals: np.ndarray
     slopes: np.ndarray
-    fixed: bool = False
     faults: tuple[str, ...] = ()
 
     @property
@@ -124,7 +122,7 @@ def fit(
         J, faults = r.slopes(s, sizes)
     (white,) = r.whitened([s])
     names = tuple(str(f) for f in faults) if isinstance(faults, list) else ()
-    return ParameterFit(s, tuple(size.tolist()), white, J, bool(held) and len(held) == p, names)
+    return ParameterFit(s, tuple(size.tolist()), white, J, names)
 
 
 def fitted(r: WindowResiduals, begin: Setting, sizes: Sequence[float] = ()) -> ParameterFit:
