@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
     """Run the command with parsed options: the errors, then the report and the validation record."""
-    from .acceptance.record.file_names import FILES as RECORD
+    from .acceptance.record import FILES as RECORD
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .predictors import MAP, open_model, ship_of_model, ship_with
     from .report import ReportData, file_content, show_comparison, write_report

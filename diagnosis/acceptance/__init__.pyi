@@ -1,7 +1,7 @@
 from .criterion import json_schema as json_schema
 from .criterion import read_criteria as read_criteria
 from .criterion import template as template
-from .record.file_names import FILES as FILES
+from .record import FILES as FILES
 from .record.signature import public_key as public_key
 from .record.validation import Validation as Validation
 from .record.validation import lines as lines

@@ -7,7 +7,7 @@ from pathlib import Path
 from ...report.content import Content
 from ...report.document import Document, Plot, write_document
 from ...report.formatting import as_json
-from .file_names import FILES, PAGE, PDF, RECORD, SIGNATURE
+from . import FILES, PAGE, PDF, RECORD, SIGNATURE
 from .pdf import write_pdf
 from .provenance import entry
 from .sections import sections

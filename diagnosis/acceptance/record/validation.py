@@ -31,7 +31,7 @@ from ..criterion import JUDGED, InputStd, ReadCriteria, now, read_criteria
 from ..judged_criterion import EXPANDED, Judgement, Predicted, judge
 from ..predictions import Predictions, possible
 from ..validity import covered, window_means
-from .file_names import FILES
+from . import FILES
 from .provenance import Files, code, files_of, foreign, parameters_of, parameters_sha256, samples
 from .record_figures import figures
 from .record_files import write_record
