@@ -50,7 +50,7 @@ def report(verdict="found", moved=(True, True), forces=True, rejected="", togeth
     )
     q = 2 + len(setting.forces)
     result = SystemCalibration(
-        verdict, values, accepted, remainder, remainder, rejected, together,
+        verdict, values, accepted, remainder, rejected, together,
         SimpleNamespace(setting=setting, sizes=(5.0,) if forces else ()), COVARIANCE[:q, :q],
         {"a": {"x": (0.5, 0.1), "w": (3.0, 2.0)}, "b": {"x": (0.6, 0.2), "w": (4.0, 1.0)}},
         {"b": (-20.0, 3.0)}, ["the FMU fails"],

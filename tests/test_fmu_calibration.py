@@ -410,7 +410,6 @@ def test_what_is_off_or_missing_is_found_with_its_value(name):
     change, error = found.changes["run7"]
     assert (change < -2.0 * error) == found.changed
     assert not found.remainder.significant
-    assert found.first.significant == found.changed
     q = 3 + len(forces)
     assert found.covariance.shape == (q, q)
     assert np.linalg.eigvalsh(found.covariance).min() > 0.0

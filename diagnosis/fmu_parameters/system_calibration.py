@@ -51,7 +51,7 @@ class SystemCalibration:
         verdict: by the rule of :func:`verdict_of`.
         values: of all parameters, as the learned model has them.
         forces: what was accepted.
-        remainder, first: what the learned and the first model leave.
+        remainder: what the learned model leaves.
         rejected: why nothing was learned though something was fitted; empty: it was kept.
         together: groups of values that are known only together.
         fit: the most likely values.
@@ -66,7 +66,6 @@ class SystemCalibration:
     values: Sequence[CalibratedValue]
     forces: Sequence[Accepted]
     remainder: SystemRemainder
-    first: SystemRemainder
     rejected: str
     together: Sequence[Sequence[str]]
     fit: ParameterFit
@@ -161,7 +160,6 @@ def calibrate(
         values,
         accepted if kept else [],
         rest if kept else first,
-        first,
         rejected,
         together(every, covariance),
         best,

@@ -14,6 +14,7 @@ import cosim
 from cosim.fmu import FmuModel
 
 from ...predictors.prediction import FAR_OFF
+from ...report.content import part
 from ...report.document import Document, Plot, ReportSection, numbers, write_document
 from ...report.document import Table as PageTable
 from ...report.formatting import write_json
@@ -103,23 +104,18 @@ class CalibrationReport:
         return {
             "verdict": r.verdict,
             "sentence": self.sentence,
-            "parameters": [self._parameter(v) for v in r.values],
+            "parameters": [*map(_parameter, r.values)],
             "effects": [self._effect(k, f) for k, f in enumerate(r.forces)],
             "indistinguishable_groups": [list(group) for group in r.together],
             "remainder": {
                 "significant": r.remainder.significant,
-                "outputs": {
-                    o.name: {"rms": o.rms, "unit": o.unit, "share": o.share, "p": o.p}
-                    for o in r.remainder.outputs
-                },
+                "outputs": {o.name: part(o, "rms unit share p") for o in r.remainder.outputs},
                 "sentence": r.remainder.sentence,
             },
             "possibilities": [],
             "withdrawn": [{"id": "parameters", "reason": r.rejected}] if r.rejected else [],
             "suspect_coefficients": [
-                {"name": v.parameter.name, "z": v.z, "value": v.value}
-                for v in r.values
-                if abs(v.z) > FAR_OFF
+                part(v, "name=parameter.name z value") for v in r.values if abs(v.z) > FAR_OFF
             ],
             "ranking": [],
             "data": {"samples": self.samples, "used": self.samples},
@@ -147,18 +143,6 @@ class CalibrationReport:
             },
         }
 
-    def _parameter(self, v: CalibratedValue) -> dict[str, Any]:
-        p = v.parameter
-        return {
-            "name": p.name,
-            "unit": p.unit,
-            "value": v.value,
-            "ci95": list(v.ci95),
-            "prior": {"value": p.value, "std": p.std, "log": p.log, "origin": p.prior.origin},
-            "z": v.z,
-            "moved": v.moved,
-        }
-
     def _effect(self, k: int, f: Accepted) -> dict[str, Any]:
         value = {
             "value": f.force.coefficient,
@@ -171,14 +155,10 @@ class CalibrationReport:
             "axis": "",
             "coefficients": {f.force.id: value},
             "confidence": f.probability,
-            "share_of_error": self._share(),
+            "share_of_error": 1.0 - float(np.mean([o.share for o in self.result.remainder.outputs])),
             "indistinguishable": list(f.alike),
             "advice": advice(f),
         }
-
-    def _share(self) -> float:
-        """Share of the first sum of squares that the learned model explains."""
-        return 1.0 - float(np.mean([o.share for o in self.result.remainder.outputs]))
 
     def write(self, folder: Path, origin: Mapping[str, str], plots: Sequence[Plot]) -> None:
         """Write all files but those of an FMU."""
@@ -288,6 +268,12 @@ FORCES = ("force", "coefficient", "95 % interval", "unit", "confidence", "indist
 ERRORS = ("run", "output", "rms before", "rms after", "unit")
 
 
+def _parameter(v: CalibratedValue) -> dict[str, Any]:
+    known = part(v, "name=parameter.name unit=parameter.unit value ci95")
+    prior = part(v.parameter, "value std log origin=prior.origin")
+    return known | {"prior": prior} | part(v, "z moved")
+
+
 def advice(f: Accepted) -> str:
     """Which run would discriminate; empty: none is needed."""
     if not f.alike:
@@ -316,17 +302,17 @@ def plots_of(
 ) -> list[Plot]:
     """Measured and predicted outputs of each run."""
     found = []
-    for part in parts.values():
-        before, after = part.raw([part.start, r.fit.setting if r.changed else part.start])
-        for run in dict.fromkeys(w.run for w in part.windows):
-            windows = [w for w in part.windows if w.run == run]
+    for own in parts.values():
+        before, after = own.raw([own.start, r.fit.setting if r.changed else own.start])
+        for run in dict.fromkeys(w.run for w in own.windows):
+            windows = [w for w in own.windows if w.run == run]
             group = np.repeat(np.arange(len(windows)), [w.time.size for w in windows])
             time = interrupted(np.concatenate([w.begin + w.time for w in windows]), group)
             measured = interrupted(np.concatenate([w.measured for w in windows]), group)
             left = [
                 interrupted(np.concatenate([x.reshape(w.measured.shape) for w, x in mine]), group)
                 for each in (before, after)
-                for mine in [[(w, x) for w, x in part.parts(each) if w.run == run]]
+                for mine in [[(w, x) for w, x in own.parts(each) if w.run == run]]
             ]
             changes = ((left[0], BEFORE, "before"), (left[1], AFTER, "after"))
             panels = []
@@ -334,7 +320,7 @@ def plots_of(
                 panel = Panel(ChartAxis("time [s]", shown=k == len(names) - 1), ChartAxis(name))
                 panel.draw(time, measured[:, k], INK, "measured", faint=True)
                 for off, colour, label in changes if r.changed else changes[:1]:
-                    panel.draw(time, measured[:, k] - off[:, k] * part.noise[k], colour, label)
+                    panel.draw(time, measured[:, k] - off[:, k] * own.noise[k], colour, label)
                 panels.append(panel)
             found.append(
                 Plot(Chart(60.0 + 110.0 * len(panels), panels), f"{run}: measured and predicted.")
