@@ -37,7 +37,7 @@ from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
-from .search.prediction_fit.refit import RefitOutcome
+from .search.prediction_fit.refit import RefitOutcome, prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .search.significance import Losses
@@ -358,10 +358,11 @@ class Session(ShortRepr):
             ("test", self.test),
         ]
         uses = [use for use, runs in parts for _ in runs]
+        known = verdict.posterior, verdict.unrecorded.push
         evaluations = [
             replace(
                 e,
-                bands=verdict.bands(e.smoothed, e.windows),
+                bands=prediction_bands(e.smoothed, e.windows, learned, *known),
                 use=use,
                 calibrated=self._calibrated_errors(e) if use == "test" else None,
             )

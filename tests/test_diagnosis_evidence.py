@@ -269,14 +269,14 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
         losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
     )
     data.of_other_runs = data
-    c = concluded(found, data, NominalPrior.of(START))
-    assert c.refitted == refitted
+    learned, is_refitted, dropped = concluded(found, data, NominalPrior.of(START))
+    assert is_refitted == refitted
     if refitted:
-        assert c.learned.model is OTHER
-        assert list(c.dropped) == list(found.effects)
+        assert learned.model is OTHER
+        assert list(dropped) == list(found.effects)
     elif case["effects"]:
-        assert c.learned is found
-        assert not c.dropped
+        assert learned is found
+        assert not dropped
     else:
-        assert c.learned.model is START
-        assert c.learned.suspects == []
+        assert learned.model is START
+        assert learned.suspects == []

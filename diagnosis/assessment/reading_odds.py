@@ -109,7 +109,7 @@ class ReadingOdds:
     def __init__(self, w: WeakWindows, model: Model) -> None:
         self.w, self.model = w, model
         independent = w.middle.size / OVERLAP
-        self._full = most_thrust(w, model)
+        self._full, self._undamped = most_thrust(w, model), undamped(model)
         self.windows = independent * SETTINGS.windows / (independent + SETTINGS.windows)
 
     def log_density(self, reading: Reading) -> float:
@@ -148,10 +148,6 @@ class ReadingOdds:
         for column in ([north, -east, zero], [east, north, zero]):
             why.may(np.column_stack(column), SETTINGS.inexact * float(self._full[0]))
         return why
-
-    @cached_property
-    def _undamped(self) -> Model:
-        return undamped(self.model)
 
     @cached_property
     def _streaming(self) -> list[Model]:

@@ -13,7 +13,6 @@ harms is kept on trial for one step, and stays if it and the next do no harm tog
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -243,14 +242,6 @@ def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ran
     return [ranked(name, s) for name, s in in_order]
 
 
-class LikelyEffect(NamedTuple):
-    """A shape of a candidate, and what it takes off the sum of squares, less its charge."""
-
-    fall: float
-    candidate: int
-    shape: int
-
-
 def likely_effects(
     ranking: Ranking, start: Model, shows: Callable[[np.ndarray, np.ndarray], bool]
 ) -> int:
@@ -269,12 +260,12 @@ def likely_effects(
     while len(used) < MOST_REPORTED:
         gram = _without(table, table.total, table.nuisance, table.precision)
         falls = [
-            LikelyEffect(_fall(table, gram, shape, entry, start), k, number)
+            (_fall(table, gram, shape, entry, start), k)
             for k, candidate in enumerate(ranking.candidates)
             if k not in used
-            for number, (shape, entry) in enumerate(zip(candidate.shapes, table.entries[k], strict=True))
+            for shape, entry in zip(candidate.shapes, table.entries[k], strict=True)
         ]
-        best = dict.fromkeys(f.candidate for f in sorted(falls, reverse=True) if f.fall > NEW)
+        best = dict.fromkeys(k for fall, k in sorted(falls, reverse=True) if fall > NEW)
         shapes = {k: len(ranking.candidates[k].shapes) for k in [*best][:LENGTH]}
         if not shapes:
             break
@@ -302,7 +293,7 @@ def _force(t: GramTable, scored: Scored, shape: CandidateShape) -> np.ndarray:
 
 
 def _fall(t: GramTable, gram: np.ndarray, shape: CandidateShape, entry: Entry, start: Model) -> float:
-    """See :class:`LikelyEffect`; minus infinity where the best values are out of their ranges."""
+    """What a shape takes off the sum of squares, less its charge; -inf: its values are out of range."""
     given, columns = entry.given, entry.columns
     right, fall = gram[columns, 0], -(len(columns) + entry.nonlinear) * t.per_parameter - entry.quieted
     if given >= 0:

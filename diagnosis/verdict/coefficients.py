@@ -3,7 +3,6 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,20 +21,6 @@ from .pruning import judgeable, without
 from .validation_data import ValidationData
 
 
-class Conclusion(NamedTuple):
-    """The model that findings amount to.
-
-    Attributes:
-        learned: the findings with that model.
-        refitted: whether that is other nominal coefficients alone.
-        dropped: effects that were accepted, of which the model has none.
-    """
-
-    learned: Findings
-    refitted: bool
-    dropped: Sequence[Finding]
-
-
 def any_finding(found: Findings, start: Model) -> bool:
     """Whether any effect is a finding, and not only a possibility."""
     return any(confidence_of(f, start).is_finding for f in found.effects)
@@ -46,17 +31,23 @@ def any_sure(learned: Findings) -> bool:
     return not all(f.confidence < FOUND for f in learned.effects)
 
 
-def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Conclusion:
+def concluded(
+    found: Findings, data: ValidationData, prior: NominalPrior
+) -> tuple[Findings, bool, Sequence[Finding]]:
     """The model that the findings amount to.
 
     Coefficients alone explain the data if something was missing, nothing is with them, none is further
     than FAR_OFF from its prior, by where its value is from, and the data that decide (each of two runs
     left out as a whole) are not worse than without. They then take the place of effects of which none
     is a finding, if these data are not worse either.
+
+    Returns:
+        The findings with that model; whether it is other nominal coefficients alone; and the effects
+        that were accepted, of which the model has none.
     """
     start, unseen = data.start, data.of_other_runs
     if any_finding(found, start) or (found.effects and found.refit is None):
-        return Conclusion(found, False, [])
+        return found, False, []
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
     judged = alone.plausible_by(prior) and unseen.judges(alone)
@@ -68,10 +59,10 @@ def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Con
     ):
         now, *others = unseen.losses(alone, *([found, start] if found.effects else [start]))
         if not any(harm(now, each) for each in others):
-            return Conclusion(replace(alone, model=other), True, found.effects)
+            return replace(alone, model=other), True, found.effects
     if found.effects:
-        return Conclusion(found, False, [])
-    return Conclusion(replace(found, model=start, suspects=[]), False, [])
+        return found, False, []
+    return replace(found, model=start, suspects=[]), False, []
 
 
 @dataclass(frozen=True, eq=False)
