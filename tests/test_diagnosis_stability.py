@@ -117,7 +117,7 @@ def test_less_is_less_by_more_than_a_share_of_what_was_before(before):
 
 def test_a_hull_drives_on_where_it_adds_energy_and_the_other_adds_less():
     def is_driven(changed, other):
-        return stability.drives_on(Model({"delta_X_u": changed}), Model({"delta_X_u": other}), OPERATING)
+        return stability.driven_on(Model({"delta_X_u": changed}), Model({"delta_X_u": other}), OPERATING)
 
     assert is_driven(3.0, 0.0)
     assert is_driven(3.0, 2.0)

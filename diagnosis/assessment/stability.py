@@ -277,11 +277,6 @@ def driven_on(model: Model, other: Model, region: OperatingRegion) -> tuple[str,
     return tuple(found)
 
 
-def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
-    """Whether in any motion a hull drives the ship on, and another less, see :func:`driven_on`."""
-    return bool(driven_on(model, other, region))
-
-
 def _less(after: Any, before: Any) -> Any:
     return after < before - SETTINGS.inexact**2 * np.abs(before)
 

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cosim import InputError
-from fmus.declare import Component
 from fmus.effects import Effect
 from fmus.fmi.trace import TraceError
 from fmus.native.program import program
@@ -204,8 +203,9 @@ class MovableModel:
         }
         head = json.dumps(header, allow_nan=False).encode()
         allocation = component_module(program(allocation_component(self.learned)))
-        balance = component_module(program(self._balance))
-        parts = head, module, allocation, balance
+        run = self.runs[0].weak_windows.run
+        balance = balance_component(self.learned, self.names, run, self._points)
+        parts = head, module, allocation, component_module(program(balance))
         sizes = [len(part).to_bytes(4, "little") for part in parts]
         return b64encode(zlib.compress(b"".join([*sizes, *parts, *store.parts]))).decode()
 
@@ -383,11 +383,6 @@ class MovableModel:
         """(points, k, n): commands that arrive, then shares that act; or one for both."""
         w = e.weak_windows.thinned
         return response(w, self.learned.during(e.name))
-
-    @property
-    def _balance(self) -> Component:
-        """The model error of a sample."""
-        return balance_component(self.learned, self.names, self.runs[0].weak_windows.run, self._points)
 
     def _force(self, e: Evaluation, store: "ArrayStore") -> dict[str, Any]:
         """What the page needs for the model error of a run, see :mod:`..predictors.weak_form`."""

@@ -42,11 +42,6 @@ class EffectEvidence(NamedTuple):
     nearest: float
     remains: float
 
-    @property
-    def beside_unknown(self) -> float:
-        """Probability of the effect beside causes that no candidate has, where something is left."""
-        return beside_unknown(self.remains**2, self.nearest)
-
 
 def beside_unknown(left: float, nearest: float) -> float:
     """Probability of an effect beside causes that no candidate has.

@@ -137,7 +137,7 @@ def better_calibration(
     calibration: RefitOutcome | None,
     found: Findings | Model,
     data: ValidationData,
-    drives: Callable[[Model, Model], bool],
+    drives: Callable[[Model, Model], Collection[str]],
     without_gain: Collection[str] = (),
     believed: bool = True,
     gained: bool = True,
@@ -151,7 +151,7 @@ def better_calibration(
         calibration: the fit; None: there is none.
         found: the end of a search without a sure finding; the initial model if nothing was learned.
         data: the data that decide.
-        drives: whether the hull of a model drives the ship on more than that of another.
+        drives: motions in which the hull of a model drives the ship on more than that of another.
         without_gain: ids of the effects that predictions do not show.
         believed: whether any effect is a finding.
         gained: whether the search predicts better than the calibration, beyond chance.

@@ -167,7 +167,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
         caps[RESIDUAL] = beside_unknown(doubts.more_than_waves[f.id], 1.0)
     # Waves are a residual themselves.
     if effect.search.by != "spectrum" and not axes.isdisjoint(doubts.residual):
-        caps[RESIDUAL] = EVEN_ODDS if f.evidence is None else f.evidence.beside_unknown
+        e = f.evidence
+        caps[RESIDUAL] = EVEN_ODDS if e is None else beside_unknown(e.remains**2, e.nearest)
     most, rest = min(caps.values()), doubts.beside_possibility.get(f.id, 1.0)
     doubt = min(caps, key=caps.__getitem__) if own > most or of_set > most else ""
     return Confidence(min(own * rest, most), min(of_set * rest, most), doubt)

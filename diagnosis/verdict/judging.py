@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError
 from ..assessment.regions import find_regions
 from ..assessment.residual.recurrence import recurrence
 from ..assessment.residual.remainder import Remainder, noise_of, remainder_sentence, remaining
-from ..assessment.stability import OperatingRegion, drives_on
+from ..assessment.stability import OperatingRegion, driven_on
 from ..execution.progress import Advance
 from ..execution.short_text import ShortRepr
 from ..predictors import Model, WeakWindows, omega
@@ -149,7 +149,7 @@ def judge(
     """
     start, train = data.start, data.train
     advance("effects without which validation data are predicted better")
-    drives = partial(drives_on, region=region)
+    drives = partial(driven_on, region=region)
     kept, withdrawn = prune(found, data, drives, criterion)
     kept, unproven = proven(kept, data, criterion)
     ended, refitted, replaced = concluded(kept, data, prior)
@@ -233,7 +233,7 @@ def _coefficients_alone(
     end: _Fitted,
     learned: Findings,
     calibrations: Calibrations,
-    drives: Callable[[Model, Model], bool],
+    drives: Callable[[Model, Model], Collection[str]],
     gain: PredictionGain | None,
     unshown: Collection[str],
 ) -> _Fitted | None:

@@ -36,7 +36,10 @@ class Withdrawn(NamedTuple):
 
 
 def prune(
-    found: Findings, data: ValidationData, drives: Callable[[Model, Model], bool], harm: Harm
+    found: Findings,
+    data: ValidationData,
+    drives: Callable[[Model, Model], Collection[str]],
+    harm: Harm,
 ) -> tuple[Findings, list[Withdrawn]]:
     """Reject effects that make the data that decide worse.
 
@@ -45,7 +48,7 @@ def prune(
     Args:
         found: the findings on the training runs.
         data: the data that decide.
-        drives: whether the hull of the first model drives the ship on where that of the second does not.
+        drives: motions in which the hull of the first model drives the ship on, that of the second not.
         harm: the criterion.
 
     Returns:

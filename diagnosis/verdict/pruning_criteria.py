@@ -31,7 +31,10 @@ class Harm(Protocol):
 
 
 # Name -> module of the package and its function.
-CRITERIA = {"paired": ("search.significance", "harm"), "bic": ("verdict.information_criterion", "harm")}
+CRITERIA = {
+    "paired": ("search.significance", "harm"),
+    "bic": ("search.significance", "harm_by_information"),
+}
 USUAL = "paired"
 PACKAGE = __name__.partition(".")[0]
 
