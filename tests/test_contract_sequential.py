@@ -32,11 +32,9 @@ def verdict(name, **confidence):
 def played(monkeypatch, tmp_path):
     """Plays rounds with given verdicts, plans and ends of the simulation; returns them, and what was asked."""
 
-    def play(verdicts, runs=True, status="done"):
+    def play(verdicts, status="done"):
         asked, contents = [], iter(verdicts)
-        plan = SimpleNamespace(
-            runs=[1] if runs else [], write=lambda folder: asked.append(("plan", folder.name))
-        )
+        plan = SimpleNamespace(write=lambda folder: asked.append(("plan", folder.name)))
         result = SimpleNamespace(status=status, message="it broke")
 
         def simulate(scenario, into, truth, **more):
@@ -84,8 +82,7 @@ def test_rounds_go_on_until_every_effect_is_certain(played):
     assert [a[1] for a in asked if a[0] == "plan"] == ["round_1", "round_2", "round_3"]
 
 
-def test_rounds_end_where_no_run_is_left_or_their_number_is_reached(played):
-    assert len(played([verdict("ambiguous", a=None)] * 3, runs=False)[0]) == 1
+def test_rounds_end_where_their_number_is_reached_or_a_run_fails(played):
     found, _ = played([verdict("ambiguous", a=None)] * 2)
     assert [r.effects for r in found] == [{"a": 0.0}] * 2
     with pytest.raises(InputError, match="the run of round 1 failed: it broke"):

@@ -124,10 +124,10 @@ class Plan:
     """What to run next.
 
     Attributes:
-        runs: in their order; none: there is nothing that a run can decide.
+        runs: in their order.
         knowledge: the hypotheses and their weights before all of them.
         inseparable: pairs of names that no manoeuvre within the limits separates.
-        advice: what would separate them, or what to do where no run is designed, a line each.
+        advice: what would separate them, and what to know of the runs, a line each.
         seed, criterion: by which it was found.
         ship: as a scenario names it; None: the default ship.
     """

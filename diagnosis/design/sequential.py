@@ -23,13 +23,11 @@ class Round(NamedTuple):
 
     Attributes:
         plan: of its run.
-        folder: with the log of the run.
         verdict: of the diagnosis of all runs so far.
         effects: id -> confidence of the effects that were found.
     """
 
     plan: Plan
-    folder: Path
     verdict: str
     effects: dict[str, float]
 
@@ -76,8 +74,8 @@ def play(
         runs = [*q.data, *gather([log], model=q.start)]
         task = begin(runs, prior=q.prior, model=q.start, advance=advance)
         content = file_content(ReportData.of(task.diagnose()))
-        found.append(Round(plan, log, content["verdict"], confidences(content)))
-        if found[-1].certain or not plan.runs:
+        found.append(Round(plan, content["verdict"], confidences(content)))
+        if found[-1].certain:
             break
         q = replace(q, data=task.train, content=content)
     return found

@@ -34,14 +34,12 @@ class Spread:
     """Tracks of a plan under every likely hypothesis.
 
     Attributes:
-        time: (n,) [s].
         eta: (h, members, n, 3), poses; the first member has the mean parameters.
         ids: numbers of the hypotheses.
         margin: (h,), least distance of the hull from the walls of the basin over all members, at the
             speed of the plan and faster [m].
     """
 
-    time: np.ndarray
     eta: np.ndarray
     ids: Sequence[int]
     margin: np.ndarray
@@ -204,6 +202,5 @@ def spread(
         every.append(followed(models, motion.faster(1.0 + 2.0 * MEASURED)))
     least = [[basin.margin(track, outline).min() for track in each] for each in every]
     margins = np.min(least, axis=0).reshape(len(ids), MEMBERS)
-    return Spread(
-        motion.time, eta.reshape(len(ids), MEMBERS, *eta.shape[1:]), list(ids), margins.min(axis=1)
-    )
+    tracks = eta.reshape(len(ids), MEMBERS, *eta.shape[1:])
+    return Spread(tracks, list(ids), margins.min(axis=1))

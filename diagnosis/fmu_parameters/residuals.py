@@ -70,7 +70,7 @@ class Whitening:
 
 
 class WindowResiduals:
-    """The residuals of an FMU in the windows of some runs.
+    """The residuals (size,) of an FMU in the windows of some runs, those without a sample included.
 
     Args:
         processes: that run the FMU.
@@ -126,11 +126,6 @@ class WindowResiduals:
             f"The FMU fails with {len(self.failed)} of the values that the fit tried, which it avoids; "
             f"the first{at}: {why}"
         )
-
-    @property
-    def size(self) -> int:
-        """Number of residuals, those without a sample included."""
-        return self.rows[-1].stop
 
     @property
     def samples(self) -> int:

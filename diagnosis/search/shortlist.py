@@ -153,14 +153,12 @@ class Shortlist:
     Attributes:
         ids: of their effects.
         starts, refined: what is fitted of them, and where they came to.
-        table: all of them.
         scored: best first; their candidates are indices of the above.
     """
 
     ids: Sequence[str]
     starts: Sequence[CandidateStart]
     refined: Sequence[Refined]
-    table: GramTable
     scored: Sequence[Scored]
 
     @property
@@ -187,7 +185,7 @@ def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking) -> Shortlist:
     found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]
     table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)
     scored = in_order([score(table, k, 1) for k in range(len(best))])
-    return Shortlist([e.id for e in effects], starts, refined, table, scored)
+    return Shortlist([e.id for e in effects], starts, refined, scored)
 
 
 def leads(t: TrainingSet, ranking: Ranking, present: str) -> bool:
