@@ -6,6 +6,5 @@ from .record.signature import public_key as public_key
 from .record.validation import Validation as Validation
 from .record.validation import lines as lines
 from .record.validation import validate as validate
-from .record.verification import Check as Check
 from .record.verification import verify_record as verify_record
 from .validity import refuse_unknown_ranges as refuse_unknown_ranges

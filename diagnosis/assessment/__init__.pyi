@@ -1,13 +1,6 @@
-from .regions import ErrorRegions as ErrorRegions
-from .regions import Profile as Profile
-from .regions import Region as Region
-from .regions import find_regions as find_regions
-from .residual.remainder import AxisRemainder as AxisRemainder
 from .residual.remainder import Remainder as Remainder
 from .stability import OPERATING as OPERATING
 from .stability import OperatingRegion as OperatingRegion
-from .stability import Stability as Stability
-from .stability import check_stability as check_stability
 from .stability import dissipation as dissipation
 from .stability import least_dissipation as least_dissipation
 from .stability import mass as mass

@@ -8,7 +8,7 @@ from .next_plan import Question, plan_next, prepared
 from .planned_motion import Basin
 from .rehearsal import Rehearsal
 from .run_files import scenario_file, write_run
-from .run_plan import MOST_RUNS, Plan, PlannedRun
+from .run_plan import MOST_RUNS, Plan
 
 __all__ = [
     "CRITERIA",
@@ -19,7 +19,6 @@ __all__ = [
     "Knowledge",
     "Limits",
     "Plan",
-    "PlannedRun",
     "Question",
     "Rehearsal",
     "ScoredPlan",
