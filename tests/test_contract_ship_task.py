@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim import InputError
-from diagnosis.fmu_parameters import ship_task
+from diagnosis.fmu_parameters import parameter_file, ship_task
 from diagnosis.fmu_parameters.ship_task import ShipTask
 from diagnosis.predictors.black_box import MOTION, POSE
 from diagnosis.predictors.fmu.variable_map import DISTURBANCES
@@ -212,9 +212,11 @@ def test_a_task_has_the_parameters_of_a_file_or_those_that_are_proposed(monkeypa
     monkeypatch.setattr(ship_task, "Fmu", lambda *of: seen.append(of) or fmu)
     monkeypatch.setattr(gathering, "gather", lambda paths, *_: [measured(p) for p in paths])
     monkeypatch.setattr(
-        ship_task, "read_parameters", lambda path, model, mapped: [(path, model, mapped)]
+        parameter_file, "read_parameters", lambda path, model, mapped: [(path, model, mapped)]
     )
-    monkeypatch.setattr(ship_task, "proposed", lambda model, mapped: ([(model, mapped)], ["a note"]))
+    monkeypatch.setattr(
+        parameter_file, "proposed", lambda model, mapped: ([(model, mapped)], ["a note"])
+    )
     options = SimpleNamespace(
         effects=(),
         ship="cse1",
@@ -238,7 +240,7 @@ def test_a_task_has_the_parameters_of_a_file_or_those_that_are_proposed(monkeypa
     options.model = "other.fmu"
     assert ship_task.ship_task(options, paths, None, None).notes == ["a note"]
     assert seen[-1][0] == "other.fmu"
-    monkeypatch.setattr(ship_task, "proposed", lambda model, mapped: ([], []))
+    monkeypatch.setattr(parameter_file, "proposed", lambda model, mapped: ([], []))
     with pytest.raises(InputError, match="no parameter that can be calibrated"):
         ship_task.ship_task(options, paths, None, None)
     told = predictor.map.told

@@ -349,16 +349,16 @@ def limits_of(minutes: float, basin: str | Path | tuple[float, float] | None) ->
         try:
             sizes = [float(x) for x in str(basin).lower().split("x")]
         except ValueError:
-            return Limits(60.0 * minutes, Basin(*_basin_file(Path(basin))))
+            return Limits(60.0 * minutes, _basin_file(Path(basin)))
     if len(sizes) != 2 or not all(0.0 < x < 1e6 for x in sizes):
         raise InputError(f"a basin is two positive lengths [m] as in 6x4, or a JSON file; got '{basin}'")
     return Limits(60.0 * minutes, size=(sizes[0], sizes[1]))
 
 
-def _basin_file(path: Path) -> tuple[tuple[float, float], tuple[float, float]]:
+def _basin_file(path: Path) -> Basin:
     what = "a basin (two lengths [m] to the north and to the east as in 6x4, or a JSON file)"
     span = read_model(path, Span, what, strict=False)
     for name, (low, high) in (("north", span.north), ("east", span.east)):
         if not low < high:
             raise InputError(f"'{path}': {name} must be the lowest, then the highest value [m]")
-    return span.north, span.east
+    return Basin(span.north, span.east)

@@ -227,6 +227,13 @@ def proposed(model: FmuModel, mapped: Collection[str]) -> tuple[list[CalibratedP
     return found, [f"left out: {', '.join(names)}; {reason}"] if names else []
 
 
+def chosen_parameters(
+    path: Path | None, model: FmuModel, mapped: Collection[str]
+) -> tuple[list[CalibratedParameter], list[str]]:
+    """The parameters of a file; without one those that are :func:`proposed`, and a sentence."""
+    return proposed(model, mapped) if path is None else (read_parameters(path, model, mapped), [])
+
+
 def _with_prior(v: FmuVariable) -> CalibratedParameter | None:
     """A parameter with the prior of its kind; None: its value is no scale and it has no range."""
     value, unit = float(v.start or 0.0), unit_of(v)

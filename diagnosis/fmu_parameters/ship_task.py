@@ -24,7 +24,7 @@ from .additional_force import AdditionalForce, EarthDirection
 from .calibration_task import CalibrationTask
 from .force_search import candidates
 from .measured_system import Window
-from .parameter_file import CalibratedParameter, proposed, read_parameters
+from .parameter_file import CalibratedParameter, chosen_parameters
 
 # Angle [rad] from the heading to that whose cosine is the part of a force on surge and sway.
 EARTH = {"F_n": {"tau_X": 0.0, "tau_Y": np.pi / 2}, "F_e": {"tau_X": -np.pi / 2, "tau_Y": 0.0}}
@@ -183,11 +183,7 @@ def ship_task(
         raise InputError(f"'{fmu.name}' needs outputs for x, y and psi to calibrate its parameters")
     groups = ("inputs", "outputs", "start", DISTURBANCES)
     mapped = {c.name for g in groups for c in told.told(g).values()}
-    notes: list[str] = []
-    if getattr(options, "parameters", None) is not None:
-        chosen = read_parameters(options.parameters, fmu.model, mapped)
-    else:
-        chosen, notes = proposed(fmu.model, mapped)
+    chosen, notes = chosen_parameters(getattr(options, "parameters", None), fmu.model, mapped)
     if not chosen:
         raise InputError(f"'{fmu.name}' has no parameter that can be calibrated")
     return ShipTask(predictor, chosen, notes, runs)

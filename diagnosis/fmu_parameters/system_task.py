@@ -19,7 +19,7 @@ from .additional_force import AdditionalForce
 from .calibration_task import CalibrationTask
 from .force_search import candidates
 from .measured_system import MeasuredRun, Window, columns_of, noises, read_runs, windows_of
-from .parameter_file import CalibratedParameter, proposed, read_parameters, unit_of
+from .parameter_file import CalibratedParameter, chosen_parameters, unit_of
 from .system_map import TIME, SystemMap, check_map, force_inputs, map_by_names, read_system_map
 
 # 1, outputs that are no measured ones, of which an additional force may be a function; chosen: the more
@@ -140,11 +140,7 @@ def system_task(
             raise InputError(f"'{fmu}' has no output of type Real to compare with measurements")
         found = SystemMap.model_validate({"outputs": outputs})
     check_map(found, model, f"'{map or fmu.name}'")
-    notes: list[str] = []
-    if parameters is not None:
-        chosen = read_parameters(parameters, model, found.variables)
-    else:
-        chosen, notes = proposed(model, found.variables)
+    chosen, notes = chosen_parameters(parameters, model, found.variables)
     if not chosen:
         why = f" ({'; '.join(notes[:3])})" if notes else ""
         notes = [f"{quoted(fmu.name)} has no parameter that can be calibrated{why}"]
