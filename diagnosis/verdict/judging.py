@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -183,18 +183,7 @@ def judge(
         known = {f.id for f in dropped}
         alike = in_place_of_coefficients(end.fit, train, start, prior)
         dropped += [f for f in alike if f.id not in known]
-    decided = DecidedFindings(
-        doubted.learned,
-        withdrawn,
-        doubted.remainder,
-        end.refitted,
-        dropped,
-        doubted.shares,
-        doubted.unique,
-        end.fit.posterior,
-        end.fit.unrecorded,
-    )
-    return decided, gain
+    return replace(doubted, withdrawn=withdrawn, dropped=dropped), gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,17 +260,11 @@ def _coefficients_alone(
     return _coefficients_alone(initial, nothing, calibrations, drives, None, ()) or initial
 
 
-class _FindingsInDoubt(NamedTuple):
-    """Findings with their confidence, what they leave, and what they explain."""
+def _in_doubt(end: _Fitted, unshown: Collection[str]) -> DecidedFindings:
+    """A model with the confidence of its findings, what it leaves and explains; no effect is rejected.
 
-    learned: Findings
-    remainder: Remainder
-    shares: Sequence[float]
-    unique: Sequence[float | None]
-
-
-def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
-    """The findings with their confidence; ``unshown`` are those that predictions do not show."""
+    ``unshown`` are the ids of the findings that predictions do not show.
+    """
     found, data = end.fit.findings, end.data
     start, train = data.start, data.train
     # What fails at times of its own in a validation run says nothing of what was learned of others.
@@ -306,7 +289,17 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> _FindingsInDoubt:
         mended=mended(found, start, falls_by_axis(found, start, train), squares(found, train), each),
         beside_possibility=beside_possibility(found, explained, each),
     )
-    return _FindingsInDoubt(with_confidence(found, start, doubts), remainder, explained, alone)
+    return DecidedFindings(
+        learned=with_confidence(found, start, doubts),
+        withdrawn=(),
+        remainder=remainder,
+        refitted=end.refitted,
+        dropped=(),
+        shares=explained,
+        unique=alone,
+        posterior=end.fit.posterior,
+        unrecorded=end.fit.unrecorded,
+    )
 
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
