@@ -29,7 +29,6 @@ from .predictors import (
     nominal,
     open_model,
 )
-from .predictors.evaluation import DataUse
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .predictors.windows import WindowErrors
@@ -352,21 +351,16 @@ class Session(ShortRepr):
         """The diagnosis by a verdict: errors and bands of predictions, and whether it is stable."""
         learned = verdict.learned.model
         found = self._compared(learned if verdict.changed else None, self.predictor.in_windows())
-        parts: list[tuple[DataUse, Sequence[WeakWindows]]] = [
-            ("train", self.train),
-            ("validate", self.validate),
-            ("test", self.test),
-        ]
-        uses = [use for use, runs in parts for _ in runs]
+        of_validation = range(len(self.train), len(self.train) + len(self.validate))
         known = verdict.posterior, verdict.unrecorded.push
         evaluations = [
             replace(
                 e,
                 bands=prediction_bands(e.smoothed, e.windows, learned, *known),
-                use=use,
-                calibrated=self._calibrated_errors(e) if use == "test" else None,
+                use="validate" if k in of_validation else e.use,
+                calibrated=self._calibrated_errors(e) if e.held_out else None,
             )
-            for e, use in zip(found.evaluations, uses, strict=True)
+            for k, e in enumerate(found.evaluations)
         ]
         self.advance("stability")
         return Diagnosis(
