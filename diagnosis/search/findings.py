@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from .refinement import RefinedModel
 
 
-MOST_REPORTED = (
-    6  # 1, effects, disturbances or forces, the clearest: with more, no one acts on the last; chosen
-)
+# 1, effects, disturbances or forces, the clearest: with more, no one acts on the last; chosen
+MOST_REPORTED = 6
 
 
 @dataclass(frozen=True, eq=False)

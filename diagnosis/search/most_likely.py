@@ -17,9 +17,8 @@ from ..predictors.evaluation import quantile
 from ..runs.cleaning import normal_within
 from ..runs.run_constants import CHANCE, DIGITS, LEVEL, STEPS
 
-ENOUGH = (
-    0.02  # 1, of cost: where a step promises less, parameters are within a seventh of their deviation
-)
+# 1, of cost: where a step promises less, parameters are within a seventh of their deviation
+ENOUGH = 0.02
 
 At = TypeVar("At")
 

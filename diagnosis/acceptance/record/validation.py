@@ -209,12 +209,8 @@ class _JudgedRuns:
     def __init__(
         self, comparison: Comparison, learned: Learned | None, acting: InputStd, notes: list[str]
     ) -> None:
-        self._evaluations, self._learned, self._acting, self._notes = (
-            comparison.evaluations,
-            learned,
-            acting,
-            notes,
-        )
+        self._evaluations = comparison.evaluations
+        self._learned, self._acting, self._notes = learned, acting, notes
         self.short: dict[float, dict[str, int]] = {}
         prints = {e.name: Fingerprint.of(e.smoothed) for e in comparison.evaluations}
         told = [*comparison.predictor.model.learned_from, *(learned.learned_from if learned else ())]

@@ -111,10 +111,8 @@ def most_changed(error: np.ndarray, x: np.ndarray) -> StructuralChange:
     rows = np.arange(2 * STRETCH, len(x) - 2 * STRETCH + 1, STRETCH)
     if not rows.size:
         return StructuralChange(0.0, 0, 0)
-    squares, products = (
-        np.cumsum(x[:, :, None] * x[:, None, :], axis=0),
-        np.cumsum(x.T * error, axis=1).T,
-    )
+    squares = np.cumsum(x[:, :, None] * x[:, None, :], axis=0)
+    products = np.cumsum(x.T * error, axis=1).T
     before = _explained(squares[rows - 1], products[rows - 1])
     after = _explained(squares[-1] - squares[rows - 1], products[-1] - products[rows - 1])
     gain = before + after - _explained(squares[-1:], products[-1:])
