@@ -16,6 +16,7 @@ from ..runs.run_constants import DIGITS
 from ..runs.sensors.constants import LEAST
 from ..search.conclusion import interval
 from ..search.findings import Finding
+from ..search.nonlinear.multistart import limits
 from ..search.shortlist import TIE
 from ..session import Diagnosis
 from .finding_text import advice, equation, sentence, separation_note, unit
@@ -116,12 +117,8 @@ def is_fitted(d: Diagnosis, name: str) -> bool:
 
 def within_range(start: Model, name: str, value: float, low: float, high: float) -> tuple[float, float]:
     """The part of an interval about a value in which its parameter may be."""
-    limits = start.declared(name).range
-    if limits.min is not None:
-        low = max(low, min(limits.min, value))
-    if limits.max is not None:
-        high = min(high, max(limits.max, value))
-    return low, high
+    lowest, highest = limits(start.declared(name))
+    return max(low, min(lowest, value)), min(high, max(highest, value))
 
 
 def _reported(
