@@ -269,7 +269,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> DecidedFindings:
     start, train = data.start, data.train
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if found.model.runs else data.runs
-    remainder = remainder_of(judged, start, found, end.changed)
+    remainder = remainder_of(judged, start, found)
     explained = shares(found, start, data.validate)
     alone = unique_shares(found, start, train, data.validate)
     doubts = Doubts(
@@ -395,14 +395,9 @@ def unsettled(found: Findings, each: Sequence[Confidence]) -> set[str]:
     return {f.id for f in found.effects if f.instead_of and not sure.issuperset(f.beside)}
 
 
-def remainder_of(
-    runs: Sequence[WeakWindows], start: Model, learned: Findings, changed: bool
-) -> Remainder:
-    """What the learned model leaves in the runs that decide, in numbers and words.
-
-    ``changed`` says whether that model differs from the initial one.
-    """
-    model = learned.model if changed else start
+def remainder_of(runs: Sequence[WeakWindows], start: Model, learned: Findings) -> Remainder:
+    """What the learned model leaves in the runs that decide, in numbers and words."""
+    model = learned.model
     axes, left = remaining(runs, start, model), [omega(w, model) for w in runs]
     significant = any(axis.significant for axis in axes.values())
     how = recurrence(runs, np.concatenate(left)) if significant else None
