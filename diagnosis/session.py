@@ -323,11 +323,8 @@ class Session(ShortRepr):
         found = self.method.fit(self.train, self.start, self.prior, self.advance, self.seed)
         data = self.data(found.sigma)
         region = OperatingRegion.of(self._velocities, self.start.ship.scale)
-        calibrates = self.predictor.parametric
-        calibration = self.calibration if calibrates else None
-        verdict, gain = judge(
-            found, data, self.known, self.harms, region, calibrates, calibration, self.advance
-        )
+        fits = self.predictor.parametric, self.calibration
+        verdict, gain = judge(found, data, self.known, self.harms, region, *fits, self.advance)
         return self._concluded(verdict, region, gain)
 
     @property

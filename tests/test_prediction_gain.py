@@ -79,7 +79,7 @@ def test_the_search_gains_what_calibration_does_not(start, calibrated, learned, 
     calibration, end = Findings(model=BETTER), found(effects)
     model = end.model if effects else START
     sizes = {id(START): start, id(calibration): calibrated, id(end): learned, id(model): learned}
-    gain = gain_of_search(Data(sizes | {id(START): start}), START, calibration, end, model)
+    gain = gain_of_search(Data(sizes | {id(START): start}), calibration, end, model)
     assert (gain.gained, gain.over, gain.windows) == (gained, over, WINDOWS)
     for change in (gain.position, gain.heading):
         assert change.difference == pytest.approx(change.before**2 - change.after**2)

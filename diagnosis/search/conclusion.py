@@ -14,10 +14,11 @@ from .coefficient_rival import LinearProblem, probability_beside_coefficients
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import WHOLE_RUNS, Nuisance, block_folds, gram_table
-from .map_regression import Scored, regression, score
+from .map_regression import regression
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
 from .refinement import RefinedModel, TrainingSet, nuisance_of, refit, weighted_rows
+from .shortlist import scored_alone
 
 
 @dataclass(frozen=True)
@@ -152,17 +153,11 @@ class Selection:
                 nuisance = self._of(at)
                 at = refit(t, at, nuisance).estimate
                 nuisance = replace(nuisance, offset=at.theta(at.fitted))
-            left = float(self._scored(at, nuisance).blocks.sum())
+            left = float(scored_alone(t, at, nuisance).blocks.sum())
             models.append(at.model(t.prior))
             shares.append((before - left) / total)
             before = left
         return models, shares
-
-    def _scored(self, at: RefinedModel, nuisance: Nuisance) -> Scored:
-        """A model as it is, by fits to a part of the data, linear about it."""
-        t = self.t
-        table = gram_table(t.error(at), t.blocks, [], nuisance, np.asarray(t.sigma))
-        return score(table, -1, 1)
 
     def _evidence(self, p: AcceptedEffect, bagged: float) -> EffectEvidence:
         data, model = self.t.data, self.model

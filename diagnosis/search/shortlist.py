@@ -116,10 +116,10 @@ def weighted(
     return Ranking(base, nuisance, table, found, order)
 
 
-def scored_alone(t: TrainingSet, at: RefinedModel) -> Scored:
-    """The score of a model without any candidate."""
+def scored_alone(t: TrainingSet, at: RefinedModel, nuisance: Nuisance | None = None) -> Scored:
+    """The score of a model without any candidate, by fits to a part of the data, linear about it."""
     base = t.error(at)
-    nuisance = nuisance_of(t, at, base)
+    nuisance = nuisance_of(t, at, base) if nuisance is None else nuisance
     return score(gram_table(base, t.blocks, [], nuisance, np.asarray(t.sigma)), -1, 1)
 
 

@@ -213,9 +213,7 @@ class _Fitted:
     def gain_over(self, calibration: RefitOutcome | None) -> PredictionGain | None:
         """What predictions gain by it, over calibration alone."""
         coefficients = calibration and calibration.findings
-        return gain_of_search(
-            self.data, self.data.start, coefficients, self.fit.findings, self.predicting
-        )
+        return gain_of_search(self.data, coefficients, self.fit.findings, self.predicting)
 
 
 def _coefficients_alone(

@@ -94,7 +94,6 @@ def prediction_gain(
 
 def gain_of_search(
     data: ValidationData,
-    start: Model,
     calibrated: Findings | None,
     found: Findings,
     after: Findings | Model,
@@ -106,15 +105,14 @@ def gain_of_search(
 
     Args:
         data: the data that decide.
-        start: the initial model.
         calibrated: the calibration; None: there is none.
         found, after: the end of the search, and what of it predicts the data that decide.
 
     Returns:
         None where that is not known, see :func:`prediction_gain`.
     """
-    if calibrated is None or predicts_worse(*data.losses(calibrated, start)):
-        gain = prediction_gain(data, start, after)
+    if calibrated is None or predicts_worse(*data.losses(calibrated, data.start)):
+        gain = prediction_gain(data, data.start, after)
     else:
         gain = prediction_gain(data, calibrated, after)
         gain = gain and replace(gain, over="calibrated")

@@ -218,7 +218,8 @@ def test_a_search_is_judged_by_the_data_that_decide(monkeypatch, parametric):
         session, "OperatingRegion", SimpleNamespace(of=lambda nu, scale: (nu.tolist(), scale))
     )
     monkeypatch.setattr(Session, "_concluded", lambda self, *arguments: arguments)
-    s = with_fit(made(parametric=parametric, method=method), "calibration")
+    s = made(parametric=parametric, method=method)
+    s = with_fit(s, "calibration") if parametric else s
     verdict, region, gain = s.diagnose()
     assert (verdict, gain) == ("verdict", "gain")
     assert seen == [(s.train, START, 0.1, s.advance, 7)]
