@@ -36,7 +36,7 @@ from .runs.run_constants import PARTS
 from .search import DEFAULT, Findings, Method, Prior, method
 from .search.prediction_fit.coefficient_calibration import Calibrator
 from .search.prediction_fit.joint_posterior import JointPosterior
-from .search.prediction_fit.refit import RefitOutcome, prediction_bands
+from .search.prediction_fit.refit import RefitOutcome
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .search.significance import Losses
@@ -349,11 +349,10 @@ class Session(ShortRepr):
         learned = verdict.learned.model
         found = self._compared(learned if verdict.changed else None, self.predictor.in_windows())
         of_validation = range(len(self.train), len(self.train) + len(self.validate))
-        known = verdict.posterior, verdict.unrecorded.push
         evaluations = [
             replace(
                 e,
-                bands=prediction_bands(e.smoothed, e.windows, learned, *known),
+                bands=verdict.bands(e.smoothed, e.windows),
                 use="validate" if k in of_validation else e.use,
                 calibrated=self._calibrated_errors(e) if e.held_out else None,
             )

@@ -15,13 +15,16 @@ from ..assessment.stability import OperatingRegion, driven_on
 from ..execution.progress import Advance
 from ..execution.short_text import ShortRepr
 from ..predictors import Model, WeakWindows, omega
+from ..predictors.evaluation import Bands
 from ..predictors.uncertainty import corner_frequency
+from ..predictors.windows import Windows
+from ..runs import Smoothed
 from ..runs.run_constants import NEGLIGIBLE
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.coefficient_calibration import HEADING
 from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..search.prediction_fit.joint_posterior import JointPosterior
-from ..search.prediction_fit.refit import RefitOutcome, to_predictions
+from ..search.prediction_fit.refit import RefitOutcome, prediction_bands, to_predictions
 from ..search.prior import NominalPrior
 from ..search.significance import predicts_worse
 from .coefficients import (
@@ -79,6 +82,11 @@ class DecidedFindings(ShortRepr):
     def calibrated(self) -> bool:
         """Whether the learned model has other coefficients, and these are no explanation."""
         return self.refitted and self.verdict == "unexplained"
+
+    def bands(self, smoothed: Smoothed, windows: Windows | None) -> Bands | None:
+        """The bands about the learned model's predictions of a run; None: it has no window."""
+        push = self.unrecorded.push
+        return prediction_bands(smoothed, windows, self.learned.model, self.posterior, push)
 
     @property
     def believed(self) -> list[bool]:
