@@ -78,7 +78,7 @@ def _following(tables: Sequence[pd.DataFrame], table: pd.DataFrame) -> pd.DataFr
     if list(tables[0]) != list(table):
         return None
     known = pd.concat([*tables, table], ignore_index=True).duplicated().to_numpy()[-len(table) :]
-    new = table[~known]
+    new = table.loc[~known]
     low, high = new[TIME].min(), new[TIME].max()
     return None if any(t[TIME].max() > low and high > t[TIME].min() for t in tables) else new
 
