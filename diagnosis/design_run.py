@@ -6,7 +6,6 @@ if __name__ == "__main__":
     supervised()  # before all other imports, which take a while
 
 import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -87,6 +86,7 @@ def design(options: argparse.Namespace, advance: Advance) -> Done:
 def _played(options: argparse.Namespace, q: "Question", advance: Advance) -> Done:
     """The whole sequence on a simulated ship."""
     from .design.sequential import play
+    from .report.formatting import write_json
 
     rounds = play(q, options.simulate, options.out, options.count, options.seed, advance)
     shown, told = [], []
@@ -98,18 +98,20 @@ def _played(options: argparse.Namespace, q: "Question", advance: Advance) -> Don
     end = "Every effect found is certain." if certain else "The effects do not become certain."
     content = rounds[0].plan.content() | {"rounds": told, "certain": certain}
     with together(options.out, [PLAN]) as new:
-        (new / PLAN).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        write_json(new / PLAN, content)
     return Done(0, [*shown, end, f"{PLAN} and a folder for each round in {options.out}"])
 
 
 def _advised(options: argparse.Namespace, content: dict[str, Any], folder: Path) -> Done:
     """The written advice of a diagnosis, where nothing can be designed."""
+    from .report.formatting import write_json
+
     effects = [*content["effects"], *content["possibilities"]]
     lines = [e["advice"] for e in effects if e["advice"]]
     lines = lines or ["The diagnosis leaves no candidates that a run could discriminate."]
     told = {"runs": [], "inseparable": [], "advice": lines}
     with together(options.out, [PLAN]) as new:
-        (new / PLAN).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        write_json(new / PLAN, told)
     return Done(0, [f"note: {NO_RUNS.format(folder / POSTERIOR)}", *lines, f"{PLAN} in {options.out}"])
 
 

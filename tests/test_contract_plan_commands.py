@@ -27,7 +27,8 @@ def options(tmp_path, **more):
 
 
 def rounds(certain):
-    plan = SimpleNamespace(lines=lambda: ["a line"], content=lambda: {"runs": [], "seed": 7})
+    content = {"runs": [{"worst_distance": np.inf}], "seed": 7}
+    plan = SimpleNamespace(lines=lambda: ["a line"], content=lambda: content)
     first = SimpleNamespace(effects={}, plan=plan, verdict="none", certain=False)
     last = SimpleNamespace(
         effects={"N_r": 0.96, "X_u": 0.5}, plan=plan, verdict="found", certain=certain
@@ -51,6 +52,7 @@ def test_rounds_of_a_simulated_ship_are_told_and_written(tmp_path, monkeypatch, 
     )
     told = json.loads((tmp_path / "out" / "next.json").read_text())
     assert (told["certain"], told["seed"]) == (certain, 7)
+    assert told["runs"] == [{"worst_distance": None}], "JSON has no infinity"
     assert [r["folder"] for r in told["rounds"]] == ["round_1", "round_2"]
     assert told["rounds"][1] == {
         "folder": "round_2",
