@@ -93,6 +93,20 @@ def test_test_runs_that_contradict_the_learned_model_are_told(before, after, lea
     ]
 
 
+@pytest.mark.parametrize(("size", "said"), [(12.0, True), (2.0, False)])
+def test_an_error_that_is_larger_by_chance_is_told_as_such(size, said):
+    """One of ten windows is predicted so much worse, all others a little better."""
+    trained = evaluation("a", 0.05, 0.01, held_out=False)
+    tested = evaluation("b", 0.05, 0.05, held_out=True)
+    tested.after.errors.position[:] *= np.where(np.arange(10) == 3, size, 0.9)  # that of heading, too
+    told = [
+        *headline.contradicted_by_tests(SimpleNamespace(evaluations=[trained, tested], learned=True))
+    ]
+    assert ("; of so few windows this may be chance." in told[0]) == said
+    # Its cause is in the model, and not in the run, where another model predicts it better.
+    assert told[-1].endswith(f"{headline.LESS_BEYOND if said else headline.OTHER_RUN}.")
+
+
 @pytest.mark.parametrize(
     ("model", "steady", "said"),
     [

@@ -59,6 +59,9 @@ CALIBRATED = (
     "and predict data left out of the fit no worse, beyond chance. This does not identify a cause."
 )
 NOT_IN_MODEL = "It is not in the learned model, which predicts as well without it."
+OTHER_RUN = "something acts in it that the others do not show, or it is another manoeuvre"
+MAY_BE_CHANCE = "; of so few windows this may be chance"
+LESS_BEYOND = "what was learned does not hold in it"
 BESIDE = " In addition it fits, without claiming a cause: {}"
 PRODUCTS = "small coefficients of further products of speeds"
 FAR = (
@@ -96,7 +99,7 @@ def finding_sentence(e: ReportedEffect) -> str:
     doubt = f" However, {e.doubt}." if e.doubt else ""
     if not e.in_model:
         doubt += f" {NOT_IN_MODEL}"
-    elif 0.0 <= e.share_of_error < NEGLIGIBLE:
+    elif 0.0 <= max(e.share_of_error, e.share_unique or 0.0) < NEGLIGIBLE:
         doubt += f" It explains {percent(e.share_of_error)} of the squared error."
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}"
 
@@ -148,17 +151,23 @@ def gain_of_calibration(calibrated: CalibratedModel, r: ReportData) -> list[str]
 def contradicted_by_tests(r: ReportData) -> Iterator[str]:
     """What test runs say against the learned model, a sentence each; they decide nothing.
 
-    A run may be predicted worse than by the initial or by the calibrated model, beyond chance. Or it is
-    predicted so much worse than all others that the difference is no chance: by more than three times.
+    A run may be predicted worse than by the initial or by the calibrated model: beyond chance, or by
+    more than NOISE_TOLERANCE. Or it is predicted so much worse than all others that the difference is no
+    chance: by more than three times. What acts in it alone would make these models worse as well.
     """
     others = [e.after for e in r.evaluations if not e.held_out]
     for e in r.evaluations:
         its = e.after.errors
         if not e.held_out or its is None:
             continue
+        is_worse = False
         for other, of in (("the initial model", e.before.errors), ("calibration alone", e.calibrated)):
-            if r.learned and of is not None and (worse := larger_errors(its, of)):
-                yield f"The learned model predicts the test run {e.name} worse than {other}: {worse}."
+            if not r.learned or of is None:
+                continue
+            surely, perhaps = larger_errors(its, of), larger_errors(its, of, NOISE_TOLERANCE, False)
+            if worse := surely or perhaps:
+                is_worse, text = True, f"The learned model predicts the test run {e.name} worse than"
+                yield f"{text} {other}: {worse}{'' if surely else MAY_BE_CHANCE}."
         far = []
         for name, unit, factor in SHOWN_ERRORS:
             after = getattr(e.after, name)
@@ -166,10 +175,8 @@ def contradicted_by_tests(r: ReportData) -> Iterator[str]:
             if after > FAR_OFF * most:
                 far.append(f"{name} {number(after, 2, factor)} against {number(most, 2, factor)} {unit}")
         if far:
-            yield (
-                f"The test run {e.name} is predicted worse than all other runs ({', '.join(far)}): "
-                "something acts in it that the others do not show, or it is another manoeuvre."
-            )
+            by, why = ", ".join(far), LESS_BEYOND if is_worse else OTHER_RUN
+            yield f"The test run {e.name} is predicted worse than all other runs ({by}): {why}."
 
 
 def worse_than_constant_velocities(r: ReportData) -> Iterator[str]:
@@ -186,16 +193,21 @@ def worse_than_constant_velocities(r: ReportData) -> Iterator[str]:
             )
 
 
-def larger_errors(its: WindowErrors, others: WindowErrors, least: float = 1.0) -> str:
-    """What is larger than of another prediction beyond chance: position, heading, both, or nothing.
+def larger_errors(
+    its: WindowErrors, others: WindowErrors, least: float = 1.0, surely: bool = True
+) -> str:
+    """What is larger than of another prediction: position, heading, both, or nothing.
 
-    ``least`` is a ratio that the errors of both have at the least.
+    Args:
+        its, others: errors in the same windows.
+        least: ratio that the errors of both have at the least.
+        surely: whether only what is larger beyond chance counts.
     """
     larger = []
     for k, (name, unit, factor) in enumerate(SHOWN_ERRORS):
         other, own = (float(of.over_all()[k]) for of in (others, its))
         squares = (np.square(getattr(of, name)) for of in (others, its))
-        if own > least * other and lower_throughout(*squares):
+        if own > least * other and (not surely or lower_throughout(*squares)):
             larger.append(f"{name} {number(other, 2, factor)} → {number(own, 2, factor)} {unit}")
     return " and ".join(larger)
 
