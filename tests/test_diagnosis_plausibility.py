@@ -292,6 +292,7 @@ OF_ACTUATORS = [
     (["port.n", "starboard.n"], ["starboard.n", "port.n"], 1.0, "port.n and starboard.n are swapped"),
     (["port.n"], ["port.n"], -1.0, "port.n has the wrong sign"),
     (["port.n", "starboard.n"], ["port.n", "starboard.n"], 60.0, "port.n and starboard.n are in rpm"),
+    (["port.n", "starboard.n"], ["port.n", "starboard.n"], 1 / 60.0, "are in 1/s in place of rpm"),
 ]
 
 
@@ -557,6 +558,21 @@ def test_angles_may_count_from_elsewhere():
     meant = read_as(vessel, [0.3, 2.0], "azimuth.alpha points the other way")
     np.testing.assert_allclose(meant, [0.3 + np.pi, 2.0])
     assert read_as(vessel, [0.3, 2.0], "azimuth.alpha counts from hard over") is None
+
+
+def test_numbers_in_si_may_stand_under_another_unit():
+    tanker = ship_with((), "kvlcc2")
+    degree = np.pi / 180.0
+    meant = read_as(tanker, [9.0, 0.3 * degree], "rudder.delta is in rad in place of")
+    np.testing.assert_allclose(meant, [9.0, 0.3])
+    assert read_as(tanker, [9.0, 0.7 * degree], "rudder.delta is in rad in place of") is None, "beyond"
+    meant = read_as(tanker, [9.0 / 60.0, 0.3], "propeller.n is in 1/s in place of rpm")
+    np.testing.assert_allclose(meant, [9.0, 0.3])
+    assert read_as(tanker, [9.0, 0.3], "propeller.n is in 1/s in place of rpm") is None, "beyond"
+    for size, possible in ((6.0, True), (7.0, False)):
+        run = replace(base(), pose=base().pose * [1.0, 1.0, 0.0] + [0.0, 0.0, size * degree])
+        found = [r for r in readings(run, Model()) if "in radians in place" in r.mistake]
+        assert [r.changes["psi"].factor for r in found] == pytest.approx([1.0 / degree] * possible)
 
 
 def test_what_may_be_dead_of_commands_that_are_meant_otherwise():

@@ -12,8 +12,9 @@ from support.ships import SHIPS, scaled
 
 from fmus.actuators.actuation import command_units, forces
 from fmus.actuators.four_quadrants import FourQuadrantPropeller, FourQuadrantRudder
-from fmus.actuators.law import Flow, Law
+from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import total
+from fmus.actuators.standard_method import RudderInRace
 from fmus.effects import Motion
 from fmus.frames import air_velocity
 from fmus.hull_functions import low_speed, swept
@@ -423,3 +424,16 @@ def test_arrays_give_what_numbers_give():
     together = vessel.disturbed(s, Force(*tau), vessel.blown(b, s, *air_velocity(1.5, 2.0)))
     alone = [acceleration(a, (x, y, z), (k, d), 1.5, 2.0) for a, x, y, z, k, d in table.tolist()]
     assert np.column_stack(together) == pytest.approx(np.array(alone), rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("law", [RudderInRace, FourQuadrantRudder])
+@given(inflow=st.floats(0.01, 3.0), added=st.floats(-5.0, 20.0), wider=st.floats(1.0, 3.0))
+def test_a_rudder_shorter_than_its_propeller_is_in_the_race_alone(law, inflow, added, wider):
+    """Whatever the propeller does: no more than the whole span can be in it."""
+    race = Race(inflow, sqrt(max(0.0, inflow * inflow + added)), wider, added, 5.0)
+    flow = Flow(inflow, 0.0, inflow, 0.0, 0.0, race)
+    p = law.Parameters()._replace(span=1.0, race=0.5)
+    u, _ = law.met(flow, p)
+    whole, _ = law.met(flow._replace(race=race._replace(diameter=1.0)), p)
+    assert np.isfinite(u)
+    assert u == whole

@@ -14,6 +14,9 @@ from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
 from ..runs.columns.geographic import is_geographic
 from ..runs.columns.unit_check import SI_UNIT, UNITS
 
+# Quantities of commands that are often logged in SI under the name of another unit.
+COUNTED = ("angle", "shaft speed")
+
 
 @dataclass(frozen=True, eq=False)
 class Reading:
@@ -121,7 +124,10 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
     from_east = {"psi": Named(name="psi", factor=-1.0, offset=0.5 * np.pi)}
     mirrored = np.diag([1.0, 1.0, -1.0])
     yield Reading("its heading counts from east, counter-clockwise", from_east, motion=mirrored)
-    yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
+    degree = UNITS["angle"]["deg"]
+    yield of_pose("its heading is in degrees", (1.0, 1.0, degree))
+    if np.nanmax(np.abs(run.pose[:, 2])) <= 2.0 * np.pi * degree:
+        yield of_pose("its heading is in radians in place of degrees", (1.0, 1.0, 1.0 / degree))
     for degrees in (180, 90, -90):
         back = Named(name="psi", offset=float(-np.radians(degrees) % (2.0 * np.pi)))
         yield Reading(f"its heading is off by {degrees} deg", {"psi": back})
@@ -164,15 +170,20 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
         if (factors < 0.0).any():
             yield of_commands(f"{who} the wrong sign", factors.tolist(), names)
     yield from (swapped(names, *pair) for pair in combinations(range(len(names)), 2))
+    largest = np.abs(commands).max(axis=0)
+    limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for si, quantity in OF_UNIT.items():
         for size, other in {x: n for n, x in UNITS[quantity].items() if n != SI_UNIT[quantity]}.items():
             factors = np.where(unit == si, size, 1.0)
             if (factors != 1.0).any():
                 yield _in_unit(f"in {other}", factors.tolist(), names)
+            taken_for = (unit == si) & (largest > 0.0) & (largest <= size * limits)
+            if quantity in COUNTED and size < 1.0 and taken_for.any():
+                back = np.where(taken_for, 1.0 / size, 1.0).tolist()
+                yield _in_unit(f"in {SI_UNIT[quantity]} in place of {other}", back, names)
     yield from _of_angles(run, commands, model)
-    limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for whole, name in ((1.0, "shares"), (100.0, "percent")):
-        meant = (np.abs(commands).max(axis=0) <= whole) & (limits > 1.0)
+        meant = (largest <= whole) & (limits > 1.0)
         factors = np.where(meant, limits / whole, 1.0)
         if meant.any():
             yield _in_unit(f"in {name} of the limits", factors.tolist(), names)

@@ -13,7 +13,7 @@ from ..declare import POSITIVE, Range, group_of, variables
 from ..ops import Number, clip, fmax, power, signed_root, sqrt, where
 from .law import Change, Flow, Span
 from .laws import SMALL, OpenWater, OpenWaterPropeller
-from .standard_method import RaceFoil, RudderInRace
+from .standard_method import RaceFoil, RudderInRace, covered
 
 
 class Quadrants(NamedTuple):
@@ -158,12 +158,12 @@ class FourQuadrantRudder(RudderInRace):
     def met(cls, flow: Flow, p: Any) -> tuple[Number, Number]:
         assert flow.race is not None
         inflow, _, diameter, added, n = flow.race
-        u, covered = flow.hull_u, diameter / p.span
+        u, eta = flow.hull_u, covered(diameter, p.span)
         raced = inflow + p.race * (sqrt(fmax(0.0, inflow * inflow + added)) - inflow)
-        ahead = p.inflow * sqrt(covered * raced * raced + (1.0 - covered) * inflow * inflow)
+        ahead = p.inflow * sqrt(eta * raced * raced + (1.0 - eta) * inflow * inflow)
         free = p.inflow * inflow
         sucked = free - p.race_astern * sqrt(abs(added))
-        square = covered * sucked * abs(sucked) + (1.0 - covered) * free * free
+        square = eta * sucked * abs(sucked) + (1.0 - eta) * free * free
         behind = signed_root(square + p.pressure_astern * u * u)
         along = where((u >= 0.0) | ((n > 0.0) & (added > 0.0)), where(n < 0.0, behind, ahead), u)
         across = flow.hull_v + p.inflow_lever * flow.r

@@ -9,7 +9,7 @@ ship's origin.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Range, group_of, variables
-from ..ops import Number, atan2, cos, exp, fmax, sin, sqrt, where
+from ..ops import Number, atan2, cos, exp, fmax, fmin, sin, sqrt, where
 from .law import Change, Command, Flow, Law, Span
 from .laws import DIVISOR, SMALL, OpenWater, OpenWaterPropeller
 
@@ -75,11 +75,16 @@ class RaceFoil(NamedTuple):
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1000.0
 
 
+def covered(diameter: Number, span: Number) -> Number:
+    """eta, share of a rudder's span [m] in the race of a propeller of a diameter [m]."""
+    return fmin(diameter / span, 1.0)
+
+
 class RudderInRace(Law[RaceFoil]):
     """Rudder in the race of a propeller.
 
     u_R = epsilon u (1 - w) sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta) with
-    eta = D / H_R, and v_R = U gamma_R (beta - l_R r / U). F_N, X_R, Y_R and N_R follow.
+    eta = min(D / H_R, 1), and v_R = U gamma_R (beta - l_R r / U). F_N, X_R, Y_R and N_R follow.
     A positive angle of a rudder aft turns a ship that goes ahead to starboard. It is not asked for
     force, which would be that of the propeller's speed at the time.
     """
@@ -123,9 +128,9 @@ class RudderInRace(Law[RaceFoil]):
         """u_R along the ship and v_R, positive from port, of the water that meets the rudder [m/s]."""
         assert flow.race is not None
         inflow, jet, diameter = flow.race[:3]
-        covered = diameter / p.span
+        eta = covered(diameter, p.span)
         raced = inflow + p.race * (jet - inflow)
-        speed = sqrt(covered * raced * raced + (1.0 - covered) * inflow * inflow)
+        speed = sqrt(eta * raced * raced + (1.0 - eta) * inflow * inflow)
         u = p.inflow * where(raced < 0.0, -speed, speed)
         moving = sqrt(flow.hull_u * flow.hull_u + flow.hull_v * flow.hull_v)
         across = moving * atan2(-flow.hull_v, flow.hull_u) - p.inflow_lever * flow.r
