@@ -60,10 +60,9 @@ def test_a_model_with_the_filter_has_the_error_of_the_run_before_it():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_filter_of_the_commands_is_found(seed):
+def test_a_filter_of_the_commands_is_found():
     """With a drag beside it, and commands that jump."""
-    run = sail(180.0, 0.1, ship={"delta_X_u": -2.0}, given=jumps, seed=seed)[0]
+    run = sail(120.0, 0.1, ship={"delta_X_u": -2.0}, given=jumps)[0]
     found = {e.id: e for e in diagnose([weak_windows(smoothed(filtered(run)))]).content.effects}
     assert {*found} == {"command_lag", "X_u"}
     assert found["command_lag"].coefficients["command_lag"].value == pytest.approx(LAG, rel=0.05)
