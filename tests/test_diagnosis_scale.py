@@ -72,7 +72,7 @@ def at_size(run, scale):
 def loaded(scale, seconds=48.0):
     """The runs of a ship of a size that lacks something, one to learn from and one to test on."""
     each = [(seconds, "a", 1), (24.0, "b", 2)]
-    runs = [replace(sail(t, **HIDDEN, seed=k)[0], name=name) for t, name, k in each]
+    runs = [replace(sail(t, 0.1, **HIDDEN, seed=k)[0], name=name) for t, name, k in each]
     return gather([at_size(run, scale) for run in runs], model=of_size(scale))
 
 

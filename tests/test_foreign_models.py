@@ -326,7 +326,8 @@ def vendor(tmp_path_factory):
 
 def vendors(hidden, seconds):
     """A run of the vendor's ship with a hidden effect, and one to test on."""
-    sailed = [sail(s, ship=VENDOR | hidden, seed=k)[0] for k, s in enumerate((seconds, 0.7 * seconds))]
+    lasting = enumerate((seconds, 0.7 * seconds))
+    sailed = [sail(s, 0.1, ship=VENDOR | hidden, seed=k)[0] for k, s in lasting]
     return diagnosis.gather(sailed)
 
 
@@ -356,7 +357,7 @@ def test_learn_writes_an_fmu_with_what_was_found(vendor, tmp_path, capsys):
     """It predicts a run of which nothing was learned; an FMU without an input for it is told which."""
     hidden = VENDOR | {"delta_X_u": -2.0}
     runs = [
-        str(csv_of(sail(s, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
+        str(csv_of(sail(s, 0.1, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
         for k, s in enumerate((50.0, 16.0))
     ]
     out = tmp_path / "out"
@@ -471,7 +472,7 @@ def test_a_force_in_the_earth_frame_is_found_in_addition_to_parameters(vendor, t
     """On every heading it acts on other inputs; the FMU with it predicts what the fit does."""
     hidden = VENDOR | {"F_n": 0.25}
     runs = [
-        str(csv_of(sail(s, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
+        str(csv_of(sail(s, 0.1, ship=hidden, seed=k)[0], tmp_path / f"{k}.csv"))
         for k, s in enumerate((26.0, 16.0))
     ]
     parameters = [{"name": "X_u", "value": VENDOR["X_u"], "prior": {"rel_std": 0.2}}]

@@ -89,7 +89,7 @@ def test_a_wrong_term_is_the_force_that_the_function_lacks(runs, plain):
 def test_a_wrong_term_of_a_function_is_learned(tmp_path, file):
     """The ship has a damper that the function lacks, by the command."""
     for k, seconds in enumerate((48.0, 24.0)):
-        csv_of(sail(seconds, ship=DAMPER, seed=k)[0], tmp_path / f"{k}.csv")
+        csv_of(sail(seconds, 0.1, ship=DAMPER, seed=k)[0], tmp_path / f"{k}.csv")
     given = ("0.csv", "--test", "1.csv", "--model", file, "--prior", 0, "--out", "out")
     done = command(learn.main, *given, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
