@@ -287,8 +287,14 @@ class TestPlots:
     def names(self, files):
         return tuple(file.name for file in files)
 
-    def test_all_pictures(self, tmp_path):
+    def test_all_pictures_are_drawn_once(self, tmp_path, monkeypatch):
+        """Measuring their letters, or a first pass for their size, would take as long again."""
+        from matplotlib.figure import Figure
+
+        draw, drawn = Figure.draw, []
+        monkeypatch.setattr(Figure, "draw", lambda *told: (drawn.append(told[0]), draw(*told))[1])
         files = drawing.draw({"a": wild(1, 5000), "b": wild(2)}, tmp_path / "new")
+        assert len(drawn) == len(set(drawn)) == len(self.ALL)
         assert self.names(files) == self.ALL
         assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
         assert {path.name for path in (tmp_path / "new").iterdir()} == set(self.ALL)
@@ -332,15 +338,6 @@ class TestPlots:
         assert plots_main([str(folder(wild())), "--out", str(tmp_path / "drawn"), "--width", width]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert said in line
-
-    def test_a_picture_is_drawn_once(self, tmp_path, monkeypatch):
-        """Measuring its letters, or a first pass for its size, would take as long again."""
-        from matplotlib.figure import Figure
-
-        draw, drawn = Figure.draw, []
-        monkeypatch.setattr(Figure, "draw", lambda *told: (drawn.append(told[0]), draw(*told))[1])
-        drawing.draw({"a": wild()}, tmp_path)
-        assert len(drawn) == len(set(drawn)) == len(self.ALL)
 
     def test_pictures_without_their_columns_are_left_out(self, tmp_path):
         log = {name: values for name, values in wild().items() if not name.startswith("controller.")}
