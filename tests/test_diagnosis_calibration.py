@@ -40,7 +40,7 @@ def runs(drag=DRAG, east=0.0):
     The water goes east [m/s].
     """
     ships = [{"delta_X_u": drag, "body_bias_N": own if drag else 0.0, "V_e": east} for own in MOMENTS]
-    tracks = [smoothed(sail(seed=k, ship=ship)[0]) for k, ship in enumerate(ships)]
+    tracks = [smoothed(sail(h=0.05, seed=k, ship=ship)[0]) for k, ship in enumerate(ships)]
     named = [
         replace(s, track=replace(s.track, run=replace(s.track.run, name=f"run {k}")))
         for k, s in enumerate(tracks)

@@ -21,7 +21,7 @@ from diagnosis.verdict.confidence import probability
 
 def data(seconds=96.0, **hidden):
     """Windows of a run of the ship with something hidden in it, and the true velocity."""
-    run, nu = sail(seconds, **hidden)
+    run, nu = sail(seconds, 0.05, **hidden)
     return weak_windows(smoothed(run)), nu
 
 

@@ -24,11 +24,12 @@ from diagnosis.search.nonlinear.waves import (
     segments_above,
 )
 
+H = 0.05  # s
 MASS = Model().reference_mass
 
 
 def test_waves_are_found_with_their_peak():
-    run = smoothed(sail(240.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
+    run = smoothed(sail(240.0, H, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
     found = find_waves([run], Model(), np.random.default_rng(0))
     assert found is not None
     assert found.peak == pytest.approx(4.0, abs=0.6)
@@ -38,7 +39,7 @@ def test_waves_are_found_with_their_peak():
 
 def test_a_run_of_few_segments_does_not_make_sure():
     """Each of its segments shows the waves, and so does each bootstrap replicate."""
-    run = smoothed(sail(80.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
+    run = smoothed(sail(80.0, H, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
     found = find_waves([run], Model(), np.random.default_rng(0))
     assert found is not None
     assert found.confidence < 0.9
@@ -46,14 +47,14 @@ def test_a_run_of_few_segments_does_not_make_sure():
 
 def held(run, seconds):
     """The run with commands that were recorded once in some seconds, and held."""
-    count = round(seconds / 0.02)
+    count = round(seconds / H)
     return replace(run, tau_cmd=run.tau_cmd[np.arange(run.time.size) // count * count])
 
 
 @pytest.mark.parametrize(("seconds", "sure"), [(0.3, True), (1.0, False)])
 def test_of_commands_that_were_recorded_rarely_waves_are_not_sure(seconds, sure):
     """The waves have a period of 1.6 s; a force by commands in between may look the same."""
-    run = sail(240.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0]
+    run = sail(240.0, H, ship={"wave_force": 0.1, "wave_peak": 4.0})[0]
     found = find_waves([smoothed(held(run, seconds))], Model(), np.random.default_rng(0))
     assert found is not None
     assert (found.confidence > 0.8) == sure
@@ -61,7 +62,7 @@ def test_of_commands_that_were_recorded_rarely_waves_are_not_sure(seconds, sure)
 
 
 def test_the_interval_of_commands_is_that_of_a_recorder_and_not_of_steps():
-    run = sail(150.0)[0]
+    run = sail(150.0, H)[0]
     assert command_interval(run) == 0.0
     assert command_interval(held(run, 1.0)) == pytest.approx(1.0)
     rng = np.random.default_rng(0)
@@ -76,7 +77,7 @@ def test_the_interval_of_commands_is_that_of_a_recorder_and_not_of_steps():
 )
 def test_commands_are_no_waves(quick, noise, seed):
     """The smoother follows quick commands only in part where there is noise; the rest is none of the sea's."""
-    run = smoothed(sail(150.0, quick=quick, noise=noise, seed=seed)[0])
+    run = smoothed(sail(150.0, H, quick=quick, noise=noise, seed=seed)[0])
     assert find_waves([run], Model(), np.random.default_rng(seed)) is None
 
 
@@ -84,7 +85,7 @@ def test_commands_are_no_waves(quick, noise, seed):
 @pytest.mark.parametrize("seed", [0, 11])
 def test_a_drawing_of_noise_makes_no_waves_of_what_is_missing(seed):
     """Drag and lost force are in the model error; of these drawings lines of the floor are low by chance."""
-    run = smoothed(sail(96.0, ship={"delta_X_u": -3.0}, thrusters={"loss_yaw": 0.3})[0])
+    run = smoothed(sail(96.0, H, ship={"delta_X_u": -3.0}, thrusters={"loss_yaw": 0.3})[0])
     assert find_waves([run], Model(), np.random.default_rng(seed)) is None
 
 

@@ -24,7 +24,7 @@ def windows(run):
 
 def found(seconds=240.0, **hidden):
     """Where the nominal model fails on a run with something hidden in it."""
-    w = windows(sail(seconds, h=0.05, **hidden)[0])
+    w = windows(sail(seconds, h=0.1, **hidden)[0])
     return find_regions([w], [omega(w, Model())], [omega_std(w)])
 
 

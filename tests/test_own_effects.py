@@ -62,7 +62,7 @@ def craft(tmp_path):
 
 
 def windows(seconds=96.0, **hidden):
-    run, _ = sail(seconds, **hidden)
+    run, _ = sail(seconds, 0.05, **hidden)
     return weak_windows(smoothed(run))
 
 
