@@ -446,7 +446,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
     """
     data = []
     for seed in (1, 2, 3):
-        run = sail(300.0, 0.05, {"N_r": LIGHTLY_DAMPED}, seed=seed, given=partial(jolted, seed=seed))[0]
+        run = sail(300.0, 0.1, {"N_r": LIGHTLY_DAMPED}, seed=seed, given=partial(jolted, seed=seed))[0]
         data.append(weak_windows(smoothed(replace(run, tau_cmd=straight_on(run.time)))))
     prior = NominalPrior.of(Model(), 0.0)
     at = RefinedModel(Model(), np.zeros(prior.size), {"delta_N_r": 0.0}, np.zeros((1, 1)))

@@ -80,7 +80,7 @@ def left(runs, model=None):
 
 @pytest.mark.parametrize("noise", [1.0, pytest.param(10.0, marks=pytest.mark.slow)])
 def test_noise_alone_is_no_remainder(noise):
-    axes = left(voyages(**SHORT, noise=noise))
+    axes = left(voyages(**SHORT, noise=noise, h=0.05))
     assert not any(a.significant for a in axes.values())
     assert all(0.7 < a.rms / a.uncertainty < 1.3 for a in axes.values())
 

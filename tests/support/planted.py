@@ -14,7 +14,6 @@ from support.cse1 import THRUSTERS, VESSEL, Inputs
 from support.measured import ACTING, MEASURED, NOISE, START, VELOCITY, commands
 from support.shared import kept
 
-STEP = 0.05  # s
 APART = 700.0  # s by which the commands of one run are later than those of the one before
 Push = Callable[[float, vessel.State], Triple]
 
@@ -45,6 +44,7 @@ def voyages(
     push: Push | None = None,
     dead: Callable[[float], bool] | None = None,
     noise: float = 1.0,
+    h: float = 0.1,
 ) -> list[WeakWindows]:
     """Windows of some runs under different commands, made once in a session.
 
@@ -54,13 +54,14 @@ def voyages(
         push: further force on the hull [N, N, N m], of time [s] and state.
         dead: whether the bow thruster is dead, of time [s].
         noise: times that of the other tests.
+        h: from sample to sample [s].
     """
-    given = (seconds, ship or {}, thrusters or {}, push, dead, noise)
+    given = (seconds, ship or {}, thrusters or {}, push, dead, noise, h)
     return [kept(_windows, k, *given) for k in range(count)]
 
 
-def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> WeakWindows:
-    t = np.arange(round(seconds / STEP)) * STEP
+def _windows(k: int, seconds, ship, thrusters, push, dead, noise, h) -> WeakWindows:
+    t = np.arange(round(seconds / h)) * h
     tau_cmd = commands(t + APART * k)
     body = stepped(VESSEL, parameters(VESSEL, START | ship), Force())
     machines = [
@@ -75,7 +76,7 @@ def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> WeakWindows
         force = acting[dead is not None and dead(now)]
         if push:
             force = np.add(force, push(now, body.state)).tolist()
-        seen, before = body.advance(force, STEP), STEP
+        seen, before = body.advance(force, h), h
     rng = np.random.default_rng(k + 1)
     pose = np.array(poses) + noise * NOISE * rng.standard_normal((t.size, 3))
     pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
