@@ -4,11 +4,9 @@ import gc
 import hashlib
 import json
 import os
-import pickle
 import signal
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -318,29 +316,6 @@ def _smooth_once(shared):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prepared_run, "smooth", lambda track, agreeing: kept(smooth, track, agreeing))
         yield
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _judged_once():
-    """A run is asked once by a process whether it is misread; test_diagnosis_plausibility.py asks each time."""
-    from diagnosis.assessment import plausibility
-
-    judge, known = plausibility._misread, {}
-
-    def misread(w, model):
-        run = replace(w.run, file=None, hashes={})
-        motion = replace(w.smoothed, track=replace(w.smoothed.track, run=run))
-        models = model, model.origin or model
-        values = [(m.vessel, m.thrusters, m.measurement, m.runs, m.given) for m in models]
-        content = hashlib.sha256(pickle.dumps((motion, w.horizon, values))).digest()
-        key = content, *(m.ship for m in models)
-        if key not in known:
-            known[key] = judge(w, model)
-        return known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plausibility, "_misread", misread)
-        yield judge
 
 
 @pytest.fixture(autouse=True, scope="session")

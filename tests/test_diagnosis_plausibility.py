@@ -53,11 +53,6 @@ from fmus.signals import Force
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 
 
-@pytest.fixture(autouse=True)
-def _judged_each_time(_judged_once, monkeypatch):
-    monkeypatch.setattr(plausibility, "_misread", _judged_once)
-
-
 @cache
 def base():
     """The run that is varied."""
