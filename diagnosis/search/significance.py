@@ -19,7 +19,6 @@ from .shortlist import NEW, TIE, Shortlist
 
 FITS = "the model fits {where} worse"
 PREDICTS = "predictions of {where} are worse"
-CHARGED = "the model fits {where} worse, or not better by the cost of its parameters (BIC)"
 
 
 def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
@@ -137,19 +136,6 @@ def harm(its: Losses, others: Losses, more: int = 0) -> str:
     if worse(its.omega, others.omega):
         return FITS
     return PREDICTS if predicts_worse(its, others) else ""
-
-
-def harm_by_information(its: Losses, others: Losses, more: int) -> str:
-    """Whether a model has the higher Bayesian information criterion on the data that decide.
-
-    The model error of a block, in units of its noise, is a sum of squares whose difference between two
-    models is twice a log likelihood ratio. Each parameter is charged log n for n blocks (G. Schwarz,
-    Estimating the dimension of a model, Annals of Statistics 6, 1978). Predictions are not asked.
-    Arguments and result are those of a criterion of pruning.
-    """
-    known = np.isfinite(others.omega)
-    difference = float(np.sum((its.omega - others.omega)[known]))
-    return CHARGED if not difference + more * np.log(max(its.omega.size, 1)) <= 0.0 else ""
 
 
 def predicts_worse(its: Losses, others: Losses) -> bool:

@@ -31,10 +31,7 @@ class Harm(Protocol):
 
 
 # Name -> module of the package and its function.
-CRITERIA = {
-    "paired": ("search.significance", "harm"),
-    "bic": ("search.significance", "harm_by_information"),
-}
+CRITERIA = {"paired": ("search.significance", "harm"), "bic": ("verdict.information_criterion", "harm")}
 USUAL = "paired"
 PACKAGE = __name__.partition(".")[0]
 
