@@ -52,10 +52,20 @@ def init(i: Nothing, p: Params) -> State:
 
 def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     t = s.t + h
-    sizes = ((p.slow_x, p.quick_x), (p.slow_y, p.quick_y), (p.slow_psi, p.quick_psi))
-    swings = [swing(*size, f, p.rate, t) for size, f in zip(sizes, FREQUENCIES, strict=True)]
-    (x, y, psi), first, second = zip(*swings, strict=True)
-    return State(t), Target(p.x_0 + x, p.y_0 + y, wrap(p.psi_0 + psi), *first, *second)
+    x, x_dot, x_ddot = swing(p.slow_x, p.quick_x, FREQUENCIES[0], p.rate, t)
+    y, y_dot, y_ddot = swing(p.slow_y, p.quick_y, FREQUENCIES[1], p.rate, t)
+    psi, psi_dot, psi_ddot = swing(p.slow_psi, p.quick_psi, FREQUENCIES[2], p.rate, t)
+    return State(t), Target(
+        p.x_0 + x,
+        p.y_0 + y,
+        wrap(p.psi_0 + psi),
+        x_dot,
+        y_dot,
+        psi_dot,
+        x_ddot,
+        y_ddot,
+        psi_ddot,
+    )
 
 
 COMPONENT = component(

@@ -53,13 +53,20 @@ def init(i: Nothing, p: Params) -> State:
 
 
 def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
-    axes = State(
-        approach(s.x, s.x.value - p.x_s, p.bandwidth, h),
-        approach(s.y, s.y.value - p.y_s, p.bandwidth, h),
-        approach(s.psi, wrap(s.psi.value - p.psi_s), p.bandwidth, h),
+    x = approach(s.x, s.x.value - p.x_s, p.bandwidth, h)
+    y = approach(s.y, s.y.value - p.y_s, p.bandwidth, h)
+    psi = approach(s.psi, wrap(s.psi.value - p.psi_s), p.bandwidth, h)
+    return State(x, y, psi), Target(
+        x.value,
+        y.value,
+        wrap(psi.value),
+        x.rate,
+        y.rate,
+        psi.rate,
+        x.acceleration,
+        y.acceleration,
+        psi.acceleration,
     )
-    (x, y, psi), rates, accelerations = zip(*axes, strict=True)
-    return axes, Target(x, y, wrap(psi), *rates, *accelerations)
 
 
 COMPONENT = component(
