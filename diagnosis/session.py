@@ -323,8 +323,10 @@ class Session(ShortRepr):
         found = self.method.fit(self.train, self.start, self.prior, self.advance, self.seed)
         data = self.data(found.sigma)
         region = OperatingRegion.of(self._velocities, self.start.ship.scale)
-        fits = self.predictor.parametric, self.calibration
-        verdict, gain = judge(found, data, self.known, self.harms, region, *fits, self.advance)
+        calibrates = self.predictor.parametric
+        verdict, gain = judge(
+            found, data, self.known, self.harms, region, calibrates, self.calibration, self.advance
+        )
         return self._concluded(verdict, region, gain)
 
     @property

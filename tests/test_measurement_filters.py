@@ -8,7 +8,7 @@ from scipy.signal import lfilter, lsim
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, diagnose
-from diagnosis.predictors.filters import BeforeFilters
+from diagnosis.predictors.filters import FilterStart
 from diagnosis.predictors.prediction import before_filters, filtered, true_motion
 from diagnosis.predictors.shooting import Shooting
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE, omega_std
@@ -106,8 +106,8 @@ def test_forward_and_back_are_inverse(model):
     before = model.filters.undone(sine)
     at = 3000
     poses = np.repeat(np.sin(w * t[at:])[:, None, None, None], 3, axis=1)
-    start = BeforeFilters(*(x[at][:, None] for x in before))
-    found = model.filters.behind(poses, start, sine.eta[at][:, None], t[1])
+    motions = (before.between, before.timely, before.timely_rate, sine.eta)
+    found = model.filters.behind(poses, FilterStart(*(x[at][:, None] for x in motions)), t[1])
     later = np.full(3, 0 if model is BOTH else 50)  # before, a latency has a line for the motion
     for k, first in enumerate(later):
         np.testing.assert_allclose(found[first:, k, 0, 0], sine.eta[at + first :, k], atol=1e-4)

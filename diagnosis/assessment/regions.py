@@ -12,6 +12,7 @@ K. Y. Liang and S. L. Zeger, Longitudinal data analysis using generalized linear
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
@@ -257,6 +258,16 @@ class _Design:
         found = filter(None, (self._test(*ends, len(tried)) for ends in tried))
         return max(found, key=lambda region: region.contrast, default=None)
 
+    @cached_property
+    def _squares(self) -> np.ndarray:
+        """(bins,), sums of the squares over the clusters."""
+        return self.total.sum(axis=1)
+
+    @cached_property
+    def _windows(self) -> np.ndarray:
+        """(bins,), numbers of windows."""
+        return self.count.sum(axis=1)
+
     def _log_mean_square(self, bins: np.ndarray) -> ClusterMean:
         """Mean logarithm of the clusters' mean squares in some bins; the noise keeps it finite."""
         total, count = ((x[bins].sum(axis=0)) for x in (self.total + self.noise, self.count))
@@ -268,8 +279,7 @@ class _Design:
         p, bins = self.profile, len(self.total)
         inside = (np.arange(bins) - first) % bins < after - first
         share, parts = float(self.profile.share[inside].sum()), (inside, ~inside)
-        in_bins = (self.total.sum(axis=1), self.count.sum(axis=1))
-        squares, windows = ([float(x[y].sum()) for y in parts] for x in in_bins)
+        squares, windows = ([float(x[y].sum()) for y in parts] for x in (self._squares, self._windows))
         clear = squares[0] * windows[1] >= SETTINGS.least_contrast**2 * squares[1] * windows[0]
         if share > SETTINGS.largest_region or not clear:
             return None

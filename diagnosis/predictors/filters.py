@@ -50,15 +50,12 @@ class Filters(NamedTuple):
         """(3,), the factor of w^2 [s2] by which undoing the filters adds to a density, at the most."""
         return np.array(self.lag) ** 2 + 0.5 * np.array(self.tracker) ** 2
 
-    def behind(
-        self, poses: np.ndarray, start: "BeforeFilters", measured: np.ndarray, h: float
-    ) -> np.ndarray:
+    def behind(self, poses: np.ndarray, start: "FilterStart", h: float) -> np.ndarray:
         """Poses (n, 3, p, w) behind the filters, exact for straight lines between.
 
         Args:
             poses: of windows, at their start and at equal intervals from there.
-            start: (3, w) each, where the windows begin.
-            measured: (3, w), the measured pose there.
+            start: of each filter.
             h: interval [s].
         """
         found = np.stack([*poses.transpose(1, 0, 2, 3)[:2], np.unwrap(poses[:, 2], axis=0)], axis=1)
@@ -69,7 +66,7 @@ class Filters(NamedTuple):
                 off = _off(found[0, k], start.timely[k], k)
                 found[:, k] = _tracking(found[:, k], off, start.timely_rate[k], T, h)
             if late:
-                found[:, k] = _late(found[:, k], _off(found[0, k], measured[k], k), late / h)
+                found[:, k] = _late(found[:, k], _off(found[0, k], start.measured[k], k), late / h)
         return found
 
 
@@ -87,6 +84,15 @@ class BeforeFilters(NamedTuple):
     between: np.ndarray
     timely: np.ndarray
     timely_rate: np.ndarray
+
+
+class FilterStart(NamedTuple):
+    """Where windows begin, (3, w) each; see :class:`BeforeFilters`. The last is the measured pose."""
+
+    between: np.ndarray
+    timely: np.ndarray
+    timely_rate: np.ndarray
+    measured: np.ndarray
 
 
 @lru_cache  # a fit asks for the same runs several times

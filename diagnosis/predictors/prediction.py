@@ -7,6 +7,7 @@ parameters.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from fmus.vessel import vessel
 from ..runs import Smoothed, idle
 from ..runs.cleaning import WIDTH
 from ..runs.run_constants import DIGITS, FAR_OFF
-from .filters import BeforeFilters
+from .filters import FilterStart
 from .ship_model import Model
 from .thrust import LONGEST_STEP, Integral, Response, drive_of
 from .traced.compiled_law import compiler
@@ -314,9 +315,13 @@ def filtered(poses: np.ndarray, model: Model, starts: WindowStarts, h: float) ->
     filters = model.filters
     if not filters:
         return poses
-    parts = range(len(BeforeFilters._fields))
-    start = BeforeFilters._make(starts.first(lambda s, k=k: filters.undone(s)[k]) for k in parts)
-    return filters.behind(poses, start, starts.first(lambda s: s.eta), h)
+    start = FilterStart(
+        between=starts.first(lambda s: filters.undone(s).between),
+        timely=starts.first(lambda s: filters.undone(s).timely),
+        timely_rate=starts.first(lambda s: filters.undone(s).timely_rate),
+        measured=starts.first(attrgetter("eta")),
+    )
+    return filters.behind(poses, start, h)
 
 
 def before_filters(s: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ ground, each an array (n,) of independent states. ``commands`` has ``tau_X``, ``
 v_dot [m/s2] and r_dot [rad/s2] of the body, each an array (n,) or a number.
 """
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -24,7 +25,6 @@ from fmus.ship import Ship
 from fmus.vessel import vessel
 
 from ..execution.progress import Advance, silent
-from ..execution.result_folder import sha256
 from ..execution.user_files import from_file
 from ..runs import Smoothed
 from .black_box import MOTION, TAU, BlackBox, Signals, commands_at
@@ -71,7 +71,7 @@ class FunctionPredictor(BlackBox):
         self.source, self.inputs = source, frozenset(TAU)
         self.files: list[tuple[str, Path, str]] = []
         if source.file is not None:
-            self.sha256 = sha256(source.file)
+            self.sha256 = hashlib.sha256(source.file.read_bytes()).hexdigest()
             self.files = [("model", source.file, self.sha256)]
 
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:

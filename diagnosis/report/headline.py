@@ -164,10 +164,12 @@ def contradicted_by_tests(r: ReportData) -> Iterator[str]:
         for other, of in (("the initial model", e.before.errors), ("calibration alone", e.calibrated)):
             if not r.learned or of is None:
                 continue
-            surely, perhaps = larger_errors(its, of), larger_errors(its, of, NOISE_TOLERANCE, False)
-            if worse := surely or perhaps:
-                is_worse, text = True, f"The learned model predicts the test run {e.name} worse than"
-                yield f"{text} {other}: {worse}{'' if surely else MAY_BE_CHANCE}."
+            worse = larger_errors(its, of)
+            if not worse and (perhaps := larger_errors(its, of, NOISE_TOLERANCE, surely=False)):
+                worse = perhaps + MAY_BE_CHANCE
+            if worse:
+                is_worse = True
+                yield f"The learned model predicts the test run {e.name} worse than {other}: {worse}."
         far = []
         for name, unit, factor in SHOWN_ERRORS:
             after = getattr(e.after, name)

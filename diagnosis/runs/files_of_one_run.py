@@ -77,10 +77,12 @@ def _following(tables: Sequence[pd.DataFrame], table: pd.DataFrame) -> pd.DataFr
     """The rows of a table that others with the same columns lack; None: they are at the same time."""
     if list(tables[0]) != list(table):
         return None
-    known = pd.concat([*tables, table], ignore_index=True).duplicated().to_numpy()[-len(table) :]
-    new = table.loc[~known]
+    low, high = table[TIME].min(), table[TIME].max()
+    beside = [t for t in tables if t[TIME].max() >= low and high >= t[TIME].min()]
+    known = pd.concat([*beside, table], ignore_index=True).duplicated().to_numpy()
+    new = table.loc[~known[len(known) - len(table) :]]
     low, high = new[TIME].min(), new[TIME].max()
-    return None if any(t[TIME].max() > low and high > t[TIME].min() for t in tables) else new
+    return None if any(t[TIME].max() > low and high > t[TIME].min() for t in beside) else new
 
 
 def _first_repeated(items: Iterable[Item]) -> Item | None:

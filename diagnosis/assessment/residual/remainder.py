@@ -301,12 +301,13 @@ def remainder_sentence(
 
 
 def _amount(axis: str, r: AxisRemainder) -> str:
-    share = 100.0 * np.sqrt(r.share)
-    of_first = f", {share:.2g} % of the initial model error" if share < 99.5 else ""
-    percent = 100.0 * r.of_command
-    of_command = f", {percent:.2g} % of the commanded force" if percent < 99.5 else ""
+    shares = {
+        "initial model error": 100.0 * np.sqrt(r.share),
+        "commanded force": 100.0 * r.of_command,
+    }
+    told = [f", {share:.2g} % of the {whole}" for whole, share in shares.items() if share < 99.5]
     size = f"{NAMES[axis]}: {number(r.rms, 2)} {UNITS[axis]}"
-    return f"{size} (uncertainty {number(r.uncertainty, 1)}{of_first}{of_command})"
+    return f"{size} (uncertainty {number(r.uncertainty, 1)}{''.join(told)})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:

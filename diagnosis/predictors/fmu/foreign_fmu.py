@@ -1,5 +1,6 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -99,7 +100,7 @@ class Fmu:
     @property
     def sha256(self) -> str:
         """Of the file."""
-        return sha256(self._given)
+        return hashlib.sha256(self._given.read_bytes()).hexdigest()
 
     @cached_property
     def learned_from(self) -> tuple[Fingerprint, ...]:
