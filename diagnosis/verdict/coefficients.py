@@ -144,8 +144,8 @@ def better_calibration(
 ) -> RefitOutcome | None:
     """The calibration of the coefficients alone, where a model without a sure finding predicts worse.
 
-    It also takes the place of effects than which it is as good, if none of them is a finding, or that
-    predict no better, if each has intervals that hold zero, or if the coefficients suffice.
+    It also takes the place of effects that predict no better, if none of them is a finding, each has
+    intervals that hold zero, or the coefficients suffice.
 
     Args:
         calibration: the fit; None: there is none.
@@ -165,11 +165,10 @@ def better_calibration(
     if calibration is None or drives(calibration.findings.model, data.start):
         return None
     now, its, first = data.losses(found, calibration.findings, data.start)
-    idle = not believed and as_good(its, now)
-    enough = (
-        not gained and not predicts_worse(its, now) and sufficient(calibration.findings, found, data)
+    enough = not gained and (
+        not believed or (not predicts_worse(its, now) and sufficient(calibration.findings, found, data))
     )
-    better = needless(found, without_gain) or idle or enough or predicts_better(its, now)
+    better = needless(found, without_gain) or enough or predicts_better(its, now)
     return calibration if better and not predicts_worse(its, first) else None
 
 
