@@ -18,6 +18,7 @@ from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import Losses
 from diagnosis.verdict import coefficients
+from diagnosis.verdict import prediction_gain as gain_module
 from diagnosis.verdict.coefficients import any_sure, better_calibration, needless, sufficient
 from diagnosis.verdict.confidence import Doubts
 from diagnosis.verdict.judging import with_confidence
@@ -248,6 +249,24 @@ def test_what_calibration_predicts_as_well_is_not_shown_but_for_changes_of_coeff
     prior = NominalPrior.of(start)
     assert without_gain(gain, findings, start, run(), prior) == unshown
     assert not without_gain(None, findings, start, run(), prior)
+
+
+@pytest.mark.parametrize(
+    ("effect", "is_coefficient"),
+    [("rate_azimuth", True), ("lag_azimuth", True), ("play_azimuth", False)],
+)
+def test_a_further_lag_or_rate_limit_of_an_actuator_is_one_of_its_coefficients(
+    effect, is_coefficient, monkeypatch
+):
+    """R/V Gunnerus states both of her azimuths, and no play: calibration knows nothing like that."""
+    monkeypatch.setattr(gain_module, "model_error", lambda *_: np.zeros((1, 3)))
+    monkeypatch.setattr(gain_module, "columns_of", lambda *a: np.zeros((3, len(a[3]))))
+    start = Model(ship=ship_with([], "gunnerus"))
+    found = Findings([Finding(effect, {effect: 0.1}, {}, 0.9, [], 1.0, 1.0, start)], model=start)
+    change = PairedChange(1.0, 1.0, 0.0, 1.0)
+    gain = PredictionGain("validation runs", 9, change, change, False, "calibrated")
+    unshown = without_gain(gain, found, start, [], NominalPrior.of(start), plausible=True)
+    assert unshown == (set() if is_coefficient else {effect})
 
 
 BOAT = """

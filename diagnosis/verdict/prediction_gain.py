@@ -18,6 +18,7 @@ from .validation_data import ValidationData
 
 # Group of coefficients -> the kind of force that they make up with others.
 KIND = {"mass": "inertia", "added_mass": "inertia", "place": "thrust"}
+DYNAMICS = ("lag", "rate")  # groups of the actuators' coefficients by which commands act late
 
 
 @dataclass(frozen=True)
@@ -155,16 +156,18 @@ def without_gain(
         kinds.setdefault(KIND.get(group, group), []).append(n)
     by_kind = [columns_of(runs, start, base, names, found.sigma) for names in kinds.values()]
     deviations = [np.array([prior.std[n] for n in names]) for names in kinds.values()]
-    lags = any(start.declared(n).unit == "s" for n in prior.std)
+    of_dynamics = {
+        start.declared(n).unit for n in prior.std if start.ship.coefficients[n].group in DYNAMICS
+    }
 
     def is_coefficient(f: Finding) -> bool:
-        """A further lag is a time constant of the actuators, though not the same function of it."""
-        of_time = effects[f.id].kind == "actuator" and all(
-            start.declared(n).unit == "s" for n in f.values
-        )
-        own = columns_of(runs, start, base, [*f.values], found.sigma)
-        if lags and of_time:
+        """A further lag is a time constant of the actuators, though not the same function of it.
+
+        So is a rate limit behind theirs.
+        """
+        if effects[f.id].memory and {start.declared(n).unit for n in f.values} <= of_dynamics:
             return True
+        own = columns_of(runs, start, base, [*f.values], found.sigma)
         size = np.array([*f.values.values()])
         pairs = zip(by_kind, deviations, strict=True)
         return any(
