@@ -36,7 +36,7 @@ from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import RefinedModel, at_limit
 from diagnosis.search.significance import harm, lower_throughout, worse
 from diagnosis.session import begin
-from diagnosis.verdict import judging
+from diagnosis.verdict import judging, law_in_parts
 from diagnosis.verdict.coefficients import spoils
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of, most_by_intervals
 from diagnosis.verdict.judging import (
@@ -585,6 +585,15 @@ def test_changes_of_actuators_on_one_line_make_up_another_force(values, parts):
     found = with_confidence(of, start, Doubts(on_one_line=on_line)).effects
     assert [f.confidence for f in found] == [0.5 if f.id in on_line else 0.99 for f in made]
     assert all(("on the same line" in f.doubt) == (f.id in on_line) for f in found)
+
+
+@pytest.mark.parametrize(("off", "parts"), [(0.0, 2), (0.21, 2), (0.23, 0), (1.5, 0)])
+def test_forces_are_on_one_line_where_little_of_their_square_is_off_it(off, parts, monkeypatch):
+    """A twentieth of the square is that of an angle of 0.2255 rad; the sign of a line says nothing."""
+    lines = {"loss_sway": [0.0, 1.0, 0.0], "loss_bow": [0.0, -np.cos(off), np.sin(off)]}
+    monkeypatch.setattr(law_in_parts, "_line", lambda f, *_: lines[f.id])
+    made = [Finding(i, {i: 0.1}, {}, 0.99, [], 0.9, 0.9) for i in lines]
+    assert len(on_one_line(Findings(made, model=Model()), Model(), [])) == parts
 
 
 @pytest.mark.parametrize(("own", "sure"), [(0.5, False), (0.99, True)])

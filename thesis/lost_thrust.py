@@ -216,7 +216,7 @@ def study(out: Path, again: bool = False) -> Path:
     report.figure("failure", partial(failure_picture, log), caption)
     report.result("losses", losses)
     report.result("places", found)
-    report.result("line", [slope, offset])
+    report.result("line", [round(float(x), 9) for x in (slope, offset)])  # other LAPACKs agree so far
     return report.write()
 
 

@@ -121,7 +121,8 @@ def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> s
 
     Of a force in a shape that no candidate has, they make up the parts: of a side force at the stern
     with the square of the shaft speed, an inclined propeller and a rudder that is off. What acts later
-    than the command, or only at times of one run, is a part of no force that does not.
+    than the command, or only at times of one run, is a part of no force that does not. Forces act on
+    one line where less than NEGLIGIBLE of the square of either is off the line of the other.
 
     Args:
         found: the findings, and the model with them.
@@ -138,7 +139,7 @@ def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> s
         return set()
     lines = {f.id: _line(f, found.model, runs) for f in of_actuators}
     pairs = combinations(lines, 2)
-    on_line = [(a, b) for a, b in pairs if np.linalg.norm(np.cross(lines[a], lines[b])) <= NEGLIGIBLE]
+    on_line = [(a, b) for a, b in pairs if np.sum(np.cross(lines[a], lines[b]) ** 2) < NEGLIGIBLE]
     return {i for pair in on_line for i in pair}
 
 

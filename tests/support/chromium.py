@@ -50,7 +50,8 @@ def opened(page, folder, *options, milliseconds=5000):
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert not re.findall(r".*CONSOLE.*", done.stderr)
+    told = re.findall(r".*CONSOLE.*", done.stderr)
+    assert not told, told
     return done.stdout
 
 
