@@ -262,7 +262,7 @@ def space_of(rows, given=None):
     start = SimpleNamespace(ship=SimpleNamespace(effects=effects("a", "b", "c")), unit=lambda n: 2.0)
     blocks = dict.fromkeys("abc", block)
     return SimpleNamespace(
-        nuisance=["m"], blocks=blocks, start=start,
+        nuisance=["m"], offset=np.array([0.5]), blocks=blocks, start=start,
         places=lambda: {n: np.array([1 + 2 * k, 2 + 2 * k]) for k, n in enumerate("abc")},
     )  # fmt: skip
 
@@ -296,6 +296,7 @@ def test_rivals_of_an_effect_are_those_that_explain_what_is_expected():
     assert both.nuisance.columns == pytest.approx(rows.X[..., [0, 4]])
     assert both.nuisance.precision.tolist() == [[1.0, 0.0], [0.0, 0.0]]
     assert both.nuisance.unit.tolist() == [1.0, 4.0]
+    assert both.nuisance.offset.tolist() == [0.5, 0.0]
     assert both.known == pytest.approx(rows.X[..., 3])
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.uncertainty import independent, omega_std
 from ..predictors.weak_form import OVERLAP
 from ..runs.run_constants import DIGITS, STEPS
-from ..search.candidates import SMALL, CandidateShape, candidate, model_error
+from ..search.candidates import SMALL, CandidateShape, candidate, model_error, shape
 from ..search.nonlinear.multistart import FAR
 from ..search.prior import NominalPrior
 from ..search.refinement import bounded
@@ -55,15 +56,19 @@ class Space:
     """All parameters of all hypotheses, and the noise by which they are weighed.
 
     Attributes:
-        start: the model that all are additions to.
+        initial: the initial model.
+        start: the model that all are additions to: the initial one with the coefficients as learned.
         prior: of the nominal coefficients.
+        offset: (q,), by how many standard deviations the coefficients of ``start`` are off its mean.
         blocks: effect -> its parameters.
         sigma: (3,), noise of the model error that counts for one window [N, N, N m].
         lasting: (3,), windows that count as one.
     """
 
+    initial: Model
     start: Model
     prior: NominalPrior
+    offset: np.ndarray
     blocks: Mapping[str, EffectParameters]
     sigma: np.ndarray
     lasting: np.ndarray
@@ -71,7 +76,7 @@ class Space:
     @property
     def nuisance(self) -> list[str]:
         """The nominal coefficients that are not known exactly."""
-        return [n for n, s in self.prior.std.items() if s > 0.0]
+        return uncertain(self.prior)
 
     def columns(self, data: Sequence[WeakWindows]) -> np.ndarray:
         """(K, 3, p): change of the model error by one unit of each parameter, in units of the noise.
@@ -124,6 +129,18 @@ class Space:
         return self.start.plus({n: bounded(self.start, n, x) for n, x in changes.items()})
 
 
+def uncertain(prior: NominalPrior) -> list[str]:
+    """The nominal coefficients that are not known exactly."""
+    return [n for n, s in prior.std.items() if s > 0.0]
+
+
+def learned_changes(content: Mapping[str, Any]) -> dict[str, float]:
+    """What a diagnosis changed: parameter -> learned value less that of the initial model, SI."""
+    each = content.get("coefficients", ())
+    changes = {c["name"].partition(".")[2]: c["after"] - c["before"] for c in each}
+    return {name: x for name, x in changes.items() if x}
+
+
 def rivals(content: Mapping[str, Any]) -> list[Rival]:
     """The effects and their rivals by the content of ``diagnosis.json``."""
     found = []
@@ -143,24 +160,39 @@ def usable(model: Model, name: str) -> bool:
 
 
 def space_of(
-    data: Sequence[WeakWindows], start: Model, prior: NominalPrior, ids: Sequence[str]
+    data: Sequence[WeakWindows],
+    initial: Model,
+    prior: NominalPrior,
+    ids: Sequence[str],
+    learned: Mapping[str, float],
 ) -> tuple[Space, np.ndarray, np.ndarray]:
-    """The parameters of some effects on measured runs; prior precision (p, p) and mean (p,) of all."""
+    """The parameters of some effects on measured runs; prior precision (p, p) and mean (p,) of all.
+
+    Everything is linear about what was learned; arguments as of :func:`knowledge`.
+    """
+    changes = {n: learned.get(n, 0.0) for n in uncertain(prior)}
+    start = initial.plus({n: x for n, x in changes.items() if x})
+    offset = np.array([x / prior.std[n] for n, x in changes.items()])
     base = model_error(data, start)
     noise = np.sqrt(np.mean(np.concatenate([omega_std(w, start) for w in data]) ** 2, axis=0))
     blocks: dict[str, EffectParameters] = {}
     for name in ids:
-        shapes = candidate(data, start, base, start.ship.effects[name]).shapes
+        effect = start.ship.effects[name]
+        values = {n: learned[n] for n in effect.fitted if n in learned}
+        if values:
+            shapes = [shape(data, start, base, values, effect.fitted, SMALL)]
+        else:
+            shapes = candidate(data, start, base, effect).shapes
         if shapes:
             blocks[name] = block_of(start, shapes, base, noise)
-    A = Space(start, prior, blocks, noise, np.ones(3)).rows(data)
+    A = Space(initial, start, prior, offset, blocks, noise, np.ones(3)).rows(data)
     fit = A @ np.linalg.lstsq(A, (base / noise).ravel(), rcond=1e-8)[0]
     left = base - fit.reshape(base.shape) * noise
     spread = np.maximum(noise, np.sqrt(np.mean(left**2, axis=0)))
     lasting = OVERLAP * independent(data, left)
-    space = Space(start, prior, blocks, spread * np.sqrt(lasting), lasting)
+    space = Space(initial, start, prior, offset, blocks, spread * np.sqrt(lasting), lasting)
     size = np.linalg.norm(base / space.sigma)
-    precision, mean = [np.eye(len(space.nuisance))], [np.zeros(len(space.nuisance))]
+    precision, mean = [np.eye(len(offset))], [-offset]
     columns = space.rows(data)
     for name, place in space.places().items():
         norms = np.linalg.norm(columns[:, place[1:]], axis=0)
@@ -200,23 +232,34 @@ def block_of(
 
 
 def knowledge(
-    data: Sequence[WeakWindows], start: Model, prior: NominalPrior, found: Sequence[Rival]
+    data: Sequence[WeakWindows],
+    start: Model,
+    prior: NominalPrior,
+    found: Sequence[Rival],
+    learned: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Space, Knowledge]:
     """The hypotheses of a diagnosis on the runs that it was made of.
 
     Weights are the confidences of the diagnosis; what these leave open among the rivals of an effect is
     shared by the evidence of the runs. Of an effect without a rival they leave other coefficients, or
     nothing, which are no hypotheses: then none may hold.
+
+    Args:
+        data: the runs.
+        start: the initial model.
+        prior: of its coefficients.
+        found: effects and their rivals, see :func:`rivals`.
+        learned: see :func:`learned_changes`.
     """
     sets = [tuple(i for i in r.ids if usable(start, i)) for r in found]
     ids = [*dict.fromkeys(i for s in sets for i in s if i)]
-    space, precision, mean = space_of(data, start, prior, ids)
+    space, precision, mean = space_of(data, start, prior, ids, learned)
     chosen = [
         tuple(dict.fromkeys(i for i in each if i in space.blocks))
         for each in product(*[s for s in sets if s])
     ]
     A, q, places = space.rows(data), len(space.nuisance), space.places()
-    y = (model_error(data, start) / space.sigma).ravel()
+    y = (model_error(data, space.start) / space.sigma).ravel()
     hypotheses = []
     for names in dict.fromkeys(chosen or [()]):
         own = np.concatenate([np.zeros(0, int), *(places[n] for n in names)])

@@ -12,9 +12,9 @@ from ..execution.progress import Advance, silent
 from ..predictors import Model, WeakWindows
 from ..report.finding_text import discriminating_run
 from ..search import Prior
-from ..search.prior import MEASURED, NominalPrior
+from ..search.prior import NominalPrior
 from .designing import Designer, Limits, ScoredPlan
-from .hypotheses import knowledge, rivals
+from .hypotheses import knowledge, learned_changes, rivals
 from .information import Knowledge
 from .rehearsal import Rehearsal
 from .run_plan import MOST_RUNS, Plan, PlannedRun
@@ -50,7 +50,8 @@ def prepared(q: Question, advance: Advance = silent) -> tuple[Designer, Knowledg
         InputError: the ship cannot follow a pose, basin or minutes are too small, no such criterion.
     """
     advance("candidates and their weights")
-    space, k = knowledge(q.data, q.start, NominalPrior.of(q.start, q.prior, MEASURED), rivals(q.content))
+    prior = NominalPrior.of(q.start, q.prior)
+    space, k = knowledge(q.data, q.start, prior, rivals(q.content), learned_changes(q.content))
     used = "d-optimal" if len(k.hypotheses) == 1 else q.criterion
     best = int(np.argmax(k.weights))
     model = space.model(k.hypotheses[best], k.estimates[best].mean)

@@ -94,8 +94,9 @@ class Rehearsal:
     @cached_property
     def residual(self) -> list[set[str]]:
         """Of each hypothesis the axes on which it leaves a significant residual in the old runs."""
-        start, each = self.space.start, zip(self.k.hypotheses, self.k.estimates, strict=True)
-        left = [remaining(self.data, start, self.space.model(h, e.mean)) for h, e in each]
+        each = zip(self.k.hypotheses, self.k.estimates, strict=True)
+        models = [self.space.model(h, e.mean) for h, e in each]
+        left = [remaining(self.data, self.space.initial, model) for model in models]
         return [{name for name, axis in axes.items() if axis.significant} for axes in left]
 
     @cached_property
@@ -178,7 +179,8 @@ class RehearsedEffect:
         columns = [rows.X[..., :q], *(shapes[i].columns for i in others)]
         unit = np.concatenate([np.ones(q), *(shapes[i].unit for i in others)])
         precision = np.diag((np.arange(unit.size) < q).astype(float))
-        nuisance = Nuisance(np.concatenate(columns, axis=2), precision, np.zeros(unit.size), unit)
+        offset = np.concatenate([s.offset, np.zeros(unit.size - q)])
+        nuisance = Nuisance(np.concatenate(columns, axis=2), precision, offset, unit)
         known = sum((rows.X[..., places[i][0]] for i in others), np.zeros_like(like))
         effects = s.start.ship.effects
         every = [Candidate(effects[i], [shapes[i]]) for i in (effect, *(shapes.keys() - h.ids))]

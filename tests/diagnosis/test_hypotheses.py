@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.measured import sail, smoothed
 
-from diagnosis import Model
+from diagnosis import Model, weak_windows
 from diagnosis.design import hypotheses
 from diagnosis.design.hypotheses import (
     EffectParameters,
@@ -15,11 +16,12 @@ from diagnosis.design.hypotheses import (
     _weights,
     block_of,
     knowledge,
+    learned_changes,
     rivals,
     usable,
 )
 from diagnosis.execution.short_text import SHOWN
-from diagnosis.search.candidates import SMALL, CandidateShape
+from diagnosis.search.candidates import SMALL, CandidateShape, model_error
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.shortlist import LENGTH
 
@@ -169,7 +171,7 @@ def space():
         "lag": EffectParameters({"lag": 0.4}, ("lag",), (0.4,)),
         "current": EffectParameters({}, ("V_n", "V_e"), (0.1, 0.2)),
     }
-    return Space(start, prior, blocks, NOISE, np.ones(3))
+    return Space(start, start, prior, np.zeros(len(prior.std) - 1), blocks, NOISE, np.ones(3))
 
 
 def test_an_effect_has_one_place_for_its_point_and_one_for_each_slope():
@@ -232,8 +234,8 @@ def test_columns_are_slopes_of_the_model_error_in_units_of_the_noise(monkeypatch
 class Made:
     """A space of two parameters of the ship and two of each effect, on data that are made up."""
 
-    def __init__(self, effects, data):
-        self.blocks = dict.fromkeys(effects)
+    def __init__(self, effects, data, start):
+        self.blocks, self.start = dict.fromkeys(effects), start
         self.nuisance, self.sigma, self._rows = ["X_u", "N_r"], NOISE, data
 
     def places(self):
@@ -248,11 +250,11 @@ def known(monkeypatch, found, without=()):
     rng = np.random.default_rng(0)
     error, asked = rng.standard_normal((K, 3)), []
 
-    def space_of(data, start, prior, ids):
+    def space_of(data, start, prior, ids, learned):
         asked.extend(ids)
         effects = [i for i in ids if i not in without]
         p = 2 + 2 * len(effects)
-        return Made(effects, rng.standard_normal((3 * K, p))), np.eye(p), np.zeros(p)
+        return Made(effects, rng.standard_normal((3 * K, p)), start), np.eye(p), np.zeros(p)
 
     monkeypatch.setattr(hypotheses, "usable", lambda start, name: not name.startswith("z"))
     monkeypatch.setattr(hypotheses, "space_of", space_of)
@@ -293,6 +295,31 @@ def test_effects_that_do_nothing_in_the_runs_are_left_out(monkeypatch):
     _, nothing, *_ = known(monkeypatch, [Rival(("zero",), 0.8)])
     assert [h.ids for h in nothing.hypotheses] == [()]
     assert nothing.weights.tolist() == [1.0]
+
+
+def test_all_is_linear_about_what_was_learned_and_the_prior_is_about_the_initial_model():
+    """Of a lag and a drag as learned, what is left is the noise; without them the model is the first."""
+    true = {"X_u": -0.4, "lag": 0.6}
+    content = {
+        "coefficients": [
+            {"name": "vessel.X_u", "before": -0.6, "after": -1.0},
+            {"name": "vessel.Y_v", "before": -1.0, "after": -1.0},
+            {"name": "thrusters.lag", "before": 0.0, "after": 0.6},
+        ]
+    }
+    learned = learned_changes(content)
+    assert learned == pytest.approx(true)
+    start = Model()
+    run = sail(60.0, ship={"X_u": -1.0}, thrusters={"lag": 0.6}, noise=0.1)[0]
+    data = [weak_windows(smoothed(run))]
+    prior = NominalPrior.of(start, 0.5)
+    space, k = knowledge(data, start, prior, [Rival(("lag",), 0.9)], learned)
+    assert space.start.value("X_u") == pytest.approx(start.value("X_u") - 0.4)
+    (h,) = k.hypotheses
+    left = model_error(data, space.model(h, k.estimates[0].mean))
+    assert np.sqrt(np.mean(left**2)) < 0.1 * np.sqrt(np.mean(model_error(data, start) ** 2))
+    before = space.model(h, np.where(np.isin(np.arange(k.prior.size), h.own), 0.0, k.prior))
+    assert before.value("X_u") == pytest.approx(start.value("X_u"))
 
 
 def test_the_likeliest_hypotheses_alone_are_kept(monkeypatch):
