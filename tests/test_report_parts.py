@@ -264,9 +264,10 @@ def test_headline_of_each_verdict():
     doubted = said("unexplained", [effect("lag", 0.1)], left=False, moved=far)
     assert doubted.startswith(headline.NOT_BELIEVED)
     assert doubted.endswith("3 standard deviations of their priors: X_u by −3.2 and N_r by 5.")
-    assert ", mainly a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
-    assert ", mainly b; no effect" in said("coefficients", suspects=suspects[1:2])
-    assert "a (mass), b, c, d and 2 others; no" in said("coefficients", suspects=suspects)
+    off = " from the description beyond chance."
+    assert said("coefficients", suspects=suspects[:2]).endswith(f"needed. a (mass) and b differ{off}")
+    assert said("coefficients", suspects=suspects[1:2]).endswith(f"needed. b differs{off}")
+    assert f"a (mass), b, c, d and 2 others differ{off}" in said("coefficients", suspects=suspects)
     assert said("coefficients").endswith("explain these data; no effect is needed.")
     beside = said("coefficients", shared={"heading_offset": 0.1, "body_bias_N": 2.0})
     assert "explain these data together with body_bias_N and heading_offset; no other" in beside
