@@ -262,12 +262,12 @@ def headline(r: ReportData) -> str:
             said.append(f"Coefficients that are probably wrong as well: {listed(names, 'and')}.")
         return " ".join(said)
     if d.verdict == "coefficients":
-        differ = f"{listed(names, 'and')} differ{'s' * (len(names) == 1)}"
-        beyond = f" {differ} from the description beyond chance." if names else ""
+        differ = "differs" if len(names) == 1 else "differ"
+        off = f" {listed(names, 'and')} {differ} from the description beyond chance." if names else ""
         others = further_values(d)
         beside = f" together with {listed(others, 'and')}" if others else ""
         needed = "no other effect is needed" if others else "no effect is needed"
-        return f"Other values of the nominal coefficients explain these data{beside}; {needed}.{beyond}"
+        return f"Other values of the nominal coefficients explain these data{beside}; {needed}.{off}"
     if d.verdict == "unexplained":
         remains = d.remainder.significant and not r.possibilities
         moved = d.learned.moved if d.refitted or r.possibilities else {}

@@ -11,7 +11,7 @@ from fmus.effects.effect import Effect
 from ..predictors import Model, WeakWindows, omega
 from ..runs.run_constants import FAR_OFF, NEGLIGIBLE
 from ..search.findings import Finding, Findings
-from .confidence import Confidence, may_be_none
+from .confidence import EVEN_ODDS, Confidence, most_by_intervals
 
 
 def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[str]:
@@ -55,9 +55,9 @@ def mended(
 
     Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
     mend its shape, until no residual is left to speak against it; they need not be findings themselves.
+    What is so near zero that of all candidates one is by chance mends nothing.
     A small effect on the measurement is in doubt, and says nothing of a force; a large one hides forces
-    that are smaller, and may be mended by another on the measurement. A possibility that is a change of
-    coefficients mends nothing if their stated deviations allow it: these are likelier, and no cause.
+    that are smaller, and may be mended by another on the measurement.
 
     Args:
         found: the findings.
@@ -80,9 +80,7 @@ def mended(
     ]
     for small, fall, square, believed in judged:
         axes = ["XYN".index(axis) for axis in effects[small.id].axis]
-        if fall[axes].max() >= NEGLIGIBLE or may_be_none(small):
-            continue
-        if not believed and _as_stated(small, found.model, start):
+        if fall[axes].max() >= NEGLIGIBLE or most_by_intervals(small, start) <= EVEN_ODDS:
             continue
         for large, more, own, is_finding in judged:
             shown = [k for k in axes if more[k] - fall[k] > NEGLIGIBLE]
@@ -95,17 +93,6 @@ def mended(
                 share = max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
                 shares[large.id] = max(share, shares.get(large.id, 0.0))
     return shares
-
-
-def _as_stated(f: Finding, model: Model, start: Model) -> bool:
-    """Whether an effect is a change of coefficients that their stated deviations allow."""
-    changes = {n.removeprefix("delta_"): x for n, x in f.values.items()}
-    known = start.ship.coefficients
-    return all(
-        n in known
-        and abs(model.value(n) + x - start.value(n)) <= FAR_OFF * known[n].deviation(start.value(n))
-        for n, x in changes.items()
-    )
 
 
 def beside_possibility(
