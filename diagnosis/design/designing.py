@@ -48,7 +48,7 @@ FASTER = 1.5  # 1, times the fastest measured motion: as far as a model is used 
 SMALLER = ((1.0, 1.0), (1.0, 0.7), (0.75, 0.7), (0.6, 0.5), (0.4, 0.4))
 NO_SPREAD = (
     "the spread of the likely candidates leaves the basin in every plan that was checked; give a larger "
-    "basin, fewer minutes or a smaller margin"
+    "basin or fewer minutes"
 )
 ROUNDED = 1.3  # 1, times the largest speeds, which ramps and turned axes exceed a little (chosen)
 
