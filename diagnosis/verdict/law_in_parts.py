@@ -55,7 +55,8 @@ def mended(
 
     Of a cause in a shape that no candidate has, the nearest candidate is found first. Small effects then
     mend its shape, until no residual is left to speak against it; they need not be findings themselves.
-    What is so near zero that of all candidates one is by chance mends nothing.
+    What is so near zero that of all candidates one is by chance mends nothing, nor does a possibility
+    that is a change of coefficients within their stated deviations: these are likelier, and no cause.
     A small effect on the measurement is in doubt, and says nothing of a force; a large one hides forces
     that are smaller, and may be mended by another on the measurement.
 
@@ -82,6 +83,8 @@ def mended(
         axes = ["XYN".index(axis) for axis in effects[small.id].axis]
         if fall[axes].max() >= NEGLIGIBLE or most_by_intervals(small, start) <= EVEN_ODDS:
             continue
+        if not believed and _as_stated(small, found.model, start):
+            continue
         for large, more, own, is_finding in judged:
             shown = [k for k in axes if more[k] - fall[k] > NEGLIGIBLE]
             mending = {small.id, large.id} & of_measurement
@@ -93,6 +96,20 @@ def mended(
                 share = max(float(square[k] / own[k]) if own[k] > 0.0 else 1.0 for k in shown)
                 shares[large.id] = max(share, shares.get(large.id, 0.0))
     return shares
+
+
+def _as_stated(f: Finding, model: Model, start: Model) -> bool:
+    """Whether an effect of a model is a change of coefficients that their stated deviations allow."""
+    known = start.ship.coefficients
+
+    def is_allowed(parameter: str, value: float) -> bool:
+        name = parameter.removeprefix("delta_")
+        if name not in known:
+            return False
+        change = model.value(name) - start.value(name) + (value if name != parameter else 0.0)
+        return abs(change) <= FAR_OFF * known[name].deviation(start.value(name))
+
+    return all(is_allowed(n, x) for n, x in f.values.items())
 
 
 def beside_possibility(
