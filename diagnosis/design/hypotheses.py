@@ -170,15 +170,17 @@ def space_of(
 
     Everything is linear about what was learned; arguments as of :func:`knowledge`.
     """
-    changes = {n: learned.get(n, 0.0) for n in uncertain(prior)}
+    effects = [initial.ship.effects[name] for name in ids]
+    own = [{p.name: learned[p.name] for p in e.parameters if p.name in learned} for e in effects]
+    # A lag is a coefficient and an effect: where it is a hypothesis, it is no part of the start.
+    moved = learned.keys() - {n for values in own for n in values}
+    changes = {n: learned[n] if n in moved else 0.0 for n in uncertain(prior)}
     start = initial.plus({n: x for n, x in changes.items() if x})
     offset = np.array([x / prior.std[n] for n, x in changes.items()])
     base = model_error(data, start)
     noise = np.sqrt(np.mean(np.concatenate([omega_std(w, start) for w in data]) ** 2, axis=0))
     blocks: dict[str, EffectParameters] = {}
-    for name in ids:
-        effect = start.ship.effects[name]
-        values = {n: learned[n] for n in effect.fitted if n in learned}
+    for name, effect, values in zip(ids, effects, own, strict=True):
         if values:
             shapes = [shape(data, start, base, values, effect.fitted, SMALL)]
         else:

@@ -315,6 +315,8 @@ def test_all_is_linear_about_what_was_learned_and_the_prior_is_about_the_initial
     prior = NominalPrior.of(start, 0.5)
     space, k = knowledge(data, start, prior, [Rival(("lag",), 0.9)], learned)
     assert space.start.value("X_u") == pytest.approx(start.value("X_u") - 0.4)
+    assert space.start.value("lag") == start.value("lag")
+    assert space.blocks["lag"].given == pytest.approx({"lag": 0.6})
     (h,) = k.hypotheses
     left = model_error(data, space.model(h, k.estimates[0].mean))
     assert np.sqrt(np.mean(left**2)) < 0.1 * np.sqrt(np.mean(model_error(data, start) ** 2))
