@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from support import reported
-from support.chromium import opened
+from support.chromium import Tab, opened
 from support.cse1 import EFFECTS
 from support.measured import sail, smoothed
 from support.project import ROOT
@@ -55,11 +55,14 @@ def evaluations(data):
     return [evaluate_run(w, Model(), after, held_out=k == 1) for k, w in enumerate(data)]
 
 
-def seen_in(browser, report, wrapped, width):
-    """Numbers of a page in a frame of some width [px], see MEASURE."""
-    content = html.escape(report.read_text(encoding="utf-8"))
-    wrapped.write_text(MEASURE.format(width=width, page=content), encoding="utf-8")
-    return dict(re.findall(r'data-(\w+)="(\d+)"', browser(wrapped, "--dump-dom")))
+def seen_in(report, folder, width):
+    """Numbers of a page of some width [px], see MEASURE."""
+    with Tab(report, folder) as tab:
+        tab.size(width, 800)
+        tab.wait("document.readyState === 'complete'")
+        found = tab.evaluate(MEASURE)
+        assert tab.console == []
+    return found
 
 
 def compared(evaluations, **before):
@@ -309,49 +312,44 @@ def browser(tmp_path):
     return lambda page, *options: opened(page, tmp_path, *options)
 
 
-MEASURE = """<!DOCTYPE html><html><body style="margin:0"><iframe style="border:0;width:{width}px;height:800px"
-srcdoc="{page}"></iframe><script>
-const frame = document.querySelector("iframe");
-window.onload = () => {{
-  const page = frame.contentDocument.documentElement;
-  document.body.dataset.folded = page.scrollHeight;
+MEASURE = """(() => {
+  const page = document.documentElement, found = { folded: page.scrollHeight };
   const said = t => getComputedStyle(t, "::before").height.replace("auto", "0px") != "0px";
   const closed = [...page.querySelectorAll(".table")].filter(t => t.checkVisibility());
-  document.body.dataset.unsaid = closed.filter(t => said(t) != (t.scrollWidth > t.clientWidth)).length;
+  found.unsaid = closed.filter(t => said(t) != (t.scrollWidth > t.clientWidth)).length;
   page.querySelectorAll("details").forEach(d => d.open = true);
   const heads = [...page.querySelectorAll("thead th")].map(h => getComputedStyle(h).whiteSpace);
-  document.body.dataset.unwrapped = heads.filter(w => w == "nowrap").length;
+  found.unwrapped = heads.filter(w => w == "nowrap").length;
   const figures = [...page.querySelectorAll("svg")].map(f => f.getBoundingClientRect());
-  document.body.dataset.width = page.scrollWidth;
-  document.body.dataset.height = page.scrollHeight;
-  document.body.dataset.figures = figures.length;
-  document.body.dataset.thin = figures.filter(f => f.width < 250 || f.height < 100).length;
+  found.width = page.scrollWidth;
+  found.height = page.scrollHeight;
+  found.figures = figures.length;
+  found.thin = figures.filter(f => f.width < 250 || f.height < 100).length;
   const tables = [...page.querySelectorAll(".table")];
-  document.body.dataset.cut = tables.filter(t => t.scrollWidth > t.clientWidth).length;
-  document.body.dataset.wide = figures.filter(f => f.right > {width}).length;
-}};
-</script></body></html>"""
+  found.cut = tables.filter(t => t.scrollWidth > t.clientWidth).length;
+  found.wide = figures.filter(f => f.right > page.clientWidth).length;
+  return found;
+})()"""
 
 
 @pytest.mark.parametrize("width", [390, 1200])
-def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_path, width):
-    seen = seen_in(browser, report, tmp_path / "wrapped.html", width)
-    assert int(seen["width"]) == width
-    assert int(seen["height"]) > 2000
-    assert int(seen["figures"]) == Page(report).tags["svg"]
-    assert seen["thin"] == seen["wide"] == "0"
-    assert width < 1000 or seen["cut"] == "0"  # on a phone tables may be scrolled
-    assert seen["unsaid"] == "0", "and say so"
-    assert seen["unwrapped"] == "0", "headings"
+def test_browser_shows_the_page_without_a_sideways_scroll(report, tmp_path, width):
+    seen = seen_in(report, tmp_path, width)
+    assert seen["width"] == width
+    assert seen["height"] > 2000
+    assert seen["figures"] == Page(report).tags["svg"]
+    assert seen["thin"] == seen["wide"] == 0
+    assert width < 1000 or seen["cut"] == 0  # on a phone tables may be scrolled
+    assert seen["unsaid"] == 0, "and say so"
+    assert seen["unwrapped"] == 0, "headings"
 
 
 @pytest.mark.slow
-def test_a_report_of_nine_runs_is_six_screens(evaluations, browser, tmp_path):
+def test_a_report_of_nine_runs_is_six_screens(evaluations, tmp_path):
     """Of 1280 x 900; the pictures of each run are folded, and can be opened."""
     nine = [replace(e, use=use) for e in evaluations[:1] for use in ("train",) * 6 + ("test",) * 3]
     page = write_report(tmp_path / "report.html", found(nine))
-    seen = seen_in(browser, page, tmp_path / "wrapped.html", 1280)
-    assert int(seen["folded"]) <= 6 * 900
+    assert seen_in(page, tmp_path, 1280)["folded"] <= 6 * 900
     summaries = re.findall(r"<summary>([^<]*): (\d) pictures</summary>", page.read_text("utf-8"))
     assert len(summaries) == 9
     assert all(int(count) >= 4 for _, count in summaries)

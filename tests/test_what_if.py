@@ -1,6 +1,5 @@
 """The part of a report in which a reader moves the model: the page computes what Python does."""
 
-import html
 import json
 import re
 from dataclasses import replace
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support import reported
-from support.chromium import opened
+from support.chromium import Tab
 from support.measured import sail, smoothed
 
 from diagnosis import Comparison, Model, evaluate_run
@@ -59,9 +58,8 @@ def report(data):
     return diagnosed(data, Model().plus(LEARNED))
 
 
-DRIVER = """<!DOCTYPE html><html><body><iframe style="width:1200px;height:800px" srcdoc="{page}"></iframe><pre></pre><script>
-window.onload = async () => {{
-  const frame = document.querySelector("iframe"), page = frame.contentDocument, found = {{}};
+DRIVER = """(async () => {{
+  const page = document, found = {{}};
   const results = () => page.querySelector("#what-if-results");
   const press = (text) => [...page.querySelectorAll("#what-if button")].find((b) => b.textContent === text).click();
   const numbers = (table) => [...table.querySelectorAll("td")].map((cell) => Number(cell.dataset.value));
@@ -71,22 +69,17 @@ window.onload = async () => {{
   const move = (name, value) => {{
     const slider = page.querySelector(`#what-if input[aria-label^="${{name}} ["]`);
     slider.value = value;
-    slider.dispatchEvent(new frame.contentWindow.Event("input"));
+    slider.dispatchEvent(new Event("input"));
   }};
-  try {{
-    page.querySelector("#what-if details").open = true;
-    while (!results().dataset.milliseconds) await new Promise((done) => setTimeout(done, 20));
-    {script}
-  }} catch (error) {{
-    found.error = String(error);
-  }}
-  document.querySelector("pre").textContent = JSON.stringify(found);
-}};
-</script></body></html>"""
+  page.querySelector("#what-if details").open = true;
+  while (!results().dataset.milliseconds) await new Promise((done) => setTimeout(done, 20));
+  {script}
+  return found;
+}})()"""
 
 
 OWN_RUN = r"""
-const { DataTransfer, File, Event } = frame.contentWindow, input = page.querySelector("#what-if input[type=file]");
+const input = page.querySelector("#what-if input[type=file]");
 const add = async (text) => {
   const moved = new DataTransfer();
   moved.items.add(new File([text], "<b>own</b>.csv"));
@@ -111,18 +104,10 @@ def page(report, tmp_path_factory):
 @pytest.fixture
 def driven(page, tmp_path):
     """A function that does something in the page, in JavaScript, and gives what that found."""
-
-    def run(script):
-        content = html.escape(page.read_text(encoding="utf-8"))
-        (tmp_path / "driver.html").write_text(
-            DRIVER.format(page=content, script=script), encoding="utf-8"
-        )
-        dom = opened(tmp_path / "driver.html", tmp_path, "--dump-dom", milliseconds=20_000)
-        found = json.loads(html.unescape(re.findall(r"<pre>(.*?)</pre>", dom, re.DOTALL)[-1]))
-        assert "error" not in found, found["error"]
-        return found
-
-    return run
+    with Tab(page, tmp_path) as tab:
+        tab.wait("document.readyState === 'complete'")
+        yield lambda script: tab.evaluate(DRIVER.format(script=script))
+        assert tab.console == []
 
 
 def test_component_predicts_as_windows_are_predicted(data):
