@@ -59,7 +59,6 @@ class Space:
         initial: the initial model.
         start: the model that all are additions to: the initial one with the coefficients as learned.
         prior: of the nominal coefficients.
-        offset: (q,), by how many standard deviations the coefficients of ``start`` are off its mean.
         blocks: effect -> its parameters.
         sigma: (3,), noise of the model error that counts for one window [N, N, N m].
         lasting: (3,), windows that count as one.
@@ -68,7 +67,6 @@ class Space:
     initial: Model
     start: Model
     prior: NominalPrior
-    offset: np.ndarray
     blocks: Mapping[str, EffectParameters]
     sigma: np.ndarray
     lasting: np.ndarray
@@ -76,7 +74,13 @@ class Space:
     @property
     def nuisance(self) -> list[str]:
         """The nominal coefficients that are not known exactly."""
-        return uncertain(self.prior)
+        return self.prior.uncertain
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(q,), by how many standard deviations these are off the mean of their prior in ``start``."""
+        mean, std = self.prior.mean, self.prior.std
+        return np.array([(self.start.value(n) - mean[n]) / std[n] for n in self.nuisance])
 
     def columns(self, data: Sequence[WeakWindows]) -> np.ndarray:
         """(K, 3, p): change of the model error by one unit of each parameter, in units of the noise.
@@ -129,11 +133,6 @@ class Space:
         return self.start.plus({n: bounded(self.start, n, x) for n, x in changes.items()})
 
 
-def uncertain(prior: NominalPrior) -> list[str]:
-    """The nominal coefficients that are not known exactly."""
-    return [n for n, s in prior.std.items() if s > 0.0]
-
-
 def learned_changes(content: Mapping[str, Any]) -> dict[str, float]:
     """What a diagnosis changed: parameter -> learned value less that of the initial model, SI."""
     each = content.get("coefficients", ())
@@ -174,9 +173,7 @@ def space_of(
     own = [{p.name: learned[p.name] for p in e.parameters if p.name in learned} for e in effects]
     # A lag is a coefficient and an effect: where it is a hypothesis, it is no part of the start.
     moved = learned.keys() - {n for values in own for n in values}
-    changes = {n: learned[n] if n in moved else 0.0 for n in uncertain(prior)}
-    start = initial.plus({n: x for n, x in changes.items() if x})
-    offset = np.array([x / prior.std[n] for n, x in changes.items()])
+    start = initial.plus({n: learned[n] for n in prior.uncertain if n in moved})
     base = model_error(data, start)
     noise = np.sqrt(np.mean(np.concatenate([omega_std(w, start) for w in data]) ** 2, axis=0))
     blocks: dict[str, EffectParameters] = {}
@@ -187,14 +184,14 @@ def space_of(
             shapes = candidate(data, start, base, effect).shapes
         if shapes:
             blocks[name] = block_of(start, shapes, base, noise)
-    A = Space(initial, start, prior, offset, blocks, noise, np.ones(3)).rows(data)
+    A = Space(initial, start, prior, blocks, noise, np.ones(3)).rows(data)
     fit = A @ np.linalg.lstsq(A, (base / noise).ravel(), rcond=1e-8)[0]
     left = base - fit.reshape(base.shape) * noise
     spread = np.maximum(noise, np.sqrt(np.mean(left**2, axis=0)))
     lasting = OVERLAP * independent(data, left)
-    space = Space(initial, start, prior, offset, blocks, spread * np.sqrt(lasting), lasting)
+    space = Space(initial, start, prior, blocks, spread * np.sqrt(lasting), lasting)
     size = np.linalg.norm(base / space.sigma)
-    precision, mean = [np.eye(len(offset))], [-offset]
+    precision, mean = [np.eye(len(space.nuisance))], [-space.offset]
     columns = space.rows(data)
     for name, place in space.places().items():
         norms = np.linalg.norm(columns[:, place[1:]], axis=0)

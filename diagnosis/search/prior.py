@@ -93,6 +93,11 @@ class NominalPrior:
         return cls(mean, std)
 
     @property
+    def uncertain(self) -> list[str]:
+        """The coefficients that are not known exactly."""
+        return [n for n, s in self.std.items() if s > 0.0]
+
+    @property
     def size(self) -> int:
         """Number of coefficients."""
         return len(self.mean)

@@ -171,7 +171,7 @@ def space():
         "lag": EffectParameters({"lag": 0.4}, ("lag",), (0.4,)),
         "current": EffectParameters({}, ("V_n", "V_e"), (0.1, 0.2)),
     }
-    return Space(start, start, prior, np.zeros(len(prior.std) - 1), blocks, NOISE, np.ones(3))
+    return Space(start, start, prior, blocks, NOISE, np.ones(3))
 
 
 def test_an_effect_has_one_place_for_its_point_and_one_for_each_slope():
