@@ -268,6 +268,7 @@ def test_runs_of_a_simulator_are_its_motion_by_orders_of_this_project(monkeypatc
 
         def __init__(self, V_current, beta_current):
             assert (V_current, beta_current) == simulated_otter.CURRENT
+            self.beta_c, self.T_n = beta_current, simulated_otter.LAG
 
         def dynamics(self, eta, nu, n, order, h):
             return np.array(
@@ -293,6 +294,16 @@ def test_runs_of_a_simulator_are_its_motion_by_orders_of_this_project(monkeypatc
     sides = np.sign(np.diff(logs["zigzag_6"]["psi"].rolling(20).mean().dropna()))
     assert np.abs(logs["zigzag_6"]["psi"]).max() < 0.6
     assert np.sum(np.diff(sides[sides != 0.0]) != 0.0) > 4
+
+
+@pytest.mark.parametrize("other", [{"beta_c": np.radians(simulated_otter.CURRENT[1])}, {"T_n": 0.1}])
+def test_another_version_of_the_simulator_is_refused(monkeypatch, other):
+    def otter(V_current, beta_current):
+        return SimpleNamespace(**{"beta_c": beta_current, "T_n": simulated_otter.LAG, **other})
+
+    simulator(monkeypatch, {"otter": otter})
+    with pytest.raises(InputError, match=r"another version; pip install git\+https"):
+        next(iter(simulated_otter.simulated()))
 
 
 def test_a_data_set_without_its_simulator_is_left_out_in_one_line(monkeypatch, capsys, tmp_path):

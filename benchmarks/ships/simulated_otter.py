@@ -11,9 +11,16 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from cosim import InputError
 from fmus.ops import wrap
 
-INSTALLED_BY = "pip install git+https://github.com/cybergalactic/PythonVehicleSimulator"
+# The model of this commit is the one that ships/otter.toml describes. A later one has a linear sway
+# damping, other propellers and the Munk moment, and takes the direction of the current in degrees.
+INSTALLED_BY = (
+    "pip install git+https://github.com/cybergalactic/PythonVehicleSimulator"
+    "@21cae21185ca51972e96949ae84cbdd6a2d1a11e"
+)
+LAG = 1.0  # s, of the propellers
 STEP = 0.02  # s, of the simulator's method of Euler
 EACH = 5  # steps of it are one sample
 LENGTH = 120.0  # s, of a run
@@ -74,6 +81,7 @@ def simulated() -> Iterator[tuple[str, pd.DataFrame]]:
 
     Raises:
         ModuleNotFoundError: the simulator is not installed.
+        InputError: it is another version.
     """
     try:
         from python_vehicle_simulator.vehicles import otter
@@ -81,6 +89,8 @@ def simulated() -> Iterator[tuple[str, pd.DataFrame]]:
         raise ModuleNotFoundError(f"{error}; {INSTALLED_BY}", name=error.name) from None
     for k, (name, orders) in enumerate(manoeuvres()):
         ship = otter(V_current=CURRENT[0], beta_current=CURRENT[1])
+        if (ship.beta_c, ship.T_n) != (CURRENT[1], LAG):
+            raise InputError(f"the model of the Otter is of another version; {INSTALLED_BY}")
         eta, nu, n = np.zeros(6), np.zeros(6), np.zeros(2)
         rows = []
         for i in range(round(LENGTH / STEP)):
