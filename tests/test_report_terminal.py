@@ -106,11 +106,11 @@ FOUND = {
 }
 
 
-def found(comparison=None, effects=EFFECTS, **changes):
+def found(comparison=None, effects=EFFECTS, possibilities=POSSIBILITIES, **changes):
     """The report of a diagnosis with three effects, of which one is only possible."""
     derived = {"inseparable": ["One shaft speed."], **DERIVED}
     given = compared(True) if comparison is None else comparison
-    return report_data(given, diagnosis(**FOUND | changes), effects, POSSIBILITIES, **derived)
+    return report_data(given, diagnosis(**FOUND | changes), effects, possibilities, **derived)
 
 
 def nothing(comparison=None):
@@ -228,6 +228,18 @@ def test_a_comparison_has_its_data_and_errors_before():
 def test_a_diagnosis_has_what_is_sure_first_and_errors_before_and_after():
     shown = lines(show_diagnosis(found(), "out/folder"))
     assert shown == DIAGNOSIS.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("confidence", "share", "in_model", "short"),
+    [(0.049, 0.049, True, True), (0.051, 0, True, False), (0, 0.051, True, False), (0, 0, False, False)],
+)
+def test_what_is_hardly_possible_and_explains_little_has_one_line(confidence, share, in_model, short):
+    small = effect("small", confidence, share_of_error=share, in_model=in_model, advice="Run.")
+    shown = lines(show_diagnosis(found(possibilities=[*POSSIBILITIES, small]), "out"))
+    assert ("small: X = small" in shown) is short
+    assert ("Possibility: small" in shown) is not short
+    assert "Possibility: unlikely" in shown
 
 
 @pytest.mark.parametrize(("heading", "told"), [(-2.1, True), (-1.9, False), (2.1, False)])

@@ -13,6 +13,7 @@ from ..assessment.stability import Stability
 from ..execution.short_text import SHOWN, WIDTH
 from ..runs import MeasuredChannel, by_name, sensor_lines
 from ..runs.measured_channels import UNUSED
+from ..runs.run_constants import NEGLIGIBLE
 from ..session import CalibratedModel
 from .formatting import number, percent
 from .headline import (
@@ -77,8 +78,14 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     for k, effect in enumerate(surest_first(r.effects), 1):
         title = f"Finding {k}: {effect.id}" if len(r.effects) > 1 else "Finding"
         yield from _lines(title, _effect(effect))
+    small = [
+        e for e in r.possibilities if e.in_model and max(e.confidence, e.share_of_error) < NEGLIGIBLE
+    ]
     for effect in r.possibilities:
-        yield from _lines(f"Possibility: {effect.id}", _effect(effect))
+        if effect not in small:
+            yield from _lines(f"Possibility: {effect.id}", _effect(effect))
+    title = f"In the learned model, each with less than {_percent(NEGLIGIBLE)} of confidence and of the error"
+    yield from _lines(title, (f"{e.id}: {e.equation}" for e in small))
     yield from _lines("Rejected", [f"{w.id}: {w.reason}" for w in d.withdrawn])
     is_value = "in the learned model" if d.calibrated else "probably"
     suspects = [
