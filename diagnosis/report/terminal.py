@@ -85,7 +85,9 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
         if effect not in small:
             yield from _lines(f"Possibility: {effect.id}", _effect(effect))
     least = f"less than {_percent(NEGLIGIBLE)} of confidence and of the error"
-    yield from _lines(f"In the learned model, each with {least}", (f"{e.id}: {e.equation}" for e in small))
+    yield from _lines(
+        f"In the learned model, each with {least}", (f"{e.id}: {e.equation}" for e in small)
+    )
     yield from _lines("Rejected", [f"{w.id}: {w.reason}" for w in d.withdrawn])
     is_value = "in the learned model" if d.calibrated else "probably"
     suspects = [
