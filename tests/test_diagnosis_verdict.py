@@ -999,19 +999,23 @@ def test_a_method_that_tells_no_set_has_findings_by_their_own_confidence(own, fi
 
 
 @pytest.mark.parametrize(
-    ("small", "change", "confidence", "mends"),
+    ("ship", "small", "change", "confidence", "mends"),
     [
-        ("N_|r|r", 1200.0, 0.44, False),  # known to 426.5: three deviations are 1279.5
-        ("N_|r|r", 1300.0, 0.44, True),
-        ("N_|r|r", 1200.0, 0.5, True),  # likelier than any change of the coefficient
-        ("lag_port", 1.4, 0.44, False),  # 1 s, known to 0.5 s
-        ("lag_port", 1.6, 0.44, True),
-        ("added_mass_N", 0.1, 0.44, True),
+        ("otter", "N_|r|r", 1200.0, 0.44, False),  # known to 426.5: three deviations are 1279.5
+        ("otter", "N_|r|r", 1300.0, 0.44, True),
+        ("otter", "N_|r|r", 1200.0, 0.5, True),  # likelier than any change of the coefficient
+        ("otter", "lag_port", 1.4, 0.44, False),  # 1 s, known to 0.5 s
+        ("otter", "lag_port", 1.6, 0.44, True),
+        ("otter", "added_mass_N", 0.1, 0.44, True),
+        ("kvlcc2", "wake_propeller", 0.11, 0.44, False),  # known to 0.04: a coefficient of the law
+        ("kvlcc2", "wake_propeller", 0.13, 0.44, True),
     ],
 )
-def test_what_stated_deviations_of_a_coefficient_allow_mends_nothing(small, change, confidence, mends):
-    """Of the Otter; a coefficient that differs as its file states is no part of another force."""
-    start = Model(ship=ship_with((), "otter"))
+def test_what_stated_deviations_of_a_coefficient_allow_mends_nothing(
+    ship, small, change, confidence, mends
+):
+    """A coefficient that differs as its file states is no part of another force."""
+    start = Model(ship=ship_with((), ship))
     (name,) = start.ship.effects[small].coefficients
     made = [
         Finding("loss_yaw", {"loss_yaw": 0.3}, {"loss_yaw": (0.2, 0.4)}, 0.99, [], 0.9, 0.9),

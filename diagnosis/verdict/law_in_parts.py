@@ -1,7 +1,7 @@
 """Findings that together make up a law which no candidate has, so that none of them is known."""
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -32,15 +32,11 @@ def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[
         for f, c in zip(found.effects, alone, strict=True)
         if c.is_finding and (effect := effects[f.id]).kind == "force"
     ]
-    moved = {f"delta_{name}" for name, z in found.moved.items() if abs(z) > FAR_OFF}
-    others = [e for e in effects.values() if e.kind == "force" and e not in laws and _all_of(e, moved)]
+    moved = {name for name, z in found.moved.items() if abs(z) > FAR_OFF}
+    forces = (e for e in effects.values() if e.kind == "force" and e not in laws)
+    others = [e for e in forces if e.adds_to and moved.issuperset(*e.adds_to.values())]
     known, count = (Counter(map(_family, part)) for part in (laws, [*laws, *others]))
     return {axis for family in known if count[family] > 1 for axis in family[0]}
-
-
-def _all_of(effect: Effect, moved: Collection[str]) -> bool:
-    """Whether an effect is a change of coefficients, and all of these have moved."""
-    return bool(effect.coefficients) and set(effect.coefficients) <= set(moved)
 
 
 def _family(law: Effect) -> tuple[str, str]:
@@ -100,16 +96,17 @@ def mended(
 
 def _as_stated(f: Finding, model: Model, start: Model) -> bool:
     """Whether an effect of a model is a change of coefficients that their stated deviations allow."""
-    known = start.ship.coefficients
+    known, adds_to = start.ship.coefficients, start.ship.effects[f.id].adds_to
 
-    def is_allowed(parameter: str, value: float) -> bool:
-        name = parameter.removeprefix("delta_")
+    def is_allowed(name: str, added: float) -> bool:
         if name not in known:
             return False
-        change = model.value(name) - start.value(name) + (value if name != parameter else 0.0)
+        change = model.value(name) - start.value(name) + added
         return abs(change) <= FAR_OFF * known[name].deviation(start.value(name))
 
-    return all(is_allowed(n, x) for n, x in f.values.items())
+    # A lag is a coefficient and an effect, by one name: it is not added to itself.
+    added = ((name, x * (name != p)) for p, x in f.values.items() for name in adds_to.get(p, (p,)))
+    return all(is_allowed(name, x) for name, x in added)
 
 
 def beside_possibility(

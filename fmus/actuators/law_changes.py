@@ -52,6 +52,10 @@ def changed(alike: Sequence[Actuator], change: Change) -> Effect:
         parameters=parameters,
         wording=Wording(lambda f: f"The {title}: {differs(change, parameters, f)}", a.devices.family),
         gives="parameters",
+        adds_to={
+            v.name: tuple([f"plant_{b.part.name}_{n}" for b in alike])
+            for v, n in zip(parameters, change.parameters, strict=True)
+        },
         formula=f"{', '.join(change.parameters)} + δ, in the law {a.law.name}",
         symbol="δ",
         sign="an addition to the described value",

@@ -253,6 +253,8 @@ class Effect:
         settings: parameters that are given and never fitted.
         gives: a ``force``; ``water velocity``, body-fixed (u, v) [m/s, m/s]; or the name of the damping
             coefficient that it adds to.
+        adds_to: parameter -> names of the ship's coefficients that it is added to; empty: the effect is
+            no change of the description.
         needs: actuators that a ship must have for it, by their names.
         apart: whether it shows only where each of several units that may share commands has its own.
         usual: standard deviation of its coefficients among ships, as far as they are imperfections that
@@ -274,6 +276,7 @@ class Effect:
     function: EffectFunction | None
     settings: frozenset[str] = frozenset()
     gives: str = "force"
+    adds_to: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     needs: frozenset[str] = frozenset()
     memory: Memory | None = None
     search: Search = Search()
@@ -347,13 +350,14 @@ def effect(
 
     Args:
         id, kind, axis, formula, symbol, sign, source, linear, settings: see :class:`Effect`.
-        more: further fields of :class:`Effect`: gives, needs, apart, usual, memory, search, wording; and
-            parameters, where the function does not declare them in its signature, with description.
+        more: further fields of :class:`Effect`: gives, adds_to, needs, apart, usual, memory, search,
+            wording; and parameters, where the function does not declare them in its signature, with
+            description.
 
     Raises:
         DeclarationError: unknown kind, axis or field, or a parameter without unit, description or start.
     """
-    further = {"gives", "apart", "usual", "memory", "search", "wording"}
+    further = {"gives", "adds_to", "apart", "usual", "memory", "search", "wording"}
     if unknown := set(more) - further - {"needs", "parameters", "description"}:
         raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
 

@@ -97,6 +97,7 @@ def change(coefficient: Variable) -> Effect:
         description=f"addition to {coefficient.name}: {coefficient.description}",
         parameters=(delta,),
         gives=coefficient.name,
+        adds_to={delta.name: (coefficient.name,)},
         wording=Wording(damping_sentence, FAMILY.get(name, UNKNOWN), APART.get(name, {})),
     )
     def force(ship: Motion, delta: Number) -> Triple:

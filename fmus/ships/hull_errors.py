@@ -31,6 +31,7 @@ def changed(function: str, change: Change) -> Effect:
         sign="an addition to the described value",
         description=change.text,
         parameters=parameters,
+        adds_to={v.name: (n,) for v, n in zip(parameters, change.parameters, strict=True)},
         wording=Wording(lambda f: capital(differs(change, parameters, f)), HULL),
     )
     def force(ship: Loaded, *additions: Number) -> Triple:

@@ -167,9 +167,8 @@ def begin(start: Model, prior: NominalPrior) -> RefinedModel:
     std = {
         n: size * start.unit(n)
         for i, size in LEFT_OUT.items()
-        if i in effects
+        if i in effects and effects[i].gives not in prior.mean
         for n in effects[i].coefficients
-        if n.removeprefix("delta_") not in prior.mean
     } | ({HEADING: effects[HEADING].usual} if HEADING in effects else {})
     precision = np.diag([s**-2.0 for s in std.values()])
     return RefinedModel(start, np.zeros(prior.size), dict.fromkeys(std, 0.0), precision)
