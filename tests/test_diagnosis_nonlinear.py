@@ -202,14 +202,47 @@ def test_a_curve_of_a_larger_ship_bends_as_much_in_its_own_units():
     rng = np.random.default_rng(2)
     force = rng.standard_normal((40, 3, 6)) * [0.0, 1.0, 1.0, 2.0, 1.0, 0.0]
     base, names = rng.standard_normal((40, 3)), [f"node_{k}" for k in range(6)]
+    addition = SimpleNamespace(parameters=[SimpleNamespace(unit="N")])
 
     def made(scale, unit):
         forces = np.array(scale.forces)
         shape = CandidateShape({}, names, None, force * forces[:, None] / unit, np.full(6, unit))
-        (found,) = curve(base * forces, shape, scale)
+        (found,) = curve(base * forces, shape, addition, scale)
         return found
 
     same, other = made(REFERENCE, 1.0), made(Scale(7.0), 50.0)
-    assert other.fitted == same.fitted == names[1:5]
+    assert other.fitted == same.fitted == names
     np.testing.assert_allclose(other.precision * 50.0**2, same.precision, rtol=1e-9)
-    assert other.columns.shape == (40, 3, 4)
+    assert other.columns.shape == (40, 3, 6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "reached", "fitted"),
+    [
+        ("1", (3, 4, 5), range(7)),  # a factor: as it is where it was last seen
+        ("1", (4, 5, 6), range(7)),
+        ("N", (1, 2, 3, 4, 5), range(7)),  # astern and ahead
+        ("N", (4, 5), range(0)),  # no bend
+        ("N", (3, 4, 5), range(3, 7)),  # ahead alone: no force at rest or astern
+        ("N", (1, 2, 3), range(4)),
+    ],
+)
+def test_a_curve_goes_on_beyond_the_data_with_its_last_value(unit, reached, fitted):
+    rng = np.random.default_rng(3)
+    force = np.zeros((50, 3, 7))
+    force[:, 0, reached] = rng.standard_normal((50, len(reached)))
+    plain = CandidateShape({}, [*"abcdefg"], None, force, np.ones(7))
+    e = SimpleNamespace(parameters=[SimpleNamespace(unit=unit)])
+    found = curve(rng.standard_normal((50, 3)), plain, e, REFERENCE)
+    if not fitted:
+        assert found == []
+        return
+    (shape,) = found
+    assert shape.fitted == [plain.fitted[k] for k in fitted]
+    values = rng.standard_normal(7)  # a solution that follows the data, and else the prior
+    A = shape.columns[:, 0]
+    H = 1e3 * A.T @ A + shape.precision
+    got = np.linalg.solve(H, 1e3 * A.T @ (force[:, 0] @ values))
+    for k, x in zip(fitted, got, strict=True):
+        near = min(max(k, reached[0]), reached[-1])
+        assert x == pytest.approx(values[near], abs=0.05)

@@ -334,12 +334,12 @@ def test_a_curve_is_as_rough_as_the_model_error_is_large():
     columns = np.zeros((K, 3, 5))
     columns[np.arange(K), 0, np.arange(K) % 5] = 2.0
     base = np.column_stack([np.full(K, 6.0), np.full(K, 9.0), np.zeros(K)])
-    P = smoothness(base, columns)
+    P = smoothness(base, columns, np.ones(5, bool))
     straight = np.arange(5.0)
     assert straight @ P @ straight == pytest.approx(0.0, abs=1e-9)
     kink = np.maximum(straight - 2.0, 0.0)
     assert kink @ P @ kink == pytest.approx(1.0 / 3.0**2)
-    assert smoothness(4.0 * base, columns) == pytest.approx(P / 16.0)
+    assert smoothness(4.0 * base, columns, np.ones(5, bool)) == pytest.approx(P / 16.0)
     assert np.ones(5) @ P @ np.ones(5) == pytest.approx(0.0, abs=1e-9)
 
 

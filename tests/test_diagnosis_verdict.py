@@ -645,18 +645,21 @@ def test_a_law_that_gives_way_is_another_cause_and_a_free_curve_is_none():
 
 
 @pytest.mark.parametrize(
-    ("moved", "sure"),
+    ("ship", "law", "moved", "sure"),
     [
-        ({"N_absr_r": 4.8}, False),
-        ({"N_absr_r": 2.0}, True),
-        ({"X_absu_u": 4.8}, True),
-        ({"m": 9.0}, True),
+        ("cse1", "N_r", {"N_absr_r": 4.8}, False),
+        ("cse1", "N_r", {"N_absr_r": 2.0}, True),
+        ("cse1", "N_r", {"X_absu_u": 4.8}, True),
+        ("cse1", "N_r", {"m": 9.0}, True),
+        ("kvlcc2", "yaw_by_yaw", {"Y_v_prime": 4.8, "Y_vvv_prime": -4.8}, False),  # one law of two
+        ("kvlcc2", "yaw_by_yaw", {"Y_v_prime": 4.8, "Y_vvv_prime": -2.0}, True),
     ],
 )
-def test_a_law_beside_a_coefficient_of_its_family_far_from_its_prior_is_in_parts(moved, sure):
+def test_a_law_beside_a_coefficient_of_its_family_far_from_its_prior_is_in_parts(ship, law, moved, sure):
     """More drag by the cube, and hardly any by the square, are a law of a higher power as well."""
-    start = Model()
-    made = [Finding("N_r", {"delta_N_r": -1.0}, {}, 0.99, [], 0.9, 0.9, together=0.99)]
+    start = Model(ship=ship_with((), ship))
+    values = dict.fromkeys(start.ship.effects[law].coefficients, -1.0)
+    made = [Finding(law, values, {}, 0.99, [], 0.9, 0.9, together=0.99)]
     (f,) = with_confidence(Findings(made, model=start, moved=moved), start, Doubts()).effects
     assert f.confidence == (0.99 if sure else 0.5)
     assert ("law of another shape" in f.doubt) != sure

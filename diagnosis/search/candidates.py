@@ -100,7 +100,7 @@ def shape(
 def covered(columns: np.ndarray) -> np.ndarray:
     """(p,), which nodes of a curve give a force that shows beside that of all, and those between them.
 
-    What lies outside stays zero: there the curve is the model's. Columns (K, 3, p) are by node.
+    Columns (K, 3, p) are by node.
     """
     weight = np.square(columns).sum(axis=(0, 1))
     reached = np.flatnonzero(weight > NEGLIGIBLE**2 * weight.sum())
@@ -110,34 +110,50 @@ def covered(columns: np.ndarray) -> np.ndarray:
     return inside
 
 
-def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def smoothness(base: np.ndarray, columns: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Prior precision of the values of a curve: its second differences are N(0, size^2).
 
     The size is that at which the curve, were it the same everywhere, would be as large as the whole
-    model error: nodes without data follow their neighbours.
+    model error: nodes without data follow their neighbours. Beyond the data a curve goes on with its
+    last value: with zero a rudder might lose half of its force within two degrees of what was learned.
 
     Args:
         base: (K, 3), model error.
         columns: (K, 3, p), force for one unit of each node.
+        inside: (p,), the nodes that the data reach.
     """
     unit = np.square(columns.sum(axis=2))
     axes = unit.sum(axis=0) > 0.0
     size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), SLIGHT)) + SLIGHT
-    bend = np.diff(np.eye(columns.shape[2]), 2, axis=0) / size
-    return bend.T @ bend
+    nodes = np.eye(columns.shape[2])
+    within = inside[:-1] & inside[1:]
+    bend = np.diff(nodes, 2, axis=0)[within[:-1] & within[1:]] / size
+    step = np.diff(nodes, axis=0)[~within] / (SMALL * size)
+    return bend.T @ bend + step.T @ step
 
 
-def curve(base: np.ndarray, plain: CandidateShape, scale: Scale) -> list[CandidateShape]:
-    """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
+def continued(inside: np.ndarray, is_factor: bool) -> slice:
+    """The nodes of a curve that are fitted: those that the data reach, and those beyond.
+
+    A factor of a force goes on to both sides. An addition to a force does so away from zero, which is in
+    the middle of the nodes; else the ship would have it without any speed or command.
+    """
+    first, last = np.flatnonzero(inside)[[0, -1]].tolist()
+    low, high = is_factor or 2 * first < inside.size - 1, is_factor or 2 * last > inside.size - 1
+    return slice(0 if low else first, inside.size if high else last + 1)
+
+
+def curve(base: np.ndarray, plain: CandidateShape, e: Effect, scale: Scale) -> list[CandidateShape]:
+    """A free curve as a smooth one; none where the data reach too few of its nodes."""
     force = plain.columns * plain.unit / np.array(scale.forces)[:, None]
     inside = covered(force)
     if inside.sum() <= 2:  # without a bend
         return []
-    unit = plain.unit[inside]
-    precision = smoothness(base / scale.forces, force[:, :, inside]) / np.outer(unit, unit)
-    fitted = [n for n, kept in zip(plain.fitted, inside, strict=True) if kept]
-    columns = plain.columns[:, :, inside]
-    return [replace(plain, fitted=fitted, columns=columns, unit=unit, precision=precision)]
+    own = continued(inside, e.parameters[0].unit == "1")
+    unit = plain.unit[own]
+    precision = smoothness(base / scale.forces, force[:, :, own], inside[own]) / np.outer(unit, unit)
+    columns = plain.columns[:, :, own]
+    return [replace(plain, fitted=plain.fitted[own], columns=columns, unit=unit, precision=precision)]
 
 
 def values_to_try(
@@ -245,7 +261,7 @@ def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Ef
     step = 1.0 if hull or not e.differentiable else SMALL
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
-        shapes += [plain] if not e.search.smooth else curve(base, plain, model.ship.scale)
+        shapes += [plain] if not e.search.smooth else curve(base, plain, e, model.ship.scale)
     if spread(e):
         return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
     for values in values_to_try(data, model, base, e):

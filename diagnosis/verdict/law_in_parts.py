@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def in_parts(found: Findings, start: Model, alone: Sequence[Confidence]) -> set[
     ]
     moved = {name for name, z in found.moved.items() if abs(z) > FAR_OFF}
     forces = (e for e in effects.values() if e.kind == "force" and e not in laws)
-    others = [e for e in forces if e.adds_to and moved.issuperset(*e.adds_to.values())]
+    others = [e for e in forces if e.adds_to and moved.issuperset(chain(*e.adds_to.values()))]
     known, count = (Counter(map(_family, part)) for part in (laws, [*laws, *others]))
     return {axis for family in known if count[family] > 1 for axis in family[0]}
 
