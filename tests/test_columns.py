@@ -151,13 +151,49 @@ def test_separators_of_thousands_are_named(
         propose(tmp_path / "a.csv", TANKER)
 
 
-def test_a_cell_that_is_a_mark_must_be_empty(tmp_path: Path) -> None:
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize("mark", ["-", "*****", "Bad Input", "# jump", "bad 7"])
+def test_a_cell_with_words_is_without_a_value(mark: str, decimal: str, tmp_path: Path) -> None:
+    table = zigzag()
+    text = table.map(lambda x: f"{x:.9g}".replace(".", decimal))
+    text.loc[[5, 7], NAMES["x"]] = mark
+    text.to_csv(tmp_path / "a.csv", index=False, sep=";")
+    run = propose(tmp_path / "a.csv", TANKER).run
+    assert run is not None
+    assert f"x: 2 cells without a number, such as '{mark}'" in run.notes
+    expected = table[NAMES["x"]].to_numpy(float, copy=True)
+    expected[[5, 7]] = np.nan
+    np.testing.assert_allclose(run.pose[:, 0], expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("cell", ["1.2.3", "5 kn", "7-"])
+def test_a_cell_that_begins_like_a_number_must_be_one(cell: str, tmp_path: Path) -> None:
     table = zigzag().astype("object")
-    table.loc[5, NAMES["x"]] = "-"
-    with pytest.raises(
-        InputError, match="'-' in row 6 is not a number; a cell without a measurement must be empty"
-    ):
+    table.loc[5, NAMES["x"]] = cell
+    with pytest.raises(InputError, match=f"'{cell}' in row 6 is not a number"):
         propose(written(tmp_path / "a.csv", table), TANKER)
+
+
+def test_a_column_of_words_has_no_numbers(tmp_path: Path) -> None:
+    table = zigzag().astype("object")
+    table[NAMES["x"]] = "Half ahead"
+    with pytest.raises(InputError, match="'Half ahead' in row 1 is not a number"):
+        propose(written(tmp_path / "a.csv", table), TANKER)
+
+
+@pytest.mark.parametrize("line", ["# 09:32, wind 7 m/s", "NAME", "Total rows: 1800"])
+def test_a_line_of_words_is_no_sample(line: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", zigzag())
+    names, *rows = path.read_text("utf-8").splitlines()
+    said = names if line == "NAME" else line
+    path.write_text("\n".join([names, *rows[:9], said, *rows[9:], said]) + "\n", "utf-8")
+    run = propose(path, TANKER).run
+    assert run is not None
+    first = names.split(",")[0] if line == "NAME" else said.split(",")[0]
+    assert f"2 rows with words in place of a time, left out, such as '{first}'" in run.notes
+    known = np.isfinite(run.time)
+    assert known.sum() == len(rows)
+    np.testing.assert_allclose(run.pose[known, 0], zigzag()[NAMES["x"]], rtol=1e-8)
 
 
 def test_a_log_with_commands_of_actuators_needs_its_ship(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -225,6 +226,17 @@ def test_a_spreadsheet_is_no_text(tmp_path: Path, look: Callable[[Path], object]
         look(path)
 
 
+@pytest.mark.parametrize("compression", ["gzip", "bz2", "xz"])
+@pytest.mark.parametrize("look", [propose, read])
+def test_a_compressed_file_is_to_be_unpacked(
+    tmp_path: Path, look: Callable[[Path], object], compression: Literal["gzip", "bz2", "xz"]
+) -> None:
+    path = tmp_path / "a.csv"
+    table().to_csv(path, index=False, compression=compression)
+    with pytest.raises(InputError, match=r"a\.csv' is compressed; unpack it"):
+        look(path)
+
+
 def test_a_text_in_utf_16_is_named_with_the_line_that_reads_it(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     table().to_csv(path, index=False, encoding="utf-16")
@@ -299,7 +311,7 @@ def test_cells_far_beyond_the_limit_of_a_command_are_missing(tmp_path: Path, mar
     expected[[20, 50, 51]] = expected[[19, 49, 49]]
     np.testing.assert_allclose(run.commanded["port.n"], expected)
     np.testing.assert_allclose(run.commanded["starboard.n"], 4.0)
-    assert "port.n: 3 cells far beyond its limits count as missing" in run.notes
+    assert "port.n: 3 cells far beyond its limits left out" in run.notes
     content.loc[:60, "port.n"] = 60.0 * content.loc[:60, "port.n"]  # in revolutions a minute
     as_written = content["port.n"].to_numpy()
     run = read(written(tmp_path / "a.csv", content), of=OTTER)
@@ -313,7 +325,7 @@ def test_a_wind_speed_below_zero_is_missing(tmp_path: Path, speed: str) -> None:
     run = read(written(tmp_path / "a.csv", table(**of)))
     expected = np.where(TIME == 7.5, np.nan, measured)
     np.testing.assert_array_equal(run.measured[speed], expected)
-    assert f"{speed}: 1 cells far beyond its limits count as missing" in run.notes
+    assert f"{speed}: 1 cell far beyond its limits left out" in run.notes
     calm = read(written(tmp_path / "b.csv", table(**of | {speed: np.abs(measured)})))
     assert not calm.notes
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import constants as c
 
 from cosim import InputError
+from cybership.message_text import counted
 from fmus.scale import REFERENCE, Scale
 
 from .files.reading import Run
@@ -47,7 +48,7 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
             )
         return even
     out = found.left_out + lost
-    note = (f"{out} rows left out: time missing, repeated or decreasing",) if out else ()
+    note = (f"{counted(out, 'row')} left out: time missing, repeated or decreasing",) if out else ()
     return replace(found.rows(kept), left_out=out, notes=(*found.notes, *note))
 
 

@@ -22,6 +22,7 @@ THOUSANDS = {  # decimal mark -> numbers with separators of thousands, as 19,800
 }
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 ARCHIVE = b"PK\3\4"  # how a zip file begins
+COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd")  # gzip, bzip2, xz, zstandard
 # How a sentence of NMEA 0183 begins; a stamp or names of columns may be before it.
 SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,|(?s:.*)[\s,;\"'][$!][A-Z]{4}\w,")
 DATAFLASH = b"FMT, "  # how a log of ArduPilot as a text begins
@@ -104,13 +105,15 @@ def refuse_encoding(path: Path, layout: Layout) -> None:
 
 
 def refuse_sentences(path: Path) -> None:
-    """Refuse a text of NMEA 0183 sentences, and a spreadsheet, neither of which is a table."""
+    """Refuse NMEA 0183 sentences, a spreadsheet and a compressed file, none of which is a table."""
     with path.open("rb") as content:
         begin = content.read(1000)
         if begin.startswith(ARCHIVE):
             raise InputError(
                 f"'{path}' is an archive, as a spreadsheet is; save its table as a CSV file"
             )
+        if begin.startswith(COMPRESSED):
+            raise InputError(f"'{path}' is compressed; unpack it")
         if SENTENCE.match(begin):
             raise InputError(
                 f"'{path}' has NMEA 0183 sentences; a measurement is a table: write a CSV file with a "

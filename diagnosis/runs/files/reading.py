@@ -16,6 +16,7 @@ import pandas as pd
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
+from cybership.message_text import counted, quoted
 from fmus.ops import wrap
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
@@ -50,6 +51,7 @@ from .tables import (
     clock_seconds,
     column_names,
     date_stamps,
+    has_words,
     is_cell,
     numbers,
     resolution,
@@ -235,6 +237,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
     """A run of a table's signals."""
     columns, noise, quantity = {}, {}, quantities(of)
     steps: dict[str, np.ndarray] = {}
+    table, remarks = _without_remarks(table, layout)
     for signal in signals(layout, list(table.columns), where, of):
         column = layout.column(signal)
         cells = table[column.name]
@@ -266,15 +269,43 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
     columns |= {s: _earlier(columns[s], columns["time"], by) for s, by in late.items()}
     run = _run(name, columns, where, of)
     rounded = np.column_stack([steps[name] for name in POSE])
+    notes = [f"{s}: {note}" for s in columns if s != "time" for note in _no_numbers(table, layout, s)]
     called = {s: c.name for s, c in layout.columns.items() if c.name != s}
     return replace(
         run,
         called=called or None,
+        notes=(*run.notes, *remarks, *notes),
         noise=noise,
         trial=layout.trial,
         resolution=rounded,
         layout=layout,
     )
+
+
+def _without_remarks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, list[str]]:
+    """A table without what stands in rows with words in place of a time, and what is said of these."""
+    name = layout.column("time").name
+    words = has_words(table[name]) if name in table else np.zeros(len(table), bool)
+    if not words.any():
+        return table, []
+    stamps = date_stamps(table[name])
+    words &= True if stamps is None else np.isnan(stamps)  # as of "Dec 31, 2026 23:59"
+    told = _told(table[name], words, "row", "with words in place of a time, left out")
+    return table.mask(np.broadcast_to(words[:, None], table.shape)), told
+
+
+def _no_numbers(table: pd.DataFrame, layout: Layout, signal: str) -> list[str]:
+    """A note of the cells of a signal that have words."""
+    cells = table[layout.column(signal).name]
+    return _told(cells, has_words(cells), "cell", "without a number")
+
+
+def _told(cells: pd.Series, words: np.ndarray, what: str, how: str) -> list[str]:
+    """A note of the cells (n,) of a column that have words, with the first; none if there are none."""
+    if not words.any():
+        return []
+    first = quoted(str(cells.iloc[int(words.argmax())]).strip())
+    return [f"{counted(int(words.sum()), what)} {how}, such as {first}"]
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
@@ -314,14 +345,16 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
             "its column, or fill in zeros"
         )
     missing = [~np.isfinite(columns[s]) for s in given]
-    lost = sum(gaps.any() for gaps in missing)
+    lost = sum(bool(gaps.any()) for gaps in missing)
     if tau is None:
         assert commands is not None
         tau = of.commanded_force(commands, power)
     notes = tuple(
-        f"{s}: {cells.sum()} cells far beyond its limits count as missing" for s, cells in false.items()
+        f"{s}: {counted(int(cells.sum()), 'cell')} far beyond its limits left out"
+        for s, cells in false.items()
     )
-    notes += (f"commands are missing in {lost} columns; the last value is held",) if lost else ()
+    held_in = f"commands are missing in {counted(lost, 'column')}; the last value is held"
+    notes += (held_in,) if lost else ()
     notes += tuple(f"no column {signal}: zero is used" for signal in absent)
     return Run(
         name,

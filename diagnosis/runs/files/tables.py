@@ -33,6 +33,8 @@ from .text_layout import STAMP, is_marked
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
 DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
+# Of a cell without a value, of a comment, and of a line such as "Total rows: 1800".
+WORDS = re.compile(r"\D*|(#|%|//|[^\W\d_]{2}).*")
 ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
 FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
@@ -189,7 +191,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         stamps = pd.to_datetime(cells, errors="coerce", utc=True)
     if stamps.isna().all():
         return None
-    first = _first(cells, stamps.isna())
+    first = _first(cells, stamps.isna() & ~has_words(cells))
     if first is not None and where is not None:
         wrong, row = first
         raise InputError(
@@ -233,20 +235,35 @@ def _day(text: str, day_first: bool) -> datetime | None:
         return None
 
 
+def has_words(cells: pd.Series) -> np.ndarray:
+    """(n,), the cells of a column that are words: without a digit, a remark, or its name again."""
+    if pd.api.types.is_numeric_dtype(cells) or pd.api.types.is_datetime64_any_dtype(cells):
+        return np.zeros(len(cells), bool)
+    texts = cells.astype("string").str.strip().fillna("0")
+    return np.asarray(texts.str.fullmatch(WORDS), bool) | np.asarray(texts == str(cells.name), bool)
+
+
 def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
-    """A column as floats; empty cells are NaN."""
+    """A column as floats; empty cells and those with words, see :func:`has_words`, are NaN.
+
+    Raises:
+        InputError: another cell is not a number, or none is.
+    """
+    marked = layout.decimal != "." and not pd.api.types.is_numeric_dtype(cells)  # beside words
+    values = cells.astype("string").str.replace(layout.decimal, ".") if marked else cells
     try:
-        found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+        found = np.asarray(pd.to_numeric(values, errors="coerce"), float)
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
         raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
-    first = _first(cells, np.isnan(found))
+    missing = np.isnan(found)
+    first = _first(cells, missing & ~has_words(cells)) or (
+        _first(cells, missing) if missing.all() else None
+    )
     if first is not None:
         wrong, row = first
         hint = what_to_do(path, layout, wrong)
         if cells.name == layout.column("time").name:
             hint = hint or " or a time stamp of ISO 8601, such as 2026-12-31T23:59:59.5Z"
-        elif not any(c.isdigit() for c in wrong):
-            hint = "; a cell without a measurement must be empty"
         raise InputError(f"'{path}': {cells.name} = {quoted(wrong)} in row {row} is not a number{hint}")
     return found
 
