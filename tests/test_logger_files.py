@@ -300,7 +300,7 @@ def test_the_direction_of_a_shaft_is_not_its_speed(
     np.testing.assert_allclose(found.run.commanded["propeller.n"], np.where(astern, sign * 10.0, 10.0))
 
 
-@pytest.mark.parametrize("mark", [-999.0, 9999.0, -32768.0])
+@pytest.mark.parametrize("mark", [-999.0, 9999.0, -32768.0, -99.9, 35.0])
 def test_cells_far_beyond_the_limit_of_a_command_are_missing(tmp_path: Path, mark: float) -> None:
     """As loggers mark what they do not have; a column of them is in another unit."""
     own = {"port.n": 5.0 + np.sin(0.3 * TIME), "starboard.n": np.full(TIME.size, 4.0)}
@@ -316,6 +316,17 @@ def test_cells_far_beyond_the_limit_of_a_command_are_missing(tmp_path: Path, mar
     as_written = content["port.n"].to_numpy()
     run = read(written(tmp_path / "a.csv", content), of=OTTER)
     np.testing.assert_allclose(run.commanded["port.n"], as_written)
+
+
+@pytest.mark.parametrize("given", [(35.0, 36.0, 35.0), (30.0, 30.0, 30.0)])  # of at most 16.5 1/s
+def test_a_demand_beyond_the_limit_of_an_actuator_is_a_command(
+    tmp_path: Path, given: tuple[float, float, float]
+) -> None:
+    own = {"port.n": 5.0 + np.sin(0.3 * TIME), "starboard.n": np.full(TIME.size, 4.0)}
+    own["port.n"][[20, 50, 51]] = given
+    content = table(**own).drop(columns=["tau_X", "tau_Y", "tau_N"])
+    run = read(written(tmp_path / "a.csv", content), of=OTTER)
+    np.testing.assert_allclose(run.commanded["port.n"], own["port.n"])
 
 
 @pytest.mark.parametrize("speed", ["wind_speed", "wind_speed_relative"])

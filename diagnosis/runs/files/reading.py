@@ -375,13 +375,17 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
 def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np.ndarray]:
     """Signal -> (n,), cells of an actuator's command that are far beyond its limit, where most are not.
 
-    Loggers write numbers such as -999 where they have no value. An angle without a limit is turned on.
+    Loggers write numbers such as -999 where they have no value: one number, and nothing between it and
+    the limit, if that is less far. An angle without a limit is turned on.
     """
     found = {}
     for form, layout in zip(of.command_forms, of.layouts, strict=True):
         for signal, limit in zip(form, largest_commands(layout, of, np.inf), strict=True):
-            size = np.abs(columns.get(signal, ()))
-            far = size > FAR * limit
+            values = columns.get(signal, np.empty(0))
+            size = np.abs(values)
+            far, beyond = size > FAR * limit, size > limit
+            if np.unique(values[beyond]).size == 1 and size[beyond][0] > 2.0 * limit:
+                far = beyond
             if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
                 found[signal] = far
     return found
