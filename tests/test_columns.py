@@ -151,6 +151,31 @@ def test_separators_of_thousands_are_named(
         propose(tmp_path / "a.csv", TANKER)
 
 
+def test_an_actuator_that_was_never_used_needs_no_column(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", zigzag().drop(columns=NAMES["rudder.delta"]))
+    side_car = propose(path, TANKER).needed
+    beside = path.with_name("a.csv.json")
+    beside.write_text(json.dumps(side_car), "utf-8")
+    with pytest.raises(InputError, match=r'rudder.delta is blank.* with "unused": \["rudder.delta"\]'):
+        read(path, of=TANKER)
+    del side_car["columns"]["rudder.delta"]
+    beside.write_text(json.dumps(side_car), "utf-8")
+    with pytest.raises(InputError, match=r'no column .rudder.delta.*put "unused": \["rudder.delta"\]'):
+        read(path, of=TANKER)
+    beside.write_text(json.dumps(side_car | {"unused": ["rudder.delta"]}), "utf-8")
+    run = read(path, of=TANKER)
+    assert not run.commanded["rudder.delta"].any()
+    assert not any("rudder" in note for note in run.notes)
+    found = propose(path, TANKER)
+    assert found.run is not None
+    np.testing.assert_array_equal(found.run.commanded["propeller.n"], run.commanded["propeller.n"])
+    beside.write_text(json.dumps(side_car | {"unused": ["rudder.alpha"]}), "utf-8")
+    with pytest.raises(
+        InputError, match=r"'rudder.alpha' is not a command; did you mean 'rudder.delta'"
+    ):
+        read(path, of=TANKER)
+
+
 @pytest.mark.parametrize("decimal", [".", ","])
 @pytest.mark.parametrize("mark", ["-", "*****", "Bad Input", "# jump", "bad 7"])
 def test_a_cell_with_words_is_without_a_value(mark: str, decimal: str, tmp_path: Path) -> None:

@@ -165,6 +165,7 @@ class Layout(BaseModel):
     skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # 1, lines before that of the names
     units_line: bool = False  # whether the line below the names is of units
     columns: dict[str, Column] = {}  # x, y, psi, ... -> a column
+    unused: tuple[str, ...] = ()  # commands that were zero all the time, and have no column
     trial: str | None = None  # the manoeuvring trial that it is, as zigzag
 
     @field_validator("trial")
@@ -328,8 +329,14 @@ def read_layout(path: Path) -> Layout | None:
         raise InputError(
             f"'{file}': columns.{blank} is blank; put the name of its column there "
             f"(cybership columns '{path}' lists likely ones), or delete the entry"
+            + (f"; if it was never used, with {_unused(blank)} in its place" if "." in blank else "")
         )
     return found
+
+
+def _unused(signal: str) -> str:
+    """What states that a command was zero all the time."""
+    return f'"unused": ["{signal}"] beside "columns"'
 
 
 def stated_layout(path: Path) -> Layout | None:
@@ -361,9 +368,8 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
     every = _forms(of)
     groups = [g for g in every if any(layout.column(s).name in names for s in g)]
     known = quantities(of)
-    strange = next((signal for signal in layout.columns if signal not in known), None)
-    if strange:
-        raise InputError(f"{where}: {quoted(strange)} is not a signal of a run{nearest(strange, known)}")
+    commands = {s for group in every for s in group}
+    _check_names(layout, known, commands, where)
     if not groups:
         forms = ", or ".join(", ".join(group) for group in every)
         raise InputError(
@@ -381,7 +387,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
         wanted |= dict.fromkeys((*named, *others))
     there = {layout.column(s).name for s in wanted}
     others = [name.casefold().replace("_", "") for name in names if name not in there]
-    for signal in list(wanted):
+    for signal in [s for s in wanted if s not in layout.unused]:
         name = layout.column(signal).name
         if names.count(name) > 1:
             raise InputError(f"{where} has the column '{name}' more than once")
@@ -392,8 +398,20 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
             meant = f" (for {signal})" if name != signal else ""
             known = nearest(name, names)
             propose = "" if signal in named else f"; {PROPOSE}"
+            if signal in commands:
+                propose += f"; if it was never used, put {_unused(signal)}"
             raise InputError(f"{where} has no column '{name}'{meant}{known}{propose}")
-    return list(wanted)
+    return [s for s in wanted if s not in layout.unused]
+
+
+def _check_names(layout: Layout, known: Collection[str], commands: Collection[str], where: str) -> None:
+    """Refuse what is not a signal of a run, or not a command."""
+    if strange := next((signal for signal in layout.columns if signal not in known), None):
+        raise InputError(f"{where}: {quoted(strange)} is not a signal of a run{nearest(strange, known)}")
+    if strange := next((signal for signal in layout.unused if signal not in commands), None):
+        raise InputError(
+            f"{where}: unused: {quoted(strange)} is not a command{nearest(strange, commands)}"
+        )
 
 
 def missing(layout: Layout, names: Sequence[str], of: Ship) -> list[str]:
@@ -402,7 +420,8 @@ def missing(layout: Layout, names: Sequence[str], of: Ship) -> list[str]:
     there = [g for g in every if any(layout.column(s).name in names for s in g)]
     # Of forces that are there, those on other axes are taken as zero.
     needed = [s for g in there if g != TAU for s in g] if there else _meant(every, names)
-    return [s for s in ("time", *POSE, *needed) if layout.column(s).name not in names]
+    wanted = [s for s in ("time", *POSE, *needed) if s not in layout.unused]
+    return [s for s in wanted if layout.column(s).name not in names]
 
 
 def _meant(forms: Sequence[tuple[str, ...]], names: Iterable[str]) -> tuple[str, ...]:

@@ -265,11 +265,17 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
             noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
     sampled = [s for s, c in layout.columns.items() if c.measured and s in columns]
     columns |= {s: row_means(columns[s], columns["time"], quantity[s] == "angle") for s in sampled}
+    columns |= {s: np.zeros(len(table)) for s in layout.unused}
     late = {s: c.late for s, c in layout.columns.items() if c.late and s in columns}
     columns |= {s: _earlier(columns[s], columns["time"], by) for s, by in late.items()}
     run = _run(name, columns, where, of)
     rounded = np.column_stack([steps[name] for name in POSE])
-    notes = [f"{s}: {note}" for s in columns if s != "time" for note in _no_numbers(table, layout, s)]
+    notes = [
+        f"{s}: {note}"
+        for s in columns
+        if s not in ("time", *layout.unused)
+        for note in _no_numbers(table, layout, s)
+    ]
     called = {s: c.name for s, c in layout.columns.items() if c.name != s}
     return replace(
         run,
