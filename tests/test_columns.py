@@ -214,6 +214,7 @@ def test_a_line_of_words_is_no_sample(line: str, tmp_path: Path) -> None:
     path.write_text("\n".join([names, *rows[:9], said, *rows[9:], said]) + "\n", "utf-8")
     run = propose(path, TANKER).run
     assert run is not None
+    assert not any("missing" in note for note in run.notes)
     first = names.split(",")[0] if line == "NAME" else said.split(",")[0]
     assert f"2 rows with words in place of a time, left out, such as '{first}'" in run.notes
     known = np.isfinite(run.time)

@@ -237,7 +237,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
     """A run of a table's signals."""
     columns, noise, quantity = {}, {}, quantities(of)
     steps: dict[str, np.ndarray] = {}
-    table, remarks = _without_remarks(table, layout)
+    table, remarks = _without_remarks(table.reset_index(drop=True), layout)
     for signal in signals(layout, list(table.columns), where, of):
         column = layout.column(signal)
         cells = table[column.name]
@@ -289,7 +289,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
 
 
 def _without_remarks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, list[str]]:
-    """A table without what stands in rows with words in place of a time, and what is said of these."""
+    """A table without rows with words in place of a time, and what is said of these."""
     name = layout.column("time").name
     words = has_words(table[name]) if name in table else np.zeros(len(table), bool)
     if not words.any():
@@ -297,7 +297,7 @@ def _without_remarks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame,
     stamps = date_stamps(table[name])
     words &= True if stamps is None else np.isnan(stamps)  # as of "Dec 31, 2026 23:59"
     told = _told(table[name], words, "row", "with words in place of a time, left out")
-    return table.mask(np.broadcast_to(words[:, None], table.shape)), told
+    return table.loc[~words], told  # the others keep their numbers, for messages
 
 
 def _no_numbers(table: pd.DataFrame, layout: Layout, signal: str) -> list[str]:

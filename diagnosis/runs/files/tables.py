@@ -301,7 +301,7 @@ def is_cell(cells: pd.Series, text: str) -> np.ndarray:
 def _first(cells: pd.Series, unreadable: Any) -> tuple[str, int] | None:
     """The first cell that is not empty and could not be read, and its row below the names, from 1."""
     wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
-    return (str(cells.iloc[wrong[0]]), int(wrong[0]) + 1) if wrong.size else None
+    return (str(cells.iloc[wrong[0]]), int(cells.index[wrong[0]]) + 1) if wrong.size else None
 
 
 def resolution(values: np.ndarray) -> np.ndarray:
