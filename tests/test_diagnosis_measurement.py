@@ -150,10 +150,12 @@ def test_times_of_an_epoch_count_from_the_first(tmp_path, unit, per):
 
 def test_first_stamp_that_is_none_is_told(tmp_path):
     stamps = (pd.Timestamp("2026-11-20T09:30:00Z") + pd.to_timedelta(TIME, unit="s")).astype(str)
-    with_tau().assign(time=np.where(np.arange(N) == 7, "noon", stamps)).to_csv(
-        tmp_path / "a.csv", index=False
-    )
-    refused(tmp_path / "a.csv", "time = 'noon' in row 8 is not a time stamp of ISO 8601")
+    path = tmp_path / "a.csv"
+    with_tau().assign(time=np.where(np.arange(N) == 7, "9 o'clock", stamps)).to_csv(path, index=False)
+    refused(path, 'time = "9 o\'clock" in row 8 is not a time stamp of ISO 8601')
+    words = [*stamps[:3], "noon", *stamps[4:7], "9 o'clock", *stamps[8:]]
+    with_tau().assign(time=words).to_csv(path, index=False)
+    refused(path, 'time = "9 o\'clock" in row 8')  # a row of words before it counts
 
 
 def test_unit_that_cannot_be_is_told_with_the_own_name_of_the_column(tmp_path):

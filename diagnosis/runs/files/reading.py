@@ -359,6 +359,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         f"{s}: {counted(int(cells.sum()), 'cell')} far beyond its limits left out"
         for s, cells in false.items()
     )
+    notes += _clipped(columns, of)
     held_in = f"commands are missing in {counted(lost, 'column')}; the last value is held"
     notes += (held_in,) if lost else ()
     notes += tuple(f"no column {signal}: zero is used" for signal in absent)
@@ -395,6 +396,23 @@ def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np
             if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
                 found[signal] = far
     return found
+
+
+def _clipped(columns: Mapping[str, np.ndarray], of: Ship) -> tuple[str, ...]:
+    """Notes of commands that are often beyond their limits, as the speed of an engine with a gear."""
+    notes = {}
+    for form, layout in zip(of.command_forms, of.layouts, strict=True):
+        for (signal, unit), limit in zip(
+            form.items(), largest_commands(layout, of, np.inf), strict=True
+        ):
+            size = np.abs(columns.get(signal, np.empty(0)))
+            beyond = size > (1.0 + NEGLIGIBLE) * limit
+            if size.size and beyond.mean() > NEGLIGIBLE:
+                notes[signal] = (
+                    f"{signal} is beyond its limit of {limit:.4g} {unit} in {beyond.mean():.0%} of the "
+                    f"rows, up to {np.nanmax(size):.4g}; it counts as the limit there"
+                ).replace("%", " %")
+    return tuple(notes.values())
 
 
 def _false_winds(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
