@@ -5,7 +5,7 @@ Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and co
 files that NTNU publishes of CyberShip Enterprise 1.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -386,33 +386,36 @@ def _false_commands(columns: Mapping[str, np.ndarray], of: Ship) -> dict[str, np
     the limit, if that is less far. An angle without a limit is turned on.
     """
     found = {}
-    for form, layout in zip(of.command_forms, of.layouts, strict=True):
-        for signal, limit in zip(form, largest_commands(layout, of, np.inf), strict=True):
-            values = columns.get(signal, np.empty(0))
-            size = np.abs(values)
-            far, beyond = size > FAR * limit, size > limit
-            if np.unique(values[beyond]).size == 1 and size[beyond][0] > 2.0 * limit:
-                far = beyond
-            if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
-                found[signal] = far
+    for signal, _, limit in _limits(columns, of):
+        values = columns[signal]
+        size = np.abs(values)
+        far, beyond = size > FAR * limit, size > limit
+        if np.unique(values[beyond]).size == 1 and size[beyond][0] > 2.0 * limit:
+            far = beyond
+        if 0 < far.sum() <= NEGLIGIBLE * np.count_nonzero(size):
+            found[signal] = far
     return found
 
 
 def _clipped(columns: Mapping[str, np.ndarray], of: Ship) -> tuple[str, ...]:
     """Notes of commands that are often beyond their limits, as the speed of an engine with a gear."""
     notes = {}
-    for form, layout in zip(of.command_forms, of.layouts, strict=True):
-        for (signal, unit), limit in zip(
-            form.items(), largest_commands(layout, of, np.inf), strict=True
-        ):
-            size = np.abs(columns.get(signal, np.empty(0)))
-            beyond = size > (1.0 + NEGLIGIBLE) * limit
-            if size.size and beyond.mean() > NEGLIGIBLE:
-                notes[signal] = (
-                    f"{signal} is beyond its limit of {limit:.4g} {unit} in {beyond.mean():.0%} of the "
-                    f"rows, up to {np.nanmax(size):.4g}; it counts as the limit there"
-                ).replace("%", " %")
+    for signal, unit, limit in _limits(columns, of):
+        size = np.abs(columns[signal])
+        share = np.mean(size > (1.0 + NEGLIGIBLE) * limit)
+        if share > NEGLIGIBLE:
+            notes[signal] = (
+                f"{signal} is beyond its limit of {limit:.4g} {unit} in {100.0 * share:.0f} % of the "
+                f"rows, up to {np.nanmax(size):.4g}; it counts as the limit there"
+            )
     return tuple(notes.values())
+
+
+def _limits(columns: Mapping[str, np.ndarray], of: Ship) -> Iterator[tuple[str, str, float]]:
+    """Commands of actuators that are there, with their units and the largest values in all forms."""
+    for form, layout in zip(of.command_forms, of.layouts, strict=True):
+        each = zip(form.items(), largest_commands(layout, of, np.inf).tolist(), strict=True)
+        yield from ((signal, unit, limit) for (signal, unit), limit in each if signal in columns)
 
 
 def _false_winds(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

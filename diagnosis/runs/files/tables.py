@@ -191,7 +191,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         stamps = pd.to_datetime(cells, errors="coerce", utc=True)
     if stamps.isna().all():
         return None
-    first = _first(cells, stamps.isna() & ~has_words(cells))
+    first = _first(cells, stamps.isna())
     if first is not None and where is not None:
         wrong, row = first
         raise InputError(
@@ -256,9 +256,7 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
         raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
     missing = np.isnan(found)
-    first = _first(cells, missing & ~has_words(cells)) or (
-        _first(cells, missing) if missing.all() else None
-    )
+    first = _first(cells, missing, words=bool(missing.all()))
     if first is not None:
         wrong, row = first
         hint = what_to_do(path, layout, wrong)
@@ -298,10 +296,15 @@ def is_cell(cells: pd.Series, text: str) -> np.ndarray:
     return same | np.asarray(pd.to_numeric(cells, errors="coerce") == number)
 
 
-def _first(cells: pd.Series, unreadable: Any) -> tuple[str, int] | None:
-    """The first cell that is not empty and could not be read, and its row below the names, from 1."""
-    wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
-    return (str(cells.iloc[wrong[0]]), int(cells.index[wrong[0]]) + 1) if wrong.size else None
+def _first(cells: pd.Series, unreadable: Any, words: bool = False) -> tuple[str, int] | None:
+    """The first cell that is not empty and could not be read, and its row below the names, from 1.
+
+    Those with words do not count, unless ``words``.
+    """
+    wrong = cells.loc[np.asarray(unreadable) & np.asarray(cells.notna())]
+    if not words:
+        wrong = wrong.loc[~has_words(wrong)]
+    return (str(wrong.iloc[0]), int(wrong.index[0]) + 1) if wrong.size else None
 
 
 def resolution(values: np.ndarray) -> np.ndarray:
