@@ -18,6 +18,7 @@ from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .frozen import goes_straight, repeated, stuck
+from .position_jumps import parted
 from .row_order import in_bursts, missing_rows, ordered
 from .run_constants import EVERY, HORIZON, LEVEL, LONG, NEGLIGIBLE, ORDER, WIDTH
 
@@ -171,11 +172,12 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         InputError: too short, time not in order, another unit than said, nothing valid, no motion.
     """
     where, run = f"run '{run.name}'", ordered(run, scale)
-    notes = list(run.notes)
     run = replace(
         run, pose=np.where(np.maximum(np.abs(run.pose), run.coarse) < LARGEST, run.pose, np.nan)
     )
+    run = parted(run, scale)
     row, seconds = refuse_short(run, scale)
+    notes = list(run.notes)
     gone = (run.pose == 0.0).all(axis=1)
     seen, repeats, between = updates(run, PLACE, gone)
     alone, lines = stuck(run, seen)

@@ -1,0 +1,74 @@
+"""Jumps of the position: a part was cut out of the log, or a receiver began anew."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fmus.scale import REFERENCE, Scale
+
+from .files.reading import Run
+from .run_constants import CHANCE, FAR, IN_A_ROW, LONG, WIDTH
+
+Jump = tuple[int, complex]  # the row behind it, and its way to the north plus i times that to the east
+
+
+def parted(run: Run, scale: Scale = REFERENCE) -> Run:
+    """A run with a gap in its time where the position jumps and does not come back.
+
+    The gap is as long as the ship needs for the jump at the highest speed that it has elsewhere.
+
+    Args:
+        run: its rows in order.
+        scale: of the ship.
+    """
+    there = np.flatnonzero(np.isfinite(run.pose[:, :2]).all(axis=1))
+    held = (np.diff(run.pose[there, :2], axis=0) == 0.0).all(axis=1)
+    rows = np.delete(there, np.flatnonzero(held) + 1)
+    if rows.size <= 2 * IN_A_ROW:
+        return run
+    time, place = run.time[rows], run.pose[rows, 0] + 1j * run.pose[rows, 1]
+    speed = np.abs(place[IN_A_ROW:] - place[:-IN_A_ROW]) / (time[IN_A_ROW:] - time[:-IN_A_ROW])
+    highest = float(np.quantile(speed, 1.0 - IN_A_ROW * CHANCE))  # of all but one jump in a hundred rows
+    time_of, notes = run.time.copy(), list(run.notes)
+    for row, way in _lasting([(rows[k], way) for k, way in _jumps(time, place, highest)]):
+        gap = max(abs(way) / highest, LONG * WIDTH * scale.time)
+        time_of[row:] += gap
+        notes.append(
+            f"the position jumps by {abs(way):.3g} m, {run.time[row] - run.time[0]:.4g} s from the start: "
+            f"the run is parted there; if rows were cut out, about {gap:.3g} s of them"
+        )
+    return replace(run, time=time_of, notes=tuple(notes))
+
+
+def _jumps(time: np.ndarray, place: np.ndarray, highest: float) -> list[Jump]:
+    """Jumps between samples of a place (n,) [m] at times (n,) [s], beyond a highest speed [m/s].
+
+    The lines through the samples before and behind are further apart than the ship goes meanwhile, and
+    far more than the samples are from their lines.
+    """
+    found = []
+    for k in np.flatnonzero(np.abs(np.diff(place)) > FAR * highest * np.diff(time)) + 1:
+        sides = slice(k - IN_A_ROW, k), slice(k, k + IN_A_ROW)
+        if not IN_A_ROW <= k <= time.size - IN_A_ROW:
+            continue
+        middle = 0.5 * (time[k - 1] + time[k])
+        lines = [np.polyfit(time[side] - middle, place[side], 1) for side in sides]
+        off = [
+            np.abs(place[side] - np.polyval(line, time[side] - middle)).max()
+            for side, line in zip(sides, lines, strict=True)
+        ]
+        way = lines[1][1] - lines[0][1]
+        if abs(way) > max(highest * (time[k + IN_A_ROW - 1] - time[k - IN_A_ROW]), FAR * max(off)):
+            found.append((int(k), complex(way)))
+    return found
+
+
+def _lasting(jumps: list[Jump]) -> list[Jump]:
+    """Jumps without those that the next one takes back, as of a receiver whose signal is reflected."""
+    kept: list[Jump] = []
+    for row, way in jumps:
+        if kept and 2.0 * abs(kept[-1][1] + way) < abs(way):
+            kept.pop()
+        else:
+            kept.append((row, way))
+    return kept
