@@ -13,7 +13,7 @@ from cosim import InputError
 from diagnosis import propose_columns
 from diagnosis.predictors import ship_with
 from diagnosis.runs import FOLDER_FILE, line_beside, meaning, prepare, propose, read
-from diagnosis.runs.columns.columns import Named, quantities
+from diagnosis.runs.columns.columns import POSE, Named, quantities
 from diagnosis.runs.columns.likely_columns import meaning_of_words, motion_of
 from diagnosis.runs.columns.unit_check import UNITS, spelt
 
@@ -385,12 +385,60 @@ def test_what_is_known_is_proposed_and_read(tmp_path: Path) -> None:
 
 
 def test_of_two_columns_of_one_meaning_none_is_chosen_and_both_are_likely(tmp_path: Path) -> None:
-    table = zigzag()
-    table["delta_rudder_cmd [rad]"] = table["delta_rudder [rad]"]
+    table = zigzag().rename(columns={"delta_rudder [rad]": "delta_rudder_cmd [rad]"})
+    table["delta_rudder_order [rad]"] = table["delta_rudder_cmd [rad]"]
     found = propose(written(tmp_path / "a.csv", table), TANKER)
     assert found.needed["columns"]["rudder.delta"] == ""
     likely = {c.name for c in found.likely["rudder.delta"]}
-    assert likely == {"delta_rudder [rad]", "delta_rudder_cmd [rad]"}
+    assert likely == {"delta_rudder_order [rad]", "delta_rudder_cmd [rad]"}
+
+
+@pytest.mark.parametrize(
+    ("names", "chosen", "measured"),
+    [
+        (["Rudder feedback [rad]", "Rudder cmd [rad]"], "Rudder cmd [rad]", None),
+        (["RudderAct [rad]", "RudderSet [rad]", "rudder angle [rad]"], "RudderSet [rad]", None),
+        (["Rudder_Ist [rad]", "Rudder [rad]"], "Rudder [rad]", None),
+        (["rudder_fb [rad]"], "rudder_fb [rad]", True),
+        (["RSA [rad]"], "RSA [rad]", None),
+    ],
+)
+def test_an_order_is_a_command_and_a_measured_value_where_there_is_none(
+    tmp_path: Path, names: list[str], chosen: str, measured: bool | None
+) -> None:
+    table = zigzag().rename(columns={"delta_rudder [rad]": names[0]})
+    table = table.assign(**dict.fromkeys(names[1:], table[names[0]]))
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    column = found.layout.column("rudder.delta")
+    assert (column.name, column.measured) == (chosen, measured)
+
+
+def test_positions_of_the_first_of_two_receivers_count(tmp_path: Path) -> None:
+    table = zigzag().drop(columns=[NAMES["x"], NAMES["y"]])
+    for k in (2, 1):
+        north = 63.0 + 1e-5 * np.arange(len(table))
+        table = table.assign(**{f"GPS{k} Lat": north, f"GPS{k} Lon": 10.0 + 1e-6 * k})
+    found = propose(written(tmp_path / "a.csv", table), TANKER)
+    assert [found.layout.column(s).name for s in "xy"] == ["GPS1 Lat", "GPS1 Lon"]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("TIME_S", "NORTH_M", "EAST_M", "HEADING_DEG"),
+        ("Time", "UTM32N_N", "UTM32N_E", "Yaw [deg]"),
+        ("时间", "北向", "东向", "首向"),
+    ],
+)
+def test_names_in_capitals_with_a_zone_and_in_chinese_are_known(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    table = zigzag().rename(columns=dict(zip((NAMES[s] for s in ("time", *POSE)), names, strict=True)))
+    path = tmp_path / "a.csv"
+    table.to_csv(path, index=False, encoding="gb18030" if names[0] == "时间" else "utf-8")
+    found = propose(path, TANKER)
+    assert [found.layout.column(s).name for s in ("time", *POSE)] == [*names]
+    assert found.run is not None
 
 
 def test_blanks_have_likely_columns_by_the_motion(tmp_path: Path) -> None:

@@ -240,7 +240,7 @@ def test_a_compressed_file_is_to_be_unpacked(
 def test_a_text_in_utf_16_is_named_with_the_line_that_reads_it(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     table().to_csv(path, index=False, encoding="utf-16")
-    with pytest.raises(InputError, match=r'UTF-16; put {"encoding": "utf-16"} into'):
+    with pytest.raises(InputError, match=r'utf-16; put {"encoding": "utf-16"} into'):
         read(path)
     path.with_name("a.csv.json").write_text('{"encoding": "utf-16"}')
     np.testing.assert_allclose(read(path).pose[:, 0], NORTH)

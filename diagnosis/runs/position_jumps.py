@@ -34,8 +34,8 @@ def parted(run: Run, scale: Scale = REFERENCE) -> Run:
         gap = max(abs(way) / highest, LONG * WIDTH * scale.time)
         time_of[row:] += gap
         notes.append(
-            f"the position jumps by {abs(way):.3g} m, {run.time[row] - run.time[0]:.4g} s from the start: "
-            f"the run is parted there; if rows were cut out, about {gap:.3g} s of them"
+            f"the position jumps by {abs(way):.3g} m, {run.time[row] - run.time[0]:.4g} s from the "
+            f"start: the run is parted there; if rows were cut out, about {gap:.3g} s of them"
         )
     return replace(run, time=time_of, notes=tuple(notes))
 

@@ -10,7 +10,16 @@ from cosim import InputError
 
 from .columns import UNITS, Column, Layout, no_unit
 from .geographic import WORDS
-from .likely_columns import SIGN, is_of_shaft, is_steering, meaning_of_words, signal_of_symbol, unit_in
+from .likely_columns import (
+    MEASURED,
+    ORDERS,
+    SIGN,
+    is_of_shaft,
+    is_steering,
+    meaning_of_words,
+    signal_of_symbol,
+    unit_in,
+)
 from .name_units import NAMED_UNITS, NO_UNIT, bare_name, unit_at_the_end, without_unit
 from .name_words import words_of
 from .unit_check import SI_UNIT
@@ -122,8 +131,17 @@ def _by_words(
     own = {
         s: [c for c in each if SIGN.isdisjoint(words_of(c.name))] or each for s, each in found.items()
     }
+    own = {s: _orders(each) if "." in s else each for s, each in own.items()}
     own |= {f"{s}_2": [each.pop()] for s, each in own.items() if f"{s}_2" in quantity and _are_two(each)}
     return {s: each[0] for s, each in own.items() if len(each) == 1 and s not in columns}
+
+
+def _orders(columns: list[Column]) -> list[Column]:
+    """Columns of a command: those called orders, else those not called measured, else the latter."""
+    words = [{*words_of(column.name)} for column in columns]
+    orders = [c for c, own in zip(columns, words, strict=True) if not ORDERS.isdisjoint(own)]
+    others = [c for c, own in zip(columns, words, strict=True) if MEASURED not in own]
+    return orders or others or [c.model_copy(update={"measured": True}) for c in columns]
 
 
 def _are_two(columns: list[Column]) -> bool:

@@ -32,7 +32,7 @@ def geographic_pair(named: Mapping[str, tuple[str, str]], stated: Mapping[str, s
     """Signals x and y -> names of the columns of latitude and longitude; empty without one of each.
 
     Of several that one counts which is stated, whose name has no other word, or the last part of it, as
-    ``GPS.Lat`` beside ``GPS.Lat.Quality``.
+    ``GPS.Lat`` beside ``GPS.Lat.Quality``; of receivers with numbers, as ``GPS1 Lat``, the first.
 
     Args:
         named: column -> its name without the unit, and its unit (empty if not known).
@@ -52,11 +52,19 @@ def geographic_pair(named: Mapping[str, tuple[str, str]], stated: Mapping[str, s
         for parts in (last, names):  # the narrower one last
             own = [c for c, part in parts.items() if WORDS[signal].issuperset(words_of(part))]
             found[signal] = own if len(own) == 1 else found[signal]
+        found[signal] = found[signal] if len(found[signal]) == 1 else _of_first(columns)
         if stated.get(signal) in columns:
             found[signal] = [stated[signal]]
     if any(len(columns) != 1 for columns in found.values()):
         return {}
     return {signal: columns[0] for signal, columns in found.items()}
+
+
+def _of_first(columns: list[str]) -> list[str]:
+    """Of columns whose names differ in a number alone the one with the least; else all."""
+    apart = {re.sub(r"\d+", "", column) for column in columns}
+    numbers = {column: [int(n) for n in re.findall(r"\d+", column)] for column in columns}
+    return [min(columns, key=numbers.__getitem__)] if len(apart) == 1 else columns
 
 
 def is_side(cells: pd.Series, letters: str) -> bool:

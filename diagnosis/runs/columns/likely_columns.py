@@ -18,6 +18,7 @@ from .unit_check import SI_UNIT, UNITS, doubts, largest
 # Words of a speed, which an angle is not.
 CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "angular"))
 ORDERS = frozenset(("order", "command", "cmd"))  # words of a reference, which is no measurement
+MEASURED = "measured"  # word of what an actuator does, as its feedback
 # Words of a column that holds the sign of another one, and its cells of a negative value.
 SIGN = frozenset(("dir", "direction", "sign", "gear", "side"))
 ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
@@ -25,12 +26,12 @@ ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "a
 FILLERS = CHANGES.union(
     ORDERS,
     SIGN,
-    ("hat", "est", "estimated", "estimate", "meas", "measured", "measurement", "filtered", "true"),
+    ("hat", "est", "estimated", "estimate", "meas", MEASURED, "measurement", "filtered", "true"),
     ("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "distance", "data", "value"),
-    ("actual", "thruster", "thrusters", "actuator", "actuators", "azimuth"),
+    ("thruster", "thrusters", "actuator", "actuators", "azimuth"),
     ("gyro", "compass", "utm", "track", "gps", "gnss"),
     ("de", "du", "di", "do", "van", "der", "burta"),
-    ("gga", "rmc", "hdt", "rsa", "me", "sg"),  # sentences of NMEA 0183, tags of plants
+    ("gga", "rmc", "hdt", "me", "sg"),  # sentences of NMEA 0183, tags of plants
 )
 # Quantity -> word that is left of a name -> signal.
 WORDS = {

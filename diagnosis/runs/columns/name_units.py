@@ -42,8 +42,8 @@ def unit_at_the_end(name: str) -> tuple[str, str]:
         quantity, _, unit = name.partition(mark)
         if quantity and spelt(unit) in NAMED_UNITS:
             return quantity, spelt(unit)
-    words = name.split("_")
-    if (inner := re.fullmatch(r"(\w*[a-z\d])([A-Z][a-z]+)", name)) and "_" not in name:  # headingDeg
+    words = (name.lower() if name.isupper() else name).split("_")
+    if inner := re.fullmatch(r"(\w*[a-z\d])([A-Z][a-z]+)", name):  # headingDeg
         words = [*inner.groups()]
     for count in (2, 1):
         unit = spelt("/".join(words[-count:]))

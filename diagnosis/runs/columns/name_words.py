@@ -3,6 +3,9 @@
 import re
 import unicodedata
 
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
+EAST_ASIAN = ("gb18030", "big5", "cp932")  # encodings of Chinese and Japanese
+
 # English words -> those that names have in their place: short forms, German, French, Spanish, Italian,
 # Portuguese, Dutch, Norwegian, Swedish, Polish, all without accents.
 FOREIGN = {
@@ -12,20 +15,20 @@ FOREIGN = {
     "port": "left ps bb backbord babord babor sinistra bakboord bombordo lewa",
     "propeller": "prop screw helice elica schroef sruba sruby",
     "rudder": "steer steering helm ruder gouvernail safran barre timon timone roer roder leme",
-    "rudder angle": "ruderlage ruderwinkel roerhoek rorvinkel rodervinkel",
+    "rudder angle": "rsa ruderlage ruderwinkel roerhoek rorvinkel rodervinkel",
     "bow": "bowthr bowthruster bug bugstrahl bugstrahler bugstrahlruder boeg baug",
     "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
     "fore": "fwd forward vorn forut",
     "aft": "achter akter",
-    "azimuth": "azimut azimute",
-    "thruster": "propulseur strahlruder boegschroef pednik pednika",
+    "azimuth": "az azi azimut azimute",
+    "thruster": "thr tunnel propulseur strahlruder boegschroef pednik pednika",
     "angle": "winkel vinkel angulo angolo hoek kat",
     "rpm": (
         "drehzahl regime toerental turtall omdreiningstall omdreininger varvtal giri rotacao rotacoes "
         "obroty"
     ),
-    "order": "setpoint soll sollwert consigne orden ordre",
-    "measured": "ist istwert mesure medido gemeten",  # codespell:ignore
+    "order": "set setpoint sp soll sollwert consigne orden ordre",
+    "measured": "act actual fb feedback ist istwert mesure medido gemeten",  # codespell:ignore
     "true": "vrai vraie wahr verdadero",
     "time": "zeit uhrzeit temps heure tiempo tempo tijd tid czas",
     "timestamp": "zeitstempel horodatage",
@@ -56,6 +59,9 @@ UNSPACED = {
     "port": "左舷 左",
     "starboard": "右舷 右",
     "propeller": "螺旋桨 推进器 プロペラ",
+    "bow": "バウ 艏 船首",
+    "stern": "スターン 艉 船尾",
+    "thruster": "スラスタ 侧推",
 }
 
 
@@ -74,3 +80,12 @@ def words_of(name: str) -> list[str]:
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     found: list[str] = re.findall(rf"[a-z]+|\d+|{WORDS}", _plain(apart))
     return " ".join(ENGLISH.get(word, word) for word in found).split()
+
+
+def likely_encoding(content: bytes) -> str:
+    """The encoding of a text that is not UTF-8: in Chinese or Japanese two of its words are known."""
+    if content.startswith(UTF_16):
+        return "utf-16"
+    known = {e: set(re.findall(WORDS, content.decode(e, errors="ignore"))) for e in EAST_ASIAN}
+    best = max(EAST_ASIAN, key=lambda encoding: len(known[encoding]))
+    return best if len(known[best]) > 1 else "latin-1"

@@ -13,7 +13,7 @@ from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read, signed
 from ..files.tables import date_stamps, table_of_file
-from ..files.text_layout import table_cells, text_layout
+from ..files.text_layout import table_cells, text_layout, unmarked
 from .columns import (
     POSE,
     UNITS,
@@ -44,7 +44,8 @@ from .likely_columns import (
     unit_in,
 )
 from .name_units import bare_name, without_unit
-from .side_car import UTF_16, as_json, refuse_sentences, refuse_thousands
+from .name_words import likely_encoding
+from .side_car import as_json, refuse_other_kinds, refuse_thousands
 from .units_by_numbers import (
     names_of,
     numbers_of,
@@ -152,7 +153,7 @@ def text_of(path: Path, stated: Layout) -> Layout:
     """
     text = Layout()
     if path.suffix not in (".parquet", ".mat"):
-        refuse_sentences(path)
+        refuse_other_kinds(path)
         encoding = stated.encoding if "encoding" in stated.model_fields_set else _encoding(path)
         found = text_layout(path, encoding)
         if found is None:
@@ -237,12 +238,10 @@ def common_layout(
 
 def _encoding(path: Path) -> str:
     content = path.read_bytes()
-    if content.startswith(UTF_16):
-        return "utf-16"
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:
-        return "latin-1"
+        return likely_encoding(content)
     return UTF_8
 
 
@@ -251,7 +250,8 @@ def units_below(path: Path, text: Layout, names: Sequence[str]) -> list[str]:
     found: list[str] = []
     if text.units_line:
         with path.open(encoding=text.encoding) as file:
-            found = table_cells(next(islice(file, text.skip + 1, None)), text.separator)
+            cells = table_cells(next(islice(file, text.skip + 1, None)), text.separator)
+            found = unmarked(cells, len(names))
     return [*found, *[""] * len(names)][: len(names)]
 
 

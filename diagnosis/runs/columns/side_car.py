@@ -14,18 +14,36 @@ from cybership.message_text import quoted
 
 from ..files.text_layout import table_cells, text_layout
 from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, Named, stated_layout
+from .name_words import likely_encoding
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 THOUSANDS = {  # decimal mark -> numbers with separators of thousands, as 19,800.5
     ".": re.compile(r"[+-]?\d{1,3}(?:[, '’\u00a0\u202f]\d{3})+(?:\.\d*)?"),
     ",": re.compile(r"[+-]?\d{1,3}(?:[. '’\u00a0\u202f]\d{3})+(?:,\d*)?"),
 }
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
-ARCHIVE = b"PK\3\4"  # how a zip file begins
-COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd")  # gzip, bzip2, xz, zstandard
-# How a sentence of NMEA 0183 begins; a stamp or names of columns may be before it.
-SENTENCE = re.compile(rb"\s*[$!][A-Z]{2,}\w*,|(?s:.*)[\s,;\"'][$!][A-Z]{4}\w,")
-DATAFLASH = b"FMT, "  # how a log of ArduPilot as a text begins
+# How files that are no tables begin -> what they are and what to do.
+NO_TABLE = {
+    rb"PK\x03\x04": "is an archive, as a spreadsheet is; save its table as a CSV file",
+    rb"\x1f\x8b|BZh|\xfd7zXZ|\x28\xb5\x2f\xfd": "is compressed; unpack it",
+    # A stamp or names of columns may be before a sentence.
+    rb"\s*[$!][A-Z]{2,}\w*,|(?s:.*)[\s,;\"'][$!][A-Z]{4}\w,": (
+        "has NMEA 0183 sentences; a measurement is a table: write a CSV file with a row for each time "
+        "and the columns time, latitude, longitude, heading and commands"
+    ),
+    rb"FMT, ": (
+        "has messages of several kinds (a DataFlash log); write a CSV file of each (mavlogdump.py "
+        "--format csv), and put them together by 'cybership join'"
+    ),
+    rb"#ROSBAG|\x89MCAP|ULog": (
+        "has messages of several kinds (a recording of ROS or PX4); write a CSV file of each topic, and "
+        "put them together by 'cybership join'"
+    ),
+    rb"\s*[{[]\s*[{\"]": "is JSON; write its table as a CSV file",
+    # Of a text in UTF-8, Latin-1 or another 8-bit encoding no character is 0.
+    rb"(?!\xff\xfe|\xfe\xff)(?s:.)*\x00": (
+        "is not a text; write its table as a CSV, Parquet or MATLAB file (.csv, .parquet, .mat)"
+    ),
+}
 
 
 def line_beside(
@@ -96,34 +114,18 @@ def refuse_encoding(path: Path, layout: Layout) -> None:
     content = path.read_bytes()
     if layout.encoding != UTF_8:
         return
-    if content.startswith(UTF_16):
-        line = _changed(path, layout, encoding="utf-16")
-        raise InputError(f"'{path}' is a text in UTF-16; {line}")
-    if b"\0" not in content:
-        line = _changed(path, layout, encoding="latin-1")
-        raise InputError(f"'{path}' is not a text in UTF-8; if its encoding is Latin-1, {line}")
+    encoding = likely_encoding(content)
+    line = _changed(path, layout, encoding=encoding)
+    raise InputError(f"'{path}' is not a text in UTF-8, but probably in {encoding}; {line}")
 
 
-def refuse_sentences(path: Path) -> None:
-    """Refuse NMEA 0183 sentences, a spreadsheet and a compressed file, none of which is a table."""
+def refuse_other_kinds(path: Path) -> None:
+    """Refuse files that are no tables, such as NMEA 0183 sentences, spreadsheets and recordings."""
     with path.open("rb") as content:
         begin = content.read(1000)
-        if begin.startswith(ARCHIVE):
-            raise InputError(
-                f"'{path}' is an archive, as a spreadsheet is; save its table as a CSV file"
-            )
-        if begin.startswith(COMPRESSED):
-            raise InputError(f"'{path}' is compressed; unpack it")
-        if SENTENCE.match(begin):
-            raise InputError(
-                f"'{path}' has NMEA 0183 sentences; a measurement is a table: write a CSV file with a "
-                "row for each time and the columns time, latitude, longitude, heading and commands"
-            )
-        if begin.startswith(DATAFLASH):
-            raise InputError(
-                f"'{path}' has messages of several kinds (a DataFlash log); write a CSV file of each "
-                "(mavlogdump.py --format csv), and put them together by 'cybership join'"
-            )
+    for beginning, what in NO_TABLE.items():
+        if re.match(beginning, begin):
+            raise InputError(f"'{path}' {what}")
 
 
 def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
@@ -135,9 +137,14 @@ def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
         return
     seen = f"has the names of its columns in line {found.skip + 1}"
     if found.separator != layout.separator:
-        seen = f"has cells that are probably separated by {found.separator!r}"
+        seen = f"has cells that are probably separated by {_mark(found.separator)}"
     line = _changed(path, layout, **found.model_dump(exclude_defaults=True))
     raise InputError(f"'{path}' {seen}; {line}")
+
+
+def _mark(separator: str) -> str:
+    """What separates cells, as a message says it."""
+    return "blanks" if separator == " " else repr(separator)
 
 
 def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
@@ -159,12 +166,12 @@ def refuse_long_rows(path: Path, layout: Layout, count: int) -> None:
     """Refuse a CSV file with a row of more cells than names: some of them are in a wrong column."""
     with path.open(encoding=layout.encoding, newline="") as file:
         for number, line in enumerate(file, 1):
-            if number <= layout.skip + 1 or line.count(layout.separator) < count:
+            if number <= layout.skip + 1 + layout.units_line or line.count(layout.separator) < count:
                 continue
             if any(table_cells(line, layout.separator)[count:]):
                 raise InputError(
                     f"'{path}', line {number} has more cells than the {count} names; name each column, "
-                    f"and quote a cell that contains the separator {layout.separator!r}"
+                    f"and quote a cell that contains the separator, {_mark(layout.separator)}"
                 )
 
 

@@ -51,7 +51,8 @@ OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
 
 def _folded(name: str) -> str:
-    """A name without case, blanks and marks between words."""
+    """A name without case, blanks, marks between words, and the zone of UTM."""
+    name = re.sub(r"(?i)(?<=utm)[\W_]*\d{1,2}[a-z]?(?=[\W_])", "", name)
     return re.sub(r"[\W_]", "", name).casefold()
 
 

@@ -20,7 +20,7 @@ from ..columns.side_car import (
     refuse_encoding,
     refuse_layout,
     refuse_long_rows,
-    refuse_sentences,
+    refuse_other_kinds,
     refuse_units,
     what_to_do,
 )
@@ -79,7 +79,7 @@ def _names(path: Path, layout: Layout) -> list[str]:
             return list(parquet.read_schema(path).names)
     if path.suffix == ".mat":
         return list(matlab_table(path))
-    refuse_sentences(path)
+    refuse_other_kinds(path)
     as_text = {"dtype": str, "keep_default_na": False, "skipinitialspace": True}
     first = _csv(path, layout, nrows=1, header=None, **as_text)
     # A column without a name is called as pandas calls it.

@@ -50,9 +50,13 @@ def is_marked(path: Path, layout: Layout) -> bool:
     with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
         lines = islice(file, layout.skip, layout.skip + 2 + layout.units_line)
         cells = [table_cells(line.rstrip(), layout.separator) for line in lines]
-    if not cells or not cells[0] or not MARK.fullmatch(cells[0][0]):
-        return False
-    return len(cells[0]) == len(cells[-1]) + 1
+    return bool(cells) and unmarked(cells[0], len(cells[-1])) != cells[0]
+
+
+def unmarked(cells: list[str], width: int) -> list[str]:
+    """The cells of a line above a table of some width, without the mark of a comment before them."""
+    is_mark = len(cells) == width + 1 and MARK.fullmatch(cells[0])
+    return cells[1:] if is_mark else cells
 
 
 def bare_unit(text: str) -> str:
@@ -82,6 +86,7 @@ def _with(
     rows = [(k, table_cells(line, separator)) for k, line in enumerate(lines) if line.strip()]
     widths = Counter(len(cells) for _, cells in rows)
     width = max(widths, key=lambda n: widths[n], default=0)
+    rows = [(k, unmarked(cells, width)) for k, cells in rows]
     quoted = any('"' in line for line in lines)  # "1,5","2,5"
     if (separator == decimal and not quoted) or width < 2:
         return -1.0, None
