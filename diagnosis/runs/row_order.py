@@ -15,7 +15,7 @@ from cybership.message_text import counted
 from fmus.scale import REFERENCE, Scale
 
 from .files.reading import Run
-from .run_constants import CHANCE, HORIZON, LONG, NEGLIGIBLE
+from .run_constants import CHANCE, FEWEST, HORIZON, IN_A_ROW, LONG, NEGLIGIBLE
 
 ON_GRID = (
     0.2  # 1, of a period, by which a sample may be off an even grid; 1 - this, of all that are on it
@@ -36,7 +36,7 @@ def ordered(run: Run, scale: Scale = REFERENCE) -> Run:
         return _spread(_of_batches(run)) if in_bursts(run, scale) else run
     run = _without_empty(run)
     many = run.time.size
-    found = _spread(_merged(_begun_anew(continued(by_stamps(run), scale))))
+    found = _spread(_merged(continued(_begun_anew(by_stamps(run)), scale)))
     kept = in_order(found.time)
     lost = found.time.size - kept.size  # a sample that is there again is none
     if lost > MOST_WRONG * many:
@@ -155,9 +155,9 @@ def _steps(position: np.ndarray, time: np.ndarray) -> np.ndarray:
 def continued(run: Run, scale: Scale = REFERENCE) -> Run:
     """A run whose clock was set back, as it would be if it had not been: all rows after that are later.
 
-    A clock was set back where the times after it were there before, row by row: rows that only come late
-    have times of their own. If the ship does not go on from where it was, a second run begins there: it
-    follows after a gap.
+    A clock was set back where the times after it were there before, row by row, or where many rows go on
+    with other times than all before, as after a restart. If the ship does not go on from where it was, a
+    second run begins there: it follows after a gap.
     """
     time, notes = np.array(run.time), []
     with np.errstate(invalid="ignore", over="ignore"):  # false cells are infinite or missing
@@ -168,20 +168,25 @@ def continued(run: Run, scale: Scale = REFERENCE) -> Run:
             again = time[row : row + 1 + (ends[0] if ends.size else time.size)]
             there = (time[:row] >= again[0]) & (time[:row] <= again[-1])
             rows = sorted((int(there.sum()), again.size))
-            if rows[0] < max(LONG, 0.5 * rows[1]):
+            steps = np.diff(again)
+            usually = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else np.inf
+            # Rows that come late, or after a false stamp, have a longer step at their end or before.
+            about = np.diff(time[max(row - IN_A_ROW, 0) : row + again.size + 1])
+            anew = rows[0] == 0 and rows[1] >= FEWEST and about.max() <= LONG * usually
+            if rows[0] < max(LONG, 0.5 * rows[1]) and not anew:
                 continue
-            usual = step[max(row - 1 - rows[0], 0) : row + rows[0]]
+            near = rows[0] or rows[1]
+            usual = step[max(row - 1 - near, 0) : row + near]
             usual = usual[np.isfinite(usual)]
             if not usual.size:
                 continue
-            steps = np.diff(again)
-            back = time[row - 1] - time[row] + float(np.median(steps[steps > 0.0]))
+            back = time[row - 1] - time[row] + usually
             if step[row - 1] <= LONG * np.median(usual):
                 notes.append(f"the clock was set back by {back:.4g} s at {time[row - 1]:.4g} s")
             else:
                 back += 2.0 * HORIZON * scale.time
                 notes.append(
-                    f"a second run begins in row {row + 1}: the time is {time[row]:.4g} s again, "
+                    f"a second run begins in row {row + 1}: the time is {run.time[row]:.4g} s there, "
                     "and the ship is elsewhere; it follows after a gap"
                 )
             time[row:] += back
