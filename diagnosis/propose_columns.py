@@ -183,7 +183,7 @@ def _seconds(s: "Smoothed") -> float:
 
 def _blanks(proposals: Iterable["Proposal"], options: argparse.Namespace) -> Iterator[str]:
     """For each blank name its likely columns, by the measurement that shows most; what to do then."""
-    from .runs.columns.columns import TAU
+    from .runs.columns.columns import TAU, stated_otherwise
 
     found: dict[str, Sequence[LikelyColumn]] = {}
     for each in proposals:
@@ -193,7 +193,8 @@ def _blanks(proposals: Iterable["Proposal"], options: argparse.Namespace) -> Ite
                 found[signal] = likely
     for signal, likely in found.items():
         each = "; ".join(f"'{c.name}' ({', '.join(c.reasons)})" for c in likely)
-        yield f"blank: {signal}; likely columns: {each or 'none'}"
+        otherwise = "" if likely else stated_otherwise(signal, "; if {}, put {} in place of the blank")
+        yield f"blank: {signal}; likely columns: {each or 'none'}{otherwise}"
     if options.ship is None and found.keys() >= set(TAU):
         yield (
             "if the log has commands of actuators, such as shaft speed and rudder angle, state the "

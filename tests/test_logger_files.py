@@ -237,6 +237,75 @@ def test_a_compressed_file_is_to_be_unpacked(
         look(path)
 
 
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"#ROSBAG V2.0\n", "recording"),
+        (b"\x89MCAP0\r\n", "recording"),
+        (b"ULog\x01\x12\x35\x01", "recording"),
+        (b'{"time": 0.0, "x": 1.0}\n', "JSON"),
+        (b"\x89HDF\r\n\x1a\n\x00\x00", "not a text"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1\x00\x00", "not a text"),
+    ],
+)
+@pytest.mark.parametrize("look", [propose, read])
+def test_other_kinds_of_files_are_named(
+    tmp_path: Path, look: Callable[[Path], object], content: bytes, what: str
+) -> None:
+    path = tmp_path / "run.log"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=what):
+        look(path)
+
+
+def test_a_number_at_once_in_north_east_and_heading_is_no_value(tmp_path: Path) -> None:
+    clean = table()
+    lost = np.isin(np.arange(len(clean)), [*range(20, 30), *range(60, 80)])
+    marked = clean.mask(np.tile(lost[:, None], clean.shape[1]) & (clean.columns != "time"), -999.0)
+    marked.loc[0, "tau_X"] = -999.0  # elsewhere it is a value
+    run = read(written(tmp_path / "run.csv", marked))
+    assert np.array_equal(np.isnan(run.pose).all(axis=1), lost)
+    np.testing.assert_array_equal(run.pose[~lost], clean[["x", "y", "psi"]].to_numpy()[~lost])
+    assert run.held is not None
+    assert np.array_equal(run.held.all(axis=1), lost)
+    assert run.tau_cmd[0, 0] == -999.0
+    assert "-999 in 30 rows is no value: left out" in run.notes
+
+
+def test_one_row_with_equal_numbers_is_a_place(tmp_path: Path) -> None:
+    content = table()
+    content.loc[5, ["x", "y", "psi"]] = 1.0
+    assert np.isfinite(read(written(tmp_path / "run.csv", content)).pose).all()
+
+
+def test_rows_without_a_time_have_the_stated_period(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", table().drop(columns="time"))
+    with pytest.raises(InputError, match='rows are evenly spaced, put "period": SECONDS'):
+        read(path)
+    assert "time" in propose(path).likely
+    path.with_name("run.csv.json").write_text('{"period": 0.5}')
+    np.testing.assert_array_equal(read(path).time, TIME)
+    found = propose(path).run
+    assert found is not None
+    np.testing.assert_array_equal(found.time, TIME)
+
+
+def test_year_to_second_in_columns_are_the_time(tmp_path: Path) -> None:
+    begin = pd.Timestamp("2028-02-28 23:59:40")
+    stamps = pd.Series(begin + pd.to_timedelta(86_400.0 * (TIME > 20.0) + TIME, unit="s"))
+    parts = {"Year": "year", "Month": "month", "Day": "day", "Hour": "hour", "Minute": "minute"}
+    content = table(**{name: getattr(stamps.dt, part) for name, part in parts.items()})
+    content["Second"] = stamps.dt.second + 1e-6 * stamps.dt.microsecond
+    found = propose(written(tmp_path / "run.csv", content.drop(columns="time"))).run
+    assert found is not None
+    np.testing.assert_allclose(found.time, 86_400.0 * (TIME > 20.0) + TIME, atol=1e-5)
+
+
+def test_minutes_and_seconds_are_durations() -> None:
+    cells = pd.Series([f"{int(s // 60)}:{s % 60:04.1f}" for s in 3550.0 + 10.0 * np.arange(20)])
+    np.testing.assert_allclose(date_stamps(cells), 10.0 * np.arange(20))
+
+
 def test_a_text_in_utf_16_is_named_with_the_line_that_reads_it(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     table().to_csv(path, index=False, encoding="utf-16")

@@ -166,6 +166,7 @@ class Layout(BaseModel):
     units_line: bool = False  # whether the line below the names is of units
     columns: dict[str, Column] = {}  # x, y, psi, ... -> a column
     unused: tuple[str, ...] = ()  # commands that were zero all the time, and have no column
+    period: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # s, of rows without a time
     trial: str | None = None  # the manoeuvring trial that it is, as zigzag
 
     @field_validator("trial")
@@ -208,6 +209,15 @@ class Layout(BaseModel):
             if column.unit is not None and column.unit not in units:
                 raise ValueError(no_unit(column.unit, key, units))
         return value
+
+    @property
+    def without_column(self) -> tuple[str, ...]:
+        """Signals that need no column."""
+        return self.unused if self.period is None else ("time", *self.unused)
+
+    def even_time(self, rows: int) -> dict[str, np.ndarray]:
+        """The time [s] of a table whose evenly spaced rows have none; empty where they have."""
+        return {} if self.period is None else {"time": self.period * np.arange(rows)}
 
     def column(self, signal: str) -> Column:
         """The column of a signal."""
@@ -329,14 +339,18 @@ def read_layout(path: Path) -> Layout | None:
         raise InputError(
             f"'{file}': columns.{blank} is blank; put the name of its column there "
             f"(cybership columns '{path}' lists likely ones), or delete the entry"
-            + (f"; if it was never used, with {_unused(blank)} in its place" if "." in blank else "")
+            + stated_otherwise(blank, "; if {}, with {} in its place")
         )
     return found
 
 
-def _unused(signal: str) -> str:
-    """What states that a command was zero all the time."""
-    return f'"unused": ["{signal}"] beside "columns"'
+def stated_otherwise(signal: str, so: str) -> str:
+    """What states how a command or the time is known without a column; else nothing."""
+    if signal == "time":
+        return so.format("rows are evenly spaced", '"period": SECONDS beside "columns"')
+    if "." in signal:
+        return so.format("it was never used", f'"unused": ["{signal}"] beside "columns"')
+    return ""
 
 
 def stated_layout(path: Path) -> Layout | None:
@@ -387,7 +401,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
         wanted |= dict.fromkeys((*named, *others))
     there = {layout.column(s).name for s in wanted}
     others = [name.casefold().replace("_", "") for name in names if name not in there]
-    for signal in [s for s in wanted if s not in layout.unused]:
+    for signal in [s for s in wanted if s not in layout.without_column]:
         name = layout.column(signal).name
         if names.count(name) > 1:
             raise InputError(f"{where} has the column '{name}' more than once")
@@ -398,10 +412,9 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
             meant = f" (for {signal})" if name != signal else ""
             known = nearest(name, names)
             propose = "" if signal in named else f"; {PROPOSE}"
-            if signal in commands:
-                propose += f"; if it was never used, put {_unused(signal)}"
+            propose += stated_otherwise(signal, "; if {}, put {}")
             raise InputError(f"{where} has no column '{name}'{meant}{known}{propose}")
-    return [s for s in wanted if s not in layout.unused]
+    return [s for s in wanted if s not in layout.without_column]
 
 
 def _check_names(layout: Layout, known: Collection[str], commands: Collection[str], where: str) -> None:
@@ -420,7 +433,7 @@ def missing(layout: Layout, names: Sequence[str], of: Ship) -> list[str]:
     there = [g for g in every if any(layout.column(s).name in names for s in g)]
     # Of forces that are there, those on other axes are taken as zero.
     needed = [s for g in there if g != TAU for s in g] if there else _meant(every, names)
-    wanted = [s for s in ("time", *POSE, *needed) if s not in layout.unused]
+    wanted = [s for s in ("time", *POSE, *needed) if s not in layout.without_column]
     return [s for s in wanted if layout.column(s).name not in names]
 
 

@@ -191,7 +191,7 @@ def _with_blanks(
     """The proposal where signals have no column, by the unused ones with the units below them."""
     columns = dict(layout.columns)
     time = layout.column("time")
-    if "time" not in {*kept, *blank} and not time.unit:
+    if "time" not in {*kept, *blank, *layout.without_column} and not time.unit:
         cells = table_of_file(path, layout, {time.name})[time.name]
         columns["time"] = time.model_copy(update={"unit": time_unit(numbers_of(cells, "time"))})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
@@ -291,7 +291,7 @@ def _of_message(
 
 def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
     """The only column of date stamps as the time, whatever its name, if no other column is known."""
-    if "time" in layout.columns:
+    if "time" in (*layout.columns, *layout.without_column):
         return {}
     table = table_of_file(path, layout, {*names} - names_of(layout.columns))
     stamped = [str(name) for name, cells in table.items() if date_stamps(cells) is not None]
@@ -333,12 +333,14 @@ def _likely(
     quantity: Mapping[str, str],
 ) -> dict[str, Sequence[LikelyColumn]]:
     """Columns that may be those of signals without one, of unused ones with the units below them."""
-    known = {s: layout.column(s) for s in ("time", *POSE) if s not in blank}
+    lacking = {*blank, *layout.without_column}
+    known = {s: layout.column(s) for s in ("time", *POSE) if s not in lacking}
     signs = {c.sign for c in known.values() if c.sign}
     table = table_of_file(path, layout, {*unused, *names_of(known), *signs})
     refuse_thousands(path, layout, table)
     numbers = {s: signed(numbers_of(table[c.name], s), table, c) for s, c in known.items()}
     pose = {s: to_si(numbers[s], s, c, quantity[s]) for s, c in known.items()}
+    pose |= layout.even_time(len(table))
     kind = "time" if "time" in blank else ""
     told = {n: without_unit(n, below) for n, below in unused.items()}
     told = {n: (n, "") if unit.isdigit() else (bare, unit) for n, (bare, unit) in told.items()}

@@ -7,7 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.constants import nano
+from scipy.constants import day as whole_day
+from scipy.constants import hour, minute, nano
 
 from ..columns.name_words import words_of
 
@@ -39,6 +40,16 @@ def stamp(whole: np.ndarray, rest: np.ndarray) -> np.ndarray:
     return whole + nano * rest
 
 
+def calendar(*parts: np.ndarray) -> np.ndarray:
+    """A time [s] by year, month, day, hour, minute and second; NaN where one is missing."""
+    there = np.isfinite(parts).all(axis=0)
+    year, month, day, *clock = (np.where(there, part, 1.0) for part in parts)
+    months = (year - 1970.0).astype("M8[Y]").astype("M8[M]") + (month - 1.0).astype("m8[M]")
+    days = months.astype("M8[D]").astype(float) + day - 1.0
+    seconds = sum(size * part for size, part in zip((hour, minute, 1.0), clock, strict=True))
+    return np.where(there, whole_day * days + seconds, np.nan)
+
+
 ARRAY = ("[1]", "[2]", "[3]", "[0]")  # of a quaternion as PX4 logs it: its real part is first
 PARTS: Mapping[tuple[str, ...], Callable[..., np.ndarray]] = {
     ("x", "y", "z", "w"): heading,
@@ -46,6 +57,11 @@ PARTS: Mapping[tuple[str, ...], Callable[..., np.ndarray]] = {
     ("secs", "nsecs"): stamp,
     ARRAY: heading,
 }
+# Parts of a date, each with other names that it has.
+DATE = tuple(
+    frozenset(names.split())
+    for names in ("year yr yyyy", "month mon", "day", "hour hr hh", "minute min", "second sec ss")
+)
 QUATERNION = frozenset(("q", "quat", "quaternion"))  # last words of the names of such an array
 
 
@@ -62,4 +78,7 @@ def message_fields(names: Collection[str]) -> dict[str, MessageField]:
                 found[field] = MessageField(columns, value, is_ros=True)
             elif parts is ARRAY and not QUATERNION.isdisjoint(words_of(begin)[-1:]):
                 found[begin] = MessageField(columns, value, is_ros=False)
+    dated = [[name for name in names if name.strip().casefold() in part] for part in DATE]
+    if all(len(each) == 1 for each in dated):
+        found["datetime"] = MessageField([each[0] for each in dated], calendar, is_ros=False)
     return found

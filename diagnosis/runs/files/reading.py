@@ -235,9 +235,10 @@ def signed(read: np.ndarray, table: pd.DataFrame, column: Column) -> np.ndarray:
 
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
-    columns, noise, quantity = {}, {}, quantities(of)
+    columns, noise, quantity = layout.even_time(len(table)), {}, quantities(of)
     steps: dict[str, np.ndarray] = {}
     table, remarks = _without_remarks(table.reset_index(drop=True), layout)
+    table, marks = _without_marks(table, layout)
     for signal in signals(layout, list(table.columns), where, of):
         column = layout.column(signal)
         cells = table[column.name]
@@ -280,7 +281,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
     return replace(
         run,
         called=called or None,
-        notes=(*run.notes, *remarks, *notes),
+        notes=(*run.notes, *remarks, *marks, *notes),
         noise=noise,
         trial=layout.trial,
         resolution=rounded,
@@ -298,6 +299,25 @@ def _without_remarks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame,
     words &= True if stamps is None else np.isnan(stamps)  # as of "Dec 31, 2026 23:59"
     told = _told(table[name], words, "row", "with words in place of a time, left out")
     return table.loc[~words], told  # the others keep their numbers, for messages
+
+
+def _without_marks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, list[str]]:
+    """A table without the number that a logger writes where it has no values, and what is said of it.
+
+    In more than one row the north, the east and the heading are one number, the same in all of these.
+    """
+    names = [layout.column(signal).name for signal in POSE]
+    if not {*names} <= {*table.columns}:
+        return table, []
+    pose = table[names].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+    alike = (pose == pose[:, :1]).all(axis=1) & (pose[:, 0] != 0.0)
+    values = np.unique(pose[alike, 0])
+    if values.size != 1 or alike.sum() < 2:
+        return table, []
+    is_mark = table.apply(pd.to_numeric, errors="coerce") == values[0]
+    return table.mask(is_mark.mul(alike, axis=0)), [
+        f"{values[0]:g} in {counted(int(alike.sum()), 'row')} is no value: left out"
+    ]
 
 
 def _no_numbers(table: pd.DataFrame, layout: Layout, signal: str) -> list[str]:
@@ -347,8 +367,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     given = [s for s in dict.fromkeys((*TAU, *own, *settings)) if s in columns]
     if empty := next((s for s in given if not np.isfinite(columns[s]).any()), None):
         raise InputError(
-            f"{where}: the command {empty} has no value in any row; if it was never given, leave out "
-            "its column, or fill in zeros"
+            f"{where}: the command {empty} has no value in any row; if it was never used, put "
+            f'"unused": ["{empty}"] beside "columns" into its side-car'
         )
     missing = [~np.isfinite(columns[s]) for s in given]
     lost = sum(bool(gaps.any()) for gaps in missing)

@@ -35,6 +35,7 @@ LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
 DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
 # Of a cell without a value, of a comment, and of a line such as "Total rows: 1800".
 WORDS = re.compile(r"\D*|(#|%|//|[^\W\d_]{2}).*")
+ELAPSED = re.compile(r"(?P<min>\d+):(?P<s>[0-5]?\d[.,]\d+)")  # minutes and seconds
 ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
 FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
@@ -162,7 +163,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
 
     Stamps are of ISO 8601, or have a date such as 31.12.2026, 12/31/2026 or Dec 31, 2026, or none: then
     a day begins where the time falls by more than half a day. A leap second of UTC is a second.
-    Durations, such as 0.1 sec, are stamps as well.
+    Durations, such as 0.1 sec and 1:23.4 (minutes and seconds), are stamps as well.
 
     Args:
         cells: the column.
@@ -185,6 +186,9 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         stamps = pd.to_datetime(iso, errors="coerce", utc=True, format="ISO8601")
         if stamps.isna().all() and given.dropna().str.fullmatch(DURATION).all():
             stamps = pd.Timestamp(0, tz="UTC") + pd.to_timedelta(given, errors="coerce")
+        if stamps.isna().all() and given.dropna().str.fullmatch(ELAPSED).all():
+            parts = iso.str.extract(ELAPSED).astype(float)
+            stamps = pd.to_datetime(60.0 * parts["min"] + parts["s"], unit="s", utc=True)
         if stamps.isna().all():
             stamps, without_date = _other_stamps(given)
     else:
