@@ -123,11 +123,15 @@ def test_files_with_the_same_columns_at_the_same_time_are_those_of_two_devices(t
     assert (joined["stern.x"].dropna().to_numpy() == table["x"].to_numpy() + 1.0).all()
 
 
-@pytest.mark.parametrize("stamps", [False, True])
-def test_each_name_of_a_table_with_one_value_in_a_row_is_a_column(tmp_path: Path, stamps: bool) -> None:
+@pytest.mark.parametrize(
+    ("stamps", "value", "unit"), [(False, "Value", "unit"), (True, "Wert", "Einheit")]
+)
+def test_each_name_of_a_table_with_one_value_in_a_row_is_a_column(
+    tmp_path: Path, stamps: bool, value: str, unit: str
+) -> None:
     table = sailed(20.0)
-    long = table.melt(id_vars="time", var_name="tag", value_name="Value")
-    long["unit"] = long["tag"].map(dict.fromkeys(("x", "y"), "m"))
+    long = table.melt(id_vars="time", var_name="tag", value_name=value)
+    long[unit] = long["tag"].map(dict.fromkeys(("x", "y"), "m"))
     long = long.sort_values("time", kind="stable")
     if stamps:
         at = pd.Timestamp("2026-03-01T10:00:00") + pd.to_timedelta(long["time"], unit="s")

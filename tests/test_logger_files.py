@@ -269,7 +269,7 @@ def test_a_number_at_once_in_north_east_and_heading_is_no_value(tmp_path: Path) 
     assert run.held is not None
     assert np.array_equal(run.held.all(axis=1), lost)
     assert run.tau_cmd[0, 0] == -999.0
-    assert "-999 in 30 rows is no value: left out" in run.notes
+    assert "-999 in x, y and psi at once, left out in 30 rows" in run.notes
 
 
 def test_one_row_with_equal_numbers_is_a_place(tmp_path: Path) -> None:

@@ -190,8 +190,8 @@ def worse_than_constant_velocities(r: ReportData) -> Iterator[str]:
         if worse := larger_errors(own, steady, NOISE_TOLERANCE):
             yield (
                 f"The {'learned ' if r.learned else ''}model predicts {r.called(e)} worse than constant "
-                f"velocities do: {worse}. If that is unexpected, check the ship and the units, signs "
-                "and columns of the file."
+                f"velocities do: {worse}. If that is unexpected, check the ship, and the units, "
+                "signs, columns and clocks of the file."
             )
 
 

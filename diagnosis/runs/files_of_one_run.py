@@ -11,6 +11,7 @@ import pandas as pd
 from cosim import InputError
 
 from .columns.columns import UNITS, Column, Layout, stated_layout, to_si
+from .columns.name_words import words_of
 from .columns.proposal import text_of, time_column, units_below
 from .columns.usual_names import value_column
 from .files.message_fields import message_fields
@@ -125,7 +126,7 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
     numbers, as those of thrusters.
     """
     value = value_column(map(str, table))
-    units = [name for name in map(str, table) if name.strip("_").casefold() in UNIT]
+    units = [name for name in map(str, table) if "".join(words_of(name)) in UNIT]
     changing = [n for n in table if n not in {*units, value} and table[n].nunique() > 1]
     texts = [n for n in changing if not pd.api.types.is_numeric_dtype(table[n])]
     named = {n: table[n].astype("string").fillna("") for n in texts} or {

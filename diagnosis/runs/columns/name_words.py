@@ -40,6 +40,8 @@ FOREIGN = {
     "longitude": "lange langengrad longitud longitudine lengtegraad lengdegrad",
     "heading": "steuerkurs gierwinkel cap prua",
     "yaw rate": "gierrate wenderate",
+    "value": "wert valeur valor valore waarde verdi varde wartosc",
+    "unit": "einheit unite unidad unita eenheid enhet",
     "speed": "geschwindigkeit vitesse velocidad snelheid fart",
 }
 ENGLISH = {word: english for english, words in FOREIGN.items() for word in words.split()}

@@ -71,7 +71,7 @@ def is_quaternion(name: str) -> bool:
 
 def value_column(names: Iterable[str]) -> str | None:
     """The column that is called as that of a table with one value in a row; None: none is."""
-    return next((name for name in names if name.strip("_").casefold() in VALUE), None)
+    return next((name for name in names if "".join(words_of(name)) in VALUE), None)
 
 
 def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:

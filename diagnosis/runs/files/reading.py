@@ -316,7 +316,7 @@ def _without_marks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, l
         return table, []
     is_mark = table.apply(pd.to_numeric, errors="coerce") == values[0]
     return table.mask(is_mark.mul(alike, axis=0)), [
-        f"{values[0]:g} in {counted(int(alike.sum()), 'row')} is no value: left out"
+        f"{values[0]:g} in x, y and psi at once, left out in {counted(int(alike.sum()), 'row')}"
     ]
 
 
