@@ -124,3 +124,12 @@ def test_an_area_is_interrupted_where_one_of_its_lines_is():
     np.testing.assert_array_equal(mark.x, [0, 1, 1, 0, nan, 3, 4, 4, 3, nan])
     np.testing.assert_array_equal(mark.y, [0, 1, 6, 5, nan, 3, 4, 9, 8, nan])
     assert (mark.area, mark.faint, mark.label) == (True, True, "band")
+
+
+def test_a_section_has_its_tables_but_for_empty_ones(styles):
+    from reportlab.platypus import LongTable
+
+    tables = [Table(("a",), [["1"]]), Table(("b",), []), Table(("c",), [["2"], ["3"]])]
+    flow = [*pdf._section(ReportSection("head", ["text"], tables), styles, 400.0)]
+    found = [cells for part in flow if isinstance(part, LongTable) for cells in [part._cellvalues]]
+    assert [len(cells) for cells in found] == [2, 3]

@@ -15,6 +15,7 @@ from support.shared import kept
 import cosim
 from cosim.live.__main__ import main
 from cosim.live.page_file import check_replaceable
+from fmus.ships.ship_file import find_ship
 
 SECONDS = 12.0  # of the run, with frozen measurements in it
 CHANGE = 400  # base step at which the tests change something
@@ -195,7 +196,10 @@ def test_files_that_are_no_such_page_are_not_replaced(tmp_path, monkeypatch):
     file.write_text(json.dumps(scenario(stop=3.0)))
     other.write_text("<!DOCTYPE html>")
     (tmp_path / "folder").mkdir()
+    ship = tmp_path / "ship.toml"
+    ship.write_bytes(find_ship("cse1").read_bytes())
     for out, more, said in (
+        (ship, ("--ship", ship, "--overwrite"), "is an input of the page"),
         (file, ("--overwrite",), "is an input of the page"),
         (other, (), "exists and is not such a page; --overwrite replaces it"),
         (tmp_path / "folder", ("--overwrite",), "is a folder"),
