@@ -29,6 +29,8 @@ def parted(run: Run, scale: Scale = REFERENCE) -> Run:
     time, place = run.time[rows], run.pose[rows, 0] + 1j * run.pose[rows, 1]
     speed = np.abs(place[IN_A_ROW:] - place[:-IN_A_ROW]) / (time[IN_A_ROW:] - time[:-IN_A_ROW])
     highest = float(np.quantile(speed, 1.0 - IN_A_ROW * CHANCE))  # of all but one jump in a hundred rows
+    if not highest > 0.0:
+        return run
     time_of, notes = run.time.copy(), list(run.notes)
     for row, way in _lasting([(rows[k], way) for k, way in _jumps(time, place, highest)]):
         gap = max(abs(way) / highest, LONG * WIDTH * scale.time)
