@@ -270,3 +270,20 @@ def test_the_command_writes_a_table_that_is_proposed_and_read(tmp_path: Path) ->
     assert not (tmp_path / "run.txt").exists()
     assert command(join.main, *files, "--out", tmp_path / "run.parquet").returncode == 0
     pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "run.parquet"), pd.read_csv(out))
+
+
+@pytest.mark.parametrize("form", ["%Y-%m-%dT%H:%M:%S.%fZ", "%d.%m.%Y %H:%M:%S.%f"])
+def test_date_stamps_and_seconds_since_1970_are_one_clock(tmp_path: Path, form: str) -> None:
+    table = sailed(20.0)
+    begin = pd.Timestamp("2026-11-29T23:59:50", tz="UTC")
+    at = begin + pd.to_timedelta(table["time"], unit="s")
+    pose, orders = table[POSE], table[COMMANDS].iloc[::5]
+    pose.assign(time=at.dt.strftime(form)).to_csv(tmp_path / "pose.csv", index=False)
+    unix = (1e3 * (begin.timestamp() + table["time"])).iloc[::5]
+    orders.assign(**{"time [ms]": unix.map("{:.0f}".format)}).to_csv(
+        tmp_path / "orders.csv", index=False
+    )
+    joined = one_table([tmp_path / "pose.csv", tmp_path / "orders.csv"])
+    there = joined["x"].notna()
+    np.testing.assert_allclose(joined["time"][there], table["time"], atol=1e-3)
+    np.testing.assert_allclose(joined["time"][~there], table["time"].iloc[::5], atol=1e-3)

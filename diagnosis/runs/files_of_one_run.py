@@ -20,6 +20,7 @@ from .run_constants import NEGLIGIBLE
 
 Item = TypeVar("Item", str, Path)
 TIME = "time"  # the column of the time in the one table
+DATED = 1e8  # s, about three years: a log's times since 1970 are later, and no other clock counts as far
 UNIT = frozenset(("unit", "units"))  # of that with their units
 NUMBER = frozenset(("id", "index", "channel", "instance"))  # of that with numbers in place of names
 
@@ -151,15 +152,24 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
 
 def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
     """The times of each part, by one clock."""
-    seconds = date_stamps(pd.concat([p.cells for p in parts], ignore_index=True), "the files' times")
-    if seconds is not None:
-        return np.split(seconds, np.cumsum([len(part.cells) for part in parts])[:-1])
-    stamps = [date_stamps(part.cells) is not None for part in parts]
-    if any(stamps):
-        dated, other = parts[stamps.index(True)].path, parts[stamps.index(False)].path
-        raise InputError(f"'{dated}' has date stamps, '{other}' numbers: they have no clock in common")
-    read = [clock_seconds(numbers(part.cells, part.path, Layout())) for part in parts]
-    return [to_si(time, TIME, part.time, TIME) for part, time in zip(parts, read, strict=True)]
+    stamps = [date_stamps(part.cells, f"'{part.path}'", pd.Timestamp(0, tz="UTC")) for part in parts]
+    times = [_seconds(p) if own is None else own for p, own in zip(parts, stamps, strict=True)]
+    dated = [own is not None for own in stamps]
+    if not any(dated):
+        return times
+    if all(np.nanmedian(time) > DATED for time in times):
+        return [time - times[0][np.isfinite(times[0])][0] for time in times]
+    if not all(dated):
+        stamped, other = parts[dated.index(True)].path, parts[dated.index(False)].path
+        raise InputError(f"'{stamped}' has date stamps, '{other}' numbers: they have no clock in common")
+    whole = date_stamps(pd.concat([p.cells for p in parts], ignore_index=True))  # times of day
+    assert whole is not None
+    return np.split(whole, np.cumsum([len(part.cells) for part in parts])[:-1])
+
+
+def _seconds(part: _Part) -> np.ndarray:
+    """The times of a part that are numbers [s]."""
+    return to_si(clock_seconds(numbers(part.cells, part.path, Layout())), TIME, part.time, TIME)
 
 
 def _refuse_apart(times: Mapping[Path, pd.Series]) -> None:

@@ -158,8 +158,10 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
             raise
 
 
-def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None:
-    """Seconds since the first of a column of date stamps, NaN where empty; None: numbers.
+def date_stamps(
+    cells: pd.Series, where: str | None = None, since: pd.Timestamp | None = None
+) -> np.ndarray | None:
+    """Seconds since a time of a column of date stamps, NaN where empty; None: numbers.
 
     Stamps are of ISO 8601, or have a date such as 31.12.2026, 12/31/2026 or Dec 31, 2026, or none: then
     a day begins where the time falls by more than half a day. A leap second of UTC is a second.
@@ -168,6 +170,7 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
     Args:
         cells: the column.
         where: what messages call the file; None: a cell that is not a stamp is NaN.
+        since: the time; None: the first one.
 
     Raises:
         InputError: a cell is not a stamp.
@@ -201,7 +204,8 @@ def date_stamps(cells: pd.Series, where: str | None = None) -> np.ndarray | None
         raise InputError(
             f"{where}: {cells.name} = {quoted(wrong)} in row {row} is not a time stamp of ISO 8601"
         )
-    seconds = np.array((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+    begin = stamps.dropna().iloc[0] if since is None else since
+    seconds = np.array((stamps - begin).dt.total_seconds(), float)
     if without_date:
         there = np.isfinite(seconds)
         seconds[there] = np.unwrap(seconds[there], period=day)
