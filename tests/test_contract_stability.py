@@ -185,6 +185,7 @@ def test_an_indefinite_mass_matrix_is_never_safe(monkeypatch):
     stubbed(monkeypatch, lambda *_: 0.5)
     found = check_stability(surge(added_mass_X=-20.0), surge())
     assert (found.mass_definite, found.bounded, found.safe) == (False, False, False)
+    assert not found.from_start, "what was learned is the reason"
     assert found.notes[0].startswith("the mass matrix is not positive definite")
     stubbed(monkeypatch, lambda *_: 0.5, lambda _: True)
     tanker = Model(ship=ship_with((), "kvlcc2"))

@@ -369,6 +369,16 @@ def test_the_direction_of_a_shaft_is_not_its_speed(
     np.testing.assert_allclose(found.run.commanded["propeller.n"], np.where(astern, sign * 10.0, 10.0))
 
 
+@pytest.mark.parametrize(("cells", "is_sign"), [("AHR", True), ("AHR?", False), ("AH", False)])
+def test_a_column_of_more_words_than_both_ways_and_stop_is_no_sign(
+    tmp_path: Path, cells: str, is_sign: bool
+) -> None:
+    states = np.array([*cells])[np.arange(len(TIME)) * len(cells) // len(TIME)]
+    content = table(**SHAFT, shaft_dir=states).drop(columns=["tau_X", "tau_Y", "tau_N"])
+    found = propose(written(tmp_path / "a.csv", content), TANKER)
+    assert (found.layout.column("propeller.n").sign == "shaft_dir") == is_sign
+
+
 @pytest.mark.parametrize("mark", [-999.0, 9999.0, -32768.0, -99.9, 35.0])
 def test_cells_far_beyond_the_limit_of_a_command_are_missing(tmp_path: Path, mark: float) -> None:
     """As loggers mark what they do not have; a column of them is in another unit."""

@@ -659,3 +659,12 @@ def test_a_delay_whose_estimate_goes_too_far_is_found_nevertheless(gain):
         last, share = motion._step(gain * (delay - taken), last, share)
         taken += last
     assert taken == pytest.approx(delay, abs=0.03)
+
+
+def test_the_interval_of_a_scale_is_as_wide_relative_to_it_at_any_scale():
+    widths = []
+    for scale in (0.5, 1.5, 4.0):
+        (finding,) = accelerations(accelerated(made(), scale=scale), REFERENCE).findings
+        low, high = finding.ci95
+        widths.append((high - low) / finding.value)
+    assert widths == pytest.approx([widths[0]] * 3, rel=0.02)
