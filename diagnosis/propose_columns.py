@@ -63,6 +63,9 @@ def _of_file(options: argparse.Namespace, craft: "Ship", advance: Advance) -> Do
         shown = [f"'{path}': no column is known for {', '.join(found.likely)}"]
     else:
         shown = _seen(path, found.run, craft, options.anyway, advance)
+    if found.by_numbers:
+        units = (f"{signal} in {unit}" for signal, unit in found.by_numbers.items())
+        shown.append(f"units by the numbers: {', '.join(units)}")
     if found.unused:
         shown.append(f"not used: {', '.join(found.unused)}")
     shown = list(map(printable, [*shown, *_blanks([found], options)]))

@@ -1113,3 +1113,16 @@ def test_the_line_that_mends_a_column_keeps_the_name_and_unit_it_was_read_by(tmp
     }
     (tmp_path / "a.csv.json").write_text(json.dumps(content))
     np.testing.assert_allclose(read(path, of=OTTER).pose, run.pose * [1.0, -1.0, -1.0])
+
+
+def test_units_that_numbers_alone_tell_are_named(tmp_path: Path) -> None:
+    table = zigzag()
+    degrees = table.assign(**{NAMES["psi"]: np.degrees(table[NAMES["psi"]]) % 360.0})
+    for content, units in (
+        (table, {}),
+        (degrees.rename(columns={NAMES["psi"]: "heading"}), {"psi": "deg"}),
+    ):
+        path = written(tmp_path / "a.csv", content)
+        assert propose(path, TANKER).by_numbers == units
+        said = command(propose_columns.main, path, "--ship", "kvlcc2").stdout
+        assert ("units by the numbers: psi in deg" in said) == bool(units)

@@ -66,12 +66,14 @@ class Proposal(NamedTuple):
         unused: names of columns that are no signals, as far as is known.
         run: the measurement, read so; None where a name is blank.
         likely: signal of a blank name -> columns that may be its own, the likeliest first.
+        by_numbers: signal -> its unit, where the numbers tell another one than the name, or than SI.
     """
 
     layout: Layout
     unused: Sequence[str]
     run: Run | None
     likely: Mapping[str, Sequence[LikelyColumn]] = {}
+    by_numbers: Mapping[str, str] = {}
 
     @property
     def needed(self) -> dict[str, Any]:
@@ -133,6 +135,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     except InputError as error:
         more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
+    told = {s: layout.column(s).unit for s in quantity}
     columns |= units_of_commands(path, layout, names, of)
     columns |= sign_columns(path, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
@@ -142,7 +145,8 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
-    return Proposal(layout, unused, read(path, layout, of))
+    by_numbers = {s: c.unit for s, c in columns.items() if c.unit and c.unit != told[s]}
+    return Proposal(layout, unused, read(path, layout, of), by_numbers=by_numbers)
 
 
 def text_of(path: Path, stated: Layout) -> Layout:
