@@ -28,7 +28,7 @@ FILLERS = CHANGES.union(
     SIGN,
     ("hat", "est", "estimated", "estimate", "meas", MEASURED, "measurement", "filtered", "true"),
     ("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "distance", "data", "value"),
-    ("thruster", "thrusters", "actuator", "actuators", "azimuth"),
+    ("thruster", "thrusters", "actuator", "actuators", "azimuth", "az"),
     ("gyro", "compass", "utm", "track", "gps", "gnss"),
     ("de", "du", "di", "do", "van", "der", "burta"),
     ("gga", "rmc", "hdt", "me", "sg"),  # sentences of NMEA 0183, tags of plants

@@ -20,7 +20,7 @@ FOREIGN = {
     "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
     "fore": "fwd forward vorn forut",
     "aft": "achter akter",
-    "azimuth": "az azi azimut azimute",
+    "azimuth": "azi azimut azimute",
     "thruster": "thr tunnel propulseur strahlruder boegschroef pednik pednika",
     "angle": "winkel vinkel angulo angolo hoek kat",
     "rpm": (
