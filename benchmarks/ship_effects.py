@@ -198,6 +198,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="CSV file for the table")
     options = parser.parse_args()
     ship = ship_with((), options.ship)
+    if not ship.description.allocates:
+        parser.error(f"{options.ship} has no thrust allocation, which its commands come from")
     names = options.causes.split(",") if options.causes else list(causes(ship))
     rows = []
     for kind in options.kinds.split(","):

@@ -68,6 +68,19 @@ def test_latitude_and_longitude_become_metres(tmp_path: Path, latitude: float) -
     assert np.ptp(moved, axis=0).max() < 3e-3
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-7])
+@pytest.mark.parametrize("longitude", [179.9998, -179.9998])
+def test_a_position_goes_on_across_the_date_line(tmp_path: Path, longitude: float, unit: float) -> None:
+    latitude, true = placed(-17.0, longitude)
+    jumped = (true + 180.0) % 360.0 - 180.0
+    assert np.abs(np.diff(jumped)).max() > 359.0
+    content = table(Latitude=latitude / unit, Longitude=jumped / unit).drop(columns=["x", "y"])
+    found = propose(written(tmp_path / "a.csv", content.round(0 if unit < 1.0 else 12))).run
+    assert found is not None
+    north, east = (np.ptp(found.pose[:, k]) for k in range(2))
+    assert (north, east) == pytest.approx((np.ptp(NORTH), np.ptp(EAST)), rel=1e-3)
+
+
 @pytest.mark.parametrize(("further", "one"), [(0.02, True), (3.0, False)])
 def test_the_runs_of_a_folder_have_one_origin_if_they_are_not_far_apart(
     tmp_path: Path, further: float, one: bool

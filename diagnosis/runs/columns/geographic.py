@@ -24,6 +24,7 @@ EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
+TURNS = 360.0, 360.0 / WHOLE, 2.0 * np.pi  # in degrees, 1e-7 degrees, rad
 # Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
@@ -67,6 +68,18 @@ def _of_first(columns: list[str]) -> list[str]:
     return [min(columns, key=numbers.__getitem__)] if len(apart) == 1 else columns
 
 
+def across_date_line(longitude: np.ndarray) -> np.ndarray:
+    """Longitudes (n,), in whatever unit, without the jump of a whole turn at the date line."""
+    there = np.isfinite(longitude)
+    most = float(np.abs(np.diff(longitude[there])).max(initial=0.0))
+    turn = next((t for t in TURNS if abs(most - t) < NEGLIGIBLE * t), None)
+    if turn is None:
+        return longitude
+    found = longitude.copy()
+    found[there] = np.unwrap(longitude[there], period=turn)
+    return found
+
+
 def is_side(cells: pd.Series, letters: str) -> bool:
     """Whether cells are the letters of a hemisphere, the negative one among them."""
     found = {*cells.dropna().astype("string").str.strip()}
@@ -88,7 +101,7 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     scale = _scale(known["x"], known["y"])
     origin = {s: scale * float(np.median(values)) for s, values in known.items()}
     largest = {s: np.radians(scale * np.abs(values).max()) for s, values in known.items()}
-    if largest["x"] > np.pi / 2 or largest["y"] > np.pi:
+    if largest["x"] > np.pi / 2 or largest["y"] > (1.0 + NEGLIGIBLE) * np.pi:
         return {}
     latitude = np.radians(origin["x"])
     flat = 1.0 - SQUARED_ECCENTRICITY * np.sin(latitude) ** 2

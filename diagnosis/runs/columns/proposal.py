@@ -30,6 +30,7 @@ from .columns import (
 from .columns_by_name import named_columns
 from .geographic import (
     SIDES,
+    across_date_line,
     are_minutes,
     geographic_pair,
     is_side,
@@ -323,6 +324,7 @@ def _geographic(
     how |= {s: how[s] | {"sign": after[s], "negative": letter} for s, letter in sides.items()}
     read = {s: Column(name=name).model_copy(update=how[s]) for s, name in pair.items()}
     degrees = {s: signed(numbers[s], table, c) for s, c in read.items()}
+    degrees["y"] = across_date_line(degrees["y"])
     columns = {s: c.model_copy(update=how[s]) for s, c in local_columns(pair, degrees).items()}
     if not columns:
         refuse_letters(pair, {signal: table[name] for signal, name in pair.items()})

@@ -43,6 +43,7 @@ from ..columns.columns import (
     to_si,
     with_units_of_names,
 )
+from ..columns.geographic import across_date_line, is_geographic
 from ..columns.unit_check import LARGEST, UNITS, largest, remedy
 from ..run_constants import DIGITS, FAR, NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
@@ -228,9 +229,9 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
 def signed(read: np.ndarray, table: pd.DataFrame, column: Column) -> np.ndarray:
     """Numbers (n,) of a column of a table with their sign; degrees where they have minutes."""
     read = degrees(read) if column.minutes else read
-    if column.sign is None:
-        return read
-    return np.where(is_cell(table[column.sign], column.negative), -read, read)
+    if column.sign is not None:
+        read = np.where(is_cell(table[column.sign], column.negative), -read, read)
+    return across_date_line(read) if is_geographic("y", column) else read
 
 
 def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
