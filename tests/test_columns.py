@@ -867,9 +867,9 @@ def test_a_unit_may_follow_a_slash(tmp_path: Path) -> None:
 
 
 def test_a_time_of_another_name_is_likely_where_rows_are_repeated(tmp_path: Path) -> None:
-    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "ticks"})
+    table = boat().iloc[np.r_[0:50, 49 : len(boat())]].rename(columns={"time": "beats"})
     found = propose(written(tmp_path / "a.csv", table), OTTER)
-    assert [c.name for c in found.likely["time"]] == ["ticks"]
+    assert [c.name for c in found.likely["time"]] == ["beats"]
 
 
 def test_a_struct_of_matlab_is_a_table(tmp_path: Path) -> None:
@@ -1126,3 +1126,11 @@ def test_units_that_numbers_alone_tell_are_named(tmp_path: Path) -> None:
         assert propose(path, TANKER).by_numbers == units
         said = command(propose_columns.main, path, "--ship", "kvlcc2").stdout
         assert ("units by the numbers: psi in deg" in said) == bool(units)
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [("North.Value", "x"), ("Heading.Value", "psi"), ("motor_left_rpm", "port.n")]
+)
+def test_a_value_and_a_motor_are_named_so(tmp_path: Path, name: str, signal: str) -> None:
+    found = propose(written(tmp_path / "a.csv", boat().rename(columns={signal: name})), OTTER)
+    assert found.layout.column(signal).name == name

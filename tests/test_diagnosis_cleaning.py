@@ -390,3 +390,17 @@ def test_minutes_that_begin_anew_each_hour_go_on_all_day():
     rare = base().rows(np.arange(0, N, 60))
     hours = replace(rare, time=(rare.time / 0.02 * 10.0 + 3000.0) % 3600.0)
     assert np.diff(ordered(hours).time) == pytest.approx(600.0)
+
+
+@pytest.mark.parametrize("repeats", [False, True])
+def test_commands_that_are_written_when_they_change_hold(repeats):
+    """A ramp writes each of its rows; a log in which commands are lost repeats some of the others."""
+    t = base().time
+    ramps = np.clip(np.abs((t % 6.0) - 3.0) - 1.5, 0.0, 1.0)
+    given = np.column_stack([ramps, 0.0 * t, 0.0 * t])
+    held = np.repeat(np.append(False, np.diff(ramps) == 0.0)[:, None], 3, axis=1)
+    if repeats:
+        held = np.repeat(((t % 6.0) > 2.5)[:, None], 3, axis=1)
+    assert 2 * held[:, 0].sum() > t.size
+    track = clean(replace(base(), tau_cmd=given, held=np.where([True, False, False], held, False)))
+    assert (track.silences % 2 == 1).any() == repeats

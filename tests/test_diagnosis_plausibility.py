@@ -628,6 +628,25 @@ def test_a_rudder_that_goes_to_and_fro_at_one_shaft_speed_varies(rudder):
     assert (said is not None and "commands are constant" in said) == (rudder == 0.0)
 
 
+@pytest.mark.parametrize(("size", "asked"), [(0.2, True), (0.006, False)])
+def test_a_steady_run_in_gusts_has_constant_commands(size, asked):
+    """What its motion needs varies by less than 5 % of what its actuators give."""
+    ship = ship_with((), "cybership2")
+    t = np.arange(0.0, 100.0, 0.1)
+    given = {"port.n": 10.0, "starboard.n": 10.0, "bow.u": 0.0}
+    given |= {"port_rudder.delta": 0.0, "starboard_rudder.delta": 0.0}
+    commands = np.tile([given[name] for name in ship.commands], (t.size, 1))
+    psi = size * np.sin(0.3 * t)
+    pose = np.column_stack([0.03 * np.cumsum(np.cos(psi)), 0.03 * np.cumsum(np.sin(psi)), psi])
+    pose += np.random.default_rng(2).normal(0.0, 1e-4, pose.shape)
+    tau = ship.commanded_force(commands, None)
+    run = Run("z", t, pose, tau, commands, signals=tuple(ship.commands), ship=ship.description)
+    w, model = weak_windows(smoothed(run)), Model(ship=ship)
+    assert bool(contradicted_commands(w, model)) == asked
+    needed = varying(w, omega(w, model))
+    assert (needed > 0.05 * most_thrust(w, model)).any() == asked
+
+
 class SomeOdds:
     """In place of the odds of readings: one reading is that much likelier than the file as it was read."""
 

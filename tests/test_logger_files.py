@@ -16,6 +16,7 @@ from diagnosis.runs import common_layout, propose, read
 from diagnosis.runs.columns.geographic import EQUATOR, SQUARED_ECCENTRICITY
 from diagnosis.runs.files.matlab_files import _vectors
 from diagnosis.runs.files.tables import date_stamps
+from diagnosis.runs.row_order import ordered
 
 TIME = np.arange(0.0, 60.0, 0.5)
 NORTH, EAST = 40.0 * np.sin(0.05 * TIME), 60.0 * np.cos(0.05 * TIME)
@@ -105,13 +106,147 @@ def in_minutes(degrees: np.ndarray) -> np.ndarray:
     return 100.0 * whole + 60.0 * (np.abs(degrees) - whole)
 
 
-def test_positions_with_letters_are_refused_by_their_name(tmp_path: Path) -> None:
+def sexagesimal(value: float, seconds: bool) -> str:
+    whole, minutes = divmod(60.0 * value, 60.0)
+    text = f"{whole:.0f}°{minutes:.6f}'"
+    return f"{whole:.0f}°{int(minutes)}'{60.0 * (minutes % 1.0):.5f}\"" if seconds else text
+
+
+ANGLES: dict[str, Callable[[float, str], str]] = {
+    "degrees and a letter": lambda value, side: f"{value:.8f}° {side}",
+    "a letter before": lambda value, side: f"{side}{value:.8f}",
+    "minutes": lambda value, side: f"{sexagesimal(value, False)}{side}",
+    "seconds": lambda value, side: f"{sexagesimal(value, True)} {side}",
+    "minutes as of NMEA 0183": lambda value, side: f"{in_minutes(np.array(value)):.6f}{side}",
+}
+
+
+@pytest.mark.parametrize("form", ANGLES)
+@pytest.mark.parametrize(("latitude", "longitude"), [(63.44, 10.4), (-33.9, -70.5)])
+def test_positions_that_are_written_as_angles_are_read(
+    tmp_path: Path, form: str, latitude: float, longitude: float
+) -> None:
     content = table().drop(columns=["x", "y"])
-    for name, letter, degrees in zip(("lat", "lon"), "NE", placed(63.44, 10.4), strict=True):
-        content[name] = [f"{value:.5f}{letter}" for value in in_minutes(degrees)]
-    said = "a cell of lat and lon is not a number: '6326.*decimal degrees"
-    with pytest.raises(InputError, match=said):
+    for name, sides, degrees in zip(
+        ("lat", "lon"), ("NS", "EW"), placed(latitude, longitude), strict=True
+    ):
+        content[name] = [ANGLES[form](abs(value), sides[int(value < 0.0)]) for value in degrees]
+    found = propose(written(tmp_path / "a.csv", content)).run
+    assert found is not None
+    for k, true in enumerate((NORTH, EAST)):
+        np.testing.assert_allclose(found.pose[:, k] - found.pose[0, k], true - true[0], atol=0.02)
+
+
+def test_a_cell_that_is_no_angle_refuses_the_position(tmp_path: Path) -> None:
+    content = table().drop(columns=["x", "y"]).assign(lat="63.44 N", lon="10.40 Q")
+    with pytest.raises(InputError, match=r"a cell of lat and lon is not a number: '.*decimal degrees"):
         propose(written(tmp_path / "a.csv", content))
+
+
+HEADS = {
+    "names, description, units, types": (
+        "Time;PosN;PosE;Hdg;X;Y;N",
+        "Time since start;North;East;Gyro heading;Surge force;Sway force;Yaw moment",
+        "s;m;m;rad;N;N;N.m",
+        "REAL;REAL;REAL;REAL;REAL;REAL;REAL",
+    ),
+    "a ruled line": ("time;x;y;psi;tau_X;tau_Y;tau_N", "----;-;-;---;-----;-----;-----"),
+    "types": ("time;x;y;psi;tau_X;tau_Y;tau_N", "REAL;REAL;REAL;REAL;REAL;REAL;REAL"),
+}
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_names_stand_above_units_types_and_ruled_lines(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(HEADS[head]) + "\n" + table().to_csv(index=False, header=False, sep=";"))
+    found = propose(path).run
+    assert found is not None
+    np.testing.assert_array_equal(found.time[np.isfinite(found.time)], TIME)
+    np.testing.assert_allclose(found.pose[-TIME.size :, 0], NORTH)
+
+
+@pytest.mark.parametrize("mark", [" ", " | "])
+def test_tables_that_databases_print_are_read(tmp_path: Path, mark: str) -> None:
+    names = [*table()]
+    rule = ("+" if "|" in mark else " ").join(["-" * 22] * len(names))
+    rows = [mark.join(f"{x:>20.12f}" for x in row) for row in table().to_numpy()]
+    lines = [mark.join(f"{name:<20}" for name in names), rule, *rows, "", f"({len(rows)} rows)"]
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(lines) + "\n")
+    found = propose(path).run
+    assert found is not None
+    np.testing.assert_allclose(found.time[: TIME.size], TIME)
+    np.testing.assert_allclose(found.pose[: TIME.size, 1], EAST, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("many", "read_as_words"), [(1, True), (TIME.size // 2, False)], ids=["few", "half of all"]
+)
+def test_words_with_numbers_are_remarks_if_they_are_few(
+    tmp_path: Path, many: int, read_as_words: bool
+) -> None:
+    cells = [f"Stbd {x:.1f}" if k < many else f"{x:.1f}" for k, x in enumerate(TIME)]
+    path = written(tmp_path / "a.csv", table(tau_X=cells))
+    if read_as_words:
+        assert "tau_X: 1 cell without a number, such as 'Stbd 0.0'" in read(path).notes
+    else:
+        with pytest.raises(InputError, match=r"tau_X = 'Stbd 0\.0' in row 1 is not a number"):
+            read(path)
+
+
+def test_other_signs_of_minus_and_hard_blanks_are_read(tmp_path: Path) -> None:
+    cells = [f"\u00a0{x:.6f}".replace("-", "\u2212") for x in NAMES["tau_Y"]]
+    found = read(written(tmp_path / "a.csv", table(tau_Y=cells)))
+    np.testing.assert_allclose(found.tau_cmd[:, 1], NAMES["tau_Y"], atol=1e-6)
+
+
+CLOCKS: dict[str, Callable[[pd.Series], pd.Series]] = {
+    "hhmmssfff": lambda at: at.dt.strftime("%H%M%S%f").str[:9].astype("int64"),
+    "yyyymmddhhmmssfff": lambda at: at.dt.strftime("%Y%m%d%H%M%S%f").str[:17].astype("int64"),
+    "hhmmssff": lambda at: at.dt.strftime("%H%M%S%f").str[:8].astype("int64"),
+    "100 ns since 1601": lambda at: (
+        (at - pd.Timestamp("1970-01-01")).dt.total_seconds().mul(1e7).astype("int64")
+        + 116_444_736_000_000_000
+    ),
+}
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_numbers_that_are_clocks_are_seconds(tmp_path: Path, clock: str) -> None:
+    seconds = 1.5 * TIME  # more than a minute
+    at = pd.Series(pd.Timestamp("2024-05-13 23:58:50") + pd.to_timedelta(seconds, unit="s"))
+    found = propose(written(tmp_path / "a.csv", table(time=CLOCKS[clock](at)))).run
+    assert found is not None
+    time = ordered(found).time
+    np.testing.assert_allclose(time - time[0], seconds, atol=5e-3)  # of numbers with 17 digits
+
+
+@pytest.mark.parametrize(("unit", "said"), [(1e3, "ms"), (1e2, "10 ms")])
+def test_a_time_in_hundredths_is_none_in_thousandths(tmp_path: Path, unit: float, said: str) -> None:
+    found = propose(written(tmp_path / "a.csv", table(time=unit * TIME)))
+    assert found.by_numbers == {"time": said}
+    assert found.run is not None
+    np.testing.assert_allclose(found.run.time, TIME)
+
+
+@pytest.mark.parametrize("form", ["to the minute", "rounded"])
+def test_coarse_stamps_are_spread_evenly(tmp_path: Path, form: str) -> None:
+    seconds = 0.5 * np.arange(600)
+    begin = pd.Timestamp("2024-05-13 10:12:33")
+    north, east = 40.0 * np.sin(0.05 * seconds), 60.0 * np.cos(0.05 * seconds)
+    stamps = {
+        "to the minute": (begin + pd.to_timedelta(seconds, unit="s")).strftime("%d.%m.%Y %H:%M"),
+        "rounded": [f"{x:.0f}" for x in seconds],
+    }
+    content = pd.DataFrame({"time": stamps[form], "x": north, "y": east, "psi": 0.1 * np.sin(seconds)})
+    path = written(
+        tmp_path / "a.csv", content.assign(**dict.fromkeys(("tau_X", "tau_Y", "tau_N"), north))
+    )
+    found = propose(path)
+    assert not found.by_numbers
+    assert found.run is not None
+    time = ordered(found.run).time
+    np.testing.assert_allclose(time - time[0], seconds, atol=0.02)
 
 
 @pytest.mark.parametrize(("latitude", "side"), [(63.44, "N"), (-33.9, "S")])
@@ -367,7 +502,9 @@ TANKER = ship_with((), "kvlcc2")
 SHAFT = {"rpm": np.full(TIME.size, 600.0), "rudder_deg": 10.0 * np.sin(0.1 * TIME)}
 
 
-@pytest.mark.parametrize("name", ["shaft_dir", "propeller_direction", "prop dir"])
+@pytest.mark.parametrize(
+    "name", ["shaft_dir", "propeller_direction", "prop dir", "Shaft clutch direction"]
+)
 @pytest.mark.parametrize(("cells", "sign"), [((1, 1), 1.0), ((1, -1), -1.0), (("AHEAD", "AHEAD"), 1.0)])
 def test_the_direction_of_a_shaft_is_not_its_speed(
     tmp_path: Path, name: str, cells: tuple[object, object], sign: float

@@ -86,3 +86,9 @@ def test_a_receiver_that_begins_anew_parts_the_run_too():
     found = parted(run)
     assert np.ptp(np.diff(found.time)[np.flatnonzero(later)[0] :]) < 1e-9
     assert "jumps by 70.7 m" in found.notes[-1]
+
+
+def test_a_coordinate_that_was_stuck_is_no_jump():
+    pose = whole().pose.copy()
+    pose[1000:1500, 0] = pose[999, 0]
+    assert np.array_equal(parted(replace(whole(), pose=pose)).time, whole().time)

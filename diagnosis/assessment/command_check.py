@@ -9,8 +9,9 @@ from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import BLOCK, inertial, needed_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import TAU, Named
-from ..runs.run_constants import DIGITS
+from ..runs.run_constants import DIGITS, NEGLIGIBLE
 from .gains import varying
+from .reading_odds import most_thrust
 from .settings import SETTINGS
 
 
@@ -117,7 +118,7 @@ def _varying(w: WeakWindows, model: Model, uncertain: np.ndarray) -> str | None:
         uncertain: (3,), what inertia and hull may be off by [N, N, N m].
     """
     varies = varying(w, omega(w, model))
-    if not (varies > uncertain).any():
+    if not (varies > np.maximum(uncertain, NEGLIGIBLE * most_thrust(w, model))).any():  # as of gusts
         return None
     k = int(np.argmax(varies / np.maximum(uncertain, np.finfo(float).tiny)))
     return (
@@ -153,6 +154,8 @@ def moves_on(w: WeakWindows, model: Model) -> str | None:
     still = lasting(needed_force(every, model)[resting], every.block[resting])
     size = lasting(needed_force(w, model), w.block)
     if 2.0 * np.median(still / size) < 1.0:  # on two axes of three: one may be so by chance
+        return None
+    if not (still > NEGLIGIBLE * most_thrust(w, model)).any():  # it drifts
         return None
     return (
         f"all commands are zero for {w.every * resting.sum():.0f} s, and the motion needs "

@@ -128,22 +128,29 @@ class Track(ShortRepr):
     def silences(self) -> np.ndarray:
         """(n,), number of the part of the run that each row lies in; odd parts are without commands.
 
-        A log in which most commands are missing, between most of the others, too, writes them when
-        they change: there they are held.
+        A log in which most commands are missing, between most of the others, too, or where hardly one
+        that is there repeats the one before, writes them when they change: there they are held.
         """
-        time, held = self.run.time, self.run.held
+        time, held, given = self.run.time, self.run.held, self.run.given
         each = np.zeros((1, time.size), bool) if held is None else held.T
-        begun, ended = np.concatenate([self._unstated(rows) for rows in each], axis=1)
+        values = given.T if given.shape == each.T.shape else np.zeros(each.shape)
+        begun, ended = np.concatenate(
+            [self._unstated(*pair) for pair in zip(each, values, strict=True)], axis=1
+        )
         order = np.argsort(begun, kind="stable")
         begun, ended = begun[order], np.maximum.accumulate(ended[order])
         meet = np.flatnonzero(begun[1:] <= ended[:-1])  # of two that overlap one part is made
         begun, ended = np.delete(begun, meet + 1), np.delete(ended, meet)
         return np.searchsorted(begun, time, "left") + np.searchsorted(ended, time, "right")
 
-    def _unstated(self, held: np.ndarray) -> np.ndarray:
-        """(2, m), begin and end [s] of the parts in which a command is not known; ``held`` (n,)."""
+    def _unstated(self, held: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """(2, m), begin and end [s] of the parts in which a command, values (n,), is not known."""
         time, stated = self.run.time, np.flatnonzero(~held)
-        written = 2 * stated.size < time.size and 2 * int((np.diff(stated) == 1).sum()) < stated.size
+        apart = 2 * int((np.diff(stated) == 1).sum()) < stated.size
+        changes = (
+            float(np.mean(np.diff(values[stated]) == 0.0)) <= NEGLIGIBLE if stated[1:].size else True
+        )
+        written = 2 * stated.size < time.size and (apart or changes)
         given = time if written else time[stated]
         longest = long_gap(float(np.median(np.diff(time))), self.scale)
         # Before the first command and behind the last one nothing is known of them either.

@@ -51,7 +51,7 @@ def _jumps(time: np.ndarray, place: np.ndarray, highest: float) -> list[Jump]:
     found = []
     for k in np.flatnonzero(np.abs(np.diff(place)) > FAR * highest * np.diff(time)) + 1:
         sides = slice(k - IN_A_ROW, k), slice(k, k + IN_A_ROW)
-        if not IN_A_ROW <= k <= time.size - IN_A_ROW:
+        if not IN_A_ROW <= k <= time.size - IN_A_ROW or _is_stuck(place[sides[0]]):
             continue
         middle = 0.5 * (time[k - 1] + time[k])
         lines = [np.polyfit(time[side] - middle, place[side], 1) for side in sides]
@@ -63,6 +63,11 @@ def _jumps(time: np.ndarray, place: np.ndarray, highest: float) -> list[Jump]:
         if abs(way) > max(highest * (time[k + IN_A_ROW - 1] - time[k - IN_A_ROW]), FAR * max(off)):
             found.append((int(k), complex(way)))
     return found
+
+
+def _is_stuck(place: np.ndarray) -> bool:
+    """Whether one coordinate alone of a place (n,) repeats: the jump behind is its own."""
+    return any((np.diff(part) == 0.0).all() for part in (place.real, place.imag))
 
 
 def _lasting(jumps: list[Jump]) -> list[Jump]:

@@ -253,17 +253,34 @@ def _spread(run: Run) -> Run:
         return run
     stamps = run.time[first]
     step = np.diff(stamps)
+    many = np.diff(np.append(first, run.time.size))
+    note = (
+        f"its stamps are {np.median(step) if step.size else 0.0:.4g} s apart, with {many.mean():.3g} "
+        "samples each: these are taken as evenly spaced"
+    )
+    if np.ptp(many[1:-1]) if many.size > 2 else 0:  # stamps that are rounded, or are no whole periods
+        even = _even_below(run.time, float(np.median(step)))
+        if even is not None:
+            return replace(run, time=even, notes=(*run.notes, note))
     until = np.append(step, np.median(step) if step.size else 0.0)
     # A gap after a stamp is no part of it.
     until = np.where((until > 0.0) & (until < LONG * np.median(until)), until, np.median(until))
-    many = np.diff(np.append(first, run.time.size))
     within = np.arange(run.time.size) - np.repeat(first, many)
-    time = run.time + np.repeat(until / many, many) * within
-    note = (
-        f"its stamps are {np.median(step):.4g} s apart, with {many.mean():.3g} samples each: "
-        "these are taken as evenly spaced"
-    )
+    apart = until / many
+    if many.size > 2:  # the first stamp and the last one may have a part of their rows
+        apart[[0, -1]] = np.minimum(apart[[0, -1]], np.median(apart[1:-1]))
+    time = run.time + np.repeat(apart, many) * within
+    time[: many[0]] += until[0] - apart[0] * many[0]
     return replace(run, time=time, notes=(*run.notes, note))
+
+
+def _even_below(time: np.ndarray, step: float) -> np.ndarray | None:
+    """Evenly spaced times (n,) whose stamps are these to a resolution [s]; None: none are."""
+    row = np.arange(time.size)
+    period, first = np.polyfit(row, time, 1).tolist()
+    even = first + period * row
+    off = time - even
+    return even + off.max() if np.ptp(off) <= (1.0 + NEGLIGIBLE) * step else None
 
 
 def in_order(time: np.ndarray) -> np.ndarray:

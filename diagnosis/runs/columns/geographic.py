@@ -25,6 +25,11 @@ SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one l
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
 TURNS = 360.0, 360.0 / WHOLE, 2.0 * np.pi  # in degrees, 1e-7 degrees, rad
+# An angle as a text: 63.44° N, N63.44, 63°26.4'N, 63 26 24.0 N; 63.44°.
+ANGLE = re.compile(
+    r"(?P<before>[NSEW])?\s*(?P<deg>[+-]?\d+(?:\.\d+)?)(?:\s*[°º]\s*|\s+|(?=[NSEW])|$)"
+    r"(?:(?P<min>\d+(?:\.\d+)?)\s*['′’]?\s*)?(?:(?P<s>\d+(?:\.\d+)?)\s*(?:[\"″”]|'')?\s*)?(?P<behind>[NSEW])?"
+)
 # Words of a name.
 WORDS = {"x": {"lat", "latitude"}, "y": {"lon", "lng", "long", "longitude"}}
 
@@ -66,6 +71,31 @@ def _of_first(columns: list[str]) -> list[str]:
     apart = {re.sub(r"\d+", "", column) for column in columns}
     numbers = {column: [int(n) for n in re.findall(r"\d+", column)] for column in columns}
     return [min(columns, key=numbers.__getitem__)] if len(apart) == 1 else columns
+
+
+def is_of_position(name: str) -> bool:
+    """Whether a name is that of a latitude or longitude."""
+    return any(words & {*words_of(name)} for words in WORDS.values())
+
+
+def degrees_in(cells: pd.Series) -> np.ndarray:
+    """Degrees (n,) of cells with angles as texts, see :data:`ANGLE`, where all are; else NaN.
+
+    South and west are negative. A cell without a letter of a side has the sign of a degree.
+    """
+    texts = cells.astype("string").str.strip().str.replace(",", ".")
+    there = texts.notna() & (texts != "")
+    found = np.full(len(cells), np.nan)
+    if not (there.any() and texts[there].str.contains("[NSEW°º]").all()):
+        return found
+    if not texts[there].str.fullmatch(ANGLE).all():
+        return found
+    parts = texts.str.extract(ANGLE)
+    size = parts[["deg", "min", "s"]].astype(float).fillna({"min": 0.0, "s": 0.0})
+    negative = parts["before"].fillna(parts["behind"]).isin(["S", "W"]) | (size["deg"] < 0.0)
+    degrees = size["deg"].abs() + size["min"] / 60.0 + size["s"] / 60.0**2
+    found[there] = np.where(negative, -degrees, degrees)[there]
+    return found
 
 
 def across_date_line(longitude: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ CHANGES = frozenset(("velocity", "velo", "vel", "speed", "rate", "angvelo", "ang
 ORDERS = frozenset(("order", "command", "cmd"))  # words of a reference, which is no measurement
 MEASURED = "measured"  # word of what an actuator does, as its feedback
 # Words of a column that holds the sign of another one, and its cells of a negative value.
-SIGN = frozenset(("dir", "direction", "sign", "gear", "side"))
+SIGN = frozenset(("dir", "direction", "sign", "gear", "side", "clutch"))
 ASTERN = frozenset(("r", "rev", "reverse", "astern", "back", "backward", "b", "aft", "-1", "-1.0", "-"))
 # Words of names that say how a signal was found or what quantity it is, which its unit says as well.
 FILLERS = CHANGES.union(
@@ -28,7 +28,7 @@ FILLERS = CHANGES.union(
     SIGN,
     ("hat", "est", "estimated", "estimate", "meas", MEASURED, "measurement", "filtered", "true"),
     ("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "distance", "data", "value"),
-    ("thruster", "thrusters", "actuator", "actuators", "azimuth", "az"),
+    ("thruster", "thrusters", "actuator", "actuators", "azimuth", "az", "motor", "main"),
     ("gyro", "compass", "utm", "track", "gps", "gnss"),
     ("de", "du", "di", "do", "van", "der", "burta"),
     ("gga", "rmc", "hdt", "me", "sg"),  # sentences of NMEA 0183, tags of plants

@@ -27,7 +27,7 @@ FOREIGN = {
         "drehzahl regime toerental turtall omdreiningstall omdreininger varvtal giri rotacao rotacoes "
         "obroty"
     ),
-    "order": "set setpoint sp soll sollwert consigne orden ordre",
+    "order": "set setpoint sp demand demanded soll sollwert consigne orden ordre",
     "measured": "act actual fb feedback ist istwert mesure medido gemeten",  # codespell:ignore
     "true": "vrai vraie wahr verdadero",
     "time": "zeit uhrzeit temps heure tiempo tempo tijd tid czas",

@@ -13,7 +13,7 @@ from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read, signed
 from ..files.tables import date_stamps, table_of_file
-from ..files.text_layout import table_cells, text_layout, unmarked
+from ..files.text_layout import KNOWN, bare_unit, table_cells, text_layout, unmarked
 from .columns import (
     POSE,
     UNITS,
@@ -48,6 +48,7 @@ from .name_units import bare_name, without_unit
 from .name_words import likely_encoding
 from .side_car import as_json, refuse_other_kinds, refuse_thousands
 from .units_by_numbers import (
+    is_stamped,
     names_of,
     numbers_of,
     seen_units,
@@ -141,13 +142,21 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     columns |= sign_columns(path, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
-    for signal, unit, factor in seen_units(run):
+    stamped = "time" not in layout.without_column and is_stamped(
+        path, layout, layout.column("time").name
+    )
+    for signal, unit, factor in seen_units(run, stamped):
         if signal not in kept or not _is_told(kept[signal]):
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
-    by_numbers = {s: c.unit for s, c in columns.items() if c.unit and c.unit != told[s]}
+    by_numbers = {s: _by(c) for s, c in columns.items() if c.unit and c.unit != told[s]}
     return Proposal(layout, unused, read(path, layout, of), by_numbers=by_numbers)
+
+
+def _by(column: Column) -> str:
+    """The unit of a column, with the factor to it."""
+    return str(column.unit) if column.factor == 1.0 else f"{column.factor:g} {column.unit}"
 
 
 def text_of(path: Path, stated: Layout) -> Layout:
@@ -257,6 +266,8 @@ def units_below(path: Path, text: Layout, names: Sequence[str]) -> list[str]:
         with path.open(encoding=text.encoding) as file:
             cells = table_cells(next(islice(file, text.skip + 1, None)), text.separator)
             found = unmarked(cells, len(names))
+    if not any(bare_unit(cell) in KNOWN for cell in found):  # of types, or a ruled line
+        found = []
     return [*found, *[""] * len(names)][: len(names)]
 
 

@@ -149,6 +149,8 @@ def _mark(separator: str) -> str:
 
 def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
     """Refuse a CSV file with a line of units below the names, unless that was stated."""
+    if layout.units_line:
+        return
     cells = table.drop(columns=layout.column("time").name, errors="ignore").head(2).astype("string")
     numbers = cells.apply(lambda column: pd.to_numeric(column.str.replace(",", "."), errors="coerce"))
     if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:

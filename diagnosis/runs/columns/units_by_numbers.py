@@ -16,10 +16,13 @@ from ..files.reading import Run
 from ..files.tables import clock_seconds, date_stamps, table_of_file
 from ..frozen import repeated
 from ..row_order import by_stamps, in_order
+from ..run_constants import IN_A_ROW
 from .columns import OF_UNIT, UNITS, Column, Layout, largest_commands, other_angles
+from .geographic import degrees_in, is_of_position
 from .likely_columns import ASTERN, says_command, signal_of_sign
 from .name_words import words_of
 from .unit_check import (
+    FASTEST,
     OFTENEST,
     doubts,
     doubts_of_angles,
@@ -28,6 +31,10 @@ from .unit_check import (
     part_of_degree,
     spelt,
 )
+
+# m/s, times the scale of the ship: a Froude number of 1.5. A time that makes a ship faster is no time in
+# ms but in 1/100 s, as controllers count it; chosen.
+PLANING = 5.0
 
 
 def is_fraction(
@@ -124,27 +131,44 @@ def numbers_of(cells: pd.Series, signal: str) -> np.ndarray:
     if stamps is not None:
         return stamps
     found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+    if np.isnan(found).all() and is_of_position(str(cells.name)):
+        found = degrees_in(cells)
     return clock_seconds(found) if signal == "time" else found
 
 
-def seen_units(run: Run) -> Iterable[tuple[str, str, float]]:
-    """Signals that seem to be in another unit: which, in which, and by which factor to that."""
+def seen_units(run: Run, stamped: bool = False) -> Iterable[tuple[str, str, float]]:
+    """Signals that seem to be in another unit: which, in which, and by which factor to that.
+
+    Args:
+        run: as it is read.
+        stamped: whether its time is by date stamps, which are in no unit.
+    """
     if not np.isfinite(run.time).any():
         return
-    unit = time_unit(run.time)
+    unit, scale = None if stamped else time_unit(run.time), ship(description=run.ship).scale
+    size = UNITS["time"][unit or "s"]
     if unit:
-        yield "time", unit, 1.0
+        tenfold = unit == "ms" and _speed(run) / size > min(PLANING * scale.speed, FASTEST)
+        size *= 10.0 if tenfold else 1.0
+        yield "time", unit, 10.0 if tenfold else 1.0
     run = by_stamps(run)
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     zeros = (run.pose == 0.0).all(axis=1)
     fresh = ~zeros & ~repeated(run.pose, there)
-    time = UNITS["time"][unit or "s"] * run.time[fresh]
+    time = size * run.time[fresh]
     angles = doubts_of_angles(other_angles(run.measured))
-    scale = ship(description=run.ship).scale
     for doubt in chain(doubts(time, run.pose[fresh], scale), angles):
         factor = part_of_degree(run.pose[fresh]) if doubt.signals == ("psi",) else 1.0
         yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
+
+
+def _speed(run: Run) -> float:
+    """The speed over some rows that a run exceeds in a tenth of it [m, by the unit of its time]."""
+    way = np.linalg.norm(run.pose[IN_A_ROW:, :2] - run.pose[:-IN_A_ROW, :2], axis=1)
+    time = run.time[IN_A_ROW:] - run.time[:-IN_A_ROW]
+    speed = (way / np.where(time > 0.0, time, np.nan))[np.isfinite(way)]
+    return float(np.nanquantile(speed, 0.9)) if np.isfinite(speed).any() else 0.0
 
 
 def time_unit(time: np.ndarray) -> str | None:

@@ -12,7 +12,8 @@ CALLED = {
     "time": (
         "t timestamp datetime utc utctime timeutc datetimeutc utcdatetime timestamputc gpstime "
         "elapsedtime seconds stamp epoch unixtime timesincestart xvalue gpst logtime timeofweek "
-        "gpstimeofweek tow gpstow itow secondsofweek"
+        "gpstimeofweek tow gpstow itow secondsofweek sow gpssow gpsseconds "
+        "timeofday datenum ticks filetime"
     ),
     "x": (
         "north northing n posx positionx xn posn positionnorth posnorth utmn northings xnorth ynorth "
@@ -89,6 +90,8 @@ def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
     parts = re.split("[/.]", name)
     parts[-2:-1] = [part.rpartition("_")[2] for part in parts[-2:-1]]  # vehicle_local_position.x
     last = parts[-1] if len(parts[-1]) > 1 or parts[-1] == "t" or "." not in name else ""
+    if len(parts) > 1 and parts[-1].casefold() in VALUE:
+        return meaning(".".join(parts[:-1]), signals)  # North.Value of OPC
     for part in (name, "".join(parts[-2:]), last):
         for said in (_folded(part), "".join(words_of(part))):
             found = known.get(said, ("", False))

@@ -246,7 +246,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         values = date_stamps(cells, f"'{path}'") if signal == "time" else None
         if values is None:
             read = numbers(cells, path, layout)
-            if signal == "time" and column.unit is None:
+            if signal == "time" and column.unit is None and column.factor == 1.0:
                 read = clock_seconds(read)
             if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
                 read = np.where(read == NO_HEADING, np.nan, read)

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from dateutil.parser import ParserError, parse
-from scipy.constants import day
+from scipy.constants import day, nano
 
 from cosim import InputError
 from cybership.message_text import quoted
 
 from ..columns.columns import Layout
+from ..columns.geographic import degrees_in, is_of_position
 from ..columns.side_car import (
     refuse_encoding,
     refuse_layout,
@@ -24,7 +25,7 @@ from ..columns.side_car import (
     refuse_units,
     what_to_do,
 )
-from ..run_constants import CHANCE, DIGITS
+from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
 from .matlab_files import matlab_table
 from .message_fields import message_fields
 from .text_layout import STAMP, is_marked
@@ -33,10 +34,11 @@ from .text_layout import STAMP, is_marked
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
 DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
-# Of a cell without a value, of a comment, and of a line such as "Total rows: 1800".
-WORDS = re.compile(r"\D*|(#|%|//|[^\W\d_]{2}).*")
+WORDS = re.compile(r"\D*|[+-]?1\.#\w+")  # of a cell without a value, as 1.#INF of C
+REMARK = re.compile(r"(#|%|//|\(|[^\W\d_]{2}).*")  # such as "Total rows: 1800"
 ELAPSED = re.compile(r"(?P<min>\d+):(?P<s>[0-5]?\d[.,]\d+)")  # minutes and seconds
 ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
+TICKS = 1e17, 1e18  # 1, counts of 100 ns since the year 1601 or 1; of 1 ns since 1970 there are more
 FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
 
@@ -238,17 +240,23 @@ def _day(text: str, day_first: bool) -> datetime | None:
     """A date in any form; None: it is none."""
     any_day = datetime.min.replace(year=1970)  # of times without a date
     try:
-        return parse(text, dayfirst=day_first, default=any_day) if text else any_day
+        day = parse(text, dayfirst=day_first, default=any_day) if text else any_day
+        return day if day.year >= any_day.year else None
     except (ParserError, OverflowError):
         return None
 
 
 def has_words(cells: pd.Series) -> np.ndarray:
-    """(n,), the cells of a column that are words: without a digit, a remark, or its name again."""
+    """(n,), the cells of a column that are words: without a digit, a remark, or its name again.
+
+    Remarks are few; many cells such as "Stbd 20.0" are none.
+    """
     if pd.api.types.is_numeric_dtype(cells) or pd.api.types.is_datetime64_any_dtype(cells):
         return np.zeros(len(cells), bool)
     texts = cells.astype("string").str.strip().fillna("0")
-    return np.asarray(texts.str.fullmatch(WORDS), bool) | np.asarray(texts == str(cells.name), bool)
+    found = np.asarray(texts.str.fullmatch(WORDS), bool) | np.asarray(texts == str(cells.name), bool)
+    remarks = np.asarray(texts.str.fullmatch(REMARK), bool) & ~found
+    return found | (remarks & (remarks.sum() <= NEGLIGIBLE * remarks.size))
 
 
 def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
@@ -259,10 +267,14 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     """
     marked = layout.decimal != "." and not pd.api.types.is_numeric_dtype(cells)  # beside words
     values = cells.astype("string").str.replace(layout.decimal, ".") if marked else cells
+    if not pd.api.types.is_numeric_dtype(values):
+        values = values.map(_plain_number)
     try:
         found = np.asarray(pd.to_numeric(values, errors="coerce"), float)
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
         raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
+    if np.isnan(found).all() and is_of_position(str(cells.name)):
+        found = degrees_in(values)
     missing = np.isnan(found)
     first = _first(cells, missing, words=bool(missing.all()))
     if first is not None:
@@ -274,21 +286,37 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     return found
 
 
+def _plain_number(cell: object) -> object:
+    """A cell with the minus of ISO 8859 in place of other signs, and without hard blanks around it."""
+    return cell.replace("\u2212", "-").strip("\u00a0 ") if isinstance(cell, str) else cell
+
+
 def clock_seconds(time: np.ndarray) -> np.ndarray:
     """Times (n,) as seconds, if they are numbers hhmmss.ss, as of NMEA 0183, of more than a minute.
 
     In such numbers neither the last two digits before the point nor the two before these exceed 59. They
-    may follow a date: 20210601085807.
+    may follow a date, and thousandths or hundredths without a point: 20210601085807250. Numbers of 18
+    digits are counts of 100 ns, as of .NET and Windows.
     """
+    finite = time[np.isfinite(time)]
+    if finite.size and TICKS[0] < finite.min() and finite.max() < TICKS[1]:
+        return 100.0 * nano * time
+    return next(
+        (found for parts in (1.0, 1e3, 1e2) if (found := _of_clock(time / parts)) is not None), time
+    )
+
+
+def _of_clock(time: np.ndarray) -> np.ndarray | None:
+    """Seconds of times (n,) that are numbers hhmmss.ss of more than a minute; None: these are none."""
     dates, there = np.divmod(time[np.isfinite(time)], 1e6)
     hours, minutes, seconds = there // 1e4, there // 1e2 % 100.0, there % 100.0
     months, days = dates // 1e2 % 100.0, dates % 100.0
     is_date = (dates == 0.0) | ((months >= 1.0) & (months <= 12.0) & (days >= 1.0) & (days <= 31.0))
     is_clock = is_date & (hours < 24.0) & (minutes < FULL) & (seconds < FULL)
     if not (there.size and is_clock.all() and np.ptp(minutes) > 0.0):
-        return time
+        return None
     if seconds.min() > 0.1 * FULL or seconds.max() < 0.9 * FULL:  # these do not end a minute
-        return time
+        return None
     found = np.full_like(time, np.nan)
     found[np.isfinite(time)] = np.unwrap(3600.0 * hours + 60.0 * minutes + seconds, period=day)
     return found
@@ -309,9 +337,8 @@ def _first(cells: pd.Series, unreadable: Any, words: bool = False) -> tuple[str,
 
     Those with words do not count, unless ``words``.
     """
-    wrong = cells.loc[np.asarray(unreadable) & np.asarray(cells.notna())]
-    if not words:
-        wrong = wrong.loc[~has_words(wrong)]
+    left = np.asarray(unreadable) & np.asarray(cells.notna())
+    wrong = cells.loc[left & ~has_words(cells) if left.any() and not words else left]
     return (str(wrong.iloc[0]), int(wrong.index[0]) + 1) if wrong.size else None
 
 

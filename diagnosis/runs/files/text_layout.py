@@ -17,6 +17,7 @@ STAMP = re.compile(
     r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
 )
+RULED = re.compile(r"[-=+|\s]*[-=]{3}[-=+|\s]*")  # a line below the names
 MARK = re.compile(r"[#%/!]+")  # of a comment, alone before the names
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
@@ -83,7 +84,13 @@ def _with(
     separator: str, decimal: str, lines: Sequence[str], is_told: Callable[[str, str], bool]
 ) -> tuple[float, Layout | None]:
     """How much of the table is told with a separator and a decimal mark, and the layout of that."""
-    rows = [(k, table_cells(line, separator)) for k, line in enumerate(lines) if line.strip()]
+    ruled = {k for k, line in enumerate(lines) if RULED.fullmatch(line.strip())}
+    blank = " " if separator == " " else ""  # at the end of a line it separates no cells
+    rows = [
+        (k, table_cells(line.rstrip("\r\n" + blank), separator))
+        for k, line in enumerate(lines)
+        if line.strip() and k not in ruled
+    ]
     widths = Counter(len(cells) for _, cells in rows)
     width = max(widths, key=lambda n: widths[n], default=0)
     rows = [(k, unmarked(cells, width)) for k, cells in rows]
@@ -103,13 +110,17 @@ def _with(
     if not first or len(rows[first - 1][1]) < 2:
         return -1.0, None
     told = [part for part in shares[first:] if math.isfinite(part)]
-    above = rows[first - 2][1] if first > 1 else []
-    below = rows[first - 1][1]
-    known = sum(bare_unit(cell) in KNOWN for cell in below)
-    # Names are all there and different.
-    is_units = len(above) == width == len(set(above) - {""}) and (
-        2 * known >= width or len(set(below)) < width
-    )
-    names = rows[first - 1 - is_units][0]
-    layout = Layout(separator=separator, decimal=decimal, skip=names, units_line=is_units)
+    below = first - 1  # the line below the names, if there is one
+    while below and not _is_of_units(rows[below - 1][1], rows[below][1], width):
+        below = below - 1 if len(set(rows[below][1])) < width else 0
+    names = rows[below - 1 if below else first - 1][0]
+    has_units = below > 0 or names + 1 in ruled
+    layout = Layout(separator=separator, decimal=decimal, skip=names, units_line=has_units)
     return sum(told) / len(rows) + 1e-3 * (decimal == "."), layout
+
+
+def _is_of_units(above: Sequence[str], below: Sequence[str], width: int) -> bool:
+    """Whether a line of cells is of units or types, and that above of names: all there and different."""
+    known = sum(bare_unit(cell) in KNOWN for cell in below)
+    are_names = len(above) == width == len(set(above) - {""})
+    return are_names and (2 * known >= width or len(set(below)) < width)
