@@ -169,7 +169,9 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
     for who, factors in {tuple(f.tolist()): (who, f) for who, f in reversed(signs.items())}.values():
         if (factors < 0.0).any():
             yield of_commands(f"{who} the wrong sign", factors.tolist(), names)
-    yield from (swapped(names, *pair) for pair in combinations(range(len(names)), 2))
+    units = [run.layout.column(s).unit for s in names]  # columns of different ones are told apart
+    pairs = ((i, k) for i, k in combinations(range(len(names)), 2) if units[i] == units[k])
+    yield from (swapped(names, *pair) for pair in pairs)
     largest = np.abs(commands).max(axis=0)
     limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for si, quantity in OF_UNIT.items():

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -152,7 +153,8 @@ def _by_names(table: pd.DataFrame, cells: pd.Series) -> tuple[pd.DataFrame, pd.S
 
 def _times(parts: Sequence[_Part]) -> list[np.ndarray]:
     """The times of each part, by one clock."""
-    stamps = [date_stamps(part.cells, f"'{part.path}'", pd.Timestamp(0, tz="UTC")) for part in parts]
+    epoch = datetime.fromtimestamp(0.0, timezone.utc)
+    stamps = [date_stamps(part.cells, f"'{part.path}'", epoch) for part in parts]
     times = [_seconds(p) if own is None else own for p, own in zip(parts, stamps, strict=True)]
     dated = [own is not None for own in stamps]
     if not any(dated):

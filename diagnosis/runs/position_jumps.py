@@ -67,7 +67,7 @@ def _jumps(time: np.ndarray, place: np.ndarray, highest: float) -> list[Jump]:
 
 def _is_stuck(place: np.ndarray) -> bool:
     """Whether one coordinate alone of a place (n,) repeats: the jump behind is its own."""
-    return any((np.diff(part) == 0.0).all() for part in (place.real, place.imag))
+    return any((np.diff(part) == 0.0).all() for part in (np.real(place), np.imag(place)))
 
 
 def _lasting(jumps: list[Jump]) -> list[Jump]:

@@ -161,7 +161,7 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
 
 
 def date_stamps(
-    cells: pd.Series, where: str | None = None, since: pd.Timestamp | None = None
+    cells: pd.Series, where: str | None = None, since: datetime | None = None
 ) -> np.ndarray | None:
     """Seconds since a time of a column of date stamps, NaN where empty; None: numbers.
 
