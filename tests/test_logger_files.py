@@ -185,19 +185,46 @@ def test_tables_that_databases_print_are_read(tmp_path: Path, mark: str) -> None
 def test_words_with_numbers_are_remarks_if_they_are_few(
     tmp_path: Path, many: int, read_as_words: bool
 ) -> None:
-    cells = [f"Stbd {x:.1f}" if k < many else f"{x:.1f}" for k, x in enumerate(TIME)]
+    cells = [f"Alarm {x:.1f}" if k < many else f"{x:.1f}" for k, x in enumerate(TIME)]
     path = written(tmp_path / "a.csv", table(tau_X=cells))
     if read_as_words:
-        assert "tau_X: 1 cell without a number, such as 'Stbd 0.0'" in read(path).notes
+        assert "tau_X: 1 cell without a number, such as 'Alarm 0.0'" in read(path).notes
     else:
-        with pytest.raises(InputError, match=r"tau_X = 'Stbd 0\.0' in row 1 is not a number"):
+        with pytest.raises(InputError, match=r"tau_X = 'Alarm 0\.0' in row 1 is not a number"):
             read(path)
 
 
-def test_other_signs_of_minus_and_hard_blanks_are_read(tmp_path: Path) -> None:
-    cells = [f"\u00a0{x:.6f}".replace("-", "\u2212") for x in NAMES["tau_Y"]]
-    found = read(written(tmp_path / "a.csv", table(tau_Y=cells)))
+SPELLINGS: dict[str, Callable[[float], str]] = {
+    "other minus, hard blank": lambda x: f"\u00a0{x:.6f}".replace("-", "\u2212"),
+    "a dash": lambda x: f"{x:.6f}".replace("-", "\u2013"),
+    "a blank behind the minus": lambda x: f"{x:.6f}".replace("-", "- "),
+    "brackets": lambda x: f"({-x:.6f})" if x < 0.0 else f"{x:.6f}",
+    "Fortran": lambda x: f"{x:.8E}".replace("E", "D"),
+    "a formula": lambda x: f'="{x:.6f}"',
+    "a text of a spreadsheet": lambda x: f"'{x:.6f}",
+    "sides": lambda x: f"{abs(x):.6f} {'P' if x < 0.0 else 'S'}",
+    "words before": lambda x: f"{'Port' if x < 0.0 else 'Stbd'} {abs(x):.6f}",
+    "one way alone": lambda x: f"{'Astern ' if x < 0.0 else ''}{abs(x):.6f}",
+}
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_numbers_in_other_spellings_are_read(tmp_path: Path, spelling: str) -> None:
+    cells = [SPELLINGS[spelling](x) for x in NAMES["tau_Y"]]
+    content = table(tau_Y=cells)
+    if spelling == "Fortran":  # whole tables are written so
+        content = content.map(lambda x: SPELLINGS[spelling](float(str(x).replace("D", "E"))))
+    found = propose(written(tmp_path / "a.csv", content)).run
+    assert found is not None
     np.testing.assert_allclose(found.tau_cmd[:, 1], NAMES["tau_Y"], atol=1e-6)
+    assert not any("without a number" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("cells", [["20.0 P", "3.0 X"], ["20.0 5.0", "3.0 P"], ["1.0 kn", "2.0 kn"]])
+def test_numbers_with_other_words_are_refused(tmp_path: Path, cells: list[str]) -> None:
+    content = table(tau_Y=[cells[k % 2] for k in range(TIME.size)])
+    with pytest.raises(InputError, match=f"tau_Y = '{cells[0]}' in row 1 is not a number"):
+        read(written(tmp_path / "a.csv", content))
 
 
 CLOCKS: dict[str, Callable[[pd.Series], pd.Series]] = {

@@ -42,6 +42,7 @@ def track(time=TIME, scale=REFERENCE, fresh=None, **of_run):
     fresh = np.ones((n, 3), bool) if fresh is None else fresh
     given = {"resolution": None, "held": None, "ship": None, "commands": None} | of_run
     r = SimpleNamespace(time=time, **given)
+    r.given = np.zeros((n, 3)) if given["held"] is None else np.zeros(given["held"].shape)
     r.coarse = np.zeros((n, 3)) if given["resolution"] is None else given["resolution"]
     empty = np.zeros(n, bool)
     return Track(r, np.zeros((n, 3)), fresh, empty, empty.copy(), empty.copy(), H, 0, (), scale)

@@ -13,12 +13,11 @@ from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
 from ..files.reading import Run
-from ..files.tables import clock_seconds, date_stamps, table_of_file
+from ..files.tables import cell_numbers, clock_seconds, date_stamps, table_of_file
 from ..frozen import repeated
 from ..row_order import by_stamps, in_order
 from ..run_constants import IN_A_ROW
 from .columns import OF_UNIT, UNITS, Column, Layout, largest_commands, other_angles
-from .geographic import degrees_in, is_of_position
 from .likely_columns import ASTERN, says_command, signal_of_sign
 from .name_words import words_of
 from .unit_check import (
@@ -32,8 +31,8 @@ from .unit_check import (
     spelt,
 )
 
-# m/s, times the scale of the ship: a Froude number of 1.5. A time that makes a ship faster is no time in
-# ms but in 1/100 s, as controllers count it; chosen.
+# m/s, times the scale of the ship: a Froude number of 1.5. A time that makes a ship faster is in
+# 1/100 s, as controllers count it, and not in ms; chosen.
 PLANING = 5.0
 
 
@@ -130,9 +129,7 @@ def numbers_of(cells: pd.Series, signal: str) -> np.ndarray:
     stamps = date_stamps(cells) if signal == "time" else None
     if stamps is not None:
         return stamps
-    found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
-    if np.isnan(found).all() and is_of_position(str(cells.name)):
-        found = degrees_in(cells)
+    found = cell_numbers(cells)
     return clock_seconds(found) if signal == "time" else found
 
 

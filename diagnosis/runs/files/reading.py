@@ -276,7 +276,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         f"{s}: {note}"
         for s in columns
         if s not in ("time", *layout.unused)
-        for note in _no_numbers(table, layout, s)
+        for note in _no_numbers(table[layout.column(s).name], columns[s])
     ]
     called = {s: c.name for s, c in layout.columns.items() if c.name != s}
     return replace(
@@ -321,10 +321,9 @@ def _without_marks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, l
     ]
 
 
-def _no_numbers(table: pd.DataFrame, layout: Layout, signal: str) -> list[str]:
-    """A note of the cells of a signal that have words."""
-    cells = table[layout.column(signal).name]
-    return _told(cells, has_words(cells), "cell", "without a number")
+def _no_numbers(cells: pd.Series, values: np.ndarray) -> list[str]:
+    """A note of the cells of a signal that have words, and no value (n,)."""
+    return _told(cells, has_words(cells) & np.isnan(values), "cell", "without a number")
 
 
 def _told(cells: pd.Series, words: np.ndarray, what: str, how: str) -> list[str]:

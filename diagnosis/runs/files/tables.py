@@ -17,6 +17,7 @@ from cybership.message_text import quoted
 
 from ..columns.columns import Layout
 from ..columns.geographic import degrees_in, is_of_position
+from ..columns.name_words import words_of
 from ..columns.side_car import (
     refuse_encoding,
     refuse_layout,
@@ -28,13 +29,17 @@ from ..columns.side_car import (
 from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
 from .matlab_files import matlab_table
 from .message_fields import message_fields
-from .text_layout import STAMP, is_marked
+from .text_layout import STAMP, is_marked, plain_number
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
 DURATION = re.compile(r"[\d.]+ (sec|min|hr|days?( [\d:.]+)?)")  # as MATLAB and pandas write it
-WORDS = re.compile(r"\D*|[+-]?1\.#\w+")  # of a cell without a value, as 1.#INF of C
+WORDS = re.compile(r"\D*|[+-]?1\.#\w+|.*\0.*")  # of a cell without a value, as 1.#INF of C
+# A number with its direction before or behind it, and what these mean.
+DIRECTED = re.compile(r"^(?P<before>[^\W\d_]+)?\s*(?P<size>\d+(?:\.\d+)?)\s*(?P<behind>[^\W\d_]+)?$")
+WAYS = {"port": -1.0, "p": -1.0, "astern": -1.0, "starboard": 1.0, "s": 1.0, "ahead": 1.0, "": 1.0}
+STILL = ("midship", "midships", "amidships", "stop")
 REMARK = re.compile(r"(#|%|//|\(|[^\W\d_]{2}).*")  # such as "Total rows: 1800"
 ELAPSED = re.compile(r"(?P<min>\d+):(?P<s>[0-5]?\d[.,]\d+)")  # minutes and seconds
 ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
@@ -267,14 +272,10 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     """
     marked = layout.decimal != "." and not pd.api.types.is_numeric_dtype(cells)  # beside words
     values = cells.astype("string").str.replace(layout.decimal, ".") if marked else cells
-    if not pd.api.types.is_numeric_dtype(values):
-        values = values.map(_plain_number)
     try:
-        found = np.asarray(pd.to_numeric(values, errors="coerce"), float)
+        found = cell_numbers(values)
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
         raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
-    if np.isnan(found).all() and is_of_position(str(cells.name)):
-        found = degrees_in(values)
     missing = np.isnan(found)
     first = _first(cells, missing, words=bool(missing.all()))
     if first is not None:
@@ -286,9 +287,34 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     return found
 
 
-def _plain_number(cell: object) -> object:
-    """A cell with the minus of ISO 8859 in place of other signs, and without hard blanks around it."""
-    return cell.replace("\u2212", "-").strip("\u00a0 ") if isinstance(cell, str) else cell
+def cell_numbers(cells: pd.Series) -> np.ndarray:
+    """Cells (n,) as floats; NaN where one is none.
+
+    Beside other spellings of numbers, positions may be angles with the letter of a side, and numbers may
+    have a direction: 20.0 P, Stbd 20.0, MIDSHIP, Astern 90.
+    """
+    if pd.api.types.is_numeric_dtype(cells):
+        return np.asarray(cells, float)
+    plain = cells.map(lambda cell: plain_number(cell) if isinstance(cell, str) else cell)
+    found = np.asarray(pd.to_numeric(plain, errors="coerce"), float)
+    if np.isnan(found).any():
+        whole = degrees_in(cells) if is_of_position(str(cells.name)) else directed(cells)
+        found = np.where(np.isnan(whole).all(), found, whole)
+    return found
+
+
+def directed(cells: pd.Series) -> np.ndarray:
+    """Numbers (n,) with a direction beside them, to port and astern negative; NaN if they have none."""
+    texts = cells.astype("string").str.strip().str.casefold().fillna("")
+    parts = texts.str.extract(DIRECTED)
+    way = parts["before"].fillna("") + parts["behind"].fillna("")
+    known = way.map(lambda word: WAYS.get("".join(words_of(word)), np.nan)).to_numpy(float)
+    size = parts["size"].astype(float).to_numpy()
+    found = np.where(size == 0.0, 0.0, known * size)
+    found = np.where(texts.map(lambda text: "".join(words_of(text)) in STILL), 0.0, found)
+    lost = np.isnan(found) & np.asarray(texts != "")
+    has_none = lost.any() or not (np.isfinite(known) & np.asarray(way != "")).any()
+    return np.full(len(cells), np.nan) if has_none else found
 
 
 def clock_seconds(time: np.ndarray) -> np.ndarray:

@@ -19,6 +19,10 @@ STAMP = re.compile(
 )
 RULED = re.compile(r"[-=+|\s]*[-=]{3}[-=+|\s]*")  # a line below the names
 MARK = re.compile(r"[#%/!]+")  # of a comment, alone before the names
+NUMBER = re.compile(
+    r"(?P<before>[(+\u2212\u2013-]?) ?(?P<digits>\d[\d.,]*|[.,]\d+)(?:[dDeE](?P<power>[+-]?\d+))?"
+    r"(?P<behind>\)?)"
+)
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
@@ -65,7 +69,17 @@ def bare_unit(text: str) -> str:
     return spelt(text.strip().strip("[]()").strip())
 
 
+def plain_number(cell: str) -> str:
+    """A number as Python reads it, of other spellings: – 1, (1), 1.0D+01, '1, ="1"; else the cell."""
+    told = NUMBER.fullmatch(cell.strip("\u00a0 '=\""))
+    if told is None or (told["before"] == "(") != (told["behind"] == ")"):
+        return cell
+    sign = "-" if told["before"] not in ("", "+") else ""
+    return f"{sign}{told['digits']}e{told['power'] or 0}"
+
+
 def _is_number(cell: str, decimal: str) -> bool:
+    cell = plain_number(cell)
     if decimal == "," and "." in cell:
         return False
     try:
