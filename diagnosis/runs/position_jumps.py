@@ -7,6 +7,7 @@ import numpy as np
 from fmus.scale import REFERENCE, Scale
 
 from .files.reading import Run
+from .frozen import repeated
 from .run_constants import CHANCE, FAR, IN_A_ROW, LONG, WIDTH
 
 Jump = tuple[int, complex]  # the row behind it, and its way to the north plus i times that to the east
@@ -21,13 +22,12 @@ def parted(run: Run, scale: Scale = REFERENCE) -> Run:
         run: its rows in order.
         scale: of the ship.
     """
-    there = np.flatnonzero(np.isfinite(run.pose[:, :2]).all(axis=1))
-    held = (np.diff(run.pose[there, :2], axis=0) == 0.0).all(axis=1)
-    rows = np.delete(there, np.flatnonzero(held) + 1)
+    there = np.asarray(np.isfinite(run.pose[:, :2]).all(axis=1))
+    rows = np.flatnonzero(there & ~repeated(run.pose[:, :2], there))
     if rows.size <= 2 * IN_A_ROW:
         return run
     time, place = run.time[rows], run.pose[rows, 0] + 1j * run.pose[rows, 1]
-    speed = np.abs(place[IN_A_ROW:] - place[:-IN_A_ROW]) / (time[IN_A_ROW:] - time[:-IN_A_ROW])
+    speed = speeds(time, run.pose[rows, :2])
     highest = float(np.quantile(speed, 1.0 - IN_A_ROW * CHANCE))  # of all but one jump in a hundred rows
     if not highest > 0.0:
         return run
@@ -40,6 +40,18 @@ def parted(run: Run, scale: Scale = REFERENCE) -> Run:
             f"start: the run is parted there; if rows were cut out, about {gap:.3g} s of them"
         )
     return replace(run, time=time_of, notes=tuple(notes))
+
+
+def speeds(time: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Speeds [m/s] from each row to that IN_A_ROW behind it; NaN where the time does not grow.
+
+    Args:
+        time: (n,) [s].
+        position: (n, 2), north and east [m].
+    """
+    way = np.linalg.norm(position[IN_A_ROW:] - position[:-IN_A_ROW], axis=1)
+    step = time[IN_A_ROW:] - time[:-IN_A_ROW]
+    return way / np.where(step > 0.0, step, np.nan)
 
 
 def _jumps(time: np.ndarray, place: np.ndarray, highest: float) -> list[Jump]:

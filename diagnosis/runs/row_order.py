@@ -258,7 +258,7 @@ def _spread(run: Run) -> Run:
         f"its stamps are {np.median(step) if step.size else 0.0:.4g} s apart, with {many.mean():.3g} "
         "samples each: these are taken as evenly spaced"
     )
-    if np.ptp(many[1:-1]) if many.size > 2 else 0:  # stamps that are rounded, or are no whole periods
+    if many.size > 2 and np.ptp(many[1:-1]):  # stamps that are rounded, or are no whole periods
         even = _even_below(run.time, float(np.median(step)))
         if even is not None:
             return replace(run, time=even, notes=(*run.notes, note))

@@ -3,9 +3,6 @@
 import re
 import unicodedata
 
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
-EAST_ASIAN = ("gb18030", "big5", "cp932")  # encodings of Chinese and Japanese
-
 # English words -> those that names have in their place: short forms, German, French, Spanish, Italian,
 # Portuguese, Dutch, Norwegian, Swedish, Polish, all without accents.
 FOREIGN = {
@@ -82,12 +79,3 @@ def words_of(name: str) -> list[str]:
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     found: list[str] = re.findall(rf"[a-z]+|\d+|{WORDS}", _plain(apart))
     return " ".join(ENGLISH.get(word, word) for word in found).split()
-
-
-def likely_encoding(content: bytes) -> str:
-    """The encoding of a text that is not UTF-8: in Chinese or Japanese two of its words are known."""
-    if content.startswith(UTF_16):
-        return "utf-16"
-    known = {e: set(re.findall(WORDS, content.decode(e, errors="ignore"))) for e in EAST_ASIAN}
-    best = max(EAST_ASIAN, key=lambda encoding: len(known[encoding]))
-    return best if len(known[best]) > 1 else "latin-1"

@@ -13,7 +13,7 @@ from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField, message_fields
 from ..files.reading import Run, column_names, read, signed
 from ..files.tables import date_stamps, table_of_file
-from ..files.text_layout import KNOWN, bare_unit, table_cells, text_layout, unmarked
+from ..files.text_layout import KNOWN, bare_unit, likely_encoding, table_cells, text_layout, unmarked
 from .columns import (
     POSE,
     UNITS,
@@ -45,7 +45,6 @@ from .likely_columns import (
     unit_in,
 )
 from .name_units import bare_name, without_unit
-from .name_words import likely_encoding
 from .side_car import as_json, refuse_other_kinds, refuse_thousands
 from .units_by_numbers import (
     is_stamped,

@@ -12,9 +12,8 @@ import pandas as pd
 from cosim import InputError
 from cybership.message_text import quoted
 
-from ..files.text_layout import table_cells, text_layout
+from ..files.text_layout import likely_encoding, table_cells, text_layout
 from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, Named, stated_layout
-from .name_words import likely_encoding
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 THOUSANDS = {  # decimal mark -> numbers with separators of thousands, as 19,800.5

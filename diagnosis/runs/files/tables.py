@@ -308,10 +308,12 @@ def directed(cells: pd.Series) -> np.ndarray:
     texts = cells.astype("string").str.strip().str.casefold().fillna("")
     parts = texts.str.extract(DIRECTED)
     way = parts["before"].fillna("") + parts["behind"].fillna("")
-    known = way.map(lambda word: WAYS.get("".join(words_of(word)), np.nan)).to_numpy(float)
+    ways = {word: WAYS.get("".join(words_of(word)), np.nan) for word in way.unique()}
+    known = way.map(ways).to_numpy(float)
     size = parts["size"].astype(float).to_numpy()
     found = np.where(size == 0.0, 0.0, known * size)
-    found = np.where(texts.map(lambda text: "".join(words_of(text)) in STILL), 0.0, found)
+    words = texts[parts["size"].isna()].unique()
+    found = np.where(texts.isin([t for t in words if "".join(words_of(t)) in STILL]), 0.0, found)
     lost = np.isnan(found) & np.asarray(texts != "")
     has_none = lost.any() or not (np.isfinite(known) & np.asarray(way != "")).any()
     return np.full(len(cells), np.nan) if has_none else found

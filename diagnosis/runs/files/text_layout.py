@@ -9,8 +9,11 @@ from itertools import islice, product
 from pathlib import Path
 
 from ..columns.columns import PREAMBLE, UNITS, Layout
+from ..columns.name_words import WORDS
 from ..columns.unit_check import spelt
 
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
+EAST_ASIAN = ("gb18030", "big5", "cp932")  # encodings of Chinese and Japanese
 SEPARATORS = (",", ";", "\t", "|", " ")  # that a table may have between its cells
 # A time of day, a date before it, and half of the day, zone or year behind it.
 STAMP = re.compile(
@@ -39,6 +42,15 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
         if best[1] is not None:
             return best[1]
     return None
+
+
+def likely_encoding(content: bytes) -> str:
+    """The encoding of a text that is not UTF-8: in Chinese or Japanese two of its words are known."""
+    if content.startswith(UTF_16):
+        return "utf-16"
+    known = {e: set(re.findall(WORDS, content.decode(e, errors="ignore"))) for e in EAST_ASIAN}
+    best = max(EAST_ASIAN, key=lambda encoding: len(known[encoding]))
+    return best if len(known[best]) > 1 else "latin-1"
 
 
 def table_cells(line: str, separator: str) -> list[str]:
