@@ -1,14 +1,14 @@
-"""What no ship has: damping that drives it on, negative added mass, actuators outside, too much mass.
+"""What no ship has: damping that drives it on, negative added mass, actuators outside, other sizes.
 
 And numbers that a file does not state although every ship has its own.
 """
 
 import re
 from collections.abc import Iterator, Sequence
-from math import sqrt
+from math import pi, sqrt
 from typing import NamedTuple
 
-from ..actuators.law import Law
+from ..actuators.law import Flow, Law
 from ..declare import Variable, parameters_of, variables
 from ..hull import term, term_force, term_variable
 from ..hull_functions import FUNCTIONS
@@ -21,6 +21,12 @@ SEA_WATER = 1025.0  # kg/m3, where the file has no density
 # below to far above all that ships reach, where the lowest and the highest power decide (chosen).
 FROUDE_NUMBERS = [10.0 ** (k / 6.0) for k in range(-18, 19)]
 AHEAD, ASIDE = 0.2, 0.02  # those of other functions: a usual speed, and a little drift on it (chosen)
+# 1, of the mass of water of length x beam x beam: a twentieth of that of the lightest shipped ship, a
+# catamaran (chosen). A mass in tonnes is a thousandth.
+LIGHTEST = 0.0017
+# 1, radius of gyration in lengths: half of a rod's, and that of a mass at both ends (chosen).
+GYRATION = 0.14, 0.5
+GIVEN_FORCE = "given_force"  # law of a force that no device limits
 OVERHANG = 0.05  # of length and beam: outboard motors and rudders hang behind the outline (chosen)
 MOTIONS = ("surge", "sway", "yaw")
 COMMON = ("1", "rad", "1/rad", "kg/m3")  # units of numbers of which a usual one serves for any ship
@@ -50,10 +56,12 @@ def doubts(ship: Description, draft: float | None = None) -> Iterator[ShipDoubt]
         draft: [m]; None: that of a function of its hull, if it has one.
     """
     yield from _inertia(ship, draft)
+    yield from _sizes(ship)
     yield from _products(ship)
     yield from _functions(ship)
     for k, part in enumerate(ship.actuators):
         yield from _place(ship, k, part)
+        yield from _angles(k, part)
         if assumed := _assumed(part.values, variables(Law.known[part.law].Parameters)):
             text = f"actuator '{part.name}' does not state all of its numbers; assumed: {assumed}"
             yield ShipDoubt("actuators", k, "", text)
@@ -85,6 +93,50 @@ def _inertia(ship: Description, draft: float | None) -> Iterator[ShipDoubt]:
         size = f"{ship.length:g} m x {ship.beam:g} m x {draft:g} m"
         text = f"more than a box of length x beam x draft, {size}, displaces: {box:.4g} kg"
         yield ShipDoubt("inertia", 0, "m", f"m = {m:.4g} kg is {text}")
+
+
+def _sizes(ship: Description) -> Iterator[ShipDoubt]:
+    """Mass, inertia and thrust that are far from those of a ship of such a length and beam."""
+    length, beam, values = ship.length, ship.beam, ship.values()
+    m, turned = values["m"].value, values["I_z"].value
+    if beam > length:
+        yield ShipDoubt("", 0, "beam", f"beam = {beam:g} m is more than the length, {length:g} m")
+    water = SEA_WATER * length * beam * beam
+    if not LIGHTEST * water <= m <= water:
+        size = f"{length:g} m x {beam:g} m ({LIGHTEST * water:.2g} to {water:.2g} kg)"
+        yield ShipDoubt("inertia", 0, "m", f"m = {m:.4g} kg is no mass of a ship of {size}")
+        return
+    if not GYRATION[0] <= (k := sqrt(turned / m) / length) <= GYRATION[1]:
+        usual = f"ships have {GYRATION[0]:g} to {GYRATION[1]:g}, most of them 0.25"
+        text = f"I_z = {turned:.4g} kg.m2 is a radius of gyration of {k:.2g} lengths; {usual}"
+        yield ShipDoubt("inertia", 0, "I_z", text)
+    if ship.actuators and not (ship.terms or ship.functions):
+        yield ShipDoubt("hull", 0, "", "the hull has no damping: what moves never stops")
+    reached = [(max(map(abs, _reach(part)), default=0.0), k) for k, part in enumerate(ship.actuators)]
+    thrust, k = max(reached, default=(0.0, 0))
+    if thrust > m * G:
+        part = ship.actuators[k]
+        text = f"actuator '{part.name}' gives {thrust:.3g} N, more than the ship's weight, {m * G:.3g} N"
+        yield ShipDoubt("actuators", k, "n_max" if part.stated("n_max") else "", text)
+
+
+def _reach(part: Part) -> Iterator[float]:
+    """Lowest and highest forces [N] of an actuator at rest, on each axis of which it can be asked."""
+    law = Law.known[part.law]
+    if law.components and part.law != GIVEN_FORCE:
+        numbers = {v.name: v.value for v in part.values if v.name in law.Parameters._fields}
+        for low, high in law.reach(Flow(), law.Parameters(**numbers)):
+            yield from (float(low), float(high))
+
+
+def _angles(k: int, part: Part) -> Iterator[ShipDoubt]:
+    """Largest angles of an actuator that are of more than two turns."""
+    law = Law.known[part.law]
+    for v in variables(law.Parameters):
+        stated = part.stated(v.name)
+        if v.unit == "rad" and v.name.endswith("_max") and stated and stated.value > 4.0 * pi:
+            text = f"actuator '{part.name}': {v.name} = {stated.value:g} rad is more than two turns"
+            yield ShipDoubt("actuators", k, v.name, f"{text}; is it in degrees?")
 
 
 def _products(ship: Description) -> Iterator[ShipDoubt]:
@@ -169,6 +221,9 @@ def line_of(doubt: ShipDoubt, text: str) -> int | None:
     if doubt.header == "product":
         found = [k for k, line in enumerate(lines, 1) for _ in re.findall(r"\bproduct\s*=", line)]
         return found[doubt.place] if doubt.place < len(found) else None
+    if not doubt.header:  # above all tables
+        found = [k for k, line in enumerate(lines, 1) if re.match(rf"\s*{doubt.key}\s*=", line)]
+        return found[0] if found else None
     header = re.compile(rf"\s*\[+\s*{re.escape(doubt.header)}\s*\]")
     heads = [k for k, line in enumerate(lines) if header.match(line)]
     if doubt.place >= len(heads):
