@@ -14,7 +14,7 @@ from support.project import COMPONENTS
 
 import cosim
 from cosim.fmu import component
-from cosim.master.algorithm import Master
+from cosim.master.algorithm import Master, Messages
 from cosim.results.log import LogWriter, Rows
 from fmus.signals import Force
 
@@ -287,6 +287,16 @@ def test_flood_of_messages_is_cut(plain_fmu, tmp_path):
     assert result.status == "done"
     assert 200 <= len(shown) <= 203
     assert any("the rest is not shown" in line for line in shown)
+
+
+def test_a_message_that_comes_again_at_once_is_shown_once_and_kept_each_time():
+    shown = []
+    messages = Messages(shown.append)
+    for name, text in (("a", "low"), ("a", "low"), ("b", "low"), ("a", "low"), ("a", "high")):
+        messages.add(name, 1, text)
+    assert shown == ["a: low", "b: low", "a: low", "a: high"]
+    assert [each["text"] for each in messages.kept] == ["low"] * 4 + ["high"]
+    assert messages.count == 5
 
 
 def test_selected_signals_and_decimation(ellipse, tmp_path):

@@ -26,7 +26,7 @@ class Messages:
     """Collects the first warnings and errors that FMUs log.
 
     Args:
-        show: receives each as a line for the user.
+        show: receives each as a line for the user, one that comes again at once only the first time.
 
     Attributes:
         kept: each as log.json has it.
@@ -44,8 +44,10 @@ class Messages:
             return
         self.count += 1
         if self.count <= self.KEEP:
-            self.kept.append({"instance": instance, "status": status, "text": text})
-            self._show(f"{instance}: {text}")
+            message = {"instance": instance, "status": status, "text": text}
+            if self.kept[-1:] != [message]:
+                self._show(f"{instance}: {text}")
+            self.kept.append(message)
         elif self.count == self.KEEP + 1:
             self._show(f"FMUs logged more than {self.KEEP} messages; the rest is not shown")
 
