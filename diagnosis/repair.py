@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from cosim.command import command_parser, run_command
 
-from .commands.command_line import Done, run, ship_option
+from .commands.command_line import Done, anyway_option, run, ship_option
 from .commands.table_file import table_options, table_target, write_table
 from .execution.progress import Advance
 from .execution.result_folder import together
@@ -33,13 +33,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def repair(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .predictors import ship_with
-    from .runs import layout_beside, prepare, table_of  # only now: they take a second to import
+    from .runs import clean, layout_beside, prepare, table_of  # only now: they take a second to import
 
     out = table_target(options)
     craft = ship_with((), options.ship)
     advance("reading and comparing channels")
     prepared = prepare(options.run, craft, anyway=True)  # what cannot be repaired is reported
     repaired = prepared.sensors.run
+    clean(repaired, options.anyway, craft.scale)  # a run that it refuses, no command reads
     side_car = f"{out.name}.json"
     with together(out.parent, (out.name, side_car)) as new:
         write_table(table_of(repaired), new / out.name)
@@ -54,12 +55,12 @@ def _found(sensors: "Examined") -> list[str]:
     from .runs import sensor_lines
 
     others = ", ".join(sensors.run.measured)
-    if not others:
-        return ["only the pose is measured: no redundant channel for a comparison"]
-    lines = [*sensor_lines(sensors.findings), *sensors.notes]
-    if not sensors.findings:
+    lines = [*sensor_lines(sensors.findings), *sensors.notes, *sensors.run.notes]
+    if not (others or sensors.aside):
+        return ["only the pose is measured: no redundant channel for a comparison", *lines]
+    if not (sensors.findings or sensors.notes):
         lines.append("no fault detected: redundant channels agree")
-    return [f"measured in addition to the pose: {others}", *lines]
+    return [f"measured in addition to the pose: {others or 'nothing that agrees with it'}", *lines]
 
 
 def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
@@ -94,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     table_options(made, "CSV or Parquet file; FILE.json next to it has the noise")
     ship_option(made)
+    anyway_option(made)
     return made
 
 

@@ -176,6 +176,34 @@ def test_of_a_repaired_file(prepared, spoilt, tmp_path):
     assert len(again.raw.time) == len(prepared.raw.time)
 
 
+def test_a_repair_refuses_what_no_other_command_reads(spoilt, tmp_path):
+    """A heading in degrees; told to go on, it states what was found in the file."""
+    table, out = pd.read_csv(spoilt), tmp_path / "out.csv"
+    table["psi"] = np.degrees(table["psi"])
+    again = table.iloc[1000:1500].assign(x=lambda t: t["x"] + 900.0)
+    pd.concat([table, again]).to_csv(tmp_path / "run.csv", index=False)
+    done = command(repair.main, tmp_path / "run.csv", "--out", out)
+    assert done.returncode == 2
+    assert "is its heading in deg?" in done.stderr
+    assert not out.exists()
+    done = command(repair.main, tmp_path / "run.csv", "--out", out, "--anyway")
+    said = " ".join(done.stdout.split())
+    assert done.returncode == 0, done.stderr
+    assert "a second run begins in row" in said
+    assert "rad/s in place of deg/s" in said
+
+
+def test_a_repair_says_which_channels_agree_with_nothing(monkeypatch, spoilt, tmp_path):
+    plain = prepare(spoilt).sensors
+    aside = Examined(plain.run, notes=("r is not used",)).without({*plain.run.measured})
+    monkeypatch.setattr(prepared_run, "examine", lambda run, _: replace(aside))
+    monkeypatch.setattr(Examined, "without", lambda self, _: self)
+    done = command(repair.main, spoilt, "--out", tmp_path / "out.csv")
+    assert "nothing that agrees with it\nr is not used\n" in done.stdout
+    assert "only the pose is measured" not in done.stdout
+    assert "channels agree" not in done.stdout
+
+
 def test_other_columns_keep_to_their_rows(spoilt, tmp_path):
     """Whatever becomes of rows and times."""
     table = pd.read_csv(spoilt)
