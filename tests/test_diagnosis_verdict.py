@@ -42,11 +42,9 @@ from diagnosis.verdict.coefficients import spoils
 from diagnosis.verdict.confidence import Confidence, Doubts, confidence_of, most_by_intervals
 from diagnosis.verdict.judging import (
     differing,
-    falls_by_axis,
     faster_than_smoothing,
     judge,
     more_than_waves,
-    replaceable,
     unexplained_axes,
     verdict_name,
     with_confidence,
@@ -54,6 +52,7 @@ from diagnosis.verdict.judging import (
 from diagnosis.verdict.law_in_parts import beside_possibility, mended, of_several, on_one_line
 from diagnosis.verdict.pruning import overfits, proven, prune, without
 from diagnosis.verdict.pruning_criteria import criterion
+from diagnosis.verdict.shares import falls_by_axis, replaceable
 from diagnosis.verdict.validation_data import Fold, ValidationData, fold_losses
 
 SHORT = {"count": 2, "seconds": 90.0}

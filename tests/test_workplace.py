@@ -33,7 +33,7 @@ from cybership.__main__ import main, usage
 from cybership.subcommands import GROUP, SUBCOMMANDS, all_modules, purpose
 from diagnosis.commands import command_line
 from diagnosis.execution import result_folder
-from diagnosis.verdict import judging
+from diagnosis.verdict import shares
 from fmus.build import BuildError
 
 SHORT = {"stop": 1.0, "metrics": {}}
@@ -373,7 +373,7 @@ def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):
 
 def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
     """Here a model is the size of the error that it leaves, and no coefficient moves."""
-    monkeypatch.setattr(judging, "omega", lambda w, model: np.full((4, 3), model.error))
+    monkeypatch.setattr(shares, "omega", lambda w, model: np.full((4, 3), model.error))
     left = {"a": 0.9, "b": 0.1}  # without it, all else fitted anew; 0.1 with both
     fitted = SimpleNamespace(search=SimpleNamespace(by="regression"))
 
@@ -388,7 +388,7 @@ def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
         effects=[SimpleNamespace(id="a", of_runs=[]), SimpleNamespace(id="b", of_runs=[])],
         model=model(0.1), sigma=np.ones(3), refit=keep,
     )  # fmt: skip
-    assert judging.unique_shares(found, model(1.0), [None], []) == pytest.approx([0.8, 0.0])
+    assert shares.unique_shares(found, model(1.0), [None], []) == pytest.approx([0.8, 0.0])
 
 
 @pytest.mark.parametrize(

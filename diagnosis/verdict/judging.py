@@ -6,7 +6,6 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import LinAlgError
 
 from ..assessment.regions import find_regions
 from ..assessment.residual.recurrence import recurrence
@@ -19,7 +18,6 @@ from ..predictors.evaluation import Bands
 from ..predictors.uncertainty import corner_frequency
 from ..predictors.windows import Windows
 from ..runs import Smoothed
-from ..runs.run_constants import NEGLIGIBLE
 from ..search.findings import Finding, Findings
 from ..search.prediction_fit.coefficient_calibration import HEADING
 from ..search.prediction_fit.disturbance_summary import Unrecorded
@@ -42,6 +40,7 @@ from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_o
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
+from .shares import falls_by_axis, is_random, left, replaceable, shares, unique_shares
 from .validation_data import ValidationData
 
 VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
@@ -282,7 +281,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> DecidedFindings:
         residual=unexplained_axes(found, remainder, start),
         more_than_waves=more_than_waves(found, remainder, start),
         of_data=doubt_of_data(train),
-        replaceable=replaceable(found, explained, alone, _left(found, start, data.validate or train)),
+        replaceable=replaceable(found, explained, alone, left(found, start, data.validate or train)),
         on_one_line=on_one_line(found, start, train),
         of_several=of_several(found, start),
         smoothed=faster_than_smoothing(found, start, train),
@@ -310,7 +309,7 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> DecidedFindings:
 
 def unexplained_axes(found: Findings, remainder: Remainder, start: Model) -> set[str]:
     """Axes with a significant residual; where waves are sure, which account for it, with a slow one."""
-    waves = [f for f in found.effects if _is_random(f, start)]
+    waves = [f for f in found.effects if is_random(f, start)]
     are_sure = any(confidence_of(f, start).own >= FOUND for f in waves)
     return {axis for axis, r in remainder.axes.items() if r.significant and (r.is_slow or not are_sure)}
 
@@ -325,34 +324,8 @@ def more_than_waves(found: Findings, remainder: Remainder, start: Model) -> dict
     """
     left = [r for axis, r in remainder.axes.items() if axis in "XY" and r.significant]
     square = sum(r.rms**2 - r.uncertainty**2 for r in left)
-    waves = {f.id: f.values["wave_force"] ** 2 for f in found.effects if _is_random(f, start)}
+    waves = {f.id: f.values["wave_force"] ** 2 for f in found.effects if is_random(f, start)}
     return {i: square / own - 1.0 for i, own in waves.items() if square > own}
-
-
-def replaceable(
-    found: Findings, explained: Sequence[float], alone: Sequence[float | None], left: float
-) -> set[str]:
-    """The effects without which all else, fitted anew, explains as much, by :func:`unique_shares`.
-
-    Of what an effect and the coefficients explain together its own part may be small. It is needed all
-    the same where that is more than half of what is left without it.
-
-    Args:
-        found: the findings.
-        explained, alone: of each, the share that it explains with the coefficients, and its own part.
-        left: share of the first sum of squares that the model with all of them leaves.
-    """
-    return {
-        f.id
-        for f, share, own in zip(found.effects, explained, alone, strict=True)
-        if own is not None and own <= min(NEGLIGIBLE * share, left)
-    }
-
-
-def _left(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> float:
-    """Share of the first sum of squares that a learned model leaves."""
-    left, first = (float(_squares(runs, m) @ found.sigma**-2.0) for m in (found.model, start))
-    return left / first if first > 0.0 else 0.0
 
 
 def differing(fit: RefitOutcome) -> set[str]:
@@ -408,86 +381,5 @@ def remainder_of(runs: Sequence[WeakWindows], start: Model, learned: Findings) -
     significant = any(axis.significant for axis in axes.values())
     how = recurrence(runs, np.concatenate(left)) if significant else None
     regions = find_regions(runs, left, noise_of(runs, start, model)).regions
-    waves = any(_is_random(f, start) for f in learned.effects)
+    waves = any(is_random(f, start) for f in learned.effects)
     return Remainder(axes, remainder_sentence(axes, how, regions, waves, runs[0].scale))
-
-
-def _squares(runs: Sequence[WeakWindows], model: Model) -> np.ndarray:
-    """(3,), sum of squares of a model's error on each axis."""
-    return np.sum([np.square(omega(w, model)).sum(axis=0) for w in runs], axis=0)
-
-
-def falls_by_axis(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> np.ndarray:
-    """(findings, 3), shares of the error's sum of squares of each axis, by which it falls with each."""
-    sums = np.array([_squares(runs, model) for model in (start, *(f.model for f in found.effects))])
-    return np.divide(-np.diff(sums, axis=0), sums[0], out=np.zeros_like(sums[1:]), where=sums[0] > 0.0)
-
-
-def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> list[float]:
-    """Share of the initial sum of squares that each finding explains.
-
-    It is that of validation runs; without any, and of times within a run, which no other run has, that
-    of cross-validation. Of waves it is their share of the power, as no model foretells them.
-
-    Args:
-        learned, start: the findings and the model with them, and the initial model.
-        validate: validation runs.
-    """
-    found = [f.share for f in learned.effects]
-    if validate and found:
-        models = [start, *(f.model for f in learned.effects)]
-        sums = np.array([_squares(validate, model) for model in models]) @ learned.sigma**-2.0
-        unseen = (-np.diff(sums) / sums[0]).tolist()
-        pairs = zip(learned.effects, unseen, strict=True)
-        found = [f.share if f.of_runs or _is_random(f, start) else share for f, share in pairs]
-    return np.clip(found, 0.0, 1.0).tolist()
-
-
-def _is_random(f: Finding, start: Model) -> bool:
-    """Whether a finding is a random process, as waves are."""
-    return start.ship.effects[f.id].search.by == "spectrum"
-
-
-def unique_shares(
-    learned: Findings, start: Model, train: Sequence[WeakWindows], validate: Sequence[WeakWindows]
-) -> list[float | None]:
-    """Share of the first sum of squares that comes back without one finding.
-
-    The other findings and the nominal coefficients are fitted anew, and so explain what they can in its
-    place; coefficients that would be further than FAR_OFF from their prior stay as they are. Of two
-    findings that explain the same, neither has a share of its own.
-
-    Args:
-        learned, start: the findings and the model with them, and the initial model.
-        train: training runs; they count for what holds in them alone, such as times of failures.
-        validate: validation runs; where there are any, they count for all else.
-
-    Returns:
-        For each finding, in their order, a share [1]; None for waves, and where the method cannot fit
-        without it.
-    """
-    if learned.refit is None:
-        return [None] * len(learned.effects)
-
-    def unique(finding: Finding, others: Findings) -> float:
-        runs = train if finding.of_runs else validate or train
-        without = others.model if others.effects else others.refitted or start
-        fitted = learned.model.ship.effects[finding.id].search.by == "regression"
-        if fitted and not others.plausible:
-            without = learned.model.plus({name: -value for name, value in finding.values.items()})
-        models = without, learned.model, start
-        left, now, first = (float(_squares(runs, m) @ learned.sigma**-2.0) for m in models)
-        return float(np.clip((left - now) / first, 0.0, 1.0))
-
-    found: list[float | None] = []
-    for finding in learned.effects:
-        if _is_random(finding, start):
-            found.append(None)
-            continue
-        try:
-            others = learned.refit([f.id for f in learned.effects if f.id != finding.id])
-        except LinAlgError:  # these data do not determine the others alone
-            found.append(None)
-        else:
-            found.append(unique(finding, others))
-    return found
