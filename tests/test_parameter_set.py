@@ -52,6 +52,13 @@ def test_a_model_comes_back_to_the_last_digit(tmp_path_factory, vessel, clock):
     assert (found.thrusters, found.clock) == ({"lag": 0.1 + 0.2}, clock)
 
 
+def test_a_path_may_be_a_text_and_its_folder_is_made(tmp_path):
+    name = f"{tmp_path}/new/folder/model.ssv"
+    write_model(name, LEARNED)
+    assert read_model(name).vessel == LEARNED.vessel
+    assert read_parameters(name).values["vessel"].keys() == LEARNED.vessel.keys()
+
+
 RUN = Fingerprint("a", 64 * "0", 0.1, np.eye(3), np.ones(3))
 
 

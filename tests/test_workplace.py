@@ -52,7 +52,7 @@ def test_a_run_by_name_has_log_metrics_and_pictures(tmp_path, monkeypatch):
     assert len(result.log) == result.rows == 101
     assert result.log.attrs["units"]["vessel.u"] == "m/s"
     assert result.plot("errors")._repr_png_().startswith(b"\x89PNG")
-    assert "<svg" in result.plot().save("track.svg").read_text()
+    assert "<svg" in result.plot().save("new/track.svg").read_text()
     ran = json.loads(Path("results/ellipse/log.json").read_text())["scenario"]
     assert (ran["seed"], ran["fmus"]["vessel"]["parameters"]["m"]) == (3, 15)
     with pytest.raises(cosim.InputError, match="did you mean 'errors'"):

@@ -92,7 +92,7 @@ class ParameterSet:
         return how.factor * given.value + how.offset
 
 
-def read_parameters(path: Path) -> ParameterSet:
+def read_parameters(path: str | Path) -> ParameterSet:
     """Numbers of a parameter set.
 
     Args:
@@ -101,6 +101,7 @@ def read_parameters(path: Path) -> ParameterSet:
     Raises:
         InputError: missing, no parameter set, a name twice, or a value that is no number.
     """
+    path = Path(path)
     try:
         content = path.read_bytes()
         check_xml(content, path, "a parameter set")
@@ -178,11 +179,11 @@ def _exponents(base: Element, where: str) -> dict[str, float]:
     return found
 
 
-def write_parameters(path: Path, content: ParameterSet) -> None:
+def write_parameters(path: str | Path, content: ParameterSet) -> None:
     """Write a parameter set as an SSP 1.0 file, numbers to the last digit, completely or not at all.
 
     Args:
-        path: the file; an older one is replaced.
+        path: the file, whose folder is made; an older one is replaced.
         content: its ``units`` must define every unit that a value states.
     """
     ElementTree.register_namespace("ssv", SSV)
@@ -207,6 +208,8 @@ def write_parameters(path: Path, content: ParameterSet) -> None:
             SubElement(within, CONTENT).text = json.dumps(told)  # the standard wants an element
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 

@@ -78,7 +78,7 @@ class Drawn:
         self.figure = figure
 
     def save(self, file: str | Path, dpi: float = DPI) -> Path:
-        """Write it as ``.png``, ``.svg`` or ``.pdf``, by the ending of the name.
+        """Write it as ``.png``, ``.svg`` or ``.pdf``, by the ending of the name; its folder is made.
 
         Raises:
             InputError: another ending.
@@ -86,6 +86,7 @@ class Drawn:
         path = Path(file)
         if path.suffix[1:] not in FORMATS:
             raise InputError(f"'{file}': a picture is {', '.join(f'.{name}' for name in FORMATS)}")
+        path.parent.mkdir(parents=True, exist_ok=True)
         save(self.figure, path, dpi)
         return path
 

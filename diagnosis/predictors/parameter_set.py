@@ -33,7 +33,7 @@ MEASUREMENT, THRUSTERS = "measurement", "thrusters"
 NO_FMU = "of the measurement system: no FMU has this parameter; a scenario has a fault instead"
 
 
-def write_model(path: Path, model: Model) -> None:
+def write_model(path: str | Path, model: Model) -> None:
     """Write a model as a parameter set.
 
     Nominal values are left out: the file of the nominal model is an empty set. No FMU has
@@ -93,7 +93,7 @@ def ship_with(files: Sequence[Path], name: str | Path | None = None) -> Ship:
         raise InputError(" ".join(str(error).split())) from None
 
 
-def read_model(path: Path, of: Ship | None = None) -> Model:
+def read_model(path: str | Path, of: Ship | None = None) -> Model:
     """A model from a parameter set.
 
     Args:
