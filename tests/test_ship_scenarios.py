@@ -153,6 +153,12 @@ def test_logs_of_several_ships_are_refused(otter, tmp_path):
     assert "of several ships" in done.stderr
 
 
+@pytest.mark.parametrize(("name", "warns"), [("cse1", True), ("otter", False)])
+def test_a_log_of_another_ship_than_stated_is_a_warning(otter, tmp_path, name, warns):
+    done = command(compare_main, otter, "--ship", name, "--out", tmp_path / "found")
+    assert ("is a log of otter; it is read as one of cse1, as --ship states" in done.stderr) == warns
+
+
 @pytest.mark.slow
 def test_the_otter_follows_its_route_by_heading_alone(tmp_path):
     """A third of a metre across, and a length behind: nothing feeds its drag forward."""

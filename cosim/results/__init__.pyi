@@ -5,5 +5,6 @@ from .performance import compute as compute
 from .performance import over_time as over_time
 from .performance import tracking as tracking
 from .picture_files import Drawn as Drawn
+from .run_options import RunOptions as RunOptions
 from .run_options import read_options as read_options
 from .track import hulls as hulls

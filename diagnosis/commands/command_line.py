@@ -248,10 +248,15 @@ def command_of(name: str) -> str:
 
 def _take_ship_of_logs(options: argparse.Namespace) -> None:
     """Take the ship that the logs among the runs are of, unless ``--ship`` names one."""
-    if getattr(options, "ship", None) is not None:
-        return
-    from ..runs import ship_of_logs  # only now: it takes a second to import
+    from ..runs import logs_of_another, ship_of_logs  # only now: it takes a second to import
 
+    if (given := getattr(options, "ship", None)) is not None:
+        from ..predictors import ship_with
+
+        for path, other in logs_of_another(_paths(options, RUNS), ship_with((), given).name).items():
+            text = f"'{path}' is a log of {other}; it is read as one of {given}, as --ship states"
+            complain(text, "warning: ")
+        return
     told = ship_of_logs(_paths(options, RUNS))
     if told is None:
         return

@@ -15,7 +15,7 @@ import pandas as pd
 
 from cosim import InputError
 from cosim.errors import nearest
-from cosim.results import read_options
+from cosim.results import RunOptions, read_options
 from cybership.message_text import counted, quoted
 from fmus.ops import wrap
 from fmus.ship import Ship, ship
@@ -490,14 +490,24 @@ def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
     Raises:
         InputError: they are of several ships.
     """
-    logs = {path: read_options(path if path.is_dir() else path.parent) for path in paths}
-    told = {path: log.ship or log.outline.name for path, log in logs.items() if log.outline}
+    told = {path: log.ship or log.outline.name for path, log in _logs(paths).items() if log.outline}
     ships = dict.fromkeys(told.values())
     if len(ships) > 1:
         each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
         raise InputError(f"the runs are of several ships: {each}")
     first = next(iter(told.items()), None)
     return None if first is None or first[1] == DEFAULT else (first[1], first[0])
+
+
+def logs_of_another(paths: Iterable[Path], name: str) -> dict[Path, str]:
+    """Logs of :mod:`cosim` of another ship than that of a name -> the name of their ship."""
+    outlines = {path: log.outline for path, log in _logs(paths).items()}
+    return {path: o.name for path, o in outlines.items() if o is not None and o.name != name}
+
+
+def _logs(paths: Iterable[Path]) -> dict[Path, RunOptions]:
+    """What is told beside each of some runs; of those that are no logs nothing."""
+    return {path: read_options(path if path.is_dir() else path.parent) for path in paths}
 
 
 def row_means(
