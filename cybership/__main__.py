@@ -30,6 +30,8 @@ def usage() -> str:
 
 def main() -> int:
     """Run the command that is named; the exit code if there is none to run."""
+    if sys.argv[1:2] == ["help"] and len(sys.argv) == 3:  # help run
+        sys.argv[1:] = [sys.argv[2], "--help"]
     name = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if name in ("-h", "--help", "help"):
         print(usage())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 
@@ -27,9 +28,11 @@ def code_of(main: Callable[[], int]) -> int:
     """Exit code of a command, whose output is written then.
 
     A reader that closes the pipe (``| head``) is no error. Output that cannot be written, as to a full
-    disk, is one line on standard error.
+    disk, is one line on standard error. Characters that it cannot show are question marks.
     """
     open_closed_streams()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
     code = 0
     try:
         code = _returned(main)

@@ -48,6 +48,19 @@ def test_closed_output_is_no_error(command):
     assert ended(command, ">&-") == (0, "")
 
 
+def test_characters_that_the_terminal_lacks_are_question_marks(monkeypatch):
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    assert ended("fmus.effects", ">/dev/null") == (0, "")
+
+
+def test_help_of_a_command_by_its_name():
+    texts = [
+        subprocess.run([sys.executable, "-m", "cybership", *words], cwd=ROOT, stdout=-1, check=True).stdout
+        for words in (["help", "metrics"], ["metrics", "--help"], ["help"])
+    ]
+    assert texts[0] == texts[1] != texts[2]
+
+
 @pytest.mark.parametrize("closed", ["2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
 def test_closed_errors_leave_the_exit_code(closed):
     assert ended("cybership metrics nothere", closed) == (2, "")

@@ -1,7 +1,6 @@
 """What the commands of the diagnosis share: options, a user's effects, progress, mistakes."""
 
 import argparse
-import io
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -277,8 +276,6 @@ def run(work: Work, options: argparse.Namespace) -> int:
     Returns:
         The exit code.
     """
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
     sweep()
     code = 0
