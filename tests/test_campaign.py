@@ -487,3 +487,25 @@ def test_progress_in_a_file_is_a_line_now_and_then(monkeypatch, capsys):
         progress(1, 0, 9)
         progress(2, 0, 9)
     assert capsys.readouterr().out == ""
+
+
+@pytest.mark.slow
+def test_the_page_has_the_shipped_campaign_and_what_it_prints(tmp_path):
+    page = (ROOT / "docs" / "campaign.md").read_text(encoding="utf-8")
+    shipped = ROOT / "scenarios" / "campaigns" / "gains.campaign.json"
+    content = re.search(r"```json\n(.*?)```", page, re.DOTALL)[1]
+    printed = re.search(r"```\n(controller.*?)```", page, re.DOTALL)[1]
+    assert json.loads(content) == json.loads(shipped.read_text())
+    options = (
+        "--compare",
+        "controller",
+        "--metrics",
+        "e_pos_rms",
+        "--workers",
+        0,
+        "--out",
+        tmp_path / "o",
+    )
+    done = command(main, shipped, *options)
+    assert done.returncode == 0, done.stderr
+    assert " ".join(printed.split()) in " ".join(done.stdout.split())
