@@ -115,6 +115,14 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
             {"faults": [{"kind": "bias", "signals": ["observer.x_mm"], "value": 1.0}]},
             "faults[0] (bias): 'observer' has no variable 'x_mm'; did you mean 'x_m'?",
         ),
+        (
+            {"faults": [{"kind": "wrap", "signals": ["observer.psi_m", "observer.y_m"]}]},
+            "faults[0] (wrap): observer.y_m is in m, and only angles in rad wrap",
+        ),
+        (
+            {"events": [{"time": 2.0, "model": "vessel", "variable": "tau_X", "action": "override", "value": v} for v in (1.0, 2.0)]},
+            "events[1]: events[0] has the same action on vessel.tau_X at t = 2 s",
+        ),
     ],
 )  # fmt: skip
 def test_wrong_content_is_refused(ellipse, change, message):
@@ -129,6 +137,39 @@ def test_a_fault_after_the_end_has_no_effect_and_says_so(ellipse, at, late):
     found = [w for w in prepare(load_scenario(ellipse)).warnings if "no effect" in w]
     line = "faults[0] (freeze): no step starts at or after t = 98.0 s: no effect"
     assert found == ([line] if late else [])
+
+
+@pytest.mark.parametrize(
+    ("time", "says"),
+    [
+        (0.004, "faults[0] (delay): 0.004 s is less than half a step, 0.01 s: no effect"),
+        (90.0, "faults[0] (delay): 90 s is longer than the run: the first values are held"),
+        (0.0, None),
+        (0.005, None),
+        (89.0, None),
+    ],
+)
+def test_a_delay_of_no_step_or_of_the_whole_run_says_so(ellipse, time, says):
+    ellipse |= {"stop": 90.0, "faults": [{"kind": "delay", "signals": ["observer.x_m"], "time": time}]}
+    found = [w for w in prepare(load_scenario(ellipse)).warnings if "(delay)" in w]
+    assert found == ([says] if says else [])
+
+
+def test_a_start_value_of_a_connected_input_has_no_effect_and_says_so(ellipse):
+    ellipse["fmus"]["vessel"]["parameters"] = {"tau_X": 1000.0, "m": 15.0}
+    found = [w for w in prepare(load_scenario(ellipse)).warnings if "no effect" in w]
+    assert found == [
+        "fmus.vessel: tau_X = 1000.0 has no effect, as the input is connected or has a recording"
+    ]
+
+
+@pytest.mark.parametrize("stop", [1.0, 3.0])
+def test_a_recording_that_ends_before_the_run_says_so(ellipse, tmp_path, stop):
+    (tmp_path / "force.csv").write_text("time,X\n0,1\n2,3\n")
+    recording = {"path": str(tmp_path / "force.csv"), "inputs": {"vessel.tau_X": "X"}}
+    ellipse |= {"stop": stop, "recordings": [recording]}
+    found = [w for w in prepare(load_scenario(ellipse)).warnings if w.startswith("recordings[0]")]
+    assert found == (["recordings[0]: it ends at 2 s; its last values are held"] if stop > 2.0 else [])
 
 
 @pytest.mark.parametrize(

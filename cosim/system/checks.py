@@ -2,13 +2,14 @@
 
 from ..errors import InputError
 from ..fmu.fmu_model import NUMERIC
-from ..scenario.faults import Timed
+from ..scenario.faults import Delay, Fault, Timed, Wrap
 from ..scenario.schema import Event, Scenario
 from .recordings import Recorded, read_recording
 from .start_values import check_value
 from .system import Signal, System, causality_of
 
 NO_EFFECT = "no step starts at or after t = {} s: no effect"
+RADIANS = (None, "rad", "1")  # units of an angle; None: the FMU states none
 
 
 def check_processes(system: System) -> None:
@@ -72,7 +73,18 @@ def check_recordings(system: System) -> dict[str, list[Recorded]]:
             own = {n: c for n, c in recording.inputs.items() if n.partition(".")[0] == instance}
             rows = list(zip(*(columns[c] for c in own.values()), strict=True))
             found.setdefault(instance, []).append(Recorded(list(own), time, rows))
+        if time[-1] < system.scenario.stop:
+            system.warnings.append(f"{where}: it ends at {time[-1]:g} s; its last values are held")
     return found
+
+
+def check_overwritten(system: System) -> None:
+    """Warn of start values of inputs that connections or files give others."""
+    for name, given in system.parameters.items():
+        for variable, value in given:
+            if f"{name}.{variable.name}" in system.fed:
+                text = "has no effect, as the input is connected or has a recording"
+                system.warnings.append(f"fmus.{name}: {variable.name} = {value} {text}")
 
 
 def check_faults(system: System) -> None:
@@ -93,13 +105,37 @@ def check_faults(system: System) -> None:
             raise InputError(
                 f"{where}: signals of one fault must be inputs, or outputs, of one instance"
             )
-        if isinstance(fault, Timed) and fault.at and min(fault.at) >= system.scenario.stop:
-            system.warnings.append(f"{where}: {NO_EFFECT.format(min(fault.at))}")
+        for signal in found if isinstance(fault, Wrap) else ():
+            unit = signal.variable.unit and signal.variable.unit.name
+            if unit not in RADIANS:
+                raise InputError(f"{where}: {signal.name} is in {unit}, and only angles in rad wrap")
+        _warn_of_no_effect(system, fault, where)
+
+
+def _warn_of_no_effect(system: System, fault: Fault, where: str) -> None:
+    """Warn of a fault that begins after the end, and of a delay of no step or of the whole run."""
+    stop, step = system.scenario.stop, system.scenario.step
+    if isinstance(fault, Timed) and fault.at and min(fault.at) >= stop:
+        system.warnings.append(f"{where}: {NO_EFFECT.format(min(fault.at))}")
+    if isinstance(fault, Delay) and 0.0 < fault.time < 0.5 * step:
+        system.warnings.append(
+            f"{where}: {fault.time:g} s is less than half a step, {step:g} s: no effect"
+        )
+    if isinstance(fault, Delay) and fault.time >= stop:
+        text = f"{fault.time:g} s is longer than the run: the first values are held"
+        system.warnings.append(f"{where}: {text}")
 
 
 def check_events(system: System) -> None:
+    places: dict[tuple[float, str, str, str], int] = {}
     for k, event in enumerate(system.scenario.events):
         where = f"events[{k}]"
+        same = places.setdefault((event.time, event.model, event.variable, event.action), k)
+        if same != k:
+            raise InputError(
+                f"{where}: events[{same}] has the same action on {event.model}.{event.variable} at "
+                f"t = {event.time:g} s"
+            )
         signal = system.find(f"{event.model}.{event.variable}", where)
         v = signal.variable
         if v.type == "String":

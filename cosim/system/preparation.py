@@ -10,6 +10,7 @@ from ..scenario.schema import Scenario
 from .checks import (
     check_events,
     check_faults,
+    check_overwritten,
     check_processes,
     check_recordings,
     check_roles,
@@ -58,6 +59,7 @@ def prepare(
     connect(system)
     system.recordings = check_recordings(system)
     find_free_inputs(system)
+    check_overwritten(system)
     check_faults(system)
     check_events(system)
     check_roles(system)
