@@ -2,12 +2,16 @@
 
 import csv
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from cybership.message_text import counted
+
 from ..errors import InputError, nearest
+from ..fmu.fmu_model import FmuVariable
 
 
 @contextmanager
@@ -33,7 +37,8 @@ def read_table(path: Path) -> dict[str, list[float]]:
         Name -> numbers, all of the same length.
 
     Raises:
-        InputError: missing, unreadable, a name twice, a cell that is no finite number, no rows.
+        InputError: missing, unreadable, a name twice, a cell that is no finite number, no rows, or one
+            that repeats the one before, as a way point that is reached at once.
     """
     with opened_table(path, "table") as reader:
         lines = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
@@ -44,8 +49,10 @@ def read_table(path: Path) -> dict[str, list[float]]:
         if names.count(name) > 1:
             raise InputError(f"'{path}': the column {name!r} occurs twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
-    for line, cells in lines[1:]:
+    for (before, above), (line, cells) in pairwise(lines):
         where = f"'{path}', line {line}"
+        if cells == above:
+            raise InputError(f"{where} repeats line {before}")
         if len(cells) != len(names):
             raise InputError(f"{where} has {len(cells)} cells, not {len(names)}")
         for name, cell in zip(names, cells, strict=True):
@@ -62,7 +69,7 @@ def _number(text: str, where: str) -> float:
 
 
 def table_parameters(
-    columns: Mapping[str, list[float]], known: Collection[str], where: str
+    columns: Mapping[str, list[float]], known: Mapping[str, FmuVariable], where: str
 ) -> dict[str, float]:
     """The parameters of an FMU that a table gives.
 
@@ -86,9 +93,10 @@ def table_parameters(
         if name not in columns and f"{name}_given" not in known:
             raise InputError(f"{where}: the column '{name}' is missing")
     rows = max(map(len, columns.values()))
-    most = sum(f"{takes[0]}_{k}" in known for k in range(1, rows + 1))
-    if rows > most:
-        raise InputError(f"{where}: {rows} rows are too many; at most {most} are allowed")
+    most = sum(f"{takes[0]}_{k}" in known for k in range(1, len(known)))
+    least = int(known["count"].min or 0)
+    if not least <= rows <= most:
+        raise InputError(f"{where} has {counted(rows, 'row')}; allowed are {least} to {most}")
     found = {f"{name}_{k}": x for name, column in columns.items() for k, x in enumerate(column, 1)}
     given = {f"{name}_given": 1.0 for name in columns if f"{name}_given" in known}
     return {"count": float(rows), **given, **found}
