@@ -114,6 +114,14 @@ def test_the_default_folder_is_not_that_of_another_run(tmp_path, monkeypatch):
     Path("results/x_3").mkdir()
     Path("results/x_3/log.json").write_text("not ours")
     assert default_folder("x", third) == Path("results/x_4")
+    Path("results/x_4").write_text("a file")
+    assert default_folder("x", third) == Path("results/x_5")
+
+
+def test_a_file_in_place_of_the_folder_of_results_ends_the_search(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("results").write_text("")
+    assert default_folder("x", {}) == Path("results/x")
 
 
 def test_a_run_that_is_refused_has_no_note_on_its_folder(tmp_path, monkeypatch):

@@ -47,8 +47,12 @@ def default_folder(name: str, description: Mapping[str, Any], overwrite: bool = 
         folder = RESULTS / (name if number == 1 else f"{name}_{number}")
         try:
             earlier = json.loads((folder / SIDECAR).read_text(encoding="utf-8"))
-        except FileNotFoundError:
+        except (FileNotFoundError, PermissionError):
             return folder
+        except NotADirectoryError:
+            if not RESULTS.is_dir():  # no name below it is free
+                return folder
+            earlier = {}
         except (OSError, ValueError):  # no log of ours: not to be replaced
             earlier = {}
         if overwrite or _input(earlier) == _input(description):

@@ -144,8 +144,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     options.names, options.out, starts, note, effects, native, options.overwrite, ship
                 )
             lines = list(map(str, made))
-    except (BuildError, DeclarationError, OSError) as error:
+    except (BuildError, DeclarationError) as error:
         complain(error)
+        return 2
+    except OSError as error:
+        complain(f"'{error.filename}': {error.strerror}" if error.filename else error)
         return 2
     for line in lines:
         print(line)
