@@ -116,6 +116,10 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
             "faults[0] (bias): 'observer' has no variable 'x_mm'; did you mean 'x_m'?",
         ),
         (
+            {"faults": [{"kind": "noise", "signals": ["observer.x_m", "observer.x_m"], "std": 1.0}]},
+            "'signals' has observer.x_m twice",
+        ),
+        (
             {"faults": [{"kind": "wrap", "signals": ["observer.psi_m", "observer.y_m"]}]},
             "faults[0] (wrap): observer.y_m is in m, and only angles in rad wrap",
         ),

@@ -36,7 +36,10 @@ class Fault(StrictModel):
     signals: list[str] = Field(min_length=1, description="inputs, as instance.variable")
 
     @model_validator(mode="after")
-    def _check_by_signal(self) -> "Fault":
+    def _check_signals(self) -> "Fault":
+        twice = next((name for name in self.signals if self.signals.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"'signals' has {twice} twice")
         value, count = getattr(self, self.by_signal, None), len(self.signals)
         if isinstance(value, list) and len(value) != count:
             raise ValueError(
