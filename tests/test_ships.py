@@ -52,7 +52,7 @@ from fmus.hull_functions import cross_flow
 from fmus.ship import ship
 from fmus.ship_description import Value
 from fmus.ships.expansion import effects_of_ship
-from fmus.ships.ship_file import Term
+from fmus.ships.ship_file import Term, read_ship
 from fmus.signals import Force, VelocityInCurrent
 
 speed = st.floats(-2.0, 2.0)
@@ -736,3 +736,22 @@ def test_power_of_a_cycloidal_propeller_is_an_output_where_it_is_described():
     assert taken(-1.165 / 4.0, 0.0, 0.0) == pytest.approx(0.5 + 4.0 / 8.0)
     aside = taken(0.0, 1.165 / 4.0, -0.4575 * 1.165 / 4.0)  # by the propeller alone
     assert aside == pytest.approx(0.5 + 4.0 / 8.0)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0, 2.0])
+def test_the_gains_of_the_pid_controller_are_of_the_masses_and_one_frequency(share):
+    """K_P = m w^2 on each axis, with w = 0.5 rad/s for CyberShip Enterprise 1, slower for a longer ship."""
+    otter = read_ship("otter")
+    of = ship(
+        description=otter._replace(
+            inertia=tuple(v._replace(value=share * v.value) for v in otter.inertia)
+        )
+    )
+    params = of.components["controller_pid"][1].params
+    gains = {v.name: v.start for v in variables(params)}
+    w = 0.5 / (otter.length / 1.105) ** 0.5
+    masses = np.diag(of.mass)
+    for k, axis in enumerate(("x", "y", "psi")):
+        assert gains[f"K_P_{axis}"] == pytest.approx(masses[k] * w**2)
+        assert gains[f"K_D_{axis}"] == pytest.approx(2.0 * masses[k] * w)
+        assert gains[f"K_I_{axis}"] == pytest.approx(0.1 * masses[k] * w**3)

@@ -8,13 +8,17 @@ There is no feed-forward.
 An input that is NaN or infinite keeps its last finite value.
 """
 
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
-from ..declare import component
+from ..declare import Component, Variable, component, redeclared
+from ..effects import EffectSet
 from ..frames import rotate_to_body
 from ..hull import Inertia, mass_matrix
 from ..ops import Number, clip, where, wrap
+from ..ship_description import Description
 from ..signals import Estimate, Force, Target
+from ..sizing import sized
 from .backstepping import Demand, Errors
 from .parametrisation import GAIN
 
@@ -101,3 +105,19 @@ COMPONENT = component(
     init=init,
     step=step,
 )
+
+
+def make(effects: EffectSet, ship: Description) -> Component:
+    """The controller of a ship: gains in proportion to its three masses, the frequency to its scale."""
+    made, length = sized(COMPONENT, ship), ship.scale.length
+    M = mass_matrix(
+        Inertia(**dict.fromkeys(Inertia._fields, 0.0) | {v.name: v.value for v in ship.inertia})
+    )
+    of_scale = {"x": _SURGE * length**3, "y": _SWAY * length**3, "psi": _YAW * length**5}
+    heavier = {axis: M[k][k] / m for k, (axis, m) in enumerate(of_scale.items())}
+
+    def for_ship(v: Variable) -> Variable:
+        kind, _, axis = v.name.rpartition("_")
+        return replace(v, start=v.start * heavier[axis]) if kind in ("K_P", "K_D", "K_I") else v
+
+    return replace(made, params=redeclared(made.params, for_ship))
