@@ -159,6 +159,12 @@ def test_a_delay_of_no_step_or_of_the_whole_run_says_so(ellipse, time, says):
     assert found == ([says] if says else [])
 
 
+def test_a_trial_is_conducted_by_what_is_connected(ellipse):
+    assert prepare(load_scenario("otter_circle")).trial is not None
+    ellipse["fmus"]["extra"] = {"path": "guidance_circle.fmu"}
+    assert prepare(load_scenario(ellipse)).trial is None
+
+
 def test_a_start_value_of_a_connected_input_has_no_effect_and_says_so(ellipse):
     ellipse["fmus"]["vessel"]["parameters"] = {"tau_X": 1000.0, "m": 15.0}
     found = [w for w in prepare(load_scenario(ellipse)).warnings if "no effect" in w]

@@ -97,8 +97,10 @@ class System:
 
     @property
     def trial(self) -> AnnotatedTrial | None:
-        """The manoeuvring trial that the first FMU which says so conducts."""
-        trials = (read_trial(m.annotations, n) for n, m in self.models.items() if "order" in m.variables)
+        """The manoeuvring trial that the first connected FMU which says so conducts."""
+        sources = {c.source.instance for c in self.connections}
+        orders = {n: m for n, m in self.models.items() if n in sources and "order" in m.variables}
+        trials = (read_trial(m.annotations, n) for n, m in orders.items())
         return next((trial for trial in trials if trial is not None), None)
 
     @property
