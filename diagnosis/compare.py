@@ -31,6 +31,7 @@ from .execution.progress import Advance
 from .execution.result_folder import together
 
 COMPARISON, REPORT = FILES = ("comparison.json", "report.html")
+NOT_MET = 1  # exit code
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,8 +47,10 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
     from .report import ReportData, file_content, show_comparison, write_report
     from .report.formatting import write_json
 
-    if options.criteria is None and (options.sign or options.learned):
-        raise InputError("--sign and --learned belong to a record: --criteria FILE.json is missing")
+    if options.criteria is None and (options.sign or options.learned or options.require_met):
+        raise InputError(
+            "--sign, --learned and --require-met belong to a record: --criteria FILE.json is missing"
+        )
     criteria = None
     if options.criteria is not None:
         from .acceptance import read_criteria
@@ -81,6 +84,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
         write_report(new / REPORT, report, advance, origin)
         judged: list[str] = []
+        code = 0
         if criteria is not None:
             from .acceptance import lines, validate
 
@@ -90,9 +94,10 @@ def compare(options: argparse.Namespace, advance: Advance) -> Iterator[Done]:
             command = origin["command"]
             record = validate(comparison, criteria, options.learned, files, command)
             names = record.write_into(new, options.sign)
+            code = NOT_MET if options.require_met and not record.met else 0
             judged = ["Criteria", *(f"  {line}" for line in lines(record.content))]
             judged.append(f"  {', '.join(names)} in {options.out}")
-    yield Done(0, [f"{REPORT} in {options.out}", *map(printable, judged)])
+    yield Done(code, [f"{REPORT} in {options.out}", *map(printable, judged)])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -102,7 +107,7 @@ def _parser() -> argparse.ArgumentParser:
         "examples:  %(prog)s run1.csv run2.csv\n"
         "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
         "           %(prog)s trial.csv --model vendor.fmu --map map.json\n"
-        "exit codes: 0 done, 2 bad input, 130 interrupted (what was shown is kept, and map.json "
+        "exit codes: 0 done, 1 a criterion is not met (with --require-met), 2 bad input, 130 interrupted (what was shown is kept, and map.json "
         "where an FMU's names do not suffice)",
     )
     fmu_options(made)
@@ -114,6 +119,9 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="FILE.json",
         help="criteria of agreement: judge them, and write a validation record",
+    )
+    made.add_argument(
+        "--require-met", action="store_true", help="exit code 1 unless all criteria are met, for scripts"
     )
     made.add_argument(
         "--learned",

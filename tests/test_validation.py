@@ -457,6 +457,17 @@ def test_an_operating_range_of_what_no_run_has_is_refused_before_anything_is_wri
     assert "operating_range: no run has 'w'" in capsys.readouterr().err
 
 
+def test_a_script_learns_by_the_exit_code_whether_all_criteria_are_met(tmp_path):
+    log = tmp_path / "a.csv"
+    table_of(sail(40.0, 0.1)[0]).to_csv(log, index=False)
+    for tolerance, required, code in ((1e3, True, 0), (1e-9, True, 1), (1e-9, False, 0)):
+        criteria = write_criteria(
+            tmp_path / "c.json", {"statistic": "rms", "horizon": 4.0, "tolerance": tolerance}
+        )
+        given = [str(log), "--criteria", str(criteria), "--out", str(tmp_path / "out")]
+        assert compare.main([*given, *["--require-met"] * required]) == code
+
+
 def test_a_signature_is_of_criteria(tmp_path, capsys):
     assert compare.main([str(tmp_path), "--sign", "key.pem", "--out", str(tmp_path / "out")]) == 2
     assert "--criteria FILE.json is missing" in capsys.readouterr().err

@@ -82,6 +82,11 @@ class Validation(ShortRepr):
     judgements: Sequence[Judgement]
     evaluations: Sequence[Evaluation] = ()
 
+    @property
+    def met(self) -> bool:
+        """Whether all criteria are met."""
+        return all(judgement.outcome == "met" for judgement in self.judgements)
+
     def write(self, folder: str | Path, sign: str | Path | None = None) -> list[str]:
         """Write the record and its report into a folder, all files or none.
 
