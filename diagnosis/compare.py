@@ -107,8 +107,9 @@ def _parser() -> argparse.ArgumentParser:
         "examples:  %(prog)s run1.csv run2.csv\n"
         "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
         "           %(prog)s trial.csv --model vendor.fmu --map map.json\n"
-        "exit codes: 0 done, 1 a criterion is not met (with --require-met), 2 bad input, 130 interrupted (what was shown is kept, and map.json "
-        "where an FMU's names do not suffice)",
+        "exit codes: 0 done, 1 a criterion is not met (with --require-met), 2 bad input,\n"
+        "            130 interrupted (what was shown is kept, and map.json where an FMU's names do not "
+        "suffice)",
     )
     fmu_options(made)
     made.add_argument(
