@@ -26,7 +26,7 @@ def program(module: str) -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that names the nearest option where there is no such option."""
+    """A parser that says in one line what is wrong, and names the nearest option where there is none."""
 
     def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
         """Print the help; argparse itself hides that it cannot be written."""
@@ -36,7 +36,9 @@ class _Parser(argparse.ArgumentParser):
         options = [option[2:] for action in self._actions for option in action.option_strings]
         given = re.match(r"unrecognized arguments: .*?--(\w[\w-]*)", message)
         near = most_alike(given[1], filter(None, options)) if given else None
-        super().error(f"{message}; did you mean '--{near}'?" if near else message)
+        hint = f"did you mean '--{near}'?" if near else f"'{self.prog} --help' lists all options"
+        complain(f"{message}; {hint}")
+        self.exit(2)
 
 
 def command_parser(module: str, description: str, epilog: str) -> argparse.ArgumentParser:
@@ -69,14 +71,14 @@ def whole_number(least: int) -> Callable[[str], int]:
 
 def positive(text: str) -> float:
     """Type of an option that takes a positive number."""
+    wanted = f"needs a positive number, not '{text}'"
     try:
         value = float(text)
     except ValueError:
-        value = 0.0
+        hint = f"{wanted} (the file of a command comes before this option)"
+        raise argparse.ArgumentTypeError(hint) from None
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(
-            f"needs a positive number, not '{text}' (the file of a command comes before this option)"
-        )
+        raise argparse.ArgumentTypeError(wanted)
     return value
 
 
