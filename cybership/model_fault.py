@@ -47,6 +47,11 @@ def first_fault(error: ValidationError, form: object, special: Special = no_spec
     return (f"{where}: " if where else "") + brief(text.removeprefix("Value error, "))
 
 
+def faulty_places(error: ValidationError, form: object) -> int:
+    """Number of places with a fault; one that fits none of several types is one place."""
+    return len({tuple(_place(fault["loc"], form)[0]) for fault in error.errors()})
+
+
 def _place(at: Location, form: object) -> tuple[list[int | str], list[str]]:
     """The parts of a place that are of the file, not names of types; and the keys that it may have."""
     place: list[int | str] = []

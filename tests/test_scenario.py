@@ -450,7 +450,9 @@ def test_an_empty_file_is_called_so(tmp_path):
 
 
 def test_one_more_fault_is_one(ellipse):
-    assert refused(ellipse | {"stop": "x", "step": "y"}).endswith("(and 1 more fault)")
+    assert refused(ellipse | {"stop": "x", "step": "y"}).endswith("(and 1 more error)")
+    noise = {"kind": "noise", "signals": ["observer.x_m"], "std": -1.0}  # a number, or a list of them
+    assert "more error" not in refused(ellipse | {"faults": [noise]})
 
 
 def test_folders_in_place_of_files_are_named_as_such(tmp_path):

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cybership.message_text import counted
-from cybership.model_fault import Special, first_fault, no_special
+from cybership.model_fault import Special, faulty_places, first_fault, no_special
 from cybership.renamed import with_new_names
 
 from ..errors import InputError, most_alike, nearest, unique_keys
@@ -77,8 +77,8 @@ def checked(
     try:
         return model.model_validate_json(json.dumps(content), strict=strict or None)
     except ValidationError as error:
-        others = error.error_count() - 1
-        more = f" (and {counted(others, 'more fault')})" if others else ""
+        others = faulty_places(error, model) - 1
+        more = f" (and {counted(others, 'more error')})" if others else ""
         raise InputError(f"{where}: {first_fault(error, model, special)}{more}") from None
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{where} cannot be written as JSON: {error}") from None
