@@ -122,7 +122,7 @@ def simulate(
     settings |= {} if ship is None else {"ship": str(ship)}
     if settings:
         scenario = with_settings(scenario, settings.items(), Path.cwd(), "set")
-    if stop is not None:
+    if "stop" in settings:
         scenario = cut_short(scenario)
     sets, controllers = (
         [p] if isinstance(p, (str, Path)) else p for p in (parameters, controller_model)

@@ -124,6 +124,11 @@ def test_a_file_in_place_of_the_folder_of_results_ends_the_search(tmp_path, monk
     assert default_folder("x", {}) == Path("results/x")
 
 
+@pytest.mark.parametrize("given", [{"stop": 0.1}, {"set": {"stop": 0.1}}])
+def test_a_run_that_is_cut_short_by_either_option_has_metrics(given, tmp_path):
+    assert "e_pos_rms" in cosim.simulate("ellipse", tmp_path, **given).metrics
+
+
 def test_a_run_that_is_refused_has_no_note_on_its_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     described(Path("results/ellipse"), 1)

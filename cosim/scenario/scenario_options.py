@@ -73,4 +73,5 @@ def chosen_scenario(options: argparse.Namespace, *more: tuple[str, Any]) -> Scen
     settings += [(k, given[k]) for k in ("native", "ship") if given.get(k) is not None]
     if settings:
         scenario = with_settings(scenario, settings, Path.cwd(), "--set" if "set" in given else "--ship")
-    return scenario if given.get("stop") is None else cut_short(scenario)
+    is_chosen = given.get("stop") is not None or "stop" in dict(settings)
+    return cut_short(scenario) if is_chosen else scenario
