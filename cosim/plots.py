@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         runs = {folder.resolve().name: read_log(folder) for folder in options.folders}
         told = {folder.resolve().name: read_options(folder) for folder in options.folders}
         drawn = draw(runs, options.out, told, look)
+        if not drawn:
+            raise InputError("nothing to draw: no log has the signals of a picture, such as a pose")
     except InputError as error:
         complain(error)
         return BAD_INPUT

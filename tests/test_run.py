@@ -153,7 +153,7 @@ def test_folder_holds_nothing_of_an_earlier_run(scenario, tmp_path):
         ({}, ["--parameters", "nowhere.ssv"], "no such parameter set"),
         ({}, ["--realtime", "-1"], "positive number"),
         ({}, ["--outt", "x"], "unrecognized arguments: --outt x; did you mean '--out'?"),
-        ({}, ["--entirely-other"], "unrecognized arguments: --entirely-other\n"),
+        ({}, ["--entirely-other"], "unrecognized arguments: --entirely-other; "),
         ({}, ["--out", ""], "needs the name of a folder"),
         ({"log": {"signals": ["vessel.x_n"]}}, [], "did you mean 'x_m'"),
     ],

@@ -55,7 +55,9 @@ def test_characters_that_the_terminal_lacks_are_question_marks(monkeypatch):
 
 def test_help_of_a_command_by_its_name():
     texts = [
-        subprocess.run([sys.executable, "-m", "cybership", *words], cwd=ROOT, stdout=-1, check=True).stdout
+        subprocess.run(
+            [sys.executable, "-m", "cybership", *words], cwd=ROOT, stdout=-1, check=True
+        ).stdout
         for words in (["help", "metrics"], ["metrics", "--help"], ["help"])
     ]
     assert texts[0] == texts[1] != texts[2]

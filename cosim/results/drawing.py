@@ -90,8 +90,8 @@ def draw(
     folder = Path(folder)
     written = []
     with options.applied():
-        folder.mkdir(parents=True, exist_ok=True)
         for name, figure in figures(runs, told):
+            folder.mkdir(parents=True, exist_ok=True)
             file = folder / f"{name}.{options.format}"
             save(options.sized(figure), file, options.dpi)
             written.append(file)
