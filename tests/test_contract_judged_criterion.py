@@ -147,10 +147,10 @@ def test_met_names_what_is_not_known():
     unknown = run(std=0.001, more={"current": "nobody knows it"})
     found = judge(criterion(), ["a"], [unknown])
     assert found.outcome == "met"
-    assert found.reason.endswith("; u_val is without current, not known")
+    assert found.reason.endswith("; u_val leaves out what is not known: current")
     off = judge(criterion(), ["a"], [run(off=(5.0, 0.0), more={"current": "nobody knows it"})])
     assert off.outcome == "not met"
-    assert "u_val is without" not in off.reason
+    assert "u_val leaves out" not in off.reason
 
 
 def test_samples_well_before_the_horizon_are_said():

@@ -294,7 +294,7 @@ def test_current_and_wind_are_inputs_where_they_are_known(comparison):
 def test_met_says_what_is_not_known(comparison, tmp_path):
     j = validated(comparison, tmp_path, {}, input_std={"current": 0.0}).content.judgements[0]
     assert j.outcome == "met"
-    assert j.reason.endswith("u_val is without parameters, process noise, wind, not known")
+    assert j.reason.endswith("u_val leaves out what is not known: parameters, process noise, wind")
     assert j.k_u_val == pytest.approx(2.0 * j.budget.u_val)
 
 

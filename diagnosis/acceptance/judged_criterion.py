@@ -134,7 +134,7 @@ def judge(
     n = independent(np.abs(errors), run)
     outcome, reason, interval = decide(c, errors, n, told.u_val)
     if outcome == "met" and told.unknown:
-        reason += f"; u_val is without {', '.join(told.unknown)}, not known"
+        reason += f"; u_val leaves out what is not known: {', '.join(told.unknown)}"
     flags = [
         _too_good(q, judged(q, every), n, budget(q, sources, masks)) for q in ("position", "heading")
     ]

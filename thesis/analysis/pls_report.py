@@ -65,7 +65,10 @@ def sentences(r: Regressed, stable: Stable | None = None) -> Iterator[str]:
     yield f"{r.recipe.name}, {r.samples.time.size} samples, {len(r.columns)} columns. R² / Q² {each}."
     weak = insignificant(r)
     if weak:
-        yield f"Coefficients within two of their standard deviations, or of changing sign: {weak}."
+        yield (
+            "Coefficients less than two standard deviations from zero, or of another sign in another "
+            f"fold: {weak}."
+        )
     outside = {n: x for n, x in r.clipped.items() if x > 0.0}
     if outside:
         told = ", ".join(f"{n} {percent(x)}" for n, x in outside.items())
