@@ -50,7 +50,7 @@ def replay(options: argparse.Namespace, advance: Advance) -> Done:
 def _parser() -> argparse.ArgumentParser:
     made = open_loop_parser(
         "replay",
-        "Feed a measured run to an observer and a controller open loop: their estimates and "
+        "Feed a run of CyberShip Enterprise 1 to an observer and a controller open loop: their estimates and "
         "outputs, and the signals that were lost in transmission.",
         "examples:  %(prog)s results/ellipse --controller abs\n"
         "           %(prog)s run.csv --controller cl_win_eps --scenario "

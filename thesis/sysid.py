@@ -61,7 +61,8 @@ def sysid(options: argparse.Namespace, advance: Advance) -> Done:
 def _parser() -> argparse.ArgumentParser:
     made = analysis_parser(
         "sysid",
-        "Identify the coefficients of (7.1)-(7.5) by repeated passes of concurrent learning over runs.",
+        "Identify the coefficients of (7.1)-(7.5) by repeated passes of concurrent learning over runs "
+        "of CyberShip Enterprise 1.",
         "examples:  %(prog)s results/ellipse --test results/eight\n"
         "           %(prog)s --recipe SYSID4 --out results/sysid4\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters results/sysid4/model.ssv\n"

@@ -46,8 +46,8 @@ def watch(options: argparse.Namespace, advance: Advance) -> Done:
 def _parser() -> argparse.ArgumentParser:
     return open_loop_parser(
         "watch",
-        "Detect whether a thruster lost force during a measured run: which, when, with what "
-        "probability.",
+        "Detect whether a thruster lost force during a run of CyberShip Enterprise 1: which, when, with "
+        "what probability.",
         "examples:  %(prog)s results/ellipse\n"
         "           %(prog)s run.csv --observer kalman --out results/thrusters\n"
         "The same in a closed loop: watch_thrusters.fmu, fed like a controller, and with the force by\n"
