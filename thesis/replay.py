@@ -50,8 +50,8 @@ def replay(options: argparse.Namespace, advance: Advance) -> Done:
 def _parser() -> argparse.ArgumentParser:
     made = open_loop_parser(
         "replay",
-        "Feed a run of CyberShip Enterprise 1 to an observer and a controller open loop: their estimates and "
-        "outputs, and the signals that were lost in transmission.",
+        "Feed a run of CyberShip Enterprise 1 to an observer and a controller in open loop: estimates "
+        "and outputs, and the signals that were lost in transmission.",
         "examples:  %(prog)s results/ellipse --controller abs\n"
         "           %(prog)s run.csv --controller cl_win_eps --scenario "
         "scenarios/eight.json\n"

@@ -4,9 +4,10 @@ import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import islice, product
 from pathlib import Path
+from typing import NamedTuple
 
 from ..columns.columns import PREAMBLE, UNITS, Layout
 from ..columns.name_words import WORDS
@@ -36,9 +37,11 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
     """
     with path.open(encoding=encoding, errors="replace", newline="") as file:
         lines = list(islice(file, PREAMBLE))
+    there = [separator for separator in SEPARATORS if any(separator in line for line in lines)]
+    tables = [(separator, _split(lines, separator)) for separator in there]
     for is_told in (_is_number, _is_value):
-        pairs = product(SEPARATORS, ".,")
-        best = max((_with(*pair, lines, is_told) for pair in pairs), key=lambda each: each[0])
+        found = [_with(*table, decimal, lines, is_told) for table, decimal in product(tables, ".,")]
+        best = max(found, key=lambda each: each[0], default=(-1.0, None))
         if best[1] is not None:
             return best[1]
     return None
@@ -106,10 +109,16 @@ def _is_value(cell: str, decimal: str) -> bool:
     return _is_number(cell, decimal) or STAMP.match(cell) is not None
 
 
-def _with(
-    separator: str, decimal: str, lines: Sequence[str], is_told: Callable[[str, str], bool]
-) -> tuple[float, Layout | None]:
-    """How much of the table is told with a separator and a decimal mark, and the layout of that."""
+class _Rows(NamedTuple):
+    """Lines as cells: number and cells of those that are not ruled, numbers of these, usual width."""
+
+    rows: Sequence[tuple[int, list[str]]]
+    ruled: Collection[int]
+    width: int
+
+
+def _split(lines: Sequence[str], separator: str) -> _Rows:
+    """Lines as cells between a separator."""
     ruled = {k for k, line in enumerate(lines) if RULED.fullmatch(line.strip())}
     blank = " " if separator == " " else ""  # at the end of a line it separates no cells
     rows = [
@@ -119,7 +128,18 @@ def _with(
     ]
     widths = Counter(len(cells) for _, cells in rows)
     width = max(widths, key=lambda n: widths[n], default=0)
-    rows = [(k, unmarked(cells, width)) for k, cells in rows]
+    return _Rows([(k, unmarked(cells, width)) for k, cells in rows], ruled, width)
+
+
+def _with(
+    separator: str,
+    table: _Rows,
+    decimal: str,
+    lines: Sequence[str],
+    is_told: Callable[[str, str], bool],
+) -> tuple[float, Layout | None]:
+    """How much of the table is told with a separator and a decimal mark, and the layout of that."""
+    rows, ruled, width = table
     quoted = any('"' in line for line in lines)  # "1,5","2,5"
     if (separator == decimal and not quoted) or width < 2:
         return -1.0, None
