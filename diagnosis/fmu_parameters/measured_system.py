@@ -15,7 +15,7 @@ from cybership.message_text import quoted
 from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.reading import LOGS
-from ..runs.files.tables import as_table, column_names, numbers, table_of_file
+from ..runs.files.tables import Table, as_table, numbers
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
@@ -90,25 +90,24 @@ def columns_of(path: Path) -> list[str]:
     Raises:
         InputError: the file cannot be read.
     """
-    table = _table(path)
     with as_table(path):
-        return column_names(table, stated_layout(table) or Layout())
+        return _table(path).names
 
 
-def _table(path: Path) -> Path:
-    return next((path / n for n in LOGS if (path / n).is_file()), path) if path.is_dir() else path
+def _table(path: Path) -> Table:
+    file = next((path / n for n in LOGS if (path / n).is_file()), path) if path.is_dir() else path
+    return Table(file, stated_layout(file) or Layout())
 
 
 def _read(path: Path, wanted: Sequence[str]) -> MeasuredRun:
     table, there = _table(path), columns_of(path)
-    layout = stated_layout(table) or Layout()
     names = [TIME, *wanted]
     for name in names:
         if name not in there:
             raise InputError(f"'{path}' has no column {quoted(name)}{nearest(name, there)}")
     with as_table(path):
-        frame = table_of_file(table, layout, names)
-    columns = {name: numbers(frame[name], table, layout) for name in names}
+        frame = table.columns(names)
+    columns = {name: numbers(frame[name], table.path, table.layout) for name in names}
     time = columns.pop(TIME)
     if time.size < FEWEST or not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
         raise InputError(f"'{path}': time needs at least {FEWEST} increasing numbers")

@@ -15,8 +15,7 @@ from .columns.columns import UNITS, Column, Layout, stated_layout, to_si
 from .columns.name_words import words_of
 from .columns.proposal import text_of, time_column, units_below
 from .columns.usual_names import value_column
-from .files.message_fields import message_fields
-from .files.tables import clock_seconds, column_names, date_stamps, numbers, table_of_file
+from .files.tables import Table, clock_seconds, date_stamps, numbers
 from .run_constants import NEGLIGIBLE
 
 Item = TypeVar("Item", str, Path)
@@ -98,20 +97,19 @@ def _part(path: Path) -> _Part:
     if not path.is_file():
         raise InputError(f"'{path}' is a folder" if path.is_dir() else f"no such file: '{path}'")
     stated = stated_layout(path) or Layout()
-    text = text_of(path, stated)
-    names = column_names(path, text)
+    whole = Table(path, text_of(path, stated))
+    names, fields = whole.names, whole.fields
     if twice := _first_repeated(filter(None, names)):
         raise InputError(f"'{path}' has more than one column '{twice}'; give each a name of its own")
-    fields = message_fields(names)
-    units = units_below(path, text, names)
-    found = time_column(path, text, stated, names, units)
+    units = units_below(whole, names)
+    found = time_column(whole, stated, names, units)
     if found is None:
         raise InputError(
             f"no column of '{path}' is known as its time; its columns: {', '.join(names)}; state it: "
             f'put {{"columns": {{"time": "NAME"}}}} into \'{path}.json\''
         )
     columns = [name for name in names if name not in fields]
-    table = table_of_file(path, text, {*columns, found.name})
+    table = whole.columns({*columns, found.name})
     cells = table[found.name]
     stamp = set(fields[found.name].columns) if found.name in fields else set()
     told = dict(zip(names, units, strict=True))

@@ -4,11 +4,11 @@ import json
 import re
 from collections.abc import Collection, Mapping, Sequence
 from itertools import takewhile
-from pathlib import Path
 
 from cosim import InputError
 
-from .columns import UNITS, Column, Layout, no_unit
+from ..files.tables import Table
+from .columns import UNITS, Column, no_unit
 from .geographic import WORDS
 from .likely_columns import (
     MEASURED,
@@ -32,8 +32,7 @@ PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
 def named_columns(
-    path: Path,
-    text: Layout,
+    table: Table,
     names: Sequence[str],
     units: Sequence[str],
     quantity: Mapping[str, str],
@@ -60,21 +59,21 @@ def named_columns(
         if is_quaternion(bare) and name not in fields:  # q is the pitch rate as well
             continue
         known = UNITS[quantity[signal]]
-        if signal == "time" and unit not in known and is_stamped(path, text, name):
+        if signal == "time" and unit not in known and is_stamped(table, name):
             unit = ""  # a time zone, or the form of the stamps
         if unit not in known and (unit.isdigit() or (bare != signal and unit in NAMED_UNITS)):
             continue  # an index, or of another quantity: n in rps is no position to the north
         if unit not in NO_UNIT and unit not in known:
             line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
             raise InputError(
-                f"'{path}', column '{name}': {no_unit(unit, signal, known)}; "
+                f"'{table.path}', column '{name}': {no_unit(unit, signal, known)}; "
                 f"if it is another one, put {line} with its factor to {SI_UNIT[quantity[signal]]} "
-                f"into '{path}.json'"
+                f"into '{table.path}.json'"
             )
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
     found = _by_words([pair for pair in free if pair[0] not in names_of(columns)], columns, quantity)
-    columns |= {s: c for s, c in found.items() if not is_fraction(path, text, s, c, quantity)}
+    columns |= {s: c for s, c in found.items() if not is_fraction(table, s, c, quantity)}
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
 
 

@@ -10,9 +10,9 @@ from cosim import InputError
 from fmus.ship import Ship, ship
 
 from ..files.matlab_files import fits_matlab
-from ..files.message_fields import MessageField, message_fields
-from ..files.reading import Run, column_names, read, signed
-from ..files.tables import date_stamps, table_of_file
+from ..files.message_fields import MessageField
+from ..files.reading import Run, read, signed
+from ..files.tables import Table, date_stamps
 from ..files.text_layout import KNOWN, bare_unit, likely_encoding, table_cells, text_layout, unmarked
 from .columns import (
     POSE,
@@ -103,12 +103,12 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         read(path, of=of)  # refuses it
     stated = stated_layout(path) or Layout()
     text = text_of(path, stated)
-    names = column_names(path, text)
-    fields = message_fields(names)
+    table = Table(path, text)
+    names, fields = table.names, table.fields
     log = log_of(of.commands)
     if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
-    units = units_below(path, text, names)
+    units = units_below(table, names)
     parts = {name for field in fields.values() for name in field.columns}
     within = tuple(f"{field}{mark}" for field in fields for mark in "./")  # as the yaw of a quaternion
     whole = [k for k, name in enumerate(names) if name not in parts and not name.startswith(within)]
@@ -116,10 +116,10 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
     kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
-    columns = named_columns(path, text, names, units, quantity, kept, fields)
+    columns = named_columns(table, names, units, quantity, kept, fields)
     columns |= _of_message(columns, fields, kept)
-    columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
-    columns |= _geographic(path, text.model_copy(update={"columns": columns}), names, units)
+    columns |= _stamped(table, text.model_copy(update={"columns": columns}), names)
+    columns |= _geographic(table, text.model_copy(update={"columns": columns}), names, units)
     kept = {s: columns[s] for s in kept}
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
@@ -130,20 +130,19 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
                 f"'cybership join {path} --out run.csv' gives each name a column"
             )
         left = {n: below.get(n, "") for n in unused}
-        return _with_blanks(path, layout, kept, left, blank, quantity)
+        return _with_blanks(table, layout, kept, left, blank, quantity)
     try:
         signals(layout, names, f"'{path}'", of)
     except InputError as error:
         more = f"; columns that are not known signals: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
     told = {s: layout.column(s).unit for s in quantity}
-    columns |= units_of_commands(path, layout, names, of)
-    columns |= sign_columns(path, layout.model_copy(update={"columns": columns}), unused, quantity)
+    columns |= units_of_commands(table, layout, of)
+    columns |= sign_columns(table, layout.model_copy(update={"columns": columns}), unused, quantity)
     unused = [name for name in unused if name not in {c.sign for c in columns.values()}]
     run = read(path, layout.model_copy(update={"columns": columns}), of)
-    stamped = "time" not in layout.without_column and is_stamped(
-        path, layout, layout.column("time").name
-    )
+    timed = "time" not in layout.without_column
+    stamped = timed and is_stamped(table, layout.column("time").name)
     for signal, unit, factor in seen_units(run, stamped):
         if signal not in kept or not _is_told(kept[signal]):
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit, "factor": factor})
@@ -179,22 +178,22 @@ def text_of(path: Path, stated: Layout) -> Layout:
 
 
 def time_column(
-    path: Path, text: Layout, stated: Layout, names: Sequence[str], units: Sequence[str]
+    table: Table, stated: Layout, names: Sequence[str], units: Sequence[str]
 ) -> Column | None:
     """The column of the time of a table, by its name, its unit or its stamps; None: none is known.
 
     Args:
-        path, text, stated: the table, how it is laid out, and what is stated beside it.
+        table, stated: the table, and what is stated beside it.
         names, units: of its columns.
     """
     kept = {s: c for s, c in stated.columns.items() if s == "time" and c.name.strip()}
-    columns = named_columns(path, text, names, units, {"time": "time"}, kept)
-    columns |= _stamped(path, text.model_copy(update={"columns": columns}), names)
+    columns = named_columns(table, names, units, {"time": "time"}, kept)
+    columns |= _stamped(table, table.layout.model_copy(update={"columns": columns}), names)
     return columns.get("time")
 
 
 def _with_blanks(
-    path: Path,
+    table: Table,
     layout: Layout,
     kept: Mapping[str, Column],
     unused: Mapping[str, str],
@@ -205,11 +204,11 @@ def _with_blanks(
     columns = dict(layout.columns)
     time = layout.column("time")
     if "time" not in {*kept, *blank, *layout.without_column} and not time.unit:
-        cells = table_of_file(path, layout, {time.name})[time.name]
+        cells = table.columns({time.name})[time.name]
         columns["time"] = time.model_copy(update={"unit": time_unit(numbers_of(cells, "time"))})
     needed = {s: c for s, c in columns.items() if s in kept or c != Column(name=s)}
     blanks = layout.model_copy(update={"columns": needed | {s: Column(name="") for s in blank}})
-    return Proposal(blanks, [*unused], None, _likely(path, layout, unused, blank, quantity))
+    return Proposal(blanks, [*unused], None, _likely(table, layout, unused, blank, quantity))
 
 
 def common_layout(
@@ -258,11 +257,12 @@ def _encoding(path: Path) -> str:
     return UTF_8
 
 
-def units_below(path: Path, text: Layout, names: Sequence[str]) -> list[str]:
+def units_below(table: Table, names: Sequence[str]) -> list[str]:
     """The units in the line below the names; empty ones where a table has no such line."""
     found: list[str] = []
+    text = table.layout
     if text.units_line:
-        with path.open(encoding=text.encoding) as file:
+        with table.path.open(encoding=text.encoding) as file:
             cells = table_cells(next(islice(file, text.skip + 1, None)), text.separator)
             found = unmarked(cells, len(names))
     if not any(bare_unit(cell) in KNOWN for cell in found):  # of types, or a ruled line
@@ -304,17 +304,17 @@ def _of_message(
     return turned
 
 
-def _stamped(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
+def _stamped(table: Table, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
     """The only column of date stamps as the time, whatever its name, if no other column is known."""
     if "time" in (*layout.columns, *layout.without_column):
         return {}
-    table = table_of_file(path, layout, {*names} - names_of(layout.columns))
-    stamped = [str(name) for name, cells in table.items() if date_stamps(cells) is not None]
+    free = table.columns({*names} - names_of(layout.columns))
+    stamped = [str(name) for name, cells in free.items() if date_stamps(cells) is not None]
     return {"time": Column(name=stamped[0])} if len(stamped) == 1 else {}
 
 
 def _geographic(
-    path: Path, layout: Layout, names: Sequence[str], units: Sequence[str]
+    table: Table, layout: Layout, names: Sequence[str], units: Sequence[str]
 ) -> dict[str, Column]:
     """Position by columns of latitude and longitude, if no other columns are known.
 
@@ -327,22 +327,22 @@ def _geographic(
     if not pair or any(stated.get(s) != pair[s] for s in layout.columns.keys() & pair):
         return {}
     after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
-    table = table_of_file(path, layout, {*pair.values(), *after.values()})
-    sides = {s: SIDES[s][1] for s, name in after.items() if is_side(table[name], SIDES[s])}
-    numbers = {signal: numbers_of(table[name], signal) for signal, name in pair.items()}
+    own = table.columns({*pair.values(), *after.values()})
+    sides = {s: SIDES[s][1] for s, name in after.items() if is_side(own[name], SIDES[s])}
+    numbers = {signal: numbers_of(own[name], signal) for signal, name in pair.items()}
     how = {s: {"minutes": True} if are_minutes(**numbers) else {} for s in pair}
     how |= {s: how[s] | {"sign": after[s], "negative": letter} for s, letter in sides.items()}
     read = {s: Column(name=name).model_copy(update=how[s]) for s, name in pair.items()}
-    degrees = {s: signed(numbers[s], table, c) for s, c in read.items()}
+    degrees = {s: signed(numbers[s], own, c) for s, c in read.items()}
     degrees["y"] = across_date_line(degrees["y"])
     columns = {s: c.model_copy(update=how[s]) for s, c in local_columns(pair, degrees).items()}
     if not columns:
-        refuse_letters(pair, {signal: table[name] for signal, name in pair.items()})
+        refuse_letters(pair, {signal: own[name] for signal, name in pair.items()})
     return columns
 
 
 def _likely(
-    path: Path,
+    table: Table,
     layout: Layout,
     unused: Mapping[str, str],
     blank: Sequence[str],
@@ -352,14 +352,14 @@ def _likely(
     lacking = {*blank, *layout.without_column}
     known = {s: layout.column(s) for s in ("time", *POSE) if s not in lacking}
     signs = {c.sign for c in known.values() if c.sign}
-    table = table_of_file(path, layout, {*unused, *names_of(known), *signs})
-    refuse_thousands(path, layout, table)
-    numbers = {s: signed(numbers_of(table[c.name], s), table, c) for s, c in known.items()}
+    own = table.columns({*unused, *names_of(known), *signs})
+    refuse_thousands(table.path, layout, own)
+    numbers = {s: signed(numbers_of(own[c.name], s), own, c) for s, c in known.items()}
     pose = {s: to_si(numbers[s], s, c, quantity[s]) for s, c in known.items()}
-    pose |= layout.even_time(len(table))
+    pose |= layout.even_time(len(own))
     kind = "time" if "time" in blank else ""
     told = {n: without_unit(n, below) for n, below in unused.items()}
     told = {n: (n, "") if unit.isdigit() else (bare, unit) for n, (bare, unit) in told.items()}
-    named = {n: (*pair, numbers_of(table[n], kind)) for n, pair in told.items()}
+    named = {n: (*pair, numbers_of(own[n], kind)) for n, pair in told.items()}
     motion = motion_of(pose)
     return {s: likely_columns(s, quantity[s], named, motion) for s in blank}

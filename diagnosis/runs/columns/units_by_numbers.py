@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
 from ..files.reading import Run
-from ..files.tables import cell_numbers, clock_seconds, date_stamps, table_of_file
+from ..files.tables import Table, cell_numbers, clock_seconds, date_stamps
 from ..frozen import repeated
 from ..position_jumps import speeds
 from ..row_order import by_stamps, in_order
@@ -36,22 +35,20 @@ from .unit_check import (
 PLANING = 5.0
 
 
-def is_fraction(
-    path: Path, text: Layout, signal: str, column: Column, quantity: Mapping[str, str]
-) -> bool:
+def is_fraction(table: Table, signal: str, column: Column, quantity: Mapping[str, str]) -> bool:
     """Whether the column of a shaft is not called a speed, and has fractions of the full command."""
     if quantity[signal] != "shaft speed" or column.unit or says_command(column.name, signal, quantity):
         return False
-    values = numbers_of(table_of_file(path, text, {column.name})[column.name], "")
+    values = numbers_of(table.columns({column.name})[column.name], "")
     return float(np.nanmax(np.abs(values), initial=0.0)) <= largest("command")
 
 
-def is_stamped(path: Path, text: Layout, name: str) -> bool:
+def is_stamped(table: Table, name: str) -> bool:
     """Whether a column has date stamps or times of day."""
-    return date_stamps(table_of_file(path, text, {name})[name]) is not None
+    return date_stamps(table.columns({name})[name]) is not None
 
 
-def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship) -> dict[str, Column]:
+def units_of_commands(table: Table, layout: Layout, of: Ship) -> dict[str, Column]:
     """Commands without a unit that are far beyond the ship's limits, in the only unit within them.
 
     Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit. Per
@@ -62,15 +59,15 @@ def units_of_commands(path: Path, layout: Layout, names: Sequence[str], of: Ship
         limits = largest_commands(commands, of, math.tau)
         for si in dict.fromkeys(form.values()):
             own = {s: x for (s, unit), x in zip(form.items(), limits, strict=True) if unit == si}
-            columns = {s: c for s in own if (c := layout.column(s)).name in names}
+            columns = {s: c for s in own if (c := layout.column(s)).name in table.names}
             if not columns or any(c.unit or c.factor != 1.0 for c in columns.values()):
                 continue
             if OF_UNIT[si] != "command" and all(_is_percent(c.name) for c in columns.values()):
                 factors = {s: float(f"{own[s] / 100.0:.6g}") for s in columns}
                 found |= {s: c.model_copy(update={"factor": factors[s]}) for s, c in columns.items()}
                 continue
-            table = table_of_file(path, layout, names_of(columns))
-            size = {s: np.abs(numbers_of(table[c.name], "")) for s, c in columns.items()}
+            cells = table.columns(names_of(columns))
+            size = {s: np.abs(numbers_of(cells[c.name], "")) for s, c in columns.items()}
             most = {s: float(np.nanmax(x, initial=0.0)) for s, x in size.items()}
             unit = _unit_within(most, own, OF_UNIT[si])
             found |= {s: c.model_copy(update={"unit": unit}) for s, c in columns.items() if unit}
@@ -94,7 +91,7 @@ def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantit
 
 
 def sign_columns(
-    path: Path, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
+    table: Table, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
 ) -> dict[str, Column]:
     """Commands whose sign is in a column of its own, as astern of a shaft, or port of a rudder."""
     own = {s: c for s, c in layout.columns.items() if "." in s and not c.sign}
@@ -103,10 +100,10 @@ def sign_columns(
     for name, signal in named.items():
         if not signal:
             continue
-        table = table_of_file(path, layout, {name, own[signal].name})
-        cells = table[name].dropna().astype("string").str.strip().unique().tolist()
+        pair = table.columns({name, own[signal].name})
+        cells = pair[name].dropna().astype("string").str.strip().unique().tolist()
         negative = [cell for cell in cells if _is_negative(cell, quantity[signal])]
-        values = numbers_of(table[own[signal].name], "")
+        values = numbers_of(pair[own[signal].name], "")
         if len(cells) <= 3 and len(negative) == 1 and np.nanmin(values, initial=0.0) >= 0.0:
             found[signal] = own[signal].model_copy(update={"sign": name, "negative": negative[0]})
     return found

@@ -48,15 +48,14 @@ from ..columns.unit_check import LARGEST, UNITS, largest, remedy
 from ..run_constants import DIGITS, FAR, NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
 from .tables import (
+    Table,
     as_table,
     clock_seconds,
-    column_names,
     date_stamps,
     has_words,
     is_cell,
     numbers,
     resolution,
-    table_of_file,
 )
 
 NO_HEADING = 511.0  # degrees, that is not available (ITU-R M.1371, AIS)
@@ -213,7 +212,8 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
     """What is needed of a CSV or Parquet file, and which column is which signal."""
     given = layout or read_layout(path)
     with as_table(path):
-        names = column_names(path, given or Layout())
+        table = Table(path, given or Layout())
+        names = table.names
         where = f"'{path}'"
         if given is None:
             layout = layout_of(names, {}, where, of, path.parent)
@@ -223,7 +223,7 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
         wanted = {name for column in used for name in (column.name, column.sign) if name}
         if absent := next((c.sign for c in used if c.sign and c.sign not in names), None):
             raise InputError(f"'{path}' has no column '{absent}' (for a sign){nearest(absent, names)}")
-        return table_of_file(path, layout, wanted | also.intersection(names)), layout
+        return table.columns(wanted | also.intersection(names)), layout
 
 
 def signed(read: np.ndarray, table: pd.DataFrame, column: Column) -> np.ndarray:

@@ -1,9 +1,10 @@
 """CSV and Parquet files as tables, read as the JSON file beside them says, and cells as numbers."""
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from ..columns.side_car import (
 )
 from ..run_constants import CHANCE, DIGITS, NEGLIGIBLE
 from .matlab_files import matlab_table
-from .message_fields import message_fields
+from .message_fields import MessageField, message_fields
 from .text_layout import STAMP, is_marked, plain_number
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
@@ -67,19 +68,72 @@ def as_table(path: Path) -> Iterator[None]:
         raise InputError(f"'{path}' cannot be read as a table: {text}") from None
 
 
-def column_names(path: Path, layout: Layout) -> list[str]:
-    """The names of the columns, and of the fields of messages that some of them make up.
+class Table:
+    """A file with named columns, which are read when they are asked for, each once.
+
+    Args:
+        path: a CSV, Parquet or MATLAB file.
+        layout: how it is laid out, and how the column of the time is called.
 
     Raises:
-        InputError: the text is in another encoding, or begins with other lines.
+        InputError: when it is read: the text is in another encoding, begins with other lines, has a line
+            of units that was not stated, or a row with more cells than names.
         OSError, ValueError: it cannot be read.
+        KeyboardInterrupt: the user has asked for the end.
     """
-    names = _names(path, layout)
-    return [*names, *(field for field in message_fields(names) if field not in names)]
+
+    def __init__(self, path: Path, layout: Layout) -> None:
+        self.path, self.layout = path, layout
+        self._read: dict[str, pd.Series] = {}
+
+    @cached_property
+    def own_names(self) -> list[str]:
+        """The names of the columns as they stand there, one that is there twice included."""
+        return _names(self.path, self.layout)
+
+    @cached_property
+    def fields(self) -> Mapping[str, MessageField]:
+        """Fields of messages that some of the columns make up, by their names."""
+        return message_fields(self.own_names)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The names of the columns and of such fields."""
+        return [*self.own_names, *(name for name in self.fields if name not in self.own_names)]
+
+    def columns(self, wanted: Collection[str]) -> pd.DataFrame:
+        """The columns and fields of some names, those of them that there are."""
+        made = {n: field for n, field in self.fields.items() if n in wanted and n not in self.own_names}
+        own = {*wanted}.difference(made).union(*(field.columns for field in made.values()))
+        if left := own.difference(self._read):
+            found = self._columns(left)
+            self._read |= {str(name): cells for name, cells in found.items()}
+        there = [name for name in dict.fromkeys(self.own_names) if name in own and name in self._read]
+        table = pd.DataFrame({name: self._read[name] for name in there})
+        values = {
+            name: field.value(*(pd.to_numeric(table[c], errors="coerce") for c in field.columns))
+            for name, field in made.items()
+        }
+        return table.assign(**values)
+
+    def _columns(self, wanted: Collection[str]) -> pd.DataFrame:
+        path, layout = self.path, self.layout
+        if path.suffix == ".parquet":
+            with as_table(path):
+                table = pd.read_parquet(path, columns=list(wanted))
+            index = [name for name in table.index.names if name in wanted]
+            return table.reset_index(index) if index else table
+        if path.suffix == ".mat":
+            return matlab_table(path).filter(items=[*wanted])
+        table = csv_table(path, layout, wanted)
+        refuse_units(path, layout, table)
+        if not self._read:
+            refuse_long_rows(path, layout, len(self.own_names))
+        return table
 
 
 def _names(path: Path, layout: Layout) -> list[str]:
-    """The names of the columns as they stand there, one that is there twice included."""
+    """The names of the columns of a file, one that is there twice included."""
     if path.suffix == ".parquet":
         with as_table(path):
             from pyarrow import parquet
@@ -95,37 +149,6 @@ def _names(path: Path, layout: Layout) -> list[str]:
     names = names[is_marked(path, layout) :]
     refuse_layout(path, layout, names)
     return names
-
-
-def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
-    """The columns of some names.
-
-    Raises:
-        InputError: the text is in another encoding, has a line of units that was not stated, or a row
-            with more cells than names.
-        OSError, ValueError: it cannot be read.
-        KeyboardInterrupt: the user has asked for the end.
-    """
-    names = _names(path, layout)
-    fields = {name: field for name, field in message_fields(names).items() if name not in names}
-    own = {c for name in wanted for c in (fields[name].columns if name in fields else (name,))}
-    if path.suffix == ".parquet":
-        with as_table(path):
-            table = pd.read_parquet(path, columns=list(own))
-        index = [name for name in table.index.names if name in own]
-        table = table.reset_index(index) if index else table
-    elif path.suffix == ".mat":
-        table = matlab_table(path).filter(items=[*own])
-    else:
-        table = csv_table(path, layout, own)
-        refuse_units(path, layout, table)
-        refuse_long_rows(path, layout, len(names))
-    values = {
-        name: field.value(*(pd.to_numeric(table[c], errors="coerce") for c in field.columns))
-        for name, field in fields.items()
-        if name in wanted
-    }
-    return table.assign(**values)
 
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
