@@ -1086,6 +1086,18 @@ def test_a_far_smaller_finding_on_the_same_axis_may_mend_the_shape_of_the_larger
         assert seen.own == pytest.approx(odds if doubted.get(made[0].id) == 0.1 else 0.99, abs=0.002)
 
 
+@pytest.mark.parametrize("listed", [0.02, 0.6, 0.999])
+def test_an_effect_is_no_surer_than_beside_a_modulated_force_which_is_named(listed):
+    """A bow thruster lost force with the shaft speed: a curve over its command had 0.976."""
+    known = EffectEvidence(0.999, 0.0, 0.0, 0.5, 0.0, listed)
+    made = Finding("loss_bow", {}, {}, 0.99, [], 0.9, 0.9, evidence=known, set_evidence=known)
+    seen = confidence_of(replace(made, modulation="the force of the bow in proportion to n"), Model())
+    assert seen.own == pytest.approx(min(listed, 0.99), abs=0.002)
+    named = "the force of the bow in proportion to n, which is no candidate, explains as much"
+    assert seen.doubt == (named if listed < 0.99 else "")
+    assert confidence_of(made, Model()).own == pytest.approx(0.99, abs=0.002)
+
+
 @pytest.mark.parametrize(
     ("explained", "believed", "doubted"),
     [

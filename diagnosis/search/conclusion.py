@@ -10,7 +10,6 @@ from ..predictors import Model
 from ..predictors.uncertainty import omega_std
 from ..predictors.weak_form import OVERLAP
 from .candidates import model_error
-from .coefficient_rival import LinearProblem, probability_beside_coefficients
 from .effect_evidence import EffectEvidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import WHOLE_RUNS, Nuisance, block_folds, gram_table
@@ -18,6 +17,13 @@ from .map_regression import regression
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
 from .refinement import RefinedModel, TrainingSet, nuisance_of, refit, weighted_rows
+from .rivals import (
+    LinearProblem,
+    is_modulation,
+    modulated_forces,
+    probability_beside_coefficients,
+    probability_beside_modulations,
+)
 from .shortlist import scored_alone
 
 
@@ -90,11 +96,13 @@ class Selection:
             alike = credible(p.id, p.weights)
             own_share, set_share = self._beside_coefficients(p, 1, 1 + len(alike))
             of_set = p.weights[p.id] + sum(p.weights[i] for i in alike)
-            seen = self._evidence(p, p.weights[p.id] * own_share)
+            listed, modulation = self._beside_modulations(p)
+            seen = self._evidence(p, p.weights[p.id] * own_share)._replace(listed=listed)
             together = seen._replace(bagged=of_set * set_share)
             q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
             found = Finding(p.id, values, ci95, np.nan, alike, q2, shares[k], nested[k], seen)
             found = replace(found, set_evidence=together, instead_of=p.instead_of, beside=p.beside)
+            found = replace(found, modulation=modulation)
             effects.append(found)
         prior, sigma = self.t.prior, np.asarray(self.t.sigma)
         model = self.model if effects else self.at.start
@@ -166,6 +174,23 @@ class Selection:
         std = np.concatenate([omega_std(w, model) for w in data])
         return evidence(bagged, p.nearest, without - left, left, std, self.t.blocks)
 
+    def _beside_modulations(self, p: AcceptedEffect) -> tuple[float, str]:
+        """Probability of an effect beside modulated forces in its place, and the likeliest of these."""
+        rest = self.at.without(p.names).model(self.t.prior)
+        if not is_modulation(rest.ship.effects[p.id]):
+            return 1.0, ""
+        problem, charged = self._linear(p.names)
+        found: list[tuple[float, str]] = []
+        for name, force in modulated_forces(self.t.data, rest):
+            column = weighted_rows(force[:, :, None], self.t.weight)
+            column = column / np.sqrt(np.mean(column**2))
+            other = problem._replace(effects=np.concatenate([problem.effects, column], axis=1))
+            found += [(other.log_evidence(wider, charged + 1), name) for wider in self._widths]
+        if not found:
+            return 1.0, ""
+        each = [log_evidence for log_evidence, _ in found]
+        return probability_beside_modulations(self._with_all, each), max(found)[1]
+
     def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
         """Probability of sets of so many ids, with an effect, beside coefficients as stated."""
         absent = {1: [self._rival(p.names)]}
@@ -178,8 +203,12 @@ class Selection:
     def _with_all(self) -> list[float]:
         """Log evidences with all effects, coefficients known to a tenth and as stated."""
         problem, charged = self._linear(())
-        ones = np.ones(problem.offset.size)
-        return [problem.log_evidence(wider, charged) for wider in (ones, self._wider)]
+        return [problem.log_evidence(wider, charged) for wider in self._widths]
+
+    @property
+    def _widths(self) -> tuple[np.ndarray, np.ndarray]:
+        """(q,), standard deviations of coefficients known to a tenth and as stated, over the former."""
+        return np.ones(self._wider.size), self._wider
 
     @cached_property
     def _without_any(self) -> float:

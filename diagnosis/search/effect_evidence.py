@@ -34,6 +34,8 @@ class EffectEvidence(NamedTuple):
             its place leaves.
         remains: as ``left``, beyond the noise as it is stated, without a tolerance: a residual that is
             significant may be as small as the noise, and as large as the effect.
+        listed: probability of an actuator's effect beside its force in proportion to another channel,
+            see :mod:`.rivals`.
     """
 
     bagged: float
@@ -41,6 +43,7 @@ class EffectEvidence(NamedTuple):
     varies: float
     nearest: float
     remains: float
+    listed: float = 1.0
 
 
 def beside_unknown(left: float, nearest: float) -> float:

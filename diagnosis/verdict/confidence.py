@@ -52,6 +52,7 @@ MENDED = "it and a far smaller effect on the same axes make up a force of anothe
 OF_SEVERAL = "the same of another actuator changes by half as much or more in the model with it"
 LESS_THAN_POSSIBLE = "what explains more of the error, in the model with it, is not sure"
 DIFFERING = "fitted to accelerations it has another value than fitted to predictions"
+MODULATED = "{}, which is no candidate, explains as much"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 
@@ -160,6 +161,8 @@ def confidence_of(f: Finding, start: Model, doubts: Doubts = NO_DOUBTS) -> Confi
     }
     caps = {text: EVEN_ODDS for text, holds in all_doubts.items() if holds}
     caps[NEAR_NONE] = most_by_intervals(f, start)
+    if f.evidence is not None and f.modulation:
+        caps[MODULATED.format(f.modulation)] = f.evidence.listed
     if f.id in doubts.mended:  # what the smaller one explains is a residual of the larger
         nearest = 0.0 if f.evidence is None else f.evidence.nearest
         caps[MENDED] = beside_unknown(doubts.mended[f.id], nearest)

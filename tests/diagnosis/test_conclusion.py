@@ -2,15 +2,16 @@
 
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search import conclusion
-from diagnosis.search.coefficient_rival import LinearProblem, probability_beside_coefficients
 from diagnosis.search.conclusion import AcceptedEffect, Selection, interval
 from diagnosis.search.gram import WHOLE_RUNS, Nuisance
+from diagnosis.search.rivals import LinearProblem, probability_beside_coefficients
 
 K, BLOCK = 240, 12
 SIGMA = np.array([0.5, 2.0, 0.1])
@@ -48,6 +49,10 @@ class Point:
     def model(self, prior):
         assert prior is PRIOR
         return self
+
+    @property
+    def ship(self):
+        return SimpleNamespace(effects=dict.fromkeys("ABC", SimpleNamespace(kind="force", id="")))
 
 
 PRIOR = SimpleNamespace(std={"X_u": 0.2, "N_r": 0.0}, mean={"X_u": -1.0, "N_r": -2.0}, size=2)
@@ -214,12 +219,9 @@ class Told(Selection):
         return [{1: 0.5, 2: 0.75}[n] for n in ids]
 
 
-class Evidence:
-    def __init__(self, bagged):
-        self.bagged = bagged
-
-    def _replace(self, bagged):
-        return Evidence(bagged)
+class Evidence(NamedTuple):
+    bagged: float
+    listed: float = 1.0
 
 
 def told(names="abc"):
@@ -252,6 +254,23 @@ def test_findings_have_their_values_with_intervals_shares_and_evidence():
         for n, x, sd in zip(COEFFICIENTS, s.at.offset, std[3:], strict=True)
         if abs(x) > conclusion.beyond(2) * sd
     ]
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_a_modulated_force_in_the_place_of_an_effect_is_weighed_by_its_evidence(monkeypatch, alone):
+    """The true force of a is there under another name: both are as likely; another force is not."""
+    forces = [("the same", 3.0 * COLUMN["a"])] + [("another", SIGMA * np.ones((K, 3)))] * (not alone)
+    monkeypatch.setattr(conclusion, "is_modulation", lambda effect: True)
+    monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: forces)
+    (found, *_) = told().findings().effects
+    assert found.evidence.listed == pytest.approx(0.5 if alone else 2.0 / 3.0, abs=1e-3)
+    assert found.modulation == "the same"
+
+
+def test_without_a_modulated_force_an_effect_is_as_sure(monkeypatch):
+    monkeypatch.setattr(conclusion, "is_modulation", lambda effect: True)
+    monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: [])
+    assert {(f.evidence.listed, f.modulation) for f in told().findings().effects} == {(1.0, "")}
 
 
 def test_findings_of_some_effects_are_fitted_anew():

@@ -1,0 +1,136 @@
+"""The rivals of an effect that are no candidates: other coefficients, and modulated forces.
+
+**Other nominal coefficients, as uncertain as the ship's description states.** The search takes each
+coefficient as known to a tenth, see :mod:`.prior`. A ship whose coefficients are all off by what its
+description allows differs by more, and a single effect may imitate that. So models are compared in which
+the coefficients are known to a tenth, or as stated, at even odds:
+
+    with the effects, known to a tenth       with the effects, as stated
+    without one of them, as stated           without any, as stated
+
+The evidence of each is that of a linear Gaussian model (Laplace's approximation), in which an effect's
+parameters have the prior that one sample would give (unit information: log n for each, R. E. Kass and
+L. Wasserman, Journal of the American Statistical Association 90, 1995). Where all other coefficients
+turn out to be right within a tenth, wide priors cost their Occam factors, and the effect stays.
+
+**The force of an actuator in proportion to what another one does.** Where two commands follow each
+other, a curve over the one, or a loss by the speed that follows, is also a force that depends on the
+other: of a bow thruster whose generator serves the propeller, too, less is left at each shaft speed.
+There are as many as pairs of actuators and channels. So the evidence of an effect of an actuator is
+compared with the mean evidence of them all, each alone in its place.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import expit, logsumexp
+
+from fmus.actuators.actuation import actuators
+from fmus.effects import Effect
+
+from ..predictors import Model, WeakWindows
+from .candidates import model_error
+from .most_likely import ridge
+
+LOSS = "loss_"  # beginning of the id of an actuator's loss, a constant share of its force
+
+
+class LinearProblem(NamedTuple):
+    """A model error that effects and coefficients are fitted to, linear about an estimate.
+
+    Attributes:
+        y: (n,), model error of the estimate, in units of the noise.
+        effects: (n, p), columns of the effects' parameters.
+        coefficients: (n, q), columns of the coefficients, in prior standard deviations.
+        offset: (q,), how far each coefficient already is from its prior mean.
+        per_parameter: log of the number of samples.
+    """
+
+    y: np.ndarray
+    effects: np.ndarray
+    coefficients: np.ndarray
+    offset: np.ndarray
+    per_parameter: float
+
+    def log_evidence(self, wider: np.ndarray, charged: int) -> float:
+        """Logarithm of the evidence, but for a constant that all models of one noise share.
+
+        Args:
+            wider: (q,), prior standard deviation of each coefficient, in those of its column.
+            charged: number of parameters of the effects, those that have no column included.
+        """
+        A = np.concatenate([self.effects, self.coefficients], axis=1)
+        p = self.effects.shape[1]
+        precision = np.concatenate([np.zeros(p), wider**-2.0])
+        offset = np.concatenate([np.zeros(p), self.offset])
+        H = A.T @ A + np.diag(precision)
+        H += ridge(H)
+        step = np.linalg.solve(H, A.T @ self.y - precision * offset)
+        loss = np.sum((self.y - A @ step) ** 2) + np.sum(precision * (offset + step) ** 2)
+        occam = np.linalg.slogdet(H)[1] - np.linalg.slogdet(H[:p, :p])[1] + 2.0 * np.sum(np.log(wider))
+        return float(-0.5 * (loss + occam + charged * self.per_parameter))
+
+
+def probability_beside_coefficients(
+    present: Sequence[float], absent: Mapping[int, Sequence[float]], prior: float
+) -> float:
+    """Probability of an effect, or of one of a set, beside models without it.
+
+    Args:
+        present: log evidences of models with all effects.
+        absent: number of effects that are left out -> log evidences of models without them.
+        prior: odds of one effect before the data: of a missing effect they are even, shared by all
+            candidates (J. G. Scott and J. O. Berger, Annals of Statistics 38, 2010).
+    """
+    without = [e - k * np.log(prior) for k, models in absent.items() for e in models]
+    odds = logsumexp(present) - np.log(len(present)) - logsumexp(without) + np.log(len(without))
+    return float(expit(odds))
+
+
+def is_modulation(e: Effect) -> bool:
+    """Whether an effect changes the force of actuators otherwise than by a constant share."""
+    return e.kind == "actuator" and not e.id.startswith(LOSS)
+
+
+def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tuple[str, np.ndarray]]:
+    """Forces of actuators in proportion to the size of a channel that no effect has: name, (K, 3).
+
+    Such channels are the commands of the other actuators, the speed aside and the yaw rate, averaged
+    over windows. Of runs with the commanded force alone there are none.
+
+    Args:
+        data: windows of every run.
+        model: of the ship, without the effect.
+    """
+    if any(w.run.commands is None for w in data):
+        return
+    base, ship, signals = model_error(data, model), model.ship, data[0].run.signals
+    apart = len(signals) != len(ship.layouts[0].commands)
+    for a in actuators(ship.description):
+        effect = ship.effects.get(f"{LOSS}{a.part.name}")
+        if effect is None:
+            continue
+        count = len(a.law.commands)
+        own = range(a.own, a.own + count * len(a.sides)) if apart else range(a.first, a.first + count)
+        lost = base - model_error(data, model.plus({effect.parameters[0].name: 1.0}))
+        if not lost.any():
+            continue
+        others = {name: k for k, name in enumerate(signals) if k not in own}
+        sizes = np.concatenate([_sizes(w, [*others.values()]) for w in data])
+        for name, size in zip((*others, "|v|", "|r|"), sizes.T, strict=True):
+            if size.any():
+                yield f"the force of the {a.part.title} in proportion to {name}", lost * size[:, None]
+
+
+def _sizes(w: WeakWindows, commands: Sequence[int]) -> np.ndarray:
+    """(K, m), means over windows of the sizes of some commands, of v and of r."""
+    nu = np.where(w.known, w.smoothed.nu.T, 0.0)
+    given = w.held @ np.abs(w.run.given[:, commands])
+    return np.column_stack([given, *(w.smooth @ np.abs(x) for x in nu[1:])])
+
+
+def probability_beside_modulations(present: Sequence[float], rivals: Sequence[float]) -> float:
+    """Probability of an effect beside modulated forces in its place, by log evidences."""
+    mean = logsumexp(rivals) - np.log(len(rivals))
+    return float(expit(logsumexp(present) - np.log(len(present)) - mean))
