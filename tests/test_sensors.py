@@ -93,6 +93,20 @@ def test_a_unit_of_the_rate_is_named():
     assert "deg/s in place of rad/s" in found["r", "scale"].sentence
 
 
+@pytest.mark.parametrize("names", ["u", "v", "uv"])
+def test_of_two_velocities_the_one_in_another_unit_is_named_and_repaired(names):
+    """A second fault, of the yaw rate, is found beside it."""
+    run = made()
+    knots = {name: run.measured[name] / 0.514444 for name in names}
+    found = examine(beside(run, r=1.05 * run.measured["r"], **knots), REFERENCE)
+    assert [(f.channel, f.kind) for f in found.findings] == [(names[0], "scale"), ("r", "scale")]
+    assert found.findings[0].value == pytest.approx(1.944, rel=0.02)
+    assert "kn in place of m/s" in found.findings[0].sentence
+    assert found.findings[0].sentence.startswith(" and ".join(names))
+    for name in "uv":
+        np.testing.assert_allclose(found.run.measured[name], run.measured[name], rtol=1e-5)
+
+
 @pytest.mark.parametrize("name", ["x", "y", "psi"])
 def test_a_mirrored_channel_of_the_pose_is_named_not_the_three_that_contradict_it(name):
     run = swung()

@@ -31,6 +31,8 @@ def units(run: Run, scale: Scale) -> Examined:
         found = _judged(found, e, ("r",), "rate", *_windows(e, e.psi[:, None], e.turned[:, None]))
     if e.velocity is not None and e.by is not None:
         names = ("speed",) if e.by[0] == "speed" else e.by
+        if e.by == ("u", "v") and (alone := _one_of_two(e)):
+            return _in_unit(found, e, alone)
         found = _judged(found, e, names, "speed", *_windows(e, _position(e), e.gone))
     return found
 
@@ -76,21 +78,54 @@ def sway(run: Run, scale: Scale) -> Examined:
     e = evidence(run)
     if e is None or e.velocity is None or e.by != ("u", "v"):
         return Examined(run)
-    still, one = np.zeros_like(e.time), np.ones_like(e.time)
-    surge, _ = rotate_to_body(e.psi, *e.velocity.T)
-    ahead = integral(e.time, np.column_stack(rotate_to_earth(e.psi, surge, still)))
-    places = (np.column_stack(rotate_to_earth(e.psi, *at)) for at in ((one, still), (still, one)))
-    way, *said = _windows(e, _position(e), ahead, e.gone - ahead, *places)
-    if len(way) < IN_A_ROW:
-        return Examined(run)
-    columns = np.column_stack([x.T.ravel() for x in said])
-    value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
+    value, std = _factors(e)
     if not value[1] < -SURE * std[1]:
         return Examined(run)
     text = f"v is {1.0 / value[1]:.3g} times that by the pose: {OPPOSITE}"
     factor, s = float(1.0 / value[1]), float(std[1] / value[1] ** 2)
     finding = SensorFinding.estimated(("v", "scale", "1"), factor, s, e.time, text)
     return Examined(replace(run, measured=dict(run.measured) | {"v": -run.measured["v"]}), (finding,))
+
+
+def _factors(e: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Factors (2,) by which surge and sway move the ship as the pose does, and their deviations."""
+    assert e.velocity is not None
+    still, one = np.zeros_like(e.time), np.ones_like(e.time)
+    surge, _ = rotate_to_body(e.psi, *e.velocity.T)
+    ahead = integral(e.time, np.column_stack(rotate_to_earth(e.psi, surge, still)))
+    places = (np.column_stack(rotate_to_earth(e.psi, *at)) for at in ((one, still), (still, one)))
+    way, *said = _windows(e, _position(e), ahead, e.gone - ahead, *places)
+    if len(way) < IN_A_ROW:
+        return np.ones(2), np.full(2, np.inf)
+    columns = np.column_stack([x.T.ravel() for x in said])
+    value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
+    return value[:2], std[:2]
+
+
+def _one_of_two(e: Evidence) -> SensorFinding | None:
+    """A surge or a sway velocity in another unit, where the other one is in the right one."""
+    value, std = _factors(e)
+    right = np.abs(value - 1.0) < np.maximum(ALIKE, SURE * std)
+    surely = np.abs(value) > SURE * std
+    if right.sum() != 1 or not surely.all():
+        return None
+    k = int(np.argmin(right))
+    channel, factor = ("u", "v")[k], float(1.0 / value[k])
+    name, _ = _nearest(factor, "speed") if factor > 0.0 else ("", factor)
+    if not name or name == SIGN:
+        return None
+    text = f"{channel} is {factor:.4g} times that by the pose: {name}"
+    s = float(std[k] / value[k] ** 2)
+    return SensorFinding.estimated((channel, "scale", "1"), factor, s, e.time, text)
+
+
+def _in_unit(found: Examined, e: Evidence, alone: SensorFinding) -> Examined:
+    """What was found, and a channel in its right unit."""
+    _, factor = _nearest(alone.value, "speed")
+    measured = dict(found.run.measured)
+    measured[alone.channel] = measured[alone.channel] / factor
+    run = replace(found.run, measured=measured)
+    return replace(found, run=run, findings=(*found.findings, alone))
 
 
 def _position(e: Evidence) -> np.ndarray:
