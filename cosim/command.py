@@ -16,6 +16,9 @@ from cybership.command_arguments import (
     program,
     whole_number,
 )
+from cybership.command_arguments import (
+    finite as finite,
+)
 from cybership.message_text import printable
 from cybership.renamed import OPTIONS, old_names
 from cybership.standard_streams import FAILED, code_of

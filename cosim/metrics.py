@@ -15,7 +15,7 @@ from rich.table import Table
 
 from cybership.scratch_folder import atomic_write
 
-from .command import BAD_INPUT, Output, command_parser, complain, run_command
+from .command import BAD_INPUT, Output, command_parser, complain, finite, run_command
 from .errors import InputError
 from .results.log import Log, read_log
 from .results.performance import MetricsError, compute, over_time, table
@@ -54,14 +54,14 @@ examples:
         "--from",
         dest="start",
         metavar="T",
-        type=float,
+        type=finite,
         help="first time that is used [s] (default: as in the scenario)",
     )
     parser.add_argument(
         "--to",
         dest="stop",
         metavar="T",
-        type=float,
+        type=finite,
         help="last time that is used [s] (default: as in the scenario)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON only")

@@ -69,6 +69,17 @@ def whole_number(least: int) -> Callable[[str], int]:
     return of
 
 
+def finite(text: str) -> float:
+    """Type of an option that takes a number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not -float("inf") < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"needs a number, not '{text}'")
+    return value
+
+
 def positive(text: str) -> float:
     """Type of an option that takes a positive number."""
     wanted = f"needs a positive number, not '{text}'"

@@ -51,6 +51,13 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}{'s' * (number != 1)}"
 
 
+def failure(error: BaseException) -> str:
+    """An exception of a user's file as a message has it; of a mistake in its syntax with the line."""
+    if isinstance(error, SyntaxError):
+        return f"{type(error).__name__}: {error.msg}, line {error.lineno}"
+    return repr(error)
+
+
 def quoted(value: object) -> str:
     """A value of a file as a message repeats it: as Python writes it, and cut."""
     return _cut(repr(value), LONGEST_VALUE)

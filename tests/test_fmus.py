@@ -273,6 +273,7 @@ def test_two_versions_in_one_process_run_their_own_code(tmp_path, opened):
     [
         ("x = 1\n", "declares no COMPONENT"),
         ("import nowhere\n", "fails when imported"),
+        ("x = 1\ndef y(:\n", "fails when imported: SyntaxError: invalid syntax, line 2"),
         (
             "from fmus.declare import component\n"
             "COMPONENT = component('pull', 'Spring', lambda i, p: None, lambda s, i, p, h: None)\n",

@@ -588,6 +588,12 @@ class TestRoles:
         assert found["energy"] == pytest.approx(2.0 * (last - first) + 1.5 * (last**2 - first**2))
         assert {k: v for k, v in found.items() if k != "energy"} == compute(log, 1.0, 5.0)
 
+    @pytest.mark.parametrize("number", ["nan", "-inf", "x"])
+    def test_a_time_is_a_number(self, folder, capsys, number):
+        with pytest.raises(SystemExit, match="2"):
+            main([str(folder(wild())), f"--from={number}"])
+        assert f"needs a number, not '{number}'" in capsys.readouterr().err
+
     def test_a_log_without_signals_of_a_picture_is_one_line_and_no_folder(self, folder, capsys):
         run = folder({"time": np.arange(3.0), "a.b": np.arange(3.0)})
         assert plots_main([str(run), "--out", str(run / "drawn")]) == 2

@@ -8,6 +8,7 @@ from typing import Any
 
 from cosim import InputError
 from cosim.errors import nearest
+from cybership.message_text import failure
 
 
 def chosen(
@@ -37,4 +38,4 @@ def from_file(path: Path, name: str, what: str) -> object:
     try:
         return runpy.run_path(str(path)).get(name)
     except (Exception, SystemExit) as error:
-        raise InputError(f"'{path}' fails when imported: {error!r}") from error
+        raise InputError(f"'{path}' fails when imported: {failure(error)}") from error

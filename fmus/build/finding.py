@@ -6,7 +6,7 @@ import math
 import traceback
 from pathlib import Path
 
-from cybership.message_text import PrintableError
+from cybership.message_text import PrintableError, failure
 
 from ..base_units import base_exponents
 from ..declare import Component, DeclarationError, nearest, variables, width
@@ -57,7 +57,7 @@ def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str,
     except DeclarationError as error:
         raise BuildError(f"'{own_file}': {error}") from error
     except (Exception, SystemExit) as error:
-        raise BuildError(f"'{own_file}' fails when imported: {error!r}") from error
+        raise BuildError(f"'{own_file}' fails when imported: {failure(error)}") from error
     component = getattr(module, "COMPONENT", None)
     if not isinstance(component, Component):
         raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")

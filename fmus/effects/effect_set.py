@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+from cybership.message_text import failure
+
 from ..declare import DeclarationError, flatten, nearest
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE, Scale
@@ -156,7 +158,7 @@ def _imported(name: str, path: Path) -> ModuleType:
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise DeclarationError(f"'{path}' fails when imported: {error!r}") from error
+        raise DeclarationError(f"'{path}' fails when imported: {failure(error)}") from error
     return module
 
 
