@@ -122,8 +122,8 @@ def test_without_commands_of_actuators_there_is_no_modulated_force(otter):
 def test_a_constant_loss_is_no_modulation(otter):
     effects = otter[0].ship.effects
     changed = {i for i, e in effects.items() if is_modulation(e)}
-    assert {"port_speed_loss", "curve_port(n)", "saturation_port"} <= changed
-    assert changed.isdisjoint({"loss_port", "X_u", "current"})
+    assert {"port_speed_loss", "curve_port(n)", "saturation_port", "N_|r|r"} <= changed
+    assert changed.isdisjoint({"loss_port", "loss_surge", "current", "mass"})
 
 
 @pytest.mark.parametrize("truth", ["curve", "modulation"])

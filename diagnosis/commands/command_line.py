@@ -247,15 +247,10 @@ def command_of(name: str) -> str:
 
 def _take_ship_of_logs(options: argparse.Namespace) -> None:
     """Take the ship that the logs among the runs are of, unless ``--ship`` names one."""
-    from ..runs import logs_of_another, ship_of_logs  # only now: it takes a second to import
-
-    if (given := getattr(options, "ship", None)) is not None:
-        from ..predictors import ship_with
-
-        for path, other in logs_of_another(_paths(options, RUNS), ship_with((), given).name).items():
-            text = f"'{path}' is a log of {other}; it is read as one of {given}, as --ship states"
-            complain(text, "warning: ")
+    if getattr(options, "ship", None) is not None:
         return
+    from ..runs import ship_of_logs  # only now: it takes a second to import
+
     told = ship_of_logs(_paths(options, RUNS))
     if told is None:
         return
@@ -264,6 +259,21 @@ def _take_ship_of_logs(options: argparse.Namespace) -> None:
         raise InputError(f"'{path}' is of {ship}; this analysis supports {DEFAULT} only")
     complain(f"the ship is {ship}, as '{path}' states; --ship names another one", "note: ")
     options.ship = ship
+
+
+def _warn_of_other_ships(options: argparse.Namespace) -> None:
+    """Warn of logs among the runs that are of another ship than ``--ship`` names."""
+    from ..runs import ships_of_logs
+
+    if not (logs := ships_of_logs(_paths(options, RUNS))):
+        return
+    from ..predictors import ship_with
+
+    given = ship_with((), options.ship).name
+    for path, name in logs.items():
+        if name != given:
+            text = f"'{path}' is a log of {name}; it is read as one of {given}, as --ship states"
+            complain(text, "warning: ")
 
 
 def run(work: Work, options: argparse.Namespace) -> int:
@@ -290,6 +300,8 @@ def run(work: Work, options: argparse.Namespace) -> int:
                 inputs = inputs_of(options)
                 options.out = default_folder(options.usual, inputs, options.overwrite)
             with progress(errors) as line, ship_warnings_to(partial(complain, kind="warning: ")):
+                if getattr(options, "ship", None) is not None:
+                    _warn_of_other_ships(options)
                 given = work(options, line)
                 for done in [given] if isinstance(given, Done) else given:
                     interrupts.hold()  # the files are there: what was found is shown

@@ -15,7 +15,7 @@ from cybership.message_text import quoted
 from ..predictors.fmu.fmu_playback import PlaybackRequest
 from ..runs.columns.columns import Layout, stated_layout
 from ..runs.files.reading import LOGS
-from ..runs.files.tables import Table, as_table, numbers
+from ..runs.files.tables import MeasuredTable, as_table, numbers
 from ..runs.sensors.evidence import FEWEST
 from .system_map import TIME, SystemMap, column_of_start
 
@@ -94,9 +94,9 @@ def columns_of(path: Path) -> list[str]:
         return _table(path).names
 
 
-def _table(path: Path) -> Table:
+def _table(path: Path) -> MeasuredTable:
     file = next((path / n for n in LOGS if (path / n).is_file()), path) if path.is_dir() else path
-    return Table(file, stated_layout(file) or Layout())
+    return MeasuredTable(file, stated_layout(file) or Layout())
 
 
 def _read(path: Path, wanted: Sequence[str]) -> MeasuredRun:

@@ -128,7 +128,7 @@ def read_model(path: str | Path, of: Ship | None = None) -> Model:
     runs = {run: numbers(own)[THRUSTERS] for run, own in given.runs.items()}
     known = of.parameters[MEASUREMENT]
     beside = {name: p.value for name, p in given.beside.items() if name in known}
-    learned = fingerprints(given.learned_from, path)
+    learned = fingerprints(given.learned_from, Path(path))
     return Model(found["vessel"], found[THRUSTERS], beside, of, runs=runs, learned_from=learned)
 
 

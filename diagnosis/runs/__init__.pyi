@@ -21,10 +21,10 @@ from .columns.unit_check import UNITS as UNITS
 from .columns.usual_names import meaning as meaning
 from .files.reading import Run as Run
 from .files.reading import layout_beside as layout_beside
-from .files.reading import logs_of_another as logs_of_another
 from .files.reading import read as read
 from .files.reading import read_frame as read_frame
 from .files.reading import ship_of_logs as ship_of_logs
+from .files.reading import ships_of_logs as ships_of_logs
 from .files.reading import table_of as table_of
 from .files_of_one_run import one_table as one_table
 from .fingerprint import Fingerprint as Fingerprint

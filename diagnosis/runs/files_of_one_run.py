@@ -15,7 +15,7 @@ from .columns.columns import UNITS, Column, Layout, stated_layout, to_si
 from .columns.name_words import words_of
 from .columns.proposal import text_of, time_column, units_below
 from .columns.usual_names import value_column
-from .files.tables import Table, clock_seconds, date_stamps, numbers
+from .files.tables import MeasuredTable, clock_seconds, date_stamps, numbers
 from .run_constants import NEGLIGIBLE
 
 Item = TypeVar("Item", str, Path)
@@ -97,7 +97,7 @@ def _part(path: Path) -> _Part:
     if not path.is_file():
         raise InputError(f"'{path}' is a folder" if path.is_dir() else f"no such file: '{path}'")
     stated = stated_layout(path) or Layout()
-    whole = Table(path, text_of(path, stated))
+    whole = MeasuredTable(path, text_of(path, stated))
     names, fields = whole.names, whole.fields
     if twice := _first_repeated(filter(None, names)):
         raise InputError(f"'{path}' has more than one column '{twice}'; give each a name of its own")

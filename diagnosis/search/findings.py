@@ -75,11 +75,11 @@ class Finding(ShortRepr):
         evidence: what the confidence is made of; None where a method has none.
         together: probability that it or one of ``alike`` is a true cause; else as ``confidence``.
         doubt: what speaks against it in addition to the evidence, as a part of a sentence.
-        modulation: the likeliest force in proportion to a channel in its place, see
-            :mod:`.rivals`; empty: there is none.
         set_evidence: what ``together`` is made of; None where a method has none.
         instead_of: ids that had its place until other findings were there.
         beside: ids of these findings, of which some may be rejected later.
+        modulation: the likeliest force in proportion to a channel in its place, see :mod:`.rivals`;
+            empty: there is none.
     """
 
     id: str
@@ -94,9 +94,9 @@ class Finding(ShortRepr):
     together: float = np.nan
     doubt: str = ""
     set_evidence: EffectEvidence | None = None
-    modulation: str = ""
     instead_of: Sequence[str] = ()
     beside: Sequence[str] = ()
+    modulation: str = ""
 
     @property
     def of_runs(self) -> list[str]:

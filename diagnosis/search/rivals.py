@@ -16,8 +16,9 @@ turn out to be right within a tenth, wide priors cost their Occam factors, and t
 **The force of an actuator in proportion to what another one does.** Where two commands follow each
 other, a curve over the one, or a loss by the speed that follows, is also a force that depends on the
 other: of a bow thruster whose generator serves the propeller, too, less is left at each shaft speed.
-There are as many as pairs of actuators and channels. So the evidence of an effect of an actuator is
-compared with the mean evidence of them all, each alone in its place.
+And a rudder behind a shaft that slows down in turns is another drag of yaw. There are as many such
+forces as pairs of actuators and channels. So the evidence of an effect that is a force is compared with
+the mean evidence of them all, each alone in its place.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -89,8 +90,11 @@ def probability_beside_coefficients(
 
 
 def is_modulation(e: Effect) -> bool:
-    """Whether an effect changes the force of actuators otherwise than by a constant share."""
-    return e.kind == "actuator" and not e.id.startswith(LOSS)
+    """Whether an effect is a force that changes with the motion or with a command.
+
+    A constant share of an actuator's force does not.
+    """
+    return e.kind in ("actuator", "force") and not e.id.startswith(LOSS)
 
 
 def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tuple[str, np.ndarray]]:

@@ -228,7 +228,7 @@ def test_the_sentences_of_a_regression(monkeypatch):
         first
         == "PLS2, 50 samples, 3 columns. R² / Q² X: 0.5 / 0.4 by 2 factors; Y: 0.25 / 0.2 by 3 factors; N: 1 / 0.9 by 4 factors."
     )
-    assert weak.endswith("of changing sign: X: v; Y: tau_X; N: u.")
+    assert weak.endswith("of another sign in another fold: X: v; Y: tau_X; N: u.")
     assert outside == "Outside of the ranges of Table 1, and clipped: u 25 %."
     assert thrust == "Thrust."
     assert last == "The nearest stable model explains R² 0.1, 0.2, 0.3, this one 0.4, 0.5, 0.6."

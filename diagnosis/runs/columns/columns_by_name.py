@@ -7,7 +7,7 @@ from itertools import takewhile
 
 from cosim import InputError
 
-from ..files.tables import Table
+from ..files.tables import MeasuredTable
 from .columns import UNITS, Column, no_unit
 from .geographic import WORDS
 from .likely_columns import (
@@ -32,7 +32,7 @@ PATH = re.compile(r"[./]")  # between the parts of a name with a path
 
 
 def named_columns(
-    table: Table,
+    table: MeasuredTable,
     names: Sequence[str],
     units: Sequence[str],
     quantity: Mapping[str, str],

@@ -12,7 +12,7 @@ from fmus.ship import Ship, ship
 from ..files.matlab_files import fits_matlab
 from ..files.message_fields import MessageField
 from ..files.reading import Run, read, signed
-from ..files.tables import Table, date_stamps
+from ..files.tables import MeasuredTable, date_stamps
 from ..files.text_layout import KNOWN, bare_unit, likely_encoding, table_cells, text_layout, unmarked
 from .columns import (
     POSE,
@@ -103,7 +103,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         read(path, of=of)  # refuses it
     stated = stated_layout(path) or Layout()
     text = text_of(path, stated)
-    table = Table(path, text)
+    table = MeasuredTable(path, text)
     names, fields = table.names, table.fields
     log = log_of(of.commands)
     if log.column("x").name in names:
@@ -178,7 +178,7 @@ def text_of(path: Path, stated: Layout) -> Layout:
 
 
 def time_column(
-    table: Table, stated: Layout, names: Sequence[str], units: Sequence[str]
+    table: MeasuredTable, stated: Layout, names: Sequence[str], units: Sequence[str]
 ) -> Column | None:
     """The column of the time of a table, by its name, its unit or its stamps; None: none is known.
 
@@ -193,7 +193,7 @@ def time_column(
 
 
 def _with_blanks(
-    table: Table,
+    table: MeasuredTable,
     layout: Layout,
     kept: Mapping[str, Column],
     unused: Mapping[str, str],
@@ -257,7 +257,7 @@ def _encoding(path: Path) -> str:
     return UTF_8
 
 
-def units_below(table: Table, names: Sequence[str]) -> list[str]:
+def units_below(table: MeasuredTable, names: Sequence[str]) -> list[str]:
     """The units in the line below the names; empty ones where a table has no such line."""
     found: list[str] = []
     text = table.layout
@@ -304,7 +304,7 @@ def _of_message(
     return turned
 
 
-def _stamped(table: Table, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
+def _stamped(table: MeasuredTable, layout: Layout, names: Sequence[str]) -> dict[str, Column]:
     """The only column of date stamps as the time, whatever its name, if no other column is known."""
     if "time" in (*layout.columns, *layout.without_column):
         return {}
@@ -314,7 +314,7 @@ def _stamped(table: Table, layout: Layout, names: Sequence[str]) -> dict[str, Co
 
 
 def _geographic(
-    table: Table, layout: Layout, names: Sequence[str], units: Sequence[str]
+    table: MeasuredTable, layout: Layout, names: Sequence[str], units: Sequence[str]
 ) -> dict[str, Column]:
     """Position by columns of latitude and longitude, if no other columns are known.
 
@@ -342,7 +342,7 @@ def _geographic(
 
 
 def _likely(
-    table: Table,
+    table: MeasuredTable,
     layout: Layout,
     unused: Mapping[str, str],
     blank: Sequence[str],

@@ -12,7 +12,7 @@ from fmus.ship import Ship, ship
 
 from ..cleaning import WIDTH, lost
 from ..files.reading import Run
-from ..files.tables import Table, cell_numbers, clock_seconds, date_stamps
+from ..files.tables import MeasuredTable, cell_numbers, clock_seconds, date_stamps
 from ..frozen import repeated
 from ..position_jumps import speeds
 from ..row_order import by_stamps, in_order
@@ -35,7 +35,7 @@ from .unit_check import (
 PLANING = 5.0
 
 
-def is_fraction(table: Table, signal: str, column: Column, quantity: Mapping[str, str]) -> bool:
+def is_fraction(table: MeasuredTable, signal: str, column: Column, quantity: Mapping[str, str]) -> bool:
     """Whether the column of a shaft is not called a speed, and has fractions of the full command."""
     if quantity[signal] != "shaft speed" or column.unit or says_command(column.name, signal, quantity):
         return False
@@ -43,12 +43,12 @@ def is_fraction(table: Table, signal: str, column: Column, quantity: Mapping[str
     return float(np.nanmax(np.abs(values), initial=0.0)) <= largest("command")
 
 
-def is_stamped(table: Table, name: str) -> bool:
+def is_stamped(table: MeasuredTable, name: str) -> bool:
     """Whether a column has date stamps or times of day."""
     return date_stamps(table.columns({name})[name]) is not None
 
 
-def units_of_commands(table: Table, layout: Layout, of: Ship) -> dict[str, Column]:
+def units_of_commands(table: MeasuredTable, layout: Layout, of: Ship) -> dict[str, Column]:
     """Commands without a unit that are far beyond the ship's limits, in the only unit within them.
 
     Those of one quantity have one unit. Far is half of the way, in logarithms, to the nearest unit. Per
@@ -91,7 +91,7 @@ def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantit
 
 
 def sign_columns(
-    table: Table, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
+    table: MeasuredTable, layout: Layout, unused: Sequence[str], quantity: Mapping[str, str]
 ) -> dict[str, Column]:
     """Commands whose sign is in a column of its own, as astern of a shaft, or port of a rudder."""
     own = {s: c for s, c in layout.columns.items() if "." in s and not c.sign}

@@ -48,7 +48,7 @@ from ..columns.unit_check import LARGEST, UNITS, largest, remedy
 from ..run_constants import DIGITS, FAR, NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
 from .tables import (
-    Table,
+    MeasuredTable,
     as_table,
     clock_seconds,
     date_stamps,
@@ -212,7 +212,7 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
     """What is needed of a CSV or Parquet file, and which column is which signal."""
     given = layout or read_layout(path)
     with as_table(path):
-        table = Table(path, given or Layout())
+        table = MeasuredTable(path, given or Layout())
         names = table.names
         where = f"'{path}'"
         if given is None:
@@ -499,10 +499,10 @@ def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
     return None if first is None or first[1] == DEFAULT else (first[1], first[0])
 
 
-def logs_of_another(paths: Iterable[Path], name: str) -> dict[Path, str]:
-    """Logs of :mod:`cosim` of another ship than that of a name -> the name of their ship."""
+def ships_of_logs(paths: Iterable[Path]) -> dict[Path, str]:
+    """Logs of :mod:`cosim` -> the name of their ship, of those that say it."""
     outlines = {path: log.outline for path, log in _logs(paths).items()}
-    return {path: o.name for path, o in outlines.items() if o is not None and o.name != name}
+    return {path: outline.name for path, outline in outlines.items() if outline is not None}
 
 
 def _logs(paths: Iterable[Path]) -> dict[Path, RunOptions]:

@@ -68,7 +68,7 @@ def as_table(path: Path) -> Iterator[None]:
         raise InputError(f"'{path}' cannot be read as a table: {text}") from None
 
 
-class Table:
+class MeasuredTable:
     """A file with named columns, which are read when they are asked for, each once.
 
     Args:
