@@ -52,7 +52,7 @@ class Point:
 
     @property
     def ship(self):
-        return SimpleNamespace(effects=dict.fromkeys("ABC", SimpleNamespace(kind="force", id="")))
+        return SimpleNamespace(effects=dict.fromkeys("ABC", SimpleNamespace(kind="environment", id="")))
 
 
 PRIOR = SimpleNamespace(std={"X_u": 0.2, "N_r": 0.0}, mean={"X_u": -1.0, "N_r": -2.0}, size=2)
