@@ -51,6 +51,16 @@ def test_evidence_of_coefficients_is_their_normal_density():
     assert differs == pytest.approx(density(wider) - density(ones), rel=1e-6)
 
 
+def test_the_evidence_of_a_further_column_is_that_of_all_rows():
+    rng = np.random.default_rng(3)
+    p, others = problem(rng, np.array([1.0, -2.0, 0.5])), rng.standard_normal((200, 4))
+    for wider in (np.ones(3), np.array([2.0, 5.0, 0.3])):
+        found = [each.log_evidence(wider, 2) for each in p.beside(others)]
+        whole = [p._replace(effects=np.column_stack([p.effects, c])) for c in others.T]
+        assert found == pytest.approx([each.log_evidence(wider, 2) for each in whole], abs=1e-6)
+    assert max(each.y.size for each in p.beside(others)) <= 9
+
+
 def test_an_effect_has_the_prior_of_one_sample():
     """A prior far wider than the data, brought to the information of one of n samples."""
     rng = np.random.default_rng(2)
@@ -115,8 +125,8 @@ def test_a_modulated_force_is_that_of_one_actuator_times_another_channel(otter):
 
 def test_without_commands_of_actuators_there_is_no_modulated_force(otter):
     model, _, (w,) = otter
-    run = replace(w.run, commands=None)
-    assert [*modulated_forces([w.commanded_as(run)], model)] == []
+    for run in (replace(w.run, commands=None), replace(w.run, signals=("a", "b"))):
+        assert [*modulated_forces([w, w.commanded_as(run)], model)] == []
 
 
 def test_a_constant_loss_is_no_modulation(otter):

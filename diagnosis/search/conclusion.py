@@ -179,17 +179,17 @@ class Selection:
         rest = self.at.without(p.names).model(self.t.prior)
         if not is_modulation(rest.ship.effects[p.id]):
             return 1.0, ""
-        problem, charged = self._linear(p.names)
-        found: list[tuple[float, str]] = []
-        for name, force in modulated_forces(self.t.data, rest):
-            column = weighted_rows(force[:, :, None], self.t.weight)
-            column = column / np.sqrt(np.mean(column**2))
-            other = problem._replace(effects=np.concatenate([problem.effects, column], axis=1))
-            found += [(other.log_evidence(wider, charged + 1), name) for wider in self._widths]
-        if not found:
+        forces = dict(modulated_forces(self.t.data, rest))
+        if not forces:
             return 1.0, ""
-        each = [log_evidence for log_evidence, _ in found]
-        return probability_beside_modulations(self._with_all, each), max(found)[1]
+        columns = weighted_rows(np.stack([*forces.values()], axis=2), self.t.weight)
+        columns = columns / np.sqrt(np.mean(columns**2, axis=0))
+        problem, charged = self._linear(p.names)
+        rivals = problem.beside(columns)
+        found = [[r.log_evidence(wider, charged + 1) for r in rivals] for wider in self._widths]
+        likeliest = [*forces][int(np.argmax(np.max(found, axis=0)))]
+        listed = probability_beside_modulations(self._with_all, np.ravel(found).tolist())
+        return listed, likeliest
 
     def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
         """Probability of sets of so many ids, with an effect, beside coefficients as stated."""

@@ -54,6 +54,17 @@ class LinearProblem(NamedTuple):
     offset: np.ndarray
     per_parameter: float
 
+    def beside(self, others: np.ndarray) -> list["LinearProblem"]:
+        """The same with a further column of the effects, each of others (n, m) in turn.
+
+        The evidence is by inner products alone, which those of a triangle are, of many fewer rows.
+        """
+        parts = [self.y[:, None], self.effects, self.coefficients, others]
+        R = np.linalg.qr(np.concatenate(parts, axis=1), mode="r")
+        y, effects, coefficients, each = np.split(R, np.cumsum([p.shape[1] for p in parts])[:-1], axis=1)
+        known = self._replace(y=y[:, 0], coefficients=coefficients)
+        return [known._replace(effects=np.column_stack([effects, column])) for column in each.T]
+
     def log_evidence(self, wider: np.ndarray, charged: int) -> float:
         """Logarithm of the evidence, but for a constant that all models of one noise share.
 
@@ -101,15 +112,16 @@ def modulated_forces(data: Sequence[WeakWindows], model: Model) -> Iterator[tupl
     """Forces of actuators in proportion to the size of a channel that no effect has: name, (K, 3).
 
     Such channels are the commands of the other actuators, the speed aside and the yaw rate, averaged
-    over windows. Of runs with the commanded force alone there are none.
+    over windows. Of runs with the commanded force alone, or with different commands, there are none.
 
     Args:
         data: windows of every run.
         model: of the ship, without the effect.
     """
-    if any(w.run.commands is None for w in data):
+    signals = data[0].run.signals
+    if any(w.run.commands is None or w.run.signals != signals for w in data):
         return
-    base, ship, signals = model_error(data, model), model.ship, data[0].run.signals
+    base, ship = model_error(data, model), model.ship
     apart = len(signals) != len(ship.layouts[0].commands)
     for a in actuators(ship.description):
         effect = ship.effects.get(f"{LOSS}{a.part.name}")
