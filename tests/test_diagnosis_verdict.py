@@ -1093,7 +1093,9 @@ def test_an_effect_is_no_surer_than_beside_a_modulated_force_which_is_named(list
     made = Finding("loss_bow", {}, {}, 0.99, [], 0.9, 0.9, evidence=known, set_evidence=known)
     seen = confidence_of(replace(made, modulation="the force of the bow in proportion to n"), Model())
     assert seen.own == pytest.approx(min(listed, 0.99), abs=0.002)
-    named = "the force of the bow in proportion to n, which is no candidate, explains as much"
+    named = (
+        "the force of the bow in proportion to n, which is not among the candidates, explains as much"
+    )
     assert seen.doubt == (named if listed < 0.99 else "")
     assert confidence_of(made, Model()).own == pytest.approx(0.99, abs=0.002)
 

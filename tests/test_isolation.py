@@ -98,7 +98,7 @@ def test_strings_whole_numbers_flags_and_messages_pass(plain_fmu, tmp_path):
     log = cosim.read_log(tmp_path / "out")
     assert list(log["a.flag"]) == [0.0, 1.0] * 5 + [0.0]
     assert (log["a.length"][1:] == 5 + len(text)).all()
-    assert sum("blåbær" in line for line in shown) == 10
+    assert sum("blåbær" in line for line in shown) == 1, "the same in each step"
 
 
 CRASHES = {

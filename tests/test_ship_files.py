@@ -176,7 +176,7 @@ DOUBTS = [
         "wind does not state all of its numbers; assumed: frontal_area = 1 m2",
     ),
     ("value = 50.0", "value = 210.0", 8, "m = 210 kg is more than a box of length x beam x draft, 2 m x 1 m x 0.1 m"),
-    ("value = 50.0", "value = 0.05", 8, "m = 0.05 kg is no mass of a ship of 2 m x 1 m (3.5 to 2e+03 kg)"),
+    ("value = 50.0", "value = 0.05", 8, "m = 0.05 kg; ships of 2 m x 1 m have 3.5 to 2e+03 kg"),
     ("beam = 1.0", "beam = 2.1", 4, "beam = 2.1 m is more than the length, 2 m"),
     ("I_z = 20.0", "I_z = 2e4", 9, "I_z = 2e+04 kg.m2 is a radius of gyration of 10 lengths; ships have 0.14 to 0.5"),
     ("I_z = 20.0", "I_z = 0.02", 9, "I_z = 0.02 kg.m2 is a radius of gyration of 0.01 lengths"),

@@ -52,7 +52,7 @@ MENDED = "it and a far smaller effect on the same axes make up a force of anothe
 OF_SEVERAL = "the same of another actuator changes by half as much or more in the model with it"
 LESS_THAN_POSSIBLE = "what explains more of the error, in the model with it, is not sure"
 DIFFERING = "fitted to accelerations it has another value than fitted to predictions"
-MODULATED = "{}, which is no candidate, explains as much"
+MODULATED = "{}, which is not among the candidates, explains as much"
 REPLACEABLE = "the other effects and coefficients explain as much without it"
 
 

@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-from cybership.message_text import failure
-
 from ..declare import DeclarationError, flatten, nearest
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE, Scale
@@ -158,7 +156,8 @@ def _imported(name: str, path: Path) -> ModuleType:
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise DeclarationError(f"'{path}' fails when imported: {failure(error)}") from error
+        what = f"{error.msg}, line {error.lineno}" if isinstance(error, SyntaxError) else repr(error)
+        raise DeclarationError(f"'{path}' fails when imported: {what}") from error
     return module
 
 

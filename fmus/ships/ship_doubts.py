@@ -103,8 +103,8 @@ def _sizes(ship: Description) -> Iterator[ShipDoubt]:
         yield ShipDoubt("", 0, "beam", f"beam = {beam:g} m is more than the length, {length:g} m")
     water = SEA_WATER * length * beam * beam
     if not LIGHTEST * water <= m <= water:
-        size = f"{length:g} m x {beam:g} m ({LIGHTEST * water:.2g} to {water:.2g} kg)"
-        yield ShipDoubt("inertia", 0, "m", f"m = {m:.4g} kg is no mass of a ship of {size}")
+        usual = f"ships of {length:g} m x {beam:g} m have {LIGHTEST * water:.2g} to {water:.2g} kg"
+        yield ShipDoubt("inertia", 0, "m", f"m = {m:.4g} kg; {usual}")
         return
     if not GYRATION[0] <= (k := sqrt(turned / m) / length) <= GYRATION[1]:
         usual = f"ships have {GYRATION[0]:g} to {GYRATION[1]:g}, most of them 0.25"

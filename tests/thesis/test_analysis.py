@@ -312,7 +312,7 @@ def test_a_regression_is_told_in_sentences():
     for axis in "XYN":
         assert f"{axis}: {number(found.by_axis('r2')[axis])} / " in first
     assert first.endswith("by 3 factors.")
-    assert "Coefficients within two of their standard deviations" in " ".join(rest)
+    assert "Coefficients less than two standard deviations from zero" in " ".join(rest)
     assert pls_report.thrust_of(found).sentence in rest
     page = pls_report.document(found, "an observer")
     fit, *parts = page.sections
