@@ -11,13 +11,11 @@ from rich.console import Console
 from cybership.command_arguments import (
     command_parser,
     complain,
+    finite,
     folder_name,
     positive,
     program,
     whole_number,
-)
-from cybership.command_arguments import (
-    finite as finite,
 )
 from cybership.message_text import printable
 from cybership.renamed import OPTIONS, old_names
@@ -39,6 +37,7 @@ __all__ = [
     "Output",
     "command_parser",
     "complain",
+    "finite",
     "folder_name",
     "missing_extra",
     "positive",

@@ -6,7 +6,7 @@ and the controller model of it are two separate sets of these parameters.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Annotated, NamedTuple
 
@@ -104,6 +104,11 @@ def mass_matrix(p: Inertia) -> tuple[Triple, Triple, Triple]:
         (0.0, p.m - p.Y_vdot, p.m * p.x_g - p.Y_rdot),
         (0.0, p.m * p.x_g - p.N_vdot, p.I_z - p.N_rdot),
     )
+
+
+def described_mass(numbers: Mapping[str, float]) -> tuple[Triple, Triple, Triple]:
+    """M as in :func:`mass_matrix` by named numbers; those that are not given are 0."""
+    return mass_matrix(Inertia(**dict.fromkeys(Inertia._fields, 0.0) | dict(numbers)))
 
 
 def inertia_force(u_dot: Number, v_dot: Number, r_dot: Number, p: Inertia) -> Triple:

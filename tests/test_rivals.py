@@ -13,10 +13,9 @@ from diagnosis.runs import read_frame
 from diagnosis.search.candidates import model_error
 from diagnosis.search.rivals import (
     LinearProblem,
-    is_modulation,
+    may_be_modulated,
     modulated_forces,
-    probability_beside_coefficients,
-    probability_beside_modulations,
+    probability_beside,
 )
 
 CANDIDATES = 60
@@ -33,9 +32,7 @@ def problem(rng, sizes, effect=0.0, rows=200):
 def probability(p, wider):
     without = p._replace(effects=p.effects[:, :0])
     present = [p.log_evidence(w, 1) for w in (np.ones_like(wider), wider)]
-    return probability_beside_coefficients(
-        present, {1: [without.log_evidence(wider, 0)]}, 1 / CANDIDATES
-    )
+    return probability_beside(present, {1: [without.log_evidence(wider, 0)]}, 1 / CANDIDATES)
 
 
 def test_evidence_of_coefficients_is_their_normal_density():
@@ -95,7 +92,7 @@ def test_an_effect_beside_coefficients_that_are_right_within_a_tenth_stays():
 
 def test_more_candidates_make_each_less_likely():
     present, absent = [-10.0], {1: [-15.0]}
-    few, many = (probability_beside_coefficients(present, absent, 1 / n) for n in (1, 100))
+    few, many = (probability_beside(present, absent, 1 / n) for n in (1, 100))
     assert few == pytest.approx(1 / (1 + np.exp(-5.0)))
     assert many == pytest.approx(1 / (1 + 100 * np.exp(-5.0)))
 
@@ -131,7 +128,7 @@ def test_without_commands_of_actuators_there_is_no_modulated_force(otter):
 
 def test_a_constant_loss_is_no_modulation(otter):
     effects = otter[0].ship.effects
-    changed = {i for i, e in effects.items() if is_modulation(e)}
+    changed = {i for i, e in effects.items() if may_be_modulated(e)}
     assert {"port_speed_loss", "curve_port(n)", "saturation_port", "N_|r|r"} <= changed
     assert changed.isdisjoint({"loss_port", "loss_surge", "current", "mass"})
 
@@ -157,5 +154,5 @@ def test_a_curve_over_a_command_is_sure_only_if_no_other_channel_does_as_well(tr
         ]
         ones = np.ones(2)
         present = [p.log_evidence(ones, 3)]
-        found.append(probability_beside_modulations(present, [r.log_evidence(ones, 1) for r in rivals]))
+        found.append(probability_beside(present, {0: [r.log_evidence(ones, 1) for r in rivals]}))
     assert max(found) < 0.01 if truth == "modulation" else min(found) > 0.99

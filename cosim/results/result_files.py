@@ -49,11 +49,9 @@ def default_folder(name: str, description: Mapping[str, Any], overwrite: bool = 
             earlier = json.loads((folder / SIDECAR).read_text(encoding="utf-8"))
         except (FileNotFoundError, PermissionError):
             return folder
-        except NotADirectoryError:
+        except (OSError, ValueError):  # no log of ours: not to be replaced
             if not RESULTS.is_dir():  # no name below it is free
                 return folder
-            earlier = {}
-        except (OSError, ValueError):  # no log of ours: not to be replaced
             earlier = {}
         if overwrite or _input(earlier) == _input(description):
             return folder

@@ -25,12 +25,14 @@ Times = Annotated[float, Field(ge=0.0)]
 Span = tuple[Times, Times]
 
 KINDS: dict[str, type["Fault"]] = {}
+NO_EFFECT = "no step starts at or after t = {} s: no effect"
 
 
 class Fault(StrictModel):
     """A fault, with the signals on which it acts together."""
 
     stage: ClassVar[int]
+    units: ClassVar[tuple[str | None, ...]] = ()  # of its signals, None: not stated; empty: of any
     by_signal: ClassVar[str] = ""  # name of the option that is one number, or one for each signal
 
     signals: list[str] = Field(min_length=1, description="inputs, as instance.variable")
@@ -52,6 +54,10 @@ class Fault(StrictModel):
         if "kind" in cls.__annotations__:
             for kind in cls.__annotations__["kind"].__args__:
                 KINDS[kind] = cls
+
+    def remark(self, step: float, stop: float) -> str:
+        """What a user should know of it in a run with a step and an end [s]; empty: nothing."""
+        return ""
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         """The fault as a function of the value table.
@@ -83,6 +89,9 @@ class Timed(Fault):
         if isinstance(self.duration, tuple) and self.duration[0] > self.duration[1]:
             raise ValueError("the shorter duration comes first")
         return self
+
+    def remark(self, step: float, stop: float) -> str:
+        return NO_EFFECT.format(min(self.at)) if self.at and min(self.at) >= stop else ""
 
     def windows(self, step: float, rng: np.random.Generator) -> TimeSpans:
         """When the fault is active."""
@@ -147,6 +156,7 @@ class Wrap(Fault):
 
     kind: Literal["wrap"]
     stage = 4
+    units = (None, "rad", "1")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         return operations.WrapOperation(slots)
@@ -158,6 +168,13 @@ class Delay(Fault):
     kind: Literal["delay"]
     stage = 5
     time: float = Field(ge=0.0, le=1e6, description="delay [s], rounded to samples")
+
+    def remark(self, step: float, stop: float) -> str:
+        if self.time >= stop:
+            return f"{self.time:g} s is longer than the run: the first values are held"
+        if 0.0 < self.time < 0.5 * step:
+            return f"{self.time:g} s is less than half a step, {step:g} s: no effect"
+        return ""
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         return operations.DelayOperation(slots, int(self.time / step + 0.5))

@@ -2,14 +2,11 @@
 
 from ..errors import InputError
 from ..fmu.fmu_model import NUMERIC
-from ..scenario.faults import Delay, Fault, Timed, Wrap
+from ..scenario.faults import NO_EFFECT
 from ..scenario.schema import Event, Scenario
 from .recordings import Recorded, read_recording
 from .start_values import check_value
 from .system import Signal, System, causality_of
-
-NO_EFFECT = "no step starts at or after t = {} s: no effect"
-RADIANS = (None, "rad", "1")  # units of an angle; None: the FMU states none
 
 
 def check_processes(system: System) -> None:
@@ -105,25 +102,12 @@ def check_faults(system: System) -> None:
             raise InputError(
                 f"{where}: signals of one fault must be inputs, or outputs, of one instance"
             )
-        for signal in found if isinstance(fault, Wrap) else ():
+        for signal in found if fault.units else ():
             unit = signal.variable.unit and signal.variable.unit.name
-            if unit not in RADIANS:
+            if unit not in fault.units:
                 raise InputError(f"{where}: {signal.name} is in {unit}, and only angles in rad wrap")
-        _warn_of_no_effect(system, fault, where)
-
-
-def _warn_of_no_effect(system: System, fault: Fault, where: str) -> None:
-    """Warn of a fault that begins after the end, and of a delay of no step or of the whole run."""
-    stop, step = system.scenario.stop, system.scenario.step
-    if isinstance(fault, Timed) and fault.at and min(fault.at) >= stop:
-        system.warnings.append(f"{where}: {NO_EFFECT.format(min(fault.at))}")
-    if isinstance(fault, Delay) and 0.0 < fault.time < 0.5 * step:
-        system.warnings.append(
-            f"{where}: {fault.time:g} s is less than half a step, {step:g} s: no effect"
-        )
-    if isinstance(fault, Delay) and fault.time >= stop:
-        text = f"{fault.time:g} s is longer than the run: the first values are held"
-        system.warnings.append(f"{where}: {text}")
+        if remark := fault.remark(system.scenario.step, system.scenario.stop):
+            system.warnings.append(f"{where}: {remark}")
 
 
 def check_events(system: System) -> None:

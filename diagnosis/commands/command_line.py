@@ -294,13 +294,14 @@ def run(work: Work, options: argparse.Namespace) -> int:
         try:
             if options.out is not None:
                 clean(options.out)
+            is_stated = getattr(options, "ship", None) is not None
             _take_ship_of_logs(options)
             inputs = None
             if options.out is None:
                 inputs = inputs_of(options)
                 options.out = default_folder(options.usual, inputs, options.overwrite)
             with progress(errors) as line, ship_warnings_to(partial(complain, kind="warning: ")):
-                if getattr(options, "ship", None) is not None:
+                if is_stated:
                     _warn_of_other_ships(options)
                 given = work(options, line)
                 for done in [given] if isinstance(given, Done) else given:

@@ -17,13 +17,7 @@ from .map_regression import regression
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
 from .refinement import RefinedModel, TrainingSet, nuisance_of, refit, weighted_rows
-from .rivals import (
-    LinearProblem,
-    is_modulation,
-    modulated_forces,
-    probability_beside_coefficients,
-    probability_beside_modulations,
-)
+from .rivals import LinearProblem, may_be_modulated, modulated_forces, probability_beside
 from .shortlist import scored_alone
 
 
@@ -101,9 +95,8 @@ class Selection:
             together = seen._replace(bagged=of_set * set_share)
             q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
             found = Finding(p.id, values, ci95, np.nan, alike, q2, shares[k], nested[k], seen)
-            found = replace(found, set_evidence=together, instead_of=p.instead_of, beside=p.beside)
-            found = replace(found, modulation=modulation)
-            effects.append(found)
+            found = replace(found, set_evidence=together, modulation=modulation)
+            effects.append(replace(found, instead_of=p.instead_of, beside=p.beside))
         prior, sigma = self.t.prior, np.asarray(self.t.sigma)
         model = self.model if effects else self.at.start
         folds, runs = self._fold_models()
@@ -177,7 +170,7 @@ class Selection:
     def _beside_modulations(self, p: AcceptedEffect) -> tuple[float, str]:
         """Probability of an effect beside modulated forces in its place, and the likeliest of these."""
         rest = self.at.without(p.names).model(self.t.prior)
-        if not is_modulation(rest.ship.effects[p.id]):
+        if not may_be_modulated(rest.ship.effects[p.id]):
             return 1.0, ""
         forces = dict(modulated_forces(self.t.data, rest))
         if not forces:
@@ -188,7 +181,7 @@ class Selection:
         rivals = problem.beside(columns)
         found = [[r.log_evidence(wider, charged + 1) for r in rivals] for wider in self._widths]
         likeliest = [*forces][int(np.argmax(np.max(found, axis=0)))]
-        listed = probability_beside_modulations(self._with_all, np.ravel(found).tolist())
+        listed = probability_beside(self._with_all, {0: np.ravel(found).tolist()})
         return listed, likeliest
 
     def _beside_coefficients(self, p: AcceptedEffect, *ids: int) -> list[float]:
@@ -197,7 +190,7 @@ class Selection:
         if len(self.accepted) > 1:
             absent[len(self.accepted)] = [self._without_any]
         present, candidates = self._with_all, len(self.ranked)
-        return [probability_beside_coefficients(present, absent, n / max(candidates, n)) for n in ids]
+        return [probability_beside(present, absent, n / max(candidates, n)) for n in ids]
 
     @cached_property
     def _with_all(self) -> list[float]:

@@ -34,8 +34,8 @@ class EffectEvidence(NamedTuple):
             its place leaves.
         remains: as ``left``, beyond the noise as it is stated, without a tolerance: a residual that is
             significant may be as small as the noise, and as large as the effect.
-        listed: probability of an actuator's effect beside its force in proportion to another channel,
-            see :mod:`.rivals`.
+        listed: probability of a force beside those of actuators in proportion to another channel, see
+            :mod:`.rivals`.
     """
 
     bagged: float

@@ -84,14 +84,15 @@ class LinearProblem(NamedTuple):
         return float(-0.5 * (loss + occam + charged * self.per_parameter))
 
 
-def probability_beside_coefficients(
-    present: Sequence[float], absent: Mapping[int, Sequence[float]], prior: float
+def probability_beside(
+    present: Sequence[float], absent: Mapping[int, Sequence[float]], prior: float = 1.0
 ) -> float:
     """Probability of an effect, or of one of a set, beside models without it.
 
     Args:
         present: log evidences of models with all effects.
-        absent: number of effects that are left out -> log evidences of models without them.
+        absent: number of effects that are left out, 0 where a rival takes the place of one -> log
+            evidences of models without them.
         prior: odds of one effect before the data: of a missing effect they are even, shared by all
             candidates (J. G. Scott and J. O. Berger, Annals of Statistics 38, 2010).
     """
@@ -100,11 +101,8 @@ def probability_beside_coefficients(
     return float(expit(odds))
 
 
-def is_modulation(e: Effect) -> bool:
-    """Whether an effect is a force that changes with the motion or with a command.
-
-    A constant share of an actuator's force does not.
-    """
+def may_be_modulated(e: Effect) -> bool:
+    """Whether a modulated force may look like an effect: a force, but no constant share of one."""
     return e.kind in ("actuator", "force") and not e.id.startswith(LOSS)
 
 
@@ -144,9 +142,3 @@ def _sizes(w: WeakWindows, commands: Sequence[int]) -> np.ndarray:
     nu = np.where(w.known, w.smoothed.nu.T, 0.0)
     given = w.held @ np.abs(w.run.given[:, commands])
     return np.column_stack([given, *(w.smooth @ np.abs(x) for x in nu[1:])])
-
-
-def probability_beside_modulations(present: Sequence[float], rivals: Sequence[float]) -> float:
-    """Probability of an effect beside modulated forces in its place, by log evidences."""
-    mean = logsumexp(rivals) - np.log(len(rivals))
-    return float(expit(logsumexp(present) - np.log(len(present)) - mean))

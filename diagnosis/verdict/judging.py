@@ -40,7 +40,7 @@ from .law_in_parts import beside_possibility, in_parts, mended, of_several, on_o
 from .prediction_gain import PredictionGain, gain_of_search, without_gain
 from .pruning import NOTHING, Withdrawn, overfits, proven, prune
 from .pruning_criteria import Harm
-from .shares import falls_by_axis, is_random, left, replaceable, shares, unique_shares
+from .shares import falls_by_axis, is_random, replaceable, share_left, shares, unique_shares
 from .validation_data import ValidationData
 
 VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
@@ -281,7 +281,9 @@ def _in_doubt(end: _Fitted, unshown: Collection[str]) -> DecidedFindings:
         residual=unexplained_axes(found, remainder, start),
         more_than_waves=more_than_waves(found, remainder, start),
         of_data=doubt_of_data(train),
-        replaceable=replaceable(found, explained, alone, left(found, start, data.validate or train)),
+        replaceable=replaceable(
+            found, explained, alone, share_left(found, start, data.validate or train)
+        ),
         on_one_line=on_one_line(found, start, train),
         of_several=of_several(found, start),
         smoothed=faster_than_smoothing(found, start, train),

@@ -111,7 +111,7 @@ def replaceable(
     }
 
 
-def left(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> float:
+def share_left(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> float:
     """Share of the first sum of squares that a learned model leaves."""
     left, first = (float(error_squares(runs, m) @ found.sigma**-2.0) for m in (found.model, start))
     return left / first if first > 0.0 else 0.0

@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 from ..declare import Component, Variable, component, redeclared
 from ..effects import EffectSet
 from ..frames import rotate_to_body
-from ..hull import Inertia, mass_matrix
+from ..hull import Inertia, described_mass, mass_matrix
 from ..ops import Number, clip, where, wrap
 from ..ship_description import Description
 from ..signals import Estimate, Force, Target
@@ -110,9 +110,7 @@ COMPONENT = component(
 def make(effects: EffectSet, ship: Description) -> Component:
     """The controller of a ship: gains in proportion to its three masses, the frequency to its scale."""
     made, length = sized(COMPONENT, ship), ship.scale.length
-    M = mass_matrix(
-        Inertia(**dict.fromkeys(Inertia._fields, 0.0) | {v.name: v.value for v in ship.inertia})
-    )
+    M = described_mass({v.name: v.value for v in ship.inertia})
     of_scale = {"x": _SURGE * length**3, "y": _SWAY * length**3, "psi": _YAW * length**5}
     heavier = {axis: M[k][k] / m for k, (axis, m) in enumerate(of_scale.items())}
 

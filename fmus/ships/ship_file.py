@@ -26,7 +26,7 @@ from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
 from ..effects import STANDARD
 from ..effects.all_thrusters import LONGEST
-from ..hull import Inertia, mass_matrix, term_variable
+from ..hull import Inertia, described_mass, term_variable
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
@@ -317,8 +317,7 @@ def _inertia(given: Mapping[str, Any], prime: Prime | None) -> tuple[Value, ...]
     missing = [name for name in REQUIRED if name not in given]
     if missing:
         raise DeclarationError(f"inertia: {missing[0]} is missing")
-    numbers = dict.fromkeys(Inertia._fields, 0.0) | {v.name: v.value for v in found}
-    (surge, _, _), (_, sway, a), (_, b, yaw) = mass_matrix(Inertia(**numbers))
+    (surge, _, _), (_, sway, a), (_, b, yaw) = described_mass({v.name: v.value for v in found})
     if min(surge, sway, yaw) <= 0.0 or sway * yaw <= 0.25 * (a + b) * (a + b):
         raise DeclarationError("inertia: the mass matrix of these numbers is not positive definite")
     return found

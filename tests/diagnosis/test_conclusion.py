@@ -11,7 +11,7 @@ from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search import conclusion
 from diagnosis.search.conclusion import AcceptedEffect, Selection, interval
 from diagnosis.search.gram import WHOLE_RUNS, Nuisance
-from diagnosis.search.rivals import LinearProblem, probability_beside_coefficients
+from diagnosis.search.rivals import LinearProblem, probability_beside
 
 K, BLOCK = 240, 12
 SIGMA = np.array([0.5, 2.0, 0.1])
@@ -205,7 +205,7 @@ def test_an_effect_is_weighed_against_coefficients_as_stated(names):
     if len(names) > 1:
         absent[3] = [evidence(tuple(names), [2.5, 1.0])]
     found = s._beside_coefficients(s.accepted[0], 1, 2, 20)
-    expected = [probability_beside_coefficients(present, absent, n / max(7, n)) for n in (1, 2, 20)]
+    expected = [probability_beside(present, absent, n / max(7, n)) for n in (1, 2, 20)]
     assert found == pytest.approx(expected)
 
 
@@ -260,7 +260,7 @@ def test_findings_have_their_values_with_intervals_shares_and_evidence():
 def test_a_modulated_force_in_the_place_of_an_effect_is_weighed_by_its_evidence(monkeypatch, alone):
     """The true force of a is there under another name: both are as likely; another force is not."""
     forces = [("the same", 3.0 * COLUMN["a"])] + [("another", SIGMA * np.ones((K, 3)))] * (not alone)
-    monkeypatch.setattr(conclusion, "is_modulation", lambda effect: True)
+    monkeypatch.setattr(conclusion, "may_be_modulated", lambda effect: True)
     monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: forces)
     (found, *_) = told().findings().effects
     assert found.evidence.listed == pytest.approx(0.5 if alone else 2.0 / 3.0, abs=1e-3)
@@ -268,7 +268,7 @@ def test_a_modulated_force_in_the_place_of_an_effect_is_weighed_by_its_evidence(
 
 
 def test_without_a_modulated_force_an_effect_is_as_sure(monkeypatch):
-    monkeypatch.setattr(conclusion, "is_modulation", lambda effect: True)
+    monkeypatch.setattr(conclusion, "may_be_modulated", lambda effect: True)
     monkeypatch.setattr(conclusion, "modulated_forces", lambda data, model: [])
     assert {(f.evidence.listed, f.modulation) for f in told().findings().effects} == {(1.0, "")}
 

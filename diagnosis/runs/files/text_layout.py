@@ -38,9 +38,10 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
     with path.open(encoding=encoding, errors="replace", newline="") as file:
         lines = list(islice(file, PREAMBLE))
     there = [separator for separator in SEPARATORS if any(separator in line for line in lines)]
+    quoted = any('"' in line for line in lines)  # "1,5","2,5"
     tables = [(separator, _split(lines, separator)) for separator in there]
     for is_told in (_is_number, _is_value):
-        found = [_with(*table, decimal, lines, is_told) for table, decimal in product(tables, ".,")]
+        found = [_with(*table, decimal, quoted, is_told) for table, decimal in product(tables, ".,")]
         best = max(found, key=lambda each: each[0], default=(-1.0, None))
         if best[1] is not None:
             return best[1]
@@ -135,12 +136,11 @@ def _with(
     separator: str,
     table: _Rows,
     decimal: str,
-    lines: Sequence[str],
+    quoted: bool,
     is_told: Callable[[str, str], bool],
 ) -> tuple[float, Layout | None]:
     """How much of the table is told with a separator and a decimal mark, and the layout of that."""
     rows, ruled, width = table
-    quoted = any('"' in line for line in lines)  # "1,5","2,5"
     if (separator == decimal and not quoted) or width < 2:
         return -1.0, None
 

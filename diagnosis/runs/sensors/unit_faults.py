@@ -32,7 +32,8 @@ def units(run: Run, scale: Scale) -> Examined:
     if e.velocity is not None and e.by is not None:
         names = ("speed",) if e.by[0] == "speed" else e.by
         if e.by == ("u", "v") and (alone := _one_of_two(e)):
-            return _in_unit(found, e, alone)
+            channel, *factor = alone
+            return _corrected(found, e, (channel,), "speed", *factor)
         found = _judged(found, e, names, "speed", *_windows(e, _position(e), e.gone))
     return found
 
@@ -102,30 +103,17 @@ def _factors(e: Evidence) -> tuple[np.ndarray, np.ndarray]:
     return value[:2], std[:2]
 
 
-def _one_of_two(e: Evidence) -> SensorFinding | None:
-    """A surge or a sway velocity in another unit, where the other one is in the right one."""
+def _one_of_two(e: Evidence) -> tuple[str, float, float] | None:
+    """A surge or a sway velocity in another unit, its factor and deviation, if the other is right."""
     value, std = _factors(e)
     right = np.abs(value - 1.0) < np.maximum(ALIKE, SURE * std)
     surely = np.abs(value) > SURE * std
     if right.sum() != 1 or not surely.all():
         return None
     k = int(np.argmin(right))
-    channel, factor = ("u", "v")[k], float(1.0 / value[k])
-    name, _ = _nearest(factor, "speed") if factor > 0.0 else ("", factor)
-    if not name or name == SIGN:
-        return None
-    text = f"{channel} is {factor:.4g} times that by the pose: {name}"
-    s = float(std[k] / value[k] ** 2)
-    return SensorFinding.estimated((channel, "scale", "1"), factor, s, e.time, text)
-
-
-def _in_unit(found: Examined, e: Evidence, alone: SensorFinding) -> Examined:
-    """What was found, and a channel in its right unit."""
-    _, factor = _nearest(alone.value, "speed")
-    measured = dict(found.run.measured)
-    measured[alone.channel] = measured[alone.channel] / factor
-    run = replace(found.run, measured=measured)
-    return replace(found, run=run, findings=(*found.findings, alone))
+    factor = float(1.0 / value[k])
+    is_unit = factor > 0.0 and _nearest(factor, "speed")[0] not in ("", SIGN)
+    return (("u", "v")[k], factor, float(std[k] / value[k] ** 2)) if is_unit else None
 
 
 def _position(e: Evidence) -> np.ndarray:
@@ -165,14 +153,20 @@ def _judged(
     middle = float(np.median(ratio))
     if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
         return found
-    value = 1.0 / middle
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
+    return _corrected(found, e, names, quantity, 1.0 / middle, s)
+
+
+def _corrected(
+    found: Examined, e: Evidence, names: tuple[str, ...], quantity: str, value: float, std: float
+) -> Examined:
+    """What was found, and channels that are some times too large, which is a unit if it is near one."""
     name, factor = _nearest(abs(value), quantity)
     true = np.copysign(factor, value) if name else value
-    text = f"{told} is {value:.4g} times that by the pose"
+    text = f"{' and '.join(names)} is {value:.4g} times that by the pose"
     text += f": {name}" if name and abs(true) != 1.0 else f": {OPPOSITE}" if value < 0.0 else ""
     measured = dict(found.run.measured) | {n: found.run.measured[n] / true for n in names}
-    finding = SensorFinding.estimated((names[0], "scale", "1"), value, s, e.time, text)
+    finding = SensorFinding.estimated((names[0], "scale", "1"), value, std, e.time, text)
     return replace(found, run=replace(found.run, measured=measured), findings=(*found.findings, finding))
 
 
