@@ -10,7 +10,7 @@ from support.measured import lacking_at_all_rows, sail, smoothed
 from benchmarks.ship_effects import causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import load
-from diagnosis.predictors import Model, omega, ship_with, weak_windows
+from diagnosis.predictors import Model, omega, ship_with, weak_form, weak_windows
 from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.runs import Run, clean, thinned, thinning
 from diagnosis.runs.cleaning import Track
@@ -87,6 +87,31 @@ def test_model_errors_by_fewer_rows_are_those_by_all(w):
     by_all = lacking_at_all_rows(w, model)
     assert omega(w, model) == pytest.approx(by_all, abs=1e-3 * np.abs(by_all).max())
     assert np.abs(by_all).max() > omega_std(w).max()
+
+
+@pytest.fixture(scope="module")
+def long():
+    """Windows of a run in blocks of 40 s, of which 15 s are an excerpt."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(weak_form, "BLOCKS", 2)
+        yield weak_windows(smoothed(sail(80.0)[0]))
+
+
+def test_a_run_with_short_blocks_is_its_own_excerpt(w):
+    assert w.excerpt is w
+
+
+@pytest.mark.parametrize("effect", [{}, {"lag": 0.5}, {"delay": 0.5}, {"clock_offset": 0.4}], ids=str)
+def test_windows_of_an_excerpt_have_the_errors_of_the_whole(long, effect):
+    """Actuators follow what was commanded before each stretch as well."""
+    part, model = long.excerpt, Model().plus(effect)
+    assert [*np.unique(part.block)] == [0, 1]
+    assert part.middle.size == pytest.approx(60, abs=1)
+    assert part.run.time.size < 0.7 * long.run.time.size
+    kept = np.isin(long.middle, part.middle)
+    whole = omega(long, model)
+    assert omega(part, model) == pytest.approx(whole[kept], abs=2e-3 * np.abs(whole).max())
+    assert omega_std(part, model) == pytest.approx(omega_std(long, model)[kept], rel=0.02)
 
 
 def answering_noise():

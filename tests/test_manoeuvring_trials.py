@@ -175,9 +175,12 @@ def test_a_zigzag_has_an_axis_of_its_order_and_marks_at_its_overshoots(check, li
     console.print(sheet(found))
     shown = console.export_text()
     assert "IMO limit" in shown
+    above = [n for n, x in found.measures.items() if x > found.limits.get(n, math.inf)]
+    assert shown.count("exceeded") == len(above)
     if limits:
         assert sentence == "IMO limit of overshoots: " + ", ".join(limits)
         assert "10 °" in shown
+        assert above == ["initial_turning"]  # of a ship of 1 m within 25 m
         assert "MSC.137(76)" in shown
     else:
         assert sentence == "no IMO limit at a check angle of 14.9°, but at 10° and 20°"

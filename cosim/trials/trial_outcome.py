@@ -163,7 +163,12 @@ def sheet(found: TrialOutcome, title: str = "") -> Table:
             f"{factor * value:.4g}",
             DEGREES.get(unit, unit),
             in_lengths,
-            "" if limit is None else f"{factor * limit:.4g} {DEGREES.get(unit, unit)}",
+            "" if limit is None else _limited(value, limit, factor, DEGREES.get(unit, unit)),
             meaning,
         )
     return shown
+
+
+def _limited(value: float, limit: float, factor: float, unit: str) -> str:
+    """A limit in a unit, and whether a value exceeds it."""
+    return f"{factor * limit:.4g} {unit}" + ", exceeded" * (value > limit)

@@ -77,11 +77,12 @@ class Timing:
     """The likelihood of times by which columns of a run's commands are earlier than they are logged.
 
     Args:
-        w: windows of the run.
+        w: windows of the run; of a long one its excerpt counts.
         model: of its ship.
     """
 
     def __init__(self, w: WeakWindows, model: Model) -> None:
+        w = w.excerpt
         self._noise = np.sum(omega_std(w, model) ** 2, axis=0)
         self.w, self.model = w.thinned, model
         self._a, self._needed = inertial(w, model), needed_force(w, model)
@@ -168,7 +169,7 @@ def late_commands(w: WeakWindows, model: Model) -> Late | None:
     times = BRIEF * scale.time * np.arange(1, round(LONGEST / BRIEF) + 1)
     with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
         timing = Timing(w, model)
-        if not varied or len(w.middle) < OVERLAP * timing.unknowns:
+        if not varied or len(timing.w.middle) < OVERLAP * timing.unknowns:
             return None
         groups = [[k] for k in varied] + ([varied] if len(varied) > 1 else [])
         found = [(*timing.likeliest(columns, times), columns) for columns in groups]

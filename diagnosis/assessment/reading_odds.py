@@ -102,11 +102,12 @@ class ReadingOdds:
     """The densities of readings of one run.
 
     Args:
-        w: windows of the run as it was read.
+        w: windows of the run as it was read; of a long one its excerpt counts.
         model: of its ship.
     """
 
     def __init__(self, w: WeakWindows, model: Model) -> None:
+        w = w.excerpt
         self.w, self.model = w, model
         independent = w.middle.size / OVERLAP
         self._full, self._undamped = most_thrust(w, model), undamped(model)

@@ -203,10 +203,26 @@ class Response:
         return float(np.median(np.diff(self.run.time)))
 
     @cached_property
+    def _shares(self) -> np.ndarray:
+        """(n, k), what is commanded, angles without jumps."""
+        return unwrapped(commanded_shares(self.run, self.model), self.run, self.model)
+
+    @cached_property
+    def _memory(self) -> float:
+        """Time [s] after which the thrusters have forgotten a command."""
+        memory = np.zeros(self._shares.shape[1])  # of each command
+        for member, of in self._memories:
+            memory[of.own] += self._lasts(member, of)
+        rates = np.broadcast_to(self.drive.params.rate, memory.shape)
+        largest = np.abs(self._shares).max(axis=0, initial=0.0)
+        memory += np.divide(2.0 * largest, rates, out=np.zeros_like(memory), where=rates > 0.0)
+        return float(min(memory.max(), FORGOTTEN * self.model.ship.scale.time))
+
+    @cached_property
     def _clock(self) -> np.ndarray:
         """(n,), time [s] at each sample, in which a long gap counts no more than a memory lasts."""
-        gaps = np.minimum(np.diff(self.run.time), FORGOTTEN * self.model.ship.scale.time)
-        return np.concatenate([[0.0], np.cumsum(gaps)])
+        longest = self._memory + abs(self.model.clock) + self._period
+        return np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(self.run.time), longest))])
 
     def _elapsed(self, time: np.ndarray) -> np.ndarray:
         """The run's times [s], those before and after it included, in the time of :attr:`_clock`."""
@@ -217,7 +233,7 @@ class Response:
     @cached_property
     def _commands(self) -> "Integral":
         """Integral of the commands as they were given; the clock of the pose is late."""
-        shares = unwrapped(commanded_shares(self.run, self.model), self.run, self.model)
+        shares = self._shares
         before = shares[0] if self.moving else 0.0 * shares[0]
         edges = np.append(self._clock, self._clock[-1] + self._period) + self.model.clock
         return Integral(edges, shares, before)
@@ -294,14 +310,7 @@ class Response:
     def _stepped(self, commands: np.ndarray) -> np.ndarray:
         """(m, 2, k), what the thrusters make of commands (m, k) in steps of the grid, in parts."""
         drive, h = self.drive, self.step
-        memory = np.zeros(commands.shape[1])  # of each command
-        for member, of in self._memories:
-            memory[of.own] += self._lasts(member, of)
-        rates = np.broadcast_to(drive.params.rate, memory.shape)
-        largest = np.abs(self._commands.values).max(axis=0, initial=0.0)
-        memory += np.divide(2.0 * largest, rates, out=np.zeros_like(memory), where=rates > 0.0)
-        longest = min(memory.max(), FORGOTTEN * self.model.ship.scale.time)
-        before = part = int(np.ceil(longest / h)) + 1  # about as long costs least
+        before = part = int(np.ceil(self._memory / h)) + 1  # about as long costs least
         rows = np.arange(-before, part)[:, None] + part * np.arange(-(-len(commands) // part))
         wanted = commands[np.clip(rows, 0, len(commands) - 1)]
         wanted = np.where(like(rows < 0, 1), self._commands.before, wanted)  # (m, parts, k)

@@ -134,6 +134,38 @@ class WeakWindows:
         rows = {"smooth": smooth, "slope": slope, "held": held}
         return replace(self, smoothed=smoothed, whole=self.run, **rows, memory={})
 
+    @cached_property
+    def excerpt(self) -> "WeakWindows":
+        """The windows at the begin of each block where blocks are long, and the rows that they need.
+
+        By these a long run is judged, in the time that one of BLOCKS short blocks takes.
+        """
+        time, length = self.run.time, BLOCK * self.scale.time
+        _, first, number = np.unique(self.block, return_index=True, return_inverse=True)
+        kept = self.middle - self.middle[first][number] < length - DIGITS
+        if kept.all():
+            return self
+        middle, settles = self.middle[kept], self.smoothed.track.responded - time[0]
+        # Half a window, and more for commands that are logged late and for actuators that are slow.
+        begin = np.searchsorted(time, middle - 2.0 * self.width - settles)
+        end = np.searchsorted(time, middle + self.width, side="right")
+        changes = np.zeros(time.size + 1, int)
+        np.add.at(changes, begin, 1)
+        np.add.at(changes, end, -1)
+        rows = np.cumsum(changes)[:-1] > 0
+        smoothed = self.smoothed.rows(rows)
+        smooth, slope, held = _integrals(smoothed.time, middle, 0.5 * self.width)
+        return replace(
+            self,
+            smoothed=smoothed,
+            middle=middle,
+            block=self.block[kept],
+            smooth=smooth,
+            slope=slope,
+            held=held,
+            memory={},
+        )
+
     def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
