@@ -339,7 +339,20 @@ def test_propellers_that_are_slower_than_described_are_no_mistake(seed, lag, mon
     table = sail_of(ship, slow, rng, None, steps_of_thrust(), seconds=160.0)
     assert len(diagnosis.load(table, ship="otter")) == 1
     monkeypatch.setattr(plausibility, "slower", lambda w, model: [])
-    assert "s passed in each second of its time" in doubt(table)
+    (w,) = diagnosis.load(table, ship="otter")
+    assert "perhaps" in w.smoothed.misread
+    assert "s passed in each second of its time" in w.smoothed.misread
+
+
+@pytest.mark.parametrize(("lost", "line"), [(0.75, "perhaps"), (0.0, "")])
+def test_thrusters_that_are_weak_are_no_mistake(lost, line):
+    """As those of a flat battery."""
+    ship = ship_with((), "otter")
+    weak = causes(ship)["none"]._replace(thrusters={"loss_port": lost, "loss_starboard": lost})
+    rng = np.random.default_rng(1)
+    table = sail_of(ship, weak, rng, None, steps_of_thrust(), seconds=160.0)
+    (w,) = diagnosis.load(table, ship="otter")
+    assert w.smoothed.misread.partition(" ")[0] == line
 
 
 @pytest.mark.slow

@@ -267,4 +267,6 @@ def likeliest_mistake(
     )
     if order[0] < named:  # a unit with a name is as good as a number
         order = [k for k in order if k < named]
-    return Mistake([possible[k] for k in order], better, bool(better >= needed))
+    # Thrusters that are weak, as by a flat battery, are as usual as a unit or clock without a name.
+    weak = order[0] >= named and factor is not None and SETTINGS.least_gain < factor < 1.0
+    return Mistake([possible[k] for k in order], better, bool(better >= needed and not weak))
