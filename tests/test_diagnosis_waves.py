@@ -20,9 +20,11 @@ from diagnosis.search.nonlinear.waves import (
     find_waves,
     followed,
     inside,
+    one_line,
     peak,
     segments_above,
 )
+from fmus.effects.environment import surface
 
 H = 0.05  # s
 MASS = Model().reference_mass
@@ -59,6 +61,26 @@ def test_of_commands_that_were_recorded_rarely_waves_are_not_sure(seconds, sure)
     assert found is not None
     assert (found.confidence > 0.8) == sure
     assert found.confidence > 0.4
+
+
+def test_an_oscillation_of_constant_period_may_be_that_of_an_actuator():
+    run = sail(240.0, H)[0]
+    hunting = 0.1 * np.sin(4.0 * run.time)[:, None] * [0.0, 1.0, 0.1]
+    hunts = smoothed(replace(run, tau_cmd=run.tau_cmd + hunting))
+    found = find_waves([hunts], Model(), np.random.default_rng(0))
+    assert found is not None
+    assert found.peak == pytest.approx(4.0, abs=0.3)
+    assert found.confidence == 0.5
+
+
+def test_one_line_has_all_power_of_a_sine_and_a_small_share_of_waves():
+    t, rng = H * np.arange(2400), np.random.default_rng(0)
+    near = 4.1 / (2.0 * np.pi)
+    sine = [a * np.sin(4.0 * t + a) + rng.normal(0.0, 0.3 * a, t.size) for a in (1.0, 3.0)]
+    assert one_line(sine, H, near) > 0.95
+    waves = np.array([surface(x, 4.0) for x in t])
+    assert one_line([waves, waves[:1200]], H, near) < 0.5
+    assert one_line([0.0 * t], H, near) == 0.0
 
 
 def test_the_interval_of_commands_is_that_of_a_recorder_and_not_of_steps():

@@ -90,7 +90,10 @@ def surface(t: Number, peak: Number) -> Number:
 def waves_sentence(f: Found) -> str:
     peak = f["wave_peak"]
     often = f", with a peak at {number(peak)} rad/s" if peak else ""
-    return f"An oscillating force excites the ship{often}, as by waves or a load that swings."
+    return (
+        f"An oscillating force excites the ship{often}, as by waves, a load that swings or an actuator "
+        "that oscillates."
+    )
 
 
 @effect(

@@ -29,6 +29,9 @@ BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a 
 PEAK = 4.0  # 1, times the spectrum around it, and its own flanks
 FEW = 20.0  # 1, with one segment a peak must be so much higher, with n the n-th part of it
 SEGMENT = 25.0  # s; six periods of the slowest wave
+# 1, share of the power near a peak that one frequency has in whole stretches, from which on it is a line
+# and no spectrum. Of six independent frequencies one has so much with a chance of 0.6 % (Fisher's test).
+ONE_LINE = 0.75
 DRAWINGS = 3  # 1, of noise, whose mean spectrum counts; chosen: of one, a line is low by chance
 
 
@@ -43,7 +46,8 @@ class Waves:
         confidence: share of bootstrap replicates in which they stand out; at most (k + 1) / (n + 2),
             with k of n segments above the spectrum around (rule of succession): what was seen in few
             may be by chance, and waves last, where a burst does not; at most one half where commands
-            were recorded less than twice in a period: forces in between look the same.
+            were recorded less than twice in a period: forces in between look the same, and where the
+            period is constant, as that of a controller or an actuator that oscillates.
     """
 
     peak: float
@@ -94,11 +98,12 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
     lasting = segments_above(segments, found, level)
     rare = any(2.0 * at * command_interval(s.track.run) > 1.0 for s in runs)
+    even = one_line([x[:, found.axis] for x in left], BRIEF * time, at) > ONE_LINE
     return Waves(
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        min(float(np.mean(heights >= least)), (lasting + 1) / (count + 2), 0.5 if rare else 1.0),
+        min(float(np.mean(heights >= least)), (lasting + 1) / (count + 2), 0.5 if rare or even else 1.0),
     )
 
 
@@ -187,6 +192,21 @@ def peak(
     height = np.where(band & above, power / np.maximum(level, np.finfo(float).tiny), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
+
+
+def one_line(signals: Sequence[np.ndarray], step: float, near: float) -> float:
+    """Share of the power of signals (n,), within a quarter of a frequency [Hz], at one of each."""
+    from scipy.signal import periodogram
+
+    lines = total = 0.0
+    for x in signals:
+        frequency, power = periodogram(
+            x, 1.0 / step, nfft=8 * len(x), detrend="linear", scaling="spectrum"
+        )
+        inside = np.abs(frequency - near) < near / 4.0
+        lines += len(x) * power[inside].max(initial=0.0)
+        total += len(x) * power[inside].sum() / 8.0
+    return float(lines / total) if total > 0.0 else 0.0
 
 
 def segments_above(segments: np.ndarray, found: Peak, level: np.ndarray) -> int:
