@@ -663,14 +663,16 @@ def test_a_steady_run_in_gusts_has_constant_commands(size, asked):
 class SomeOdds:
     """In place of the odds of readings: one reading is that much likelier than the file as it was read."""
 
-    def __init__(self, better):
-        self.better = better
+    def __init__(self, better, dead=0.0):
+        self.better, self.dead = better, dead
 
     def __call__(self, w, model):
         return self
 
     def log_density(self, reading):
-        return self.better if reading.mistake == "tau_Y has the wrong sign" else 0.0
+        if reading.mistake == "tau_Y has the wrong sign":
+            return self.better
+        return 0.0 if reading.mistake or reading.commands is None else self.dead
 
 
 @pytest.mark.parametrize(
@@ -692,6 +694,20 @@ def test_a_mistake_that_is_likely_and_not_sure_is_a_line_and_no_refusal(
     assert line in found.smoothed.notes
     assert doubt_of_data([w]) == ""
     assert "--anyway" in doubt_of_data([w, found]), "a finding of it is not sure"
+
+
+@pytest.mark.parametrize(
+    ("dead", "odds"), [(-5.0, "more than 10^6 : 1"), (12.0, "20 : 1"), (14.5, None), (16.0, None)]
+)
+def test_a_wrong_sign_may_be_where_a_dead_actuator_does_nearly_as_well(dead, odds, monkeypatch):
+    """Where it does better it is one: nothing is said."""
+    monkeypatch.setattr(plausibility, "ReadingOdds", SomeOdds(15.0, dead))
+    found = likeliest_mistake(weak_windows(smoothed(base())), Model())
+    if odds is None:
+        assert found is None
+        return
+    assert found.clause.partition(" (")[2] == f"odds {odds})"
+    assert found.sure == (dead < 0.0)
 
 
 def test_what_is_found_in_a_file_is_told_with_its_side_car(monkeypatch, tmp_path):

@@ -4,7 +4,7 @@ Each mistake that a file may have (an axis that points the other way, another un
 other's place, ...) is put right in turn, and the densities of the motion are compared
 (:mod:`.reading_odds`). A mistake is reported, with its odds, if it is likelier than the file as it was
 read by more than chance gives to one of all, and lawful effects, a constant offset of the heading or
-dead actuators, do not do as well.
+dead actuators, do not do as well; if these hardly do worse, as one that may be.
 """
 
 from collections.abc import Mapping, Sequence
@@ -244,14 +244,16 @@ def likeliest_mistake(
     if not found.max() > as_read + asked:
         return None
     best = possible[int(np.argmax(found))]
-    lawful = [Reading("", {"psi": Named(name="psi", offset=turn)}) for turn in TURNS]
+    turned = [Reading("", {"psi": Named(name="psi", offset=turn)}) for turn in TURNS]
+    dead = best.dead(TAU if w.run.commands is None else w.run.signals)
     if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
-        lawful = []
-    elif dead := best.dead(TAU if w.run.commands is None else w.run.signals):
-        lawful.append(dead)
-    better = found.max() - max([as_read, *map(odds.log_density, lawful)])
-    if better < asked:
+        turned, dead = [], None
+    lawful = max([as_read, *map(odds.log_density, turned)])
+    # Of an actuator that acts the other way a dead one explains one half: it need not be far less likely.
+    without = odds.log_density(dead) if dead else -np.inf
+    if found.max() < lawful + asked or found.max() < without + np.log(2.0):
         return None
+    better = found.max() - max(lawful, without)
     near = np.flatnonzero(found > found.max() + np.log(SETTINGS.chance))
     # Of a ship that is the same on both sides, axes that are mirrored are as well commands that are
     # swapped, which is a rarer mistake, unless it is twice as likely or more.
