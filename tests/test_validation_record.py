@@ -189,6 +189,13 @@ def test_falsified_data_next_to_an_original_does_not_hold(folder, tmp_path, monk
     usual = [str(tmp_path / "out" / FILES[0]), "--allow-missing", "signature"]
     assert verify_main(usual) == 0
     original = data.read_bytes()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert verify_main(usual) == 0
+    data.write_bytes(original.replace(b"0", b"1", 1))
+    assert verify_main(usual) == 1
+    data.write_bytes(original)
+    monkeypatch.chdir(tmp_path)
     copy = tmp_path / "out" / "run.csv"
     copy.write_bytes(original.replace(b"0", b"1", 1))
     assert verify_main(usual) == 1

@@ -159,6 +159,8 @@ def _check(f: HashedFile, folder: Path, files: Collection[HashedFile]) -> Check:
     names, copy = "\n".join(_names(f)), (folder / name).resolve()
     named = {(folder / f.path).resolve(), Path(f.path).resolve()}
     places = named if name in OUTPUTS else {*named, copy}
+    if not any(map(Path.exists, places)):  # written in a folder above, and verified elsewhere
+        places = {parent / f.path for parent in folder.resolve().parents}
     found = {place: h for place in sorted(places) if (h := sha256(place))}
     # A copy in the record's folder may be of another file of that name, such as the log of another run.
     others = {each.sha256 for each in files if Path(each.path).name == name}
