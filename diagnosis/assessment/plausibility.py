@@ -249,7 +249,7 @@ def likeliest_mistake(
     if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
         turned, dead = [], None
     lawful = max([as_read, *map(odds.log_density, turned)])
-    # Of an actuator that acts the other way a dead one explains one half: it need not be far less likely.
+    # Of an actuator that acts the other way a dead one explains half: it may be nearly as likely.
     without = odds.log_density(dead) if dead else -np.inf
     if found.max() < lawful + asked or found.max() < without + np.log(2.0):
         return None
