@@ -172,15 +172,33 @@ def test_a_run_that_begins_under_way_had_its_first_command_before():
 
 
 def test_a_long_gap_takes_neither_time_nor_memory():
-    later = np.where(base().time > 20.0, base().time + 1e9, base().time)
+    later = np.where(base().time > 8.0, base().time + 1e9, base().time)
     run = Run("gap", later, base().pose, base().tau_cmd)
     model = Model(thrusters={"lag": 0.5})
     with_gap = along_time(Response(run, model))[1]
     without = along_time(Response(base(), model))[1]
-    before = base().time < 19.9
+    before = base().time < 7.9
     np.testing.assert_allclose(with_gap[before], without[before], atol=1e-9)
-    after = base().time > 27.0  # twelve time constants later the gap is forgotten
+    after = base().time > 14.1  # twelve time constants later the gap is forgotten
     np.testing.assert_allclose(with_gap[after], without[after], atol=1e-4)
+
+
+@pytest.mark.parametrize("values", [{"lag": 0.5}, {"delay": 0.5}, {"clock_offset": 0.4}], ids=str)
+@pytest.mark.parametrize("seconds", [20.0, 70.0])
+def test_what_was_commanded_before_a_gap_is_held_in_it(seconds, values):
+    """Be it filled with rows of the last command or not."""
+    k, h = 400, float(np.median(np.diff(base().time)))
+    later = np.where(np.arange(base().time.size) > k, base().time + seconds, base().time)
+    with_gap = Run("gap", later, base().pose, base().tau_cmd)
+    rows = np.concatenate(
+        [np.arange(k + 1), np.full(round(seconds / h), k), np.arange(k + 1, later.size)]
+    )
+    filled = Run(
+        "filled", base().time[0] + h * np.arange(rows.size), base().pose[rows], base().tau_cmd[rows]
+    )
+    model = Model().plus(values)
+    gap, whole = (along_time(Response(run, model))[-1] for run in (with_gap, filled))
+    np.testing.assert_allclose(gap[k + 1 :], whole[k - later.size + 1 :], atol=1e-4)
 
 
 @pytest.mark.parametrize("dynamics", [{"lag": 0.4}, {"delay": 0.37}, {"delay": 0.1, "lag": 0.7}])

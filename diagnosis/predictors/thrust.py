@@ -220,9 +220,10 @@ class Response:
 
     @cached_property
     def _clock(self) -> np.ndarray:
-        """(n,), time [s] at each sample, in which a long gap counts no more than a memory lasts."""
-        longest = self._memory + abs(self.model.clock) + self._period
-        return np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(self.run.time), longest))])
+        """(n,), time [s] at each sample, in which a long gap counts no more than the memory lasts."""
+        gaps, lasts = np.diff(self.run.time), self._memory + abs(self.model.clock) + self._period
+        long = gaps > FORGOTTEN * self.model.ship.scale.time
+        return np.concatenate([[0.0], np.cumsum(np.where(long, np.minimum(gaps, lasts), gaps))])
 
     def _elapsed(self, time: np.ndarray) -> np.ndarray:
         """The run's times [s], those before and after it included, in the time of :attr:`_clock`."""
