@@ -79,10 +79,11 @@ class Given:
 
 
 def late(monkeypatch, given, varies=(True, True, False), windows=1000):
-    monkeypatch.setattr(module, "Timing", lambda w, model: given)
     tau = np.where(varies, np.arange(N)[:, None], 1.0)
     run = Run("made", np.arange(float(N)), np.zeros((N, 3)), tau)
     w = SimpleNamespace(run=run, scale=SimpleNamespace(time=1.0), middle=np.zeros(windows))
+    given.w = w
+    monkeypatch.setattr(module, "Timing", lambda w, model: given)
     return late_commands(w, None)
 
 
