@@ -92,7 +92,7 @@ def waves_sentence(f: Found) -> str:
     often = f", with a peak at {number(peak)} rad/s" if peak else ""
     return (
         f"An oscillating force excites the ship{often}, as by waves, a load that swings or an actuator "
-        "that oscillates."
+        "that oscillates, or its position is measured on a mast that rolls."
     )
 
 
