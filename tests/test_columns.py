@@ -489,7 +489,7 @@ def test_units_have_their_factors_by_definition() -> None:
     others = {
         "time": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "d": 86400.0, "h": 3600.0, "min": minute},
         "length": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": foot, "in": foot / 12.0},
-        "angle": {"deg": degree, "°": degree},
+        "angle": {"deg": degree, "°": degree, "gon": np.pi / 200.0},
         "force": {"mN": 1e-3, "kN": 1e3},
         "moment": {"N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
         "command": {"%": 0.01},

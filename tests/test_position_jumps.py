@@ -75,6 +75,14 @@ def test_samples_that_are_somewhere_else_for_a_while_make_no_gap(many, metres):
     assert np.array_equal(parted(run).time, run.time)
 
 
+@given(st.integers(50, 300), st.floats(2.0, 20.0), st.floats(0.0, 0.2))
+def test_a_tracker_that_lost_the_ship_for_a_while_makes_no_gap(many, metres, wandered):
+    """What it sees meanwhile wanders: the step back is smaller, and may be none of a jump's size."""
+    there, run = slice(1000, 1000 + many), whole()
+    off = metres * np.linspace(1.0, 1.0 - wandered, many)[:, None] * [1.0, 0.0, 0.0]
+    assert np.array_equal(parted(changed(run, there, run.pose[there] + off)).time, run.time)
+
+
 def test_a_run_without_a_jump_stays():
     assert np.array_equal(parted(whole()).time, whole().time)
     assert parted(whole()).notes == whole().notes

@@ -10,9 +10,9 @@ from ..predictors import Model, WeakWindows
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OF_MOTION
 from ..runs import Run
-from ..runs.columns.columns import OF_UNIT, POSE, TAU, Named
-from ..runs.columns.geographic import is_geographic
-from ..runs.columns.unit_check import SI_UNIT, UNITS
+from ..runs.columns.columns import OF_UNIT, POSE, QUANTITY, TAU, Named
+from ..runs.columns.geographic import is_geographic, metres_in_degree
+from ..runs.columns.unit_check import SI_UNIT, STATED, UNITS
 
 # Quantities of commands that are often logged in SI under the name of another unit.
 COUNTED = ("angle", "shaft speed")
@@ -120,23 +120,34 @@ def readings(run: Run, model: Model) -> Iterator[Reading]:
         yield of_pose(
             "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
         )
-    yield swapped(POSE, 0, 1)
+    yield swapped(POSE, 0, 1) if _has_unit(run) else _exchanged_angles(run)
     from_east = {"psi": Named(name="psi", factor=-1.0, offset=0.5 * np.pi)}
     mirrored = np.diag([1.0, 1.0, -1.0])
     yield Reading("its heading counts from east, counter-clockwise", from_east, motion=mirrored)
-    degree = UNITS["angle"]["deg"]
-    yield of_pose("its heading is in degrees", (1.0, 1.0, degree))
+    degree, angle = UNITS["angle"]["deg"], _size(run, "psi")
+    if angle == 1.0:
+        yield of_pose("its heading is in degrees", (1.0, 1.0, degree))
     if np.nanmax(np.abs(run.pose[:, 2])) <= 2.0 * np.pi * degree:
         yield of_pose("its heading is in radians in place of degrees", (1.0, 1.0, 1.0 / degree))
+    if angle == degree:
+        yield of_pose("its heading is in gon", (1.0, 1.0, UNITS["angle"]["gon"] / degree))
     for degrees in (180, 90, -90):
         back = Named(name="psi", offset=float(-np.radians(degrees) % (2.0 * np.pi)))
         yield Reading(f"its heading is off by {degrees} deg", {"psi": back})
-    for unit, m in UNITS["length"].items():
-        if m == 1.0 or not _has_unit(run):
-            continue
-        for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
-            yield of_pose(f"{name} is in {unit}", factors)
+    for unit, size in UNITS["length"].items() if _has_unit(run) else ():
+        m, n = size / _size(run, "x"), size / _size(run, "y")
+        for name, factors in (("its position", (m, n, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, n, 1.0))):
+            if factors != (1.0, 1.0, 1.0):
+                yield of_pose(f"{name} is in {unit}", factors)
     yield from _of_force(model) if run.commands is None else _of_actuators(run, run.commands, model)
+
+
+def _exchanged_angles(run: Run) -> Reading:
+    """Latitude and longitude in each other's column: other factors make metres of their degrees."""
+    x, y = (run.layout.column(s) for s in ("x", "y"))
+    metres, motion = metres_in_degree(-y.offset / y.factor), np.diag([0.0, 0.0, 1.0])
+    motion[0, 1], motion[1, 0] = metres["x"] / abs(y.factor), metres["y"] / abs(x.factor)
+    return Reading("its latitude and longitude are in each other's column", motion=motion)
 
 
 def _of_force(model: Model) -> Iterator[Reading]:
@@ -175,7 +186,8 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
     largest = np.abs(commands).max(axis=0)
     limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for si, quantity in OF_UNIT.items():
-        for size, other in {x: n for n, x in UNITS[quantity].items() if n != SI_UNIT[quantity]}.items():
+        others = {n: x for n, x in UNITS[quantity].items() if n not in STATED | {SI_UNIT[quantity]}}
+        for size, other in {x: n for n, x in others.items()}.items():
             factors = np.where(unit == si, size, 1.0)
             if (factors != 1.0).any():
                 yield _in_unit(f"in {other}", factors.tolist(), names)
@@ -219,6 +231,12 @@ def other_factors(run: Run, k: float, pace: float) -> Iterator[Reading]:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
     clock = {"time": Named(name="time", factor=pace)}
     yield Reading(f"{pace:.3g} s passed in each second of its time", clock)
+
+
+def _size(run: Run, signal: str) -> float:
+    """The unit that a coordinate was read in [SI]."""
+    column = run.layout.column(signal)
+    return UNITS[QUANTITY[signal]].get(column.unit or "", 1.0)
 
 
 def _has_unit(run: Run) -> bool:

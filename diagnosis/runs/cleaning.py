@@ -242,7 +242,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     pose = np.where(measured, run.pose, np.nan)
     gap = long_gap(period, scale)
     of_heading = np.flatnonzero(measured[:, 2])
-    refuse_units(run.time, pose, other_angles(run.measured), where, anyway, run.called or {}, scale)
+    refuse_units(run.time, pose, angles_beside(run), where, anyway, run.called or {}, scale)
     pose[of_heading, 2] = unwrap(run.time[of_heading], pose[of_heading, 2], gap)
     channels = [pose[rows, k] for k, rows in enumerate(measured.T)]
     reach = np.array([np.ptp(np.quantile(values, (0.1, 0.9))) for values in channels])
@@ -303,6 +303,16 @@ def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (n, m) at some times (n,) by linear interpolation of those (k, m) at known ones (k,)."""
     return np.column_stack([np.interp(time, known, x) for x in values.T])
+
+
+def angles_beside(run: Run) -> dict[str, np.ndarray]:
+    """Angles of a run beside its heading: those that are measured, and commands that may go round."""
+    layout, commands = run.ship and layouts(run.ship)[0], run.commands
+    found = other_angles(run.measured)
+    if not layout or commands is None or len(layout.rates) != commands.shape[1]:
+        return found
+    turns = np.broadcast_to(layout.round, commands.shape[1])
+    return found | {s: x for s, x, turn in zip(run.signals, commands.T, turns, strict=True) if turn}
 
 
 def lost(pose: np.ndarray) -> np.ndarray:

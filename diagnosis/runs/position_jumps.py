@@ -32,8 +32,9 @@ def parted(run: Run, scale: Scale = REFERENCE) -> Run:
     if not highest > 0.0:
         return run
     time_of, notes = run.time.copy(), list(run.notes)
-    for row, way in _lasting([(rows[k], way) for k, way in _jumps(time, place, highest)]):
-        gap = max(abs(way) / highest, LONG * WIDTH * scale.time)
+    shortest = LONG * WIDTH * scale.time
+    for k, way in _lasting(_jumps(time, place, highest), time, place, shortest):
+        row, gap = rows[k], max(abs(way) / highest, shortest)
         time_of[row:] += gap
         notes.append(
             f"the position jumps by {abs(way):.3g} m, {run.time[row] - run.time[0]:.4g} s from the "
@@ -82,12 +83,24 @@ def _is_stuck(place: np.ndarray) -> bool:
     return any((np.diff(part) == 0.0).all() for part in (np.real(place), np.imag(place)))
 
 
-def _lasting(jumps: list[Jump]) -> list[Jump]:
-    """Jumps without those that the next one takes back, as of a receiver whose signal is reflected."""
+def _lasting(jumps: list[Jump], time: np.ndarray, place: np.ndarray, brief: float) -> list[Jump]:
+    """Jumps without those that the next one takes back, as of a receiver whose signal is reflected.
+
+    Nor does one last that a single step takes back within a brief time [s], before it or behind, as of a
+    tracker that lost the ship: such a step may be too small to be a jump by itself.
+    """
+    steps = np.diff(place, prepend=place[0])
+
+    def alone(jump: Jump) -> bool:
+        k, way = jump
+        beside = np.abs(time - time[k]) < brief
+        beside[k] = False
+        return not (2.0 * np.abs(steps[beside] + way) < abs(way)).any()
+
     kept: list[Jump] = []
     for row, way in jumps:
         if kept and 2.0 * abs(kept[-1][1] + way) < abs(way):
             kept.pop()
         else:
             kept.append((row, way))
-    return kept
+    return [jump for jump in kept if alone(jump)]

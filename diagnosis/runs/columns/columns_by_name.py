@@ -4,6 +4,8 @@ import json
 import re
 from collections.abc import Collection, Mapping, Sequence
 from itertools import takewhile
+from pathlib import Path
+from typing import NoReturn
 
 from cosim import InputError
 
@@ -17,11 +19,12 @@ from .likely_columns import (
     is_of_shaft,
     is_steering,
     meaning_of_words,
+    says_nothing_else,
     signal_of_symbol,
     unit_in,
 )
 from .name_units import NAMED_UNITS, NO_UNIT, bare_name, unit_at_the_end, without_unit
-from .name_words import words_of
+from .name_words import is_magnetic, words_of
 from .unit_check import SI_UNIT
 from .units_by_numbers import is_fraction, is_stamped, names_of
 from .usual_names import is_quaternion, meaning
@@ -41,12 +44,14 @@ def named_columns(
 ) -> dict[str, Column]:
     """The columns that names and units tell; of two for one signal, that of its own name or the first.
 
+    A magnetic heading is the last of several.
+
     Those that are stated are kept. A name of which words alone are known counts where it has a unit of
     the signal, and no other column is as likely.
     """
     columns = dict(kept)
     free = [pair for pair in zip(names, units, strict=False) if pair[0] not in names_of(kept)]
-    for name, below in sorted(free, key=lambda pair: pair[0] not in quantity):
+    for name, below in sorted(free, key=lambda p: (p[0] not in quantity, is_magnetic(p[0]))):
         bare, unit = bare_name(name, below)
         signal, flip = meaning(bare, quantity)
         if not signal:
@@ -64,17 +69,22 @@ def named_columns(
         if unit not in known and (unit.isdigit() or (bare != signal and unit in NAMED_UNITS)):
             continue  # an index, or of another quantity: n in rps is no position to the north
         if unit not in NO_UNIT and unit not in known:
-            line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
-            raise InputError(
-                f"'{table.path}', column '{name}': {no_unit(unit, signal, known)}; "
-                f"if it is another one, put {line} with its factor to {SI_UNIT[quantity[signal]]} "
-                f"into '{table.path}.json'"
-            )
+            refuse_unit(table.path, signal, name, unit, quantity)
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
     found = _by_words([pair for pair in free if pair[0] not in names_of(columns)], columns, quantity)
     columns |= {s: c for s, c in found.items() if not is_fraction(table, s, c, quantity)}
     return {s: columns[s] for s in (*quantity, *kept) if s in columns}
+
+
+def refuse_unit(path: Path, signal: str, name: str, unit: str, quantity: Mapping[str, str]) -> NoReturn:
+    """Refuse a column in a unit that its signal cannot have, with the line that states a factor."""
+    line = json.dumps({"columns": {signal: {"name": name, "factor": 1.0}}}, ensure_ascii=False)
+    raise InputError(
+        f"'{path}', column '{name}': {no_unit(unit, signal, UNITS[quantity[signal]])}; "
+        f"if it is another one, put {line} with its factor to {SI_UNIT[quantity[signal]]} "
+        f"into '{path}.json'"
+    )
 
 
 def _is_beside_speed(name: str, names: Sequence[str]) -> bool:
@@ -124,8 +134,10 @@ def _by_words(
             only["angle"].append(Column(name=name, unit=unit))
     for kind, told in only.items():
         left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]
-        if len(left) == len(told) == 1:
-            found[left[0]] = told
+        bare = [c for c in told if says_nothing_else(c.name)]
+        of_one = _orders(bare or told)
+        if len(left) == len(of_one) == 1:
+            found[left[0]] = of_one
     # Beside a command its sign may have a column, as rudder_dir beside rudder_deg.
     own = {
         s: [c for c in each if SIGN.isdisjoint(words_of(c.name))] or each for s, each in found.items()

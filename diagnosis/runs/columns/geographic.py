@@ -24,6 +24,7 @@ EQUATOR, SQUARED_ECCENTRICITY = 6_378_137.0, 6.694_379_990_14e-3  # m, 1; WGS 84
 SIDES = {"x": "NS", "y": "EW"}  # letters of the hemispheres, the negative one last
 NEAR_ZERO = 0.1  # 1, of both angles: 11 km about the origin in degrees (chosen)
 WHOLE = 1e-7  # degrees, of whole numbers in messages of receivers and of MAVLink
+NOT_AVAILABLE = {"x": 91.0, "y": 181.0}  # degrees
 TURNS = 360.0, 360.0 / WHOLE, 2.0 * np.pi  # in degrees, 1e-7 degrees, rad
 # An angle as a text: 63.44° N, N63.44, 63°26.4'N, 63 26 24.0 N; 63.44°.
 ANGLE = re.compile(
@@ -133,18 +134,22 @@ def local_columns(pair: Mapping[str, str], degrees: Mapping[str, np.ndarray]) ->
     largest = {s: np.radians(scale * np.abs(values).max()) for s, values in known.items()}
     if largest["x"] > np.pi / 2 or largest["y"] > (1.0 + NEGLIGIBLE) * np.pi:
         return {}
-    latitude = np.radians(origin["x"])
-    flat = 1.0 - SQUARED_ECCENTRICITY * np.sin(latitude) ** 2
-    radius = {
-        "x": EQUATOR * (1.0 - SQUARED_ECCENTRICITY) / flat**1.5,
-        "y": EQUATOR / flat**0.5 * np.cos(latitude),
-    }
-    columns = {}
+    metres, columns = metres_in_degree(origin["x"]), {}
     for signal, name in pair.items():
-        in_degree = round(float(np.radians(radius[signal])), 3)  # m
+        in_degree = round(metres[signal], 3)
         offset = round(-in_degree * origin[signal], 3)
         columns[signal] = Column(name=name, factor=float(f"{scale * in_degree:.9g}"), offset=offset)
     return columns
+
+
+def metres_in_degree(latitude: float) -> dict[str, float]:
+    """Length [m] of a degree of latitude (x) and of longitude (y), at a latitude [degrees]."""
+    flat = 1.0 - SQUARED_ECCENTRICITY * float(np.sin(np.radians(latitude))) ** 2
+    radius = {
+        "x": EQUATOR * (1.0 - SQUARED_ECCENTRICITY) / flat**1.5,
+        "y": EQUATOR / flat**0.5 * float(np.cos(np.radians(latitude))),
+    }
+    return {signal: float(np.radians(r)) for signal, r in radius.items()}
 
 
 def _scale(latitude: np.ndarray, longitude: np.ndarray) -> float:
@@ -159,6 +164,11 @@ def _scale(latitude: np.ndarray, longitude: np.ndarray) -> float:
     reach = [np.abs(angle).max() for angle in (latitude, longitude)]
     is_rad = reach[0] <= np.pi / 2 and reach[1] <= np.pi and max(reach) > NEAR_ZERO
     return float(np.degrees(1.0)) if is_rad else 1.0
+
+
+def available(signal: str, degrees: np.ndarray) -> np.ndarray:
+    """Latitudes (x) or longitudes (y) without those that are not available (ITU-R M.1371, AIS)."""
+    return np.where(np.abs(degrees) == NOT_AVAILABLE[signal], np.nan, degrees)
 
 
 def is_geographic(signal: str, column: Column) -> bool:

@@ -127,6 +127,12 @@ def is_of_shaft(name: str, unit: str) -> bool:
     return told or unit in ("rpm", "rps")
 
 
+def says_nothing_else(name: str) -> bool:
+    """Whether a name is that of revolutions or a rudder, and of no other machine, as a generator."""
+    left = {word for word in words_of(name) if not word.isdigit()}
+    return left <= FILLERS | REVOLUTIONS | {"rudder", "propeller"}
+
+
 def _is_command(words: Sequence[str], signal: str, quantity: Mapping[str, str]) -> bool:
     """Whether words tell which command of its actuator a column without a unit holds."""
     actuator, _, command = signal.partition(".")

@@ -11,7 +11,7 @@ FOREIGN = {
     ),
     "port": "left ps bb backbord babord babor sinistra bakboord bombordo lewa",
     "propeller": "prop screw helice elica schroef sruba sruby",
-    "rudder": "steer steering helm ruder gouvernail safran barre timon timone roer roder leme",
+    "rudder": "rud steer steering helm ruder gouvernail safran barre timon timone roer roder leme",
     "rudder angle": "rsa ruderlage ruderwinkel roerhoek rorvinkel rodervinkel",
     "bow": "bowthr bowthruster bug bugstrahl bugstrahler bugstrahlruder boeg baug",
     "stern": "sternthr sternthruster heck heckstrahl heckstrahler heckstrahlruder hek",
@@ -24,8 +24,8 @@ FOREIGN = {
         "drehzahl regime toerental turtall omdreiningstall omdreininger varvtal giri rotacao rotacoes "
         "obroty"
     ),
-    "order": "set setpoint sp demand demanded soll sollwert consigne orden ordre",
-    "measured": "act actual fb feedback ist istwert mesure medido gemeten",  # codespell:ignore
+    "order": "set setpoint setp sp ord demand demanded soll sollwert consigne orden ordre",
+    "measured": "act actual fb fbk feedb feedback ist istwert mesure medido gemeten",  # codespell:ignore
     "true": "vrai vraie wahr verdadero",
     "time": "zeit uhrzeit temps heure tiempo tempo tijd tid czas",
     "timestamp": "zeitstempel horodatage",
@@ -44,6 +44,7 @@ FOREIGN = {
 ENGLISH = {word: english for english, words in FOREIGN.items() for word in words.split()}
 # Letters that are no other letter with an accent.
 PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "δ": "delta", "ψ": "psi"})
+MAGNETIC = frozenset(("magnetic", "mag", "hdm"))
 # The same in Chinese and Japanese, where no blanks are between words.
 UNSPACED = {
     "time": "时间 時間 時刻",
@@ -72,6 +73,11 @@ def _plain(text: str) -> str:
 
 ENGLISH |= {_plain(word): english for english, words in UNSPACED.items() for word in words.split()}
 WORDS = "|".join(sorted((w for w in ENGLISH if not w.isascii()), key=len, reverse=True))
+
+
+def is_magnetic(name: str) -> bool:
+    """Whether a name is that of a heading by a magnetic compass."""
+    return not MAGNETIC.isdisjoint(words_of(name))
 
 
 def words_of(name: str) -> list[str]:

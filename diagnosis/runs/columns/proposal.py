@@ -27,11 +27,12 @@ from .columns import (
     stated_layout,
     to_si,
 )
-from .columns_by_name import named_columns
+from .columns_by_name import named_columns, refuse_unit
 from .geographic import (
     SIDES,
     across_date_line,
     are_minutes,
+    available,
     geographic_pair,
     is_side,
     local_columns,
@@ -44,7 +45,7 @@ from .likely_columns import (
     motion_of,
     unit_in,
 )
-from .name_units import bare_name, without_unit
+from .name_units import NO_UNIT, bare_name, without_unit
 from .side_car import as_json, refuse_other_kinds, refuse_thousands
 from .units_by_numbers import (
     is_stamped,
@@ -115,7 +116,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     names, units = [names[k] for k in whole], [units[k] for k in whole]
     below = dict(zip(names, units, strict=False))
     named = {s: c for s, c in stated.columns.items() if c.name.strip()}
-    kept = {s: _in_unit_of_name(c, s, below, quantity) for s, c in named.items()}
+    kept = {s: _in_unit_of_name(c, s, below, quantity, path) for s, c in named.items()}
     columns = named_columns(table, names, units, quantity, kept, fields)
     columns |= _of_message(columns, fields, kept)
     columns |= _stamped(table, text.model_copy(update={"columns": columns}), names)
@@ -276,12 +277,18 @@ def _is_told(stated: Column) -> bool:
 
 
 def _in_unit_of_name(
-    stated: Column, signal: str, below: Mapping[str, str], quantity: Mapping[str, str]
+    stated: Column, signal: str, below: Mapping[str, str], quantity: Mapping[str, str], path: Path
 ) -> Column:
-    """A column of which only the name is stated, in the unit that stands in that or below it."""
+    """A column of which only the name is stated, in the unit that stands in that or below it.
+
+    Raises:
+        InputError: a unit of a command that is none: numbers do not tell it.
+    """
     if _is_told(stated):
         return stated
     bare, unit = without_unit(stated.name, below.get(stated.name, ""))
+    if "." in signal and unit not in (*NO_UNIT, "%", *UNITS[quantity[signal]]) and not unit.isdigit():
+        refuse_unit(path, signal, stated.name, unit, quantity)
     factors = UNITS.get(quantity.get(signal, ""), {})
     unit = unit or unit_in(bare)
     return stated.model_copy(update={"unit": unit}) if factors.get(unit, 1.0) != 1.0 else stated
@@ -329,7 +336,7 @@ def _geographic(
     after = {s: names[k] for s, name in pair.items() if (k := names.index(name) + 1) < len(names)}
     own = table.columns({*pair.values(), *after.values()})
     sides = {s: SIDES[s][1] for s, name in after.items() if is_side(own[name], SIDES[s])}
-    numbers = {signal: numbers_of(own[name], signal) for signal, name in pair.items()}
+    numbers = {s: available(s, numbers_of(own[name], s)) for s, name in pair.items()}
     how = {s: {"minutes": True} if are_minutes(**numbers) else {} for s in pair}
     how |= {s: how[s] | {"sign": after[s], "negative": letter} for s, letter in sides.items()}
     read = {s: Column(name=name).model_copy(update=how[s]) for s, name in pair.items()}

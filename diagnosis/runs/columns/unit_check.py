@@ -26,7 +26,7 @@ UNITS: dict[str, dict[str, float]] = {
         "min": c.minute,
     },
     "length": {"m": 1.0, "mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch},
-    "angle": {"rad": 1.0, "deg": c.degree, "°": c.degree},
+    "angle": {"rad": 1.0, "deg": c.degree, "°": c.degree, "gon": 0.9 * c.degree},
     "force": {"N": 1.0, "mN": c.milli, "kN": c.kilo},
     "moment": {"N.m": 1.0, "N.mm": c.milli, "N.cm": c.centi, "kN.m": c.kilo},
     "command": {"1": 1.0, "%": c.centi},
@@ -36,6 +36,8 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s2": 1.0, "mm/s2": c.milli, "g": c.g},
     "angular acceleration": {"rad/s2": 1.0, "deg/s2": c.degree},
 }
+# Units that columns state: numbers of commands alone would not tell them from others.
+STATED = frozenset(("gon",))
 # Other spellings of units in files -> the one above.
 SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
@@ -43,6 +45,7 @@ SPELT = {
     **dict.fromkeys(("degree", "degrees", "grader", "Grad", "graden", "grados", "gradi"), "deg"),
     **dict.fromkeys(("graus", "stopnie", "stopni"), "deg"),
     **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
+    **dict.fromkeys(("gons", "grade", "grades"), "gon"),
     **dict.fromkeys(("sec", "seconds"), "s"),
     **dict.fromkeys(("day", "days"), "d"),
     **dict.fromkeys(("hour", "hours", "hr", "hrs"), "h"),
@@ -73,9 +76,9 @@ FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 # orders units ten times apart.
 USUAL = 0.4
 TURN = 360.0  # degrees
-# Counts in a turn: tenths and hundredths of a degree, as of some compasses and of MAVLink, mils, parts
-# of 16 bits, thousandths of a radian.
-COUNTS = (10.0 * TURN, 100.0 * TURN, 6400.0, 65536.0, 2000.0 * math.pi)
+# Counts in a turn: gon, tenths and hundredths of a degree, as of some compasses and of MAVLink, mils,
+# parts of 16 bits, thousandths of a radian.
+COUNTS = (400.0, 10.0 * TURN, 100.0 * TURN, 6400.0, 65536.0, 2000.0 * math.pi)
 AHEAD = 0.5  # 1, of the way that a constant heading does not explain, what one in degrees does (chosen)
 
 
@@ -199,16 +202,32 @@ def part_of_degree(pose: np.ndarray) -> float:
     """
     there = np.isfinite(pose).all(axis=1)
     psi = pose[there, 2]
-    most = float(np.quantile(np.abs(psi), 1.0 - CHANCE)) if psi.size else 0.0  # without spikes
+    most, steps = _most(psi), np.abs(np.diff(psi))
+    if most > TURN and (jumps := steps[(2.0 * steps > most) & (steps < 2.0 * most)]).size:
+        return TURN / min((TURN, *COUNTS), key=lambda n: abs(np.median(jumps) - n))
     if most <= 2.0 * TURN:
         return 1.0
-    steps = np.abs(np.diff(psi))
-    if (jumps := steps[(2.0 * steps > most) & (steps < 2.0 * most)]).size:
-        turn = min(COUNTS, key=lambda n: abs(np.median(jumps) - n))
-        return TURN / turn
     way = np.diff(pose[there, 0]) + 1j * np.diff(pose[there, 1])
-    within = [1.0, *(TURN / n for n in COUNTS[:2] if most <= n)]
+    within = [1.0, *(TURN / n for n in COUNTS[1:3] if most <= n)]
     return max(within, key=lambda part: follows(way, psi[:-1] * c.degree * part))
+
+
+def part_by_span(angle: np.ndarray) -> float | None:
+    """The part of a degree that an angle (n,) is in that is anywhere in a turn; None: it is not told.
+
+    An angle that jumps as it likes spans hardly less than the counts of a turn, or less than 360.
+    """
+    span = float(np.nanmax(angle) - np.nanmin(angle))
+    if span <= TURN:
+        return 1.0 if _most(angle) <= TURN else None
+    turn = min((n for n in COUNTS if n >= span), default=math.inf)
+    return TURN / turn if span > (1.0 - NEGLIGIBLE) * turn else None
+
+
+def _most(angle: np.ndarray) -> float:
+    """The largest size of an angle (n,), without spikes; 0 where there is none."""
+    known = np.abs(angle[np.isfinite(angle)])
+    return float(np.quantile(known, 1.0 - CHANCE)) if known.size else 0.0
 
 
 def doubts_of_angles(angles: Mapping[str, np.ndarray]) -> Iterator[Doubt]:
@@ -223,7 +242,9 @@ def doubts_of_angles(angles: Mapping[str, np.ndarray]) -> Iterator[Doubt]:
             continue
         if abs(values[0]) > turn or np.abs(np.diff(values)).max() > math.pi:
             yield Doubt(
-                (signal,), "deg", f"has {signal} up to {np.abs(values).max():.4g}: is it in deg?"
+                (signal,),
+                "deg",
+                f"has {signal} up to {np.abs(values).max():.4g}: is it in deg, or in a part of one?",
             )
 
 

@@ -3,29 +3,30 @@
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain
 
 import numpy as np
 import pandas as pd
 
 from fmus.ship import Ship, ship
 
-from ..cleaning import WIDTH, lost
+from ..cleaning import WIDTH, angles_beside, lost
 from ..files.reading import Run
 from ..files.tables import MeasuredTable, cell_numbers, clock_seconds, date_stamps
 from ..frozen import repeated
 from ..position_jumps import speeds
 from ..row_order import by_stamps, in_order
-from .columns import OF_UNIT, UNITS, Column, Layout, largest_commands, other_angles
+from .columns import OF_UNIT, UNITS, Column, Layout, largest_commands
 from .likely_columns import ASTERN, says_command, signal_of_sign
 from .name_words import words_of
 from .unit_check import (
     FASTEST,
     OFTENEST,
+    STATED,
     doubts,
     doubts_of_angles,
     largest,
     likely_unit,
+    part_by_span,
     part_of_degree,
     spelt,
 )
@@ -81,7 +82,8 @@ def _is_percent(name: str) -> bool:
 
 def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantity: str) -> str | None:
     """The only unit in which commands of a quantity are within limits; None: SI, or it is not known."""
-    smaller = {size: unit for unit, size in reversed(UNITS[quantity].items()) if size < 1.0}
+    known = [(unit, size) for unit, size in UNITS[quantity].items() if unit not in STATED]
+    smaller = {size: unit for unit, size in reversed(known) if size < 1.0}
     if not smaller:
         return None
     share = max((most[s] / limits[s] for s in most if limits[s] > 0.0), default=0.0)
@@ -146,15 +148,19 @@ def seen_units(run: Run, stamped: bool = False) -> Iterable[tuple[str, str, floa
         size *= 10.0 if tenfold else 1.0
         yield "time", unit, 10.0 if tenfold else 1.0
     run = by_stamps(run)
+    run = run.rows(np.isfinite(run.pose).any(axis=1))  # rows of other tables may have the same times
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     zeros = (run.pose == 0.0).all(axis=1)
     fresh = ~zeros & ~repeated(run.pose, there)
     time = size * run.time[fresh]
-    angles = doubts_of_angles(other_angles(run.measured))
-    for doubt in chain(doubts(time, run.pose[fresh], scale), angles):
+    for doubt in doubts(time, run.pose[fresh], scale):
         factor = part_of_degree(run.pose[fresh]) if doubt.signals == ("psi",) else 1.0
         yield from ((signal, doubt.unit, factor) for signal in doubt.signals)
+    angles = angles_beside(run)
+    for doubt in doubts_of_angles(angles):
+        if part := part_by_span(angles[doubt.signals[0]]):
+            yield doubt.signals[0], doubt.unit, part
 
 
 def _speed(run: Run) -> float:

@@ -43,7 +43,8 @@ from ..columns.columns import (
     to_si,
     with_units_of_names,
 )
-from ..columns.geographic import across_date_line, is_geographic
+from ..columns.geographic import across_date_line, available, is_geographic
+from ..columns.name_words import is_magnetic
 from ..columns.unit_check import LARGEST, UNITS, largest, remedy
 from ..run_constants import DIGITS, FAR, NEGLIGIBLE
 from .matlab_files import fits_matlab, read_matlab
@@ -248,9 +249,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
             read = numbers(cells, path, layout)
             if signal == "time" and column.unit is None and column.factor == 1.0:
                 read = clock_seconds(read)
-            if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
-                read = np.where(read == NO_HEADING, np.nan, read)
-            read = signed(read, table, column)
+            read = signed(_available(read, signal, column), table, column)
             values = to_si(read, signal, column, quantity[signal])
             if signal in POSE:
                 unit = UNITS[quantity[signal]].get(column.unit or "", 1.0)
@@ -278,6 +277,7 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         if s not in ("time", *layout.unused)
         for note in _no_numbers(table[layout.column(s).name], columns[s])
     ]
+    notes += _by_compass(layout.column("psi"))
     called = {s: c.name for s, c in layout.columns.items() if c.name != s}
     return replace(
         run,
@@ -288,6 +288,23 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
         resolution=rounded,
         layout=layout,
     )
+
+
+def _available(read: np.ndarray, signal: str, column: Column) -> np.ndarray:
+    """Numbers (n,) of a column without those of a coordinate that is not available."""
+    if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
+        return np.where(read == NO_HEADING, np.nan, read)
+    of_place = signal in ("x", "y") and is_geographic(signal, column)
+    return available(signal, read) if of_place else read
+
+
+def _by_compass(psi: Column) -> Iterator[str]:
+    """A line on a heading that is magnetic by its name, and not corrected."""
+    if is_magnetic(psi.name) and not psi.offset:
+        yield (
+            f"'{psi.name}' is by a magnetic compass: if it is not corrected, the variation, positive to "
+            'the east, is the "offset" of the column'
+        )
 
 
 def _without_remarks(table: pd.DataFrame, layout: Layout) -> tuple[pd.DataFrame, list[str]]:
