@@ -45,8 +45,9 @@ from diagnosis.assessment.readings import (
 from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors import ship_with
 from diagnosis.predictors.ship_model import parameters
-from diagnosis.runs import line_beside
+from diagnosis.runs import line_beside, propose
 from diagnosis.runs.columns.columns import POSE, Column, Layout, Named
+from diagnosis.runs.columns.unit_check import UNITS
 from diagnosis.verdict.confidence import doubt_of_data
 from fmus.signals import Force
 
@@ -305,6 +306,30 @@ def test_mistakes_of_a_described_ship_are_told_with_odds(columns, read_from, fac
     said = doubt(table)
     assert mistake in said
     assert "(odds " in said
+
+
+def test_latitude_and_longitude_may_be_in_each_others_column(tmp_path):
+    """A degree of the one has not as many metres as one of the other."""
+    lat, lon = 63.44 + otter()["x"] / 111_469.0, 10.4 + otter()["y"] / 49_896.0
+    table = otter().drop(columns=["x", "y"]).assign(lat=lon, lon=lat)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    needed = propose(tmp_path / "a.csv", ship_with((), "otter")).needed
+    (tmp_path / "a.csv.json").write_text(json.dumps(needed))
+    with pytest.raises(InputError, match="its latitude and longitude are in each other's column"):
+        diagnosis.load([tmp_path / "a.csv"], ship="otter")
+
+
+@pytest.mark.parametrize("unit", ["cm", "mm"])
+def test_a_length_that_was_read_in_another_unit_is_put_right_by_the_unit(unit, tmp_path):
+    """Not by a factor of the wrong one."""
+    size = UNITS["length"][unit]
+    table = otter().assign(x=otter()["x"] / size, y=otter()["y"] / size)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    wrong = {s: {"name": s, "unit": "in"} for s in ("x", "y")}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": wrong}))
+    with pytest.raises(InputError) as error:
+        diagnosis.load([tmp_path / "a.csv"], ship="otter")
+    assert f'"x": {{"name": "x", "unit": "{unit}"}}' in str(error.value)
 
 
 def test_axes_that_are_mirrored_stand_before_actuators_that_are_swapped():

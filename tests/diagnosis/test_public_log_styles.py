@@ -9,7 +9,7 @@ import pytest
 
 from cosim import InputError
 from diagnosis.predictors import ship_with
-from diagnosis.runs import Run, propose
+from diagnosis.runs import Run, clean, propose
 from diagnosis.runs.columns.unit_check import likely_unit
 from diagnosis.runs.files.tables import clock_seconds
 from diagnosis.runs.files_of_one_run import one_table
@@ -393,3 +393,72 @@ def test_a_broken_table_is_named(
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=f"{name}' {twice if name == 'b.txt' else BROKEN}"):
         look(tmp_path / name)
+
+
+def test_a_heading_in_gon_jumps_by_four_hundred(tmp_path: Path) -> None:
+    gon = np.degrees(4.0 * PSI) % 360.0 / 0.9
+    is_turned = seen(tmp_path / "a.csv", log(psi=gon.round(2)))
+    np.testing.assert_allclose(np.sin(is_turned.pose[:, 2] - 4.0 * PSI), 0.0, atol=1e-3)
+
+
+def test_an_azimuth_that_goes_round_is_in_the_counts_of_its_span(tmp_path: Path) -> None:
+    of = ship_with((), "gunnerus")
+    alpha = (0.4 * TIME) % (2.0 * np.pi)
+    table = log(**{s: np.full(TIME.size, 1.0) for s in of.commands}).drop(columns=[*SHAFTS])
+    angle = next(s for s in of.commands if s.endswith("alpha"))
+    tenths = np.floor(10.0 * np.degrees(alpha))
+    run = seen(tmp_path / "a.csv", table.assign(**{angle: tenths}), of)
+    assert run.commands is not None
+    found = run.commands[:, run.signals.index(angle)]
+    np.testing.assert_allclose(np.sin(found - alpha), 0.0, atol=2e-3)
+    steps = 1600.0 * np.sign(np.sin(TIME))  # within a part of a turn: tenths, or mils
+    with pytest.raises(InputError, match="in deg, or in a part of one"):
+        clean(seen(tmp_path / "b.csv", table.assign(**{angle: steps}), of))
+
+
+def test_a_current_in_the_name_of_an_angle_is_no_angle(tmp_path: Path) -> None:
+    table = log(**{"Rudder [mA]": 12.0 + np.sin(TIME), "rpm": 60.0}).drop(columns=[*SHAFTS])
+    path = tmp_path / "a.csv"
+    table.to_csv(path, index=False)
+    path.with_suffix(".csv.json").write_text('{"columns": {"rudder.delta": "Rudder [mA]"}}')
+    with pytest.raises(InputError, match=r"'mA' is not a unit of rudder\.delta"):
+        propose(path, TANKER)
+
+
+@pytest.mark.parametrize("name", ["HDM", "Heading magnetic"])
+def test_a_magnetic_heading_is_the_last_of_several_and_said_to_be_one(tmp_path: Path, name: str) -> None:
+    degrees = np.degrees(PSI).round(3)
+    both = {name: degrees - 4.0, "Heading true": degrees}
+    table = log().drop(columns="psi")
+    run = seen(tmp_path / "a.csv", table.assign(**both))
+    is_the_motion(run)
+    assert not any("magnetic" in note for note in run.notes)
+    alone = seen(tmp_path / "b.csv", table.assign(**{name: degrees}))
+    assert sum("magnetic compass" in note for note in alone.notes) == 1
+
+
+def test_a_place_that_is_not_available_is_none(tmp_path: Path) -> None:
+    """Of AIS: 91 and 181 degrees."""
+    lat, lon = 59.4292 + NORTH / 111_402.0, 10.4691 + EAST / 56_758.0
+    gone = np.arange(TIME.size) % 30 == 7
+    place = {"lat": np.where(gone, 91.0, lat), "lon": np.where(gone, 181.0, lon)}
+    run = seen(tmp_path / "a.csv", log(**place).drop(columns=["x", "y"]))
+    assert np.isnan(run.pose[gone, :2]).all()
+    assert np.isfinite(run.pose[~gone]).all()
+
+
+def test_rows_of_commands_between_those_of_the_pose_hide_no_unit(tmp_path: Path) -> None:
+    """As of two tables that were joined, with rows of the same times."""
+    pose = log(psi=np.degrees(PSI).round(2)).drop(columns=[*SHAFTS])
+    commands = pd.DataFrame({"time": TIME, **SHAFTS})
+    both = pd.concat([pose, commands]).sort_values("time", kind="stable")
+    both.to_csv(tmp_path / "a.csv", index=False)
+    assert propose(tmp_path / "a.csv", OTTER).by_numbers == {"psi": "deg"}
+
+
+def test_revolutions_of_a_generator_are_none_of_a_shaft(tmp_path: Path) -> None:
+    others = {"ME1_RPM_ACT": 59.0, "ME1_RPM_ORD": 60.0 + TIME, "DG1_RPM": 1800.0, "rudder": 0.1}
+    table = log(**others).drop(columns=[*SHAFTS])
+    run = seen(tmp_path / "a.csv", table, TANKER)
+    assert run.called is not None
+    assert run.called["propeller.n"] == "ME1_RPM_ORD"
