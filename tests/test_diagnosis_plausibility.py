@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from itertools import count, cycle, repeat
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -35,6 +36,7 @@ from diagnosis.assessment.reading_odds import Explanation, ReadingOdds, bounded,
 from diagnosis.assessment.readings import (
     AS_READ,
     Reading,
+    of_angles,
     of_commands,
     of_pose,
     other_factors,
@@ -306,6 +308,24 @@ def test_mistakes_of_a_described_ship_are_told_with_odds(columns, read_from, fac
     said = doubt(table)
     assert mistake in said
     assert "(odds " in said
+
+
+def test_a_share_of_the_whole_way_of_a_rudder_counts_from_hard_over():
+    """0 to 100 % was read as from midship to starboard."""
+    run = replace(
+        base(), signals=("rudder.delta",), commands=np.linspace(0.0, 0.6, base().time.size)[:, None]
+    )
+    layout = SimpleNamespace(limits=lambda _: [(-0.6, 0.6)], round=None)
+    ship = SimpleNamespace(layout_of=lambda _: layout, form_of=lambda _: {"rudder.delta": "rad"})
+    model = SimpleNamespace(ship=ship, drive=SimpleNamespace(params=None))
+    found = {r.mistake: r for r in of_angles(run, run.commands, model)}
+    shares = found["rudder.delta is a share of the way from hard over to port"]
+    meant = run.commands @ shares.commands.T + shares.added
+    assert meant[[0, -1], 0] == pytest.approx([-0.6, 0.6])
+    other = found["rudder.delta is a share of the way from hard over to starboard"]
+    np.testing.assert_allclose(run.commands @ other.commands.T + other.added, -meant, atol=1e-12)
+    half = replace(run, commands=2.0 * run.commands)
+    assert not any("share" in r.mistake for r in of_angles(half, half.commands, model))
 
 
 def test_latitude_and_longitude_may_be_in_each_others_column(tmp_path):

@@ -195,7 +195,7 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
             if quantity in COUNTED and size < 1.0 and taken_for.any():
                 back = np.where(taken_for, 1.0 / size, 1.0).tolist()
                 yield _in_unit(f"in {SI_UNIT[quantity]} in place of {other}", back, names)
-    yield from _of_angles(run, commands, model)
+    yield from of_angles(run, commands, model)
     for whole, name in ((1.0, "shares"), (100.0, "percent")):
         meant = (largest <= whole) & (limits > 1.0)
         factors = np.where(meant, limits / whole, 1.0)
@@ -203,7 +203,7 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
             yield _in_unit(f"in {name} of the limits", factors.tolist(), names)
 
 
-def _of_angles(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
+def of_angles(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
     """Angles that count from elsewhere: the other way round, or from hard over."""
     layout = model.ship.layout_of(commands)
     ends, form = layout.limits(model.drive.params), model.ship.form_of(commands)
@@ -213,8 +213,13 @@ def _of_angles(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading
         if layout.round and layout.round[k]:
             yield off_by(f"{name} points the other way, by 180 deg", name, 1.0, np.pi, run.signals)
         elif low < 0.0 <= commands[:, k].min():
-            for way, factor, offset in (("port", 1.0, low), ("starboard", -1.0, high)):
-                yield off_by(f"{name} counts from hard over to {way}", name, factor, offset, run.signals)
+            # A share of the way from hard over to hard over may have been read as one of half of it.
+            whole = (high - low) / high if commands[:, k].max() <= high else 1.0
+            for way, sign, end in (("port", 1.0, low), ("starboard", -1.0, high)):
+                yield off_by(f"{name} counts from hard over to {way}", name, sign, end, run.signals)
+                share = f"{name} is a share of the way from hard over to {way}"
+                if whole > 1.0:
+                    yield off_by(share, name, sign * whole, end, run.signals)
 
 
 def other_factors(run: Run, k: float, pace: float) -> Iterator[Reading]:

@@ -29,7 +29,7 @@ FILLERS = CHANGES.union(
     ("hat", "est", "estimated", "estimate", "meas", MEASURED, "measurement", "filtered", "true"),
     ("mid", "midship", "position", "pos", "coordinate", "angle", "ang", "distance", "data", "value"),
     ("thruster", "thrusters", "actuator", "actuators", "azimuth", "az", "motor", "main"),
-    ("gyro", "compass", "utm", "track", "gps", "gnss"),
+    ("gyro", "compass", "utm", "track", "gps", "gnss", "imu", "ins", "ahrs", "mru", "seapath", "nacos"),
     ("de", "du", "di", "do", "van", "der", "burta"),
     ("gga", "rmc", "hdt", "me", "sg"),  # sentences of NMEA 0183, tags of plants
 )

@@ -43,7 +43,7 @@ SPELT = {
     **{unit.replace(".", mark): unit for unit in UNITS["moment"] for mark in ("", "·", "*", " ", "-")},
     **dict.fromkeys(("kt", "kts", "knot", "knots", "nd"), "kn"),  # codespell:ignore
     **dict.fromkeys(("degree", "degrees", "grader", "Grad", "graden", "grados", "gradi"), "deg"),
-    **dict.fromkeys(("graus", "stopnie", "stopni"), "deg"),
+    **dict.fromkeys(("graus", "stopnie", "stopni", "度"), "deg"),
     **dict.fromkeys(("deg T", "deg M", "deg true", "degT", "degM", "°T", "°M"), "deg"),
     **dict.fromkeys(("gons", "grade", "grades"), "gon"),
     **dict.fromkeys(("sec", "seconds"), "s"),
@@ -53,7 +53,8 @@ SPELT = {
     **dict.fromkeys(("millis", "milliseconds"), "ms"),
     **dict.fromkeys(("micros", "microseconds"), "us"),
     **dict.fromkeys(("pct", "percent"), "%"),
-    **dict.fromkeys(("m/s²", "m/s^2"), "m/s2"),
+    **dict.fromkeys(("m/s²", "m/s^2", "m.s-2"), "m/s2"),
+    **dict.fromkeys(("m.s-1", "m s-1", "m s^-1"), "m/s"),
     **dict.fromkeys(("1/min", "min-1", "min^-1", "r/min", "rev/min", "U/min", "tr/min"), "rpm"),
     **dict.fromkeys(("o/min", "omdr/min", "omw/min", "varv/min", "giri/min", "obr/min"), "rpm"),
     **dict.fromkeys(("°/min",), "deg/min"),
