@@ -148,7 +148,8 @@ def seen_units(run: Run, stamped: bool = False) -> Iterable[tuple[str, str, floa
         size *= 10.0 if tenfold else 1.0
         yield "time", unit, 10.0 if tenfold else 1.0
     run = by_stamps(run)
-    run = run.rows(np.isfinite(run.pose).any(axis=1))  # rows of other tables may have the same times
+    of_pose = np.asarray(np.isfinite(run.pose).any(axis=1))
+    run = run.rows(of_pose)  # those of other tables may have the same times
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     zeros = (run.pose == 0.0).all(axis=1)
