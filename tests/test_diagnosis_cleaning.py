@@ -404,3 +404,17 @@ def test_commands_that_are_written_when_they_change_hold(repeats):
     assert 2 * held[:, 0].sum() > t.size
     track = clean(replace(base(), tau_cmd=given, held=np.where([True, False, False], held, False)))
     assert (track.silences % 2 == 1).any() == repeats
+
+
+@given(
+    st.lists(st.tuples(st.integers(5, 40), st.integers(5, 40)), min_size=1, max_size=4),
+    st.integers(0, 99),
+)
+def test_a_heading_that_is_the_other_way_round_for_a_while_makes_no_turn(flips, seed):
+    """As of a marker that is taken for its opposite: noise decides by which way it seems to jump."""
+    away = np.concatenate([np.repeat([0, 1], pair) for pair in flips] + [np.zeros(10, int)])
+    t, rng = 0.04 * np.arange(away.size), np.random.default_rng(seed)
+    true = 1.0 + 0.5 * t
+    measured = np.angle(np.exp(1j * (true + np.pi * away + rng.normal(0.0, 0.01, t.size))))
+    found = unwrap(t, measured, 0.5)
+    np.testing.assert_allclose(np.abs(found - true), np.pi * away, atol=0.1)

@@ -14,7 +14,7 @@ from fmus.scale import REFERENCE, Scale
 
 from ..execution.short_text import ShortRepr
 from .columns.columns import other_angles
-from .columns.unit_check import GO_ON, LARGEST, refuse_time, refuse_units
+from .columns.unit_check import GO_ON, LARGEST, QUICKEST, refuse_time, refuse_units
 from .files.reading import Run
 from .files.telegrams import filled
 from .frozen import goes_straight, repeated, stuck
@@ -390,7 +390,8 @@ def unwrap(time: np.ndarray, psi: np.ndarray, gap: float) -> np.ndarray:
     """The heading [rad] continuous over turns.
 
     Over a longer gap [s] it may have turned by more than half a turn: then that step is taken which
-    comes nearest to what the yaw rate as long before and after would have turned it.
+    comes nearest to what the yaw rate as long before and after would have turned it. A jump that no ship
+    makes, as of a marker that is taken for another one, goes back the way that it came.
     """
     step, dt = wrap(np.diff(psi)), np.diff(time)
     rate = step / dt
@@ -399,6 +400,11 @@ def unwrap(time: np.ndarray, psi: np.ndarray, gap: float) -> np.ndarray:
         near &= dt <= gap
         turn = dt[k] * float(np.median(rate[near])) if near.any() else 0.0
         step[k] = turn + wrap(step[k] - turn)
+    away = 0.0
+    for k in np.flatnonzero(np.abs(step) > np.maximum(0.5 * np.pi, QUICKEST * dt)):
+        if away * step[k] > 0.0:
+            step[k] -= 2.0 * np.pi * np.sign(away)
+        away = 0.0 if away else float(step[k])
     return np.concatenate([psi[:1], psi[0] + np.cumsum(step)])
 
 

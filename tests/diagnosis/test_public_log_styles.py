@@ -462,3 +462,16 @@ def test_revolutions_of_a_generator_are_none_of_a_shaft(tmp_path: Path) -> None:
     run = seen(tmp_path / "a.csv", table, TANKER)
     assert run.called is not None
     assert run.called["propeller.n"] == "ME1_RPM_ORD"
+
+
+def test_a_side_is_the_sign_of_a_thruster_that_pushes_sideways(tmp_path: Path) -> None:
+    """To port is negative."""
+    of = ship_with((), "cybership2")
+    power = np.sin(TIME).round(3)
+    others = {s: 1.0 for s in of.commands if s != "bow.u"}
+    table = log(**others, bow_power=np.abs(power), bow_side=np.where(power < 0.0, "P", "S"))
+    path = tmp_path / "a.csv"
+    path.with_suffix(".csv.json").write_text('{"columns": {"bow.u": "bow_power"}}')
+    run = seen(path, table, of)
+    assert run.commands is not None
+    np.testing.assert_allclose(run.commands[:, run.signals.index("bow.u")], power, atol=1e-9)

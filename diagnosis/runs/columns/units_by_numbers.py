@@ -112,10 +112,10 @@ def sign_columns(
 
 
 def _is_negative(cell: str, quantity: str) -> bool:
-    """Whether the cell of a sign is that of negative values: astern, or of an angle to port."""
-    if quantity == "angle":
-        return words_of(cell) == ["port"] or cell.casefold() in ("p", "l", "-", "-1", "-1.0")
-    return cell.casefold() in ASTERN
+    """Whether the cell of a sign is that of negative values: astern, or to port, but of a shaft."""
+    to_port = words_of(cell) == ["port"] or cell.casefold() in ("p", "l", "-", "-1", "-1.0")
+    astern = cell.casefold() in ASTERN
+    return {"angle": to_port, "shaft speed": astern}.get(quantity, to_port or astern)
 
 
 def names_of(columns: Mapping[str, Column]) -> set[str]:
