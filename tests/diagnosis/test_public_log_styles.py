@@ -1,6 +1,7 @@
 """Logs in the styles of widespread tools: PX4, MAVLink, ROS, libcosim, LabVIEW, MOOS, and tables of pandas and numpy."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from diagnosis.runs import Run, clean, propose
 from diagnosis.runs.columns.unit_check import likely_unit
 from diagnosis.runs.files.tables import clock_seconds
 from diagnosis.runs.files_of_one_run import one_table
+from diagnosis.runs.sensors.unit_faults import without_code
 
 OTTER, TANKER = ship_with((), "otter"), ship_with((), "kvlcc2")
 TIME = np.arange(0.0, 30.0, 0.1)
@@ -475,3 +477,29 @@ def test_a_side_is_the_sign_of_a_thruster_that_pushes_sideways(tmp_path: Path) -
     run = seen(path, table, of)
     assert run.commands is not None
     np.testing.assert_allclose(run.commands[:, run.signals.index("bow.u")], power, atol=1e-9)
+
+
+def test_a_rate_of_turn_that_is_coded_as_by_ais_is_not_used() -> None:
+    """Whole degrees per minute are no such code, and a unit."""
+    t, rng = np.arange(0.0, 1500.0), np.random.default_rng(0)
+    psi, rate = 2.0 * np.sin(0.01 * t), 0.02 * np.cos(0.01 * t)
+    pose = np.column_stack([np.cumsum(5.0 * np.cos(psi)), np.cumsum(5.0 * np.sin(psi)), psi])
+    pose += rng.normal(0.0, 1e-3, pose.shape)
+    per_minute = 60.0 * np.degrees(rate)
+    code = np.round(4.733 * np.sign(rate) * np.sqrt(np.abs(per_minute)))
+    run = Run("a", t, pose, np.ones((t.size, 3)), measured={"r": code})
+    found = without_code(run)
+    assert "r" not in found.run.measured
+    assert found.notes == ("r is coded as by AIS, by roots of degrees per minute: it is not used",)
+    for other in (np.round(per_minute), rate, np.round(per_minute) + 0.5):
+        measured = replace(run, measured={"r": other})
+        assert without_code(measured).run is measured
+
+
+def test_a_rate_of_turn_that_is_not_available_is_none(tmp_path: Path) -> None:
+    gone = np.arange(TIME.size) % 20 == 3
+    run = seen(tmp_path / "a.csv", log(**{"ROT [deg/min]": np.where(gone, -128.0, 60.0 * TIME)}))
+    assert np.isnan(run.measured["r"]).tolist() == gone.tolist()
+    below = np.where(gone, -128.0, -200.0)
+    kept = seen(tmp_path / "b.csv", log(**{"ROT [deg/min]": below}))
+    assert np.isfinite(kept.measured["r"]).all()

@@ -59,7 +59,8 @@ from .tables import (
     resolution,
 )
 
-NO_HEADING = 511.0  # degrees, that is not available (ITU-R M.1371, AIS)
+# Degrees, and a rate of turn in degrees per minute or coded, that are not available (ITU-R M.1371, AIS).
+NO_HEADING, NO_RATE = 511.0, -128.0
 LOGS, LOG_OPTIONS = ("log.csv", "log.parquet"), "log.json"
 TABLES = (".csv", ".parquet", ".mat")  # endings of files of measured runs
 
@@ -291,7 +292,9 @@ def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where:
 
 
 def _available(read: np.ndarray, signal: str, column: Column) -> np.ndarray:
-    """Numbers (n,) of a column without those of a coordinate that is not available."""
+    """Numbers (n,) of a column without those of a coordinate, or a rate, that is not available."""
+    if signal == "r" and column.unit in (None, "deg/min") and not (read < NO_RATE).any():
+        return np.where(read == NO_RATE, np.nan, read)
     if signal == "psi" and column.unit in ("deg", "°") and not (read > NO_HEADING).any():
         return np.where(read == NO_HEADING, np.nan, read)
     of_place = signal in ("x", "y") and is_geographic(signal, column)

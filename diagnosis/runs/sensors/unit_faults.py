@@ -10,20 +10,23 @@ from fmus.scale import Scale
 
 from ..cleaning import between
 from ..columns.columns import POSE
-from ..columns.unit_check import UNITS
-from ..files.reading import Run
+from ..columns.unit_check import QUICKEST, UNITS
+from ..files.reading import NO_RATE, Run
 from ..run_constants import HORIZON, IN_A_ROW
 from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
 NEAR = 0.15  # 1, relative distance within which a factor is that of a unit (chosen)
+CODED = 4.733  # 1, times the root of degrees per minute: rate of turn of AIS (ITU-R M.1371)
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is reversed"
 
 
 def units(run: Run, scale: Scale) -> Examined:
     """Velocity and yaw rate that are many times what the pose says, or its opposite."""
-    found = mirrored(run)
+    plain = without_code(run)
+    found = mirrored(plain.run)
+    found = replace(found, notes=(*plain.notes, *found.notes))
     e = evidence(found.run)
     if e is None:
         return found
@@ -36,6 +39,29 @@ def units(run: Run, scale: Scale) -> Examined:
             return _corrected(found, e, (channel,), "speed", *factor)
         found = _judged(found, e, names, "speed", *_windows(e, _position(e), e.gone))
     return found
+
+
+def without_code(run: Run) -> Examined:
+    """A run without a yaw rate as AIS sends it, if it is that of the pose.
+
+    In whole numbers of CODED times the root of degrees per minute, it is too coarse beside a heading.
+    """
+    code = run.measured.get("r", np.zeros(0))
+    known = code[np.isfinite(code)]
+    most = np.abs(known).max(initial=0.0)
+    if not QUICKEST < most < -NO_RATE or (known != np.round(known)).any():
+        return Examined(run)
+    rate = np.sign(code) * (code / CODED) ** 2 * UNITS["rate"]["deg/min"]
+    e = evidence(replace(run, measured=dict(run.measured) | {"r": rate}))
+    if e is None or e.rate is None:
+        return Examined(run)
+    pose, said = _windows(e, e.psi[:, None], e.turned[:, None])
+    factor = float((pose * said).sum() / (said**2).sum())
+    if _alike(pose, said) < AGREED or abs(factor - 1.0) > ALIKE:
+        return Examined(run)
+    others = {name: values for name, values in run.measured.items() if name != "r"}
+    note = "r is coded as by AIS, by roots of degrees per minute: it is not used"
+    return Examined(replace(run, measured=others), notes=(note,))
 
 
 def mirrored(run: Run) -> Examined:
