@@ -99,7 +99,7 @@ def test_a_density_is_that_of_a_normal_prior_and_normal_noise():
     b = s * (x * w * e * w).sum() / information
     noise = np.sqrt(((e - b * s * x) ** 2).mean(axis=0) + least**2)
     expected = -windows * np.log(noise).sum() - 0.5 * (b**2 + np.log(information))
-    assert explained((x, s)).density(e, least, windows) == pytest.approx(expected, abs=1e-2)
+    assert explained((x, s)).explain(e, least, windows).density == pytest.approx(expected, abs=1e-2)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -132,9 +132,11 @@ def test_the_unit_of_a_column_does_not_matter():
 
     def density(k):
         columns = (k * x, 0.7 / k, -np.inf, 1.2 / k), (k * y, 0.4 / k, -1.1 / k, np.inf)
-        return explained(*columns).density(e, least, 15.0)
+        return explained(*columns).explain(e, least, 15.0).density
 
-    assert density(1.0) < explained((x, 0.7), (y, 0.4)).density(e, least, 15.0) - 1.0, "limits act"
+    assert density(1.0) < explained((x, 0.7), (y, 0.4)).explain(e, least, 15.0).density - 1.0, (
+        "limits act"
+    )
     assert [density(k) for k in (0.2, 7.0)] == pytest.approx([density(1.0)] * 2)
 
 
@@ -154,8 +156,10 @@ def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit(
     e = 2.0 * x + 0.05 * rng.normal(size=(60, 3))
 
     def density(*columns, unit=1.0):
-        return explained(*((unit * c, *rest) for c, *rest in columns)).density(
-            unit * e, unit * least, 20.0
+        return (
+            explained(*((unit * c, *rest) for c, *rest in columns))
+            .explain(unit * e, unit * least, 20.0)
+            .density
         )
 
     plain = density((other, 1.0))

@@ -269,6 +269,8 @@ def likeliest_mistake(
     )
     if order[0] < named:  # a unit with a name is as good as a number
         order = [k for k in order if k < named]
-    # Thrusters that are weak, as by a flat battery, are as usual as a unit or clock without a name.
+    # Thrusters that are weak, as by a flat battery, are as usual as a unit or clock without a name,
+    # unless this explains all of the motion.
     weak = order[0] >= named and factor is not None and SETTINGS.least_gain < factor < 1.0
+    weak = weak and odds.explained(possible[order[0]]).left > 2.0
     return Mistake([possible[k] for k in order], better, bool(better >= needed and not weak))

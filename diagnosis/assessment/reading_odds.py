@@ -18,6 +18,7 @@ not, and counts as if it had been drawn from ``windows`` (:mod:`.settings`) inde
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -28,6 +29,13 @@ from ..predictors.weak_form import OVERLAP, needed_force, undamped
 from ..runs.run_constants import STEPS
 from .readings import Reading, reread
 from .settings import SETTINGS
+
+
+class Explained(NamedTuple):
+    """Logarithm of the density of a model error, and what it leaves, times its noise at the least."""
+
+    density: float
+    left: float
 
 
 @dataclass
@@ -45,8 +53,8 @@ class Explanation:
             self.columns.append(column)
             self.priors.append((deviation, low, high))
 
-    def density(self, e: np.ndarray, least: np.ndarray, windows: float) -> float:
-        """Logarithm of the density of a model error.
+    def explain(self, e: np.ndarray, least: np.ndarray, windows: float) -> "Explained":
+        """The most likely explanation of a model error.
 
         Args:
             e: (K, 3), the model error.
@@ -65,7 +73,8 @@ class Explanation:
             b = bounded(design, y, low / s, high / s, b)
         noise = _noise(axes, b, len(e), least)
         known = np.linalg.slogdet(design.T @ design)[1]
-        return float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
+        density = float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
+        return Explained(density, float((noise / least).max()))
 
 
 def bounded(
@@ -115,6 +124,10 @@ class ReadingOdds:
 
     def log_density(self, reading: Reading) -> float:
         """Logarithm of the density of the run's motion by a reading."""
+        return self.explained(reading).density
+
+    def explained(self, reading: Reading) -> Explained:
+        """The motion as a reading explains it."""
         with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
             w = reread(self.w, reading, self.model)
             e, z = omega(w, self.model), needed_force(w, self.model)
@@ -122,7 +135,7 @@ class ReadingOdds:
             each, streams = ([omega(w, m) - e for m in some] for some in (self._lost, self._streaming))
             found = np.concatenate([e, z, a, *each, *streams])
         if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
-            return -np.inf
+            return Explained(-np.inf, np.inf)
         why, T = self._steady(w), z - e
         for stream in streams:
             why.may(stream, 1.0)
@@ -133,9 +146,9 @@ class ReadingOdds:
             why.may(-part, SETTINGS.much, 0.0, 1.0)
         for axis in axes:
             why.may((a - z) * axis, 1.0, -1.0)
-        return why.density(e, SETTINGS.inexact * np.sqrt((a**2).mean(axis=0)), self.windows) + (
-            self.windows * reading.density
-        )
+        least = SETTINGS.inexact * np.sqrt((a**2).mean(axis=0))
+        found = why.explain(e, least, self.windows)
+        return found._replace(density=found.density + self.windows * reading.density)
 
     def _steady(self, w: WeakWindows) -> Explanation:
         """Forces that are steady in the body or on earth."""

@@ -309,7 +309,7 @@ def angles_beside(run: Run) -> dict[str, np.ndarray]:
     """Angles of a run beside its heading: those that are measured, and commands that may go round."""
     layout, commands = run.ship and layouts(run.ship)[0], run.commands
     found = other_angles(run.measured)
-    if not layout or commands is None or len(layout.rates) != commands.shape[1]:
+    if not layout or commands is None or not len(layout.rates) == len(run.signals) == commands.shape[1]:
         return found
     turns = np.broadcast_to(layout.round, commands.shape[1])
     return found | {s: x for s, x, turn in zip(run.signals, commands.T, turns, strict=True) if turn}
