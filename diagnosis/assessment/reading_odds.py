@@ -31,7 +31,7 @@ from .readings import Reading, reread
 from .settings import SETTINGS
 
 
-class Explained(NamedTuple):
+class ExplainedMotion(NamedTuple):
     """Logarithm of the density of a model error, and what it leaves, times its noise at the least."""
 
     density: float
@@ -53,7 +53,7 @@ class Explanation:
             self.columns.append(column)
             self.priors.append((deviation, low, high))
 
-    def explain(self, e: np.ndarray, least: np.ndarray, windows: float) -> "Explained":
+    def explain(self, e: np.ndarray, least: np.ndarray, windows: float) -> "ExplainedMotion":
         """The most likely explanation of a model error.
 
         Args:
@@ -74,7 +74,7 @@ class Explanation:
         noise = _noise(axes, b, len(e), least)
         known = np.linalg.slogdet(design.T @ design)[1]
         density = float(-windows * np.log(noise).sum() - 0.5 * (b @ b + known))
-        return Explained(density, float((noise / least).max()))
+        return ExplainedMotion(density, float((noise / least).max()))
 
 
 def bounded(
@@ -126,7 +126,7 @@ class ReadingOdds:
         """Logarithm of the density of the run's motion by a reading."""
         return self.explained(reading).density
 
-    def explained(self, reading: Reading) -> Explained:
+    def explained(self, reading: Reading) -> ExplainedMotion:
         """The motion as a reading explains it."""
         with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
             w = reread(self.w, reading, self.model)
@@ -135,7 +135,7 @@ class ReadingOdds:
             each, streams = ([omega(w, m) - e for m in some] for some in (self._lost, self._streaming))
             found = np.concatenate([e, z, a, *each, *streams])
         if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
-            return Explained(-np.inf, np.inf)
+            return ExplainedMotion(-np.inf, np.inf)
         why, T = self._steady(w), z - e
         for stream in streams:
             why.may(stream, 1.0)
