@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 from support.cases import slow
 from support.measured import sail, smoothed
 
@@ -14,6 +15,7 @@ from diagnosis.search import forward_selection
 from diagnosis.search.findings import Finding, Findings, Suspect
 from diagnosis.search.nonlinear.waves import (
     BAND,
+    CONSTANT,
     PEAK,
     Peak,
     command_interval,
@@ -97,6 +99,16 @@ def test_the_period_of_a_sine_is_constant_and_that_of_waves_is_not():
     assert constancy([waves, waves[:1200]], H, near) < 0.8
     assert constancy([waves * np.cos(0.1 * t)], H, near) < 0.8
     assert constancy([0.0 * t], H, near) == 0.0
+
+
+def test_irregular_waves_have_no_constant_period():
+    """Of a second-order filter with a damping of 0.1, over 38 periods."""
+    rng, h, count = np.random.default_rng(0), 0.1, 600
+    filtered = cont2discrete(([1.0, 0.0], [1.0, 0.8, 16.0]), h)
+    drawn = lfilter(filtered[0].ravel(), filtered[1], rng.standard_normal((100, 2000 + count)))[:, 2000:]
+    found = [constancy([x], h, 4.0 / (2.0 * np.pi)) for x in drawn]
+    assert max(found) < CONSTANT
+    assert np.median(found) < 0.7
 
 
 def test_the_interval_of_commands_is_that_of_a_recorder_and_not_of_steps():

@@ -53,7 +53,7 @@ class Explanation:
             self.columns.append(column)
             self.priors.append((deviation, low, high))
 
-    def explain(self, e: np.ndarray, least: np.ndarray, windows: float) -> "ExplainedMotion":
+    def explain(self, e: np.ndarray, least: np.ndarray, windows: float) -> ExplainedMotion:
         """The most likely explanation of a model error.
 
         Args:

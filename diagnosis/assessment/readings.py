@@ -186,8 +186,8 @@ def _of_actuators(run: Run, commands: np.ndarray, model: Model) -> Iterator[Read
     largest = np.abs(commands).max(axis=0)
     limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
     for si, quantity in OF_UNIT.items():
-        others = {n: x for n, x in UNITS[quantity].items() if n not in STATED | {SI_UNIT[quantity]}}
-        for size, other in {x: n for n, x in others.items()}.items():
+        untold = STATED | {SI_UNIT[quantity]}
+        for size, other in {x: n for n, x in UNITS[quantity].items() if n not in untold}.items():
             factors = np.where(unit == si, size, 1.0)
             if (factors != 1.0).any():
                 yield _in_unit(f"in {other}", factors.tolist(), names)
@@ -217,8 +217,8 @@ def of_angles(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]
             whole = (high - low) / high if commands[:, k].max() <= high else 1.0
             for way, sign, end in (("port", 1.0, low), ("starboard", -1.0, high)):
                 yield off_by(f"{name} counts from hard over to {way}", name, sign, end, run.signals)
-                share = f"{name} is a share of the way from hard over to {way}"
                 if whole > 1.0:
+                    share = f"{name} is a share of the way from hard over to {way}"
                     yield off_by(share, name, sign * whole, end, run.signals)
 
 

@@ -208,7 +208,7 @@ class Response:
         return unwrapped(commanded_shares(self.run, self.model), self.run, self.model)
 
     @cached_property
-    def _memory(self) -> float:
+    def _longest_memory(self) -> float:
         """Time [s] after which the thrusters have forgotten a command."""
         memory = np.zeros(self._shares.shape[1])  # of each command
         for member, of in self._memories:
@@ -221,7 +221,7 @@ class Response:
     @cached_property
     def _clock(self) -> np.ndarray:
         """(n,), time [s] at each sample, in which a long gap counts no more than the memory lasts."""
-        gaps, lasts = np.diff(self.run.time), self._memory + abs(self.model.clock) + self._period
+        gaps, lasts = np.diff(self.run.time), self._longest_memory + abs(self.model.clock) + self._period
         long = gaps > FORGOTTEN * self.model.ship.scale.time
         return np.concatenate([[0.0], np.cumsum(np.where(long, np.minimum(gaps, lasts), gaps))])
 
@@ -311,7 +311,7 @@ class Response:
     def _stepped(self, commands: np.ndarray) -> np.ndarray:
         """(m, 2, k), what the thrusters make of commands (m, k) in steps of the grid, in parts."""
         drive, h = self.drive, self.step
-        before = part = int(np.ceil(self._memory / h)) + 1  # about as long costs least
+        before = part = int(np.ceil(self._longest_memory / h)) + 1  # about as long costs least
         rows = np.arange(-before, part)[:, None] + part * np.arange(-(-len(commands) // part))
         wanted = commands[np.clip(rows, 0, len(commands) - 1)]
         wanted = np.where(like(rows < 0, 1), self._commands.before, wanted)  # (m, parts, k)

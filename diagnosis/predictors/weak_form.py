@@ -130,13 +130,11 @@ class WeakWindows:
         smoothed = thinned_motion(self.smoothed)
         if smoothed is self.smoothed:
             return self
-        smooth, slope, held = _integrals(smoothed.time, self.middle, 0.5 * self.width)
-        rows = {"smooth": smooth, "slope": slope, "held": held}
-        return replace(self, smoothed=smoothed, whole=self.run, **rows, memory={})
+        return replace(self._of_rows(smoothed, self.middle), whole=self.run)
 
     @cached_property
     def excerpt(self) -> "WeakWindows":
-        """The windows at the begin of each block where blocks are long, and the rows that they need.
+        """The windows at the beginning of each block where blocks are long, and the rows that they need.
 
         By these a long run is judged, in the time that one of BLOCKS short blocks takes.
         """
@@ -147,24 +145,15 @@ class WeakWindows:
             return self
         middle, settles = self.middle[kept], self.smoothed.track.responded - time[0]
         # Half a window, and more for commands that are logged late and for actuators that are slow.
-        begin = np.searchsorted(time, middle - 2.0 * self.width - settles)
-        end = np.searchsorted(time, middle + self.width, side="right")
-        changes = np.zeros(time.size + 1, int)
-        np.add.at(changes, begin, 1)
-        np.add.at(changes, end, -1)
-        rows = np.cumsum(changes)[:-1] > 0
-        smoothed = self.smoothed.rows(rows)
+        last = np.searchsorted(middle, time + 2.0 * self.width + settles, side="right")
+        needed = last > np.searchsorted(middle, time - self.width)
+        return replace(self._of_rows(self.smoothed.rows(needed), middle), block=self.block[kept])
+
+    def _of_rows(self, smoothed: Smoothed, middle: np.ndarray) -> "WeakWindows":
+        """Windows of some middles (K,) [s] by the run with fewer rows."""
         smooth, slope, held = _integrals(smoothed.time, middle, 0.5 * self.width)
-        return replace(
-            self,
-            smoothed=smoothed,
-            middle=middle,
-            block=self.block[kept],
-            smooth=smooth,
-            slope=slope,
-            held=held,
-            memory={},
-        )
+        rows = {"smooth": smooth, "slope": slope, "held": held}
+        return replace(self, smoothed=smoothed, middle=middle, **rows, memory={})
 
     def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.

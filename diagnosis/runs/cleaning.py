@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri
 
 from cosim import InputError
-from fmus.actuators.response import layouts
+from fmus.actuators.response import CommandLayout, layouts
 from fmus.ops import wrap
 from fmus.scale import REFERENCE, Scale
 
@@ -89,8 +89,8 @@ class Track(ShortRepr):
     @cached_property
     def slewing(self) -> float:
         """Time [s] that commands with a limited rate take for all of their way in a run, or to zero."""
-        layout, commands = self.run.ship and layouts(self.run.ship)[0], self.run.commands
-        if not layout or commands is None or len(layout.rates) != commands.shape[1]:
+        layout, commands = _layout(self.run), self.run.commands
+        if layout is None or commands is None:
             return 0.0
         rates = np.array(layout.rates)
         ways = np.ptp(np.vstack([commands, np.zeros_like(rates)]), axis=0)
@@ -307,12 +307,18 @@ def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarr
 
 def angles_beside(run: Run) -> dict[str, np.ndarray]:
     """Angles of a run beside its heading: those that are measured, and commands that may go round."""
-    layout, commands = run.ship and layouts(run.ship)[0], run.commands
-    found = other_angles(run.measured)
-    if not layout or commands is None or not len(layout.rates) == len(run.signals) == commands.shape[1]:
+    layout, commands, found = _layout(run), run.commands, other_angles(run.measured)
+    if layout is None or commands is None or len(run.signals) != commands.shape[1]:
         return found
     turns = np.broadcast_to(layout.round, commands.shape[1])
     return found | {s: x for s, x, turn in zip(run.signals, commands.T, turns, strict=True) if turn}
+
+
+def _layout(run: Run) -> CommandLayout | None:
+    """How a ship's description lays out the commands of a run; None: they are others, or none."""
+    layout = layouts(run.ship)[0] if run.ship else None
+    fits = layout and run.commands is not None and len(layout.rates) == run.commands.shape[1]
+    return layout if fits else None
 
 
 def lost(pose: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from .likely_columns import (
     is_of_shaft,
     is_steering,
     meaning_of_words,
-    says_nothing_else,
+    names_no_other_machine,
     signal_of_symbol,
     unit_in,
 )
@@ -134,7 +134,7 @@ def _by_words(
             only["angle"].append(Column(name=name, unit=unit))
     for kind, told in only.items():
         left = [s for s, q in quantity.items() if q == kind and "." in s and s not in {*columns, *found}]
-        bare = [c for c in told if says_nothing_else(c.name)]
+        bare = [c for c in told if names_no_other_machine(c.name)]
         of_one = _orders(bare or told)
         if len(left) == len(of_one) == 1:
             found[left[0]] = of_one

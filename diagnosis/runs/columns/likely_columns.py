@@ -127,7 +127,7 @@ def is_of_shaft(name: str, unit: str) -> bool:
     return told or unit in ("rpm", "rps")
 
 
-def says_nothing_else(name: str) -> bool:
+def names_no_other_machine(name: str) -> bool:
     """Whether a name is that of revolutions or a rudder, and of no other machine, as a generator."""
     left = {word for word in words_of(name) if not word.isdigit()}
     return left <= FILLERS | REVOLUTIONS | {"rudder", "propeller"}

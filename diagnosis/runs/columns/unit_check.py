@@ -77,9 +77,9 @@ FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 # orders units ten times apart.
 USUAL = 0.4
 TURN = 360.0  # degrees
-# Counts in a turn: gon, tenths and hundredths of a degree, as of some compasses and of MAVLink, mils,
+# Counts in a turn: tenths and hundredths of a degree, as of some compasses and of MAVLink, gon, mils,
 # parts of 16 bits, thousandths of a radian.
-COUNTS = (400.0, 10.0 * TURN, 100.0 * TURN, 6400.0, 65536.0, 2000.0 * math.pi)
+COUNTS = (10.0 * TURN, 100.0 * TURN, 400.0, 6400.0, 65536.0, 2000.0 * math.pi)
 AHEAD = 0.5  # 1, of the way that a constant heading does not explain, what one in degrees does (chosen)
 
 
@@ -209,7 +209,7 @@ def part_of_degree(pose: np.ndarray) -> float:
     if most <= 2.0 * TURN:
         return 1.0
     way = np.diff(pose[there, 0]) + 1j * np.diff(pose[there, 1])
-    within = [1.0, *(TURN / n for n in COUNTS[1:3] if most <= n)]
+    within = [1.0, *(TURN / n for n in COUNTS[:2] if most <= n)]
     return max(within, key=lambda part: follows(way, psi[:-1] * c.degree * part))
 
 

@@ -82,8 +82,8 @@ def _is_percent(name: str) -> bool:
 
 def _unit_within(most: Mapping[str, float], limits: Mapping[str, float], quantity: str) -> str | None:
     """The only unit in which commands of a quantity are within limits; None: SI, or it is not known."""
-    known = [(unit, size) for unit, size in UNITS[quantity].items() if unit not in STATED]
-    smaller = {size: unit for unit, size in reversed(known) if size < 1.0}
+    units = reversed(UNITS[quantity].items())
+    smaller = {size: unit for unit, size in units if size < 1.0 and unit not in STATED}
     if not smaller:
         return None
     share = max((most[s] / limits[s] for s in most if limits[s] > 0.0), default=0.0)

@@ -25,8 +25,7 @@ OPPOSITE = "its sign is reversed"
 def units(run: Run, scale: Scale) -> Examined:
     """Velocity and yaw rate that are many times what the pose says, or its opposite."""
     plain = without_code(run)
-    found = mirrored(plain.run)
-    found = replace(found, notes=(*plain.notes, *found.notes))
+    found = replace(mirrored(plain.run), notes=plain.notes)
     e = evidence(found.run)
     if e is None:
         return found
