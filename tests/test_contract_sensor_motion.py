@@ -31,8 +31,8 @@ def turned(angle, ahead, aside):
 def seen(psi=PSI, velocity=None, rate=None, by=("u", "v"), rows=None, measured=None, time=TIME):
     """The evidence of channels, all with the times of the log."""
     velocity = turned(psi, U, V) if velocity is None else velocity
-    run = SimpleNamespace(time=time, measured=measured or {}, pose=np.zeros((time.size, 3)))
     rate = np.gradient(psi, time) if rate is None else rate
+    run = SimpleNamespace(time=time, measured={"r": rate, **(measured or {})}, pose=np.zeros((time.size, 3)))
     return Evidence(run, np.arange(time.size) if rows is None else rows, psi, velocity, rate, by, None)
 
 
@@ -215,7 +215,10 @@ def test_only_what_is_sure_and_matters_is_kept():
     path = path_of(
         [1.0] * 4, every, (-0.02, 0.09, 0.0399, 0.0401, 0.02), (0.001, 0.001, 0.01, 0.01, 0.0)
     )
-    assert [c.channel for c in motion._sure(path)] == ["u", "y"]
+    found = MotionFaults(path, False)
+    assert [c.channel for c in motion._sure(found)] == ["u", "y"]
+    scattered = found._replace(scatter=np.array([0.0, 0.0, 0.0, 0.001, 0.0]))  # 0.01005 in all
+    assert [c.channel for c in motion._sure(scattered)] == ["u"]
 
 
 def test_an_even_clock_is_one_finding_and_no_scale():

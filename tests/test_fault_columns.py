@@ -125,6 +125,29 @@ def test_a_column_is_what_one_unit_of_its_fault_adds_to_the_path(by, channel, ki
     np.testing.assert_allclose(added, expected, atol=0.01 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("by", PAIRS)
+def test_a_fault_in_a_part_of_the_run_adds_what_it_adds_there(by):
+    e = evidence(run_with(by))
+    part = np.repeat([0, 1, 2], [500, 1000, T.size - 1501])
+    for column in columns(e, REFERENCE):
+        each = np.array([own.path for own in column.in_parts(part, 3)])
+        np.testing.assert_allclose(each.sum(axis=0), column.path - column.path[0], atol=1e-9)
+        for own, first, last in zip(each, (0, 500, 1500), (500, 1500, T.size - 1), strict=True):
+            assert not own[: first + 1].any() and np.ptp(own[last:], axis=0) == pytest.approx(0.0)
+            gone = column.path[last] - column.path[first]
+            assert own[last] == pytest.approx(gone, abs=1e-9)
+
+
+def test_a_yaw_rate_that_is_not_measured_has_no_fault_there():
+    run = run_with(("u", "v"))
+    missing = (T >= 100.0) & (T <= 140.0)
+    rate = np.where(missing, np.nan, run.measured["r"])
+    e = evidence(replace(run, measured={**run.measured, "r": rate}))
+    for column in columns(e, REFERENCE):
+        moved = np.abs(np.diff(column.path[missing], axis=0)).sum()
+        assert (moved == 0.0) == (column.channel == "r"), column
+
+
 @pytest.mark.parametrize(("by", "channel", "kind"), CASES)
 def test_a_repair_undoes_a_fault(by, channel, kind):
     size, true = 0.1, run_with(by)

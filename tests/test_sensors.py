@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from support.measured import DATA
 
 import diagnosis
@@ -86,6 +87,28 @@ def test_a_constant_fault_is_named_with_its_size_and_repaired(name):
     assert found.findings[0].value == pytest.approx(value, rel=0.1)
     assert not told(found.run)
     assert closure(found.run, 30.0, 10.0).position < 0.02
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("turning", "named"), [(0.5, ("psi", "offset")), (2.0, ("psi", "deviation_cos"))])
+def test_an_error_that_goes_with_speed_and_course_is_no_scale_of_the_yaw_rate(turning, named, seed):
+    """A gyrocompass errs by the speed to the north: nearly an offset on few headings, a cosine on all."""
+    run = made(seed, turning)
+    north = gaussian_filter1d(np.gradient(run.pose[:, 0], run.time), 10.0)
+    found = told(replace(run, pose=run.pose + np.column_stack([0.0 * north, 0.0 * north, -1.0 * north])))
+    assert named in found and {channel for channel, _ in found} <= {"psi", "u"}
+    assert {kind for channel, kind in found if channel == "psi"} == {named[1]}
+
+
+def test_a_constant_of_half_of_the_run_has_the_uncertainty_of_its_parts():
+    """An axis that is off by 0.04 rad in the second half alone: parts of 0, 0, 0.04 and 0.04."""
+    run = made()
+    off = np.where(run.time > SECONDS / 2.0, 0.04, 0.0)
+    broken = replace(run, pose=run.pose + np.column_stack([0.0 * off, 0.0 * off, off]))
+    assert ("psi", "offset") not in told(broken)
+    whole = replace(run, pose=run.pose + np.array([0.0, 0.0, 0.04]))
+    fault = told(whole)["psi", "offset"]
+    assert fault.ci95[0] < 0.04 < fault.ci95[1] and np.ptp(fault.ci95) < 0.02
 
 
 def test_a_unit_of_the_rate_is_named():

@@ -13,7 +13,7 @@ from fmus.scale import REFERENCE_LENGTH, Scale
 
 from ..cleaning import noise
 from ..run_constants import HORIZON
-from .evidence import Evidence, integral
+from .evidence import Evidence, integral, without_rate
 
 Needs = Literal["velocity", "rate"]
 Deviation = Literal["deviation_sin", "deviation_cos", "deviation_sin_2", "deviation_cos_2"]
@@ -51,6 +51,12 @@ class FaultColumn(NamedTuple):
     path: np.ndarray
     least: float
     clocked: bool = True
+
+    def in_parts(self, part: np.ndarray, count: int) -> "list[FaultColumn]":
+        """The same fault in each part of a run alone; ``part`` (n - 1,) is that of each step."""
+        steps, start = np.diff(self.path, axis=0), np.zeros((1, 3))
+        each = (np.where((part == k)[:, None], steps, 0.0) for k in range(count))
+        return [self._replace(path=np.vstack([start, np.cumsum(own, axis=0)])) for own in each]
 
 
 def columns(e: Evidence, scale: Scale) -> list[FaultColumn]:
@@ -107,11 +113,15 @@ def _of_rate(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
     """Scale, offset and delay of the yaw rate."""
     if e.rate is None:
         return []
-    offset = _path(e, turn=e.time[0] - e.time)
+    measured = ~without_rate(e.run)[1:]
+    scaled, offset, delay = (
+        _path(e, turn=np.cumsum(np.append(0.0, np.diff(turn) * measured)))
+        for turn in (-e.turned, -e.time, e.rate)
+    )
     return [
-        FaultColumn("r", "scale", "1", "rate", _path(e, turn=-e.turned), _least_scale(e.rate[:, None])),
+        FaultColumn("r", "scale", "1", "rate", scaled, _least_scale(e.rate[:, None])),
         FaultColumn("r", "offset", "rad/s", "rate", offset, LEAST / (HORIZON * scale.time)),
-        FaultColumn("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
+        FaultColumn("r", "delay", "s", "rate", delay, late, False),
     ]
 
 

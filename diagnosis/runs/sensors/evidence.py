@@ -135,15 +135,19 @@ def _whole(run: Run, name: str) -> np.ndarray:
     return np.interp(run.time, run.time[there], np.unwrap(values) if name == "course" else values)
 
 
-def _rate_of_turn(run: Run, psi: np.ndarray) -> np.ndarray:
-    """(n,) [rad/s]; where it is missing for long that of the heading (n,), which contradicts nothing."""
+def without_rate(run: Run) -> np.ndarray:
+    """Rows (n,) far from any measured yaw rate."""
     missing = ~np.isfinite(run.measured["r"])
     known = run.time[~missing]
     step = np.diff([-np.inf, *known, np.inf])[np.searchsorted(known, run.time, side="right")]
-    far = missing & (step > long_gap(float(np.median(np.diff(known))), REFERENCE))
+    return missing & (step > long_gap(float(np.median(np.diff(known))), REFERENCE))
+
+
+def _rate_of_turn(run: Run, psi: np.ndarray) -> np.ndarray:
+    """(n,) [rad/s]; where it is missing for long that of the heading (n,), which contradicts nothing."""
     with np.errstate(all="ignore"):  # two rows may have one time
         turning = np.gradient(psi, run.time)
-    return np.where(far & np.isfinite(turning), turning, _whole(run, "r"))
+    return np.where(without_rate(run) & np.isfinite(turning), turning, _whole(run, "r"))
 
 
 def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from fmus.scale import Scale
 
 from ..cleaning import noise
 from ..files.reading import Run
-from ..run_constants import BLOCKS
+from ..run_constants import BLOCKS, PARTS
 from .clock_path import (
     DRIFT,
     HEADING,
@@ -57,6 +57,7 @@ class MotionFaults(NamedTuple):
         either: whether a compass that is off by heading would look like that clock.
         torn: whether way and turn would each need a clock of its own.
         by_way: whether the way alone tells of that clock.
+        scatter: (k,), of its constants, see :func:`_scatter`.
     """
 
     path: Path
@@ -64,6 +65,12 @@ class MotionFaults(NamedTuple):
     either: bool = False
     torn: bool = False
     by_way: bool = False
+    scatter: np.ndarray | float = 0.0
+
+    @property
+    def std(self) -> np.ndarray:
+        """(k,), standard deviation of the constants."""
+        return np.hypot(self.path.deviation, self.scatter)
 
 
 def motion(
@@ -181,15 +188,39 @@ def _estimated(
     if torn:  # nor is what is wrong a constant: of these a delay alone may have torn them
         wanders = False
         path = problem.solve([c for c in every if c.kind == "delay"], fixed_clock=True)
-    while len(kept := _sure(path)) < len(path.columns):
-        path = problem.solve(kept, fixed_clock=not wanders)
-    return MotionFaults(path, wanders, either, torn, wanders and e.rate is None)
+    found = MotionFaults(path, wanders, either, torn, wanders and e.rate is None)
+    while True:
+        while len(kept := _sure(found)) < len(found.path.columns):
+            found = found._replace(path=problem.solve(kept, not wanders), scatter=0.0)
+        if not isinstance(found.scatter, float):
+            return found
+        found = found._replace(scatter=_scatter(found.path, not wanders))
 
 
-def _sure(path: Path) -> list[FaultColumn]:
+def _sure(found: MotionFaults) -> list[FaultColumn]:
     """Constants that are sure and matter."""
-    found = zip(path.columns, path.constants, path.deviation, strict=True)
-    return [c for c, value, s in found if abs(value) > max(SURE * s, c.least) and s > 0.0]
+    each = zip(found.path.columns, found.path.constants, found.std, strict=True)
+    return [c for c, value, s in each if abs(value) > max(SURE * s, c.least) and s > 0.0]
+
+
+def _scatter(path: Path, fixed_clock: bool) -> np.ndarray:
+    """Standard deviation (k,) of constants by what their values in parts of the run differ by.
+
+    An error that is no constant, as of a gyrocompass by speed and course, has another value in each
+    part. The variance between the parts is that of DerSimonian and Laird (1986), Control. Clin. Trials 7.
+    """
+    if not path.columns:
+        return np.zeros(0)
+    time = path.problem.evidence.time
+    part = np.minimum((PARTS * (time[:-1] - time[0]) / (time[-1] - time[0])).astype(int), PARTS - 1)
+    each = path.problem.solve([p for c in path.columns for p in c.in_parts(part, PARTS)], fixed_clock)
+    values, own = (x.reshape(-1, PARTS) for x in (each.constants, each.deviation))
+    weights = np.where(own > 0.0, np.where(own > 0.0, own, 1.0) ** -2.0, 0.0)
+    total, squares = weights.sum(axis=1), (weights**2).sum(axis=1)
+    mean = (weights * values).sum(axis=1) / total
+    apart = (weights * (values - mean[:, None]) ** 2).sum(axis=1) - ((weights > 0.0).sum(axis=1) - 1)
+    between = np.maximum(apart, 0.0) / np.maximum(total - squares / total, np.finfo(float).tiny)
+    return np.sqrt(between * squares) / total
 
 
 def _clock(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
@@ -224,7 +255,7 @@ def _even(found: MotionFaults) -> tuple[float, float] | None:
     at = [k for k, c in enumerate(found.path.columns) if c.kind == "scale"]
     if found.wanders or len(at) < 2:
         return None
-    values, variances = found.path.constants[at], found.path.deviation[at] ** 2
+    values, variances = found.path.constants[at], found.std[at] ** 2
     if abs(values[0] - values[1]) > max(SURE * np.sqrt(variances.sum()), LEAST):
         return None
     weights = 1.0 / variances
@@ -237,7 +268,7 @@ def _constants(found: MotionFaults, e: Evidence) -> list[SensorFinding]:
     # Whether the run turns so much that its turns tell by how much the clock is off at the least.
     drift = path.std[TURN] * np.sqrt(e.time[-1] - e.time[0])
     turns = e.rate is not None and np.hypot(drift, path.std[HEADING]) < SURE * LEAST * np.ptp(e.psi)
-    for c, x, s in zip(path.columns, path.constants.tolist(), path.deviation.tolist(), strict=True):
+    for c, x, s in zip(path.columns, path.constants.tolist(), found.std.tolist(), strict=True):
         value, std, text, alike, aside = x, s, "", (), ()
         if c.kind == "scale":
             if by_clock:
