@@ -32,7 +32,9 @@ def seen(psi=PSI, velocity=None, rate=None, by=("u", "v"), rows=None, measured=N
     """The evidence of channels, all with the times of the log."""
     velocity = turned(psi, U, V) if velocity is None else velocity
     rate = np.gradient(psi, time) if rate is None else rate
-    run = SimpleNamespace(time=time, measured={"r": rate, **(measured or {})}, pose=np.zeros((time.size, 3)))
+    run = SimpleNamespace(
+        time=time, measured={"r": rate, **(measured or {})}, pose=np.zeros((time.size, 3))
+    )
     return Evidence(run, np.arange(time.size) if rows is None else rows, psi, velocity, rate, by, None)
 
 

@@ -207,7 +207,7 @@ def _scatter(path: Path, fixed_clock: bool) -> np.ndarray:
     """Standard deviation (k,) of constants by what their values in parts of the run differ by.
 
     An error that is no constant, as of a gyrocompass by speed and course, has another value in each
-    part. The variance between the parts is that of DerSimonian and Laird (1986), Control. Clin. Trials 7.
+    part. The variance between parts is by DerSimonian and Laird (1986), Control. Clin. Trials 7.
     """
     if not path.columns:
         return np.zeros(0)
