@@ -21,11 +21,10 @@ from scipy.linalg import eigh
 
 from cosim import InputError
 from cosim.campaign import Posterior, read_posterior
-from fmus.frames import rotate_to_body
 
 from ..predictors import Model
 from ..predictors.shooting import Shooting
-from ..runs import Fingerprint, Smoothed, fingerprints
+from ..runs import Fingerprint, Smoothed, body_velocity, fingerprints
 from ..runs.run_constants import DIGITS
 from ..search.prediction_fit.disturbance import ForceDisturbance, covariance
 from .criterion import JUDGED, InputStd
@@ -206,8 +205,7 @@ def _initial(p: Predictions, base: np.ndarray) -> Variances:
 
 def _in_body(s: Smoothed) -> Smoothed:
     """A run with the velocity of the body as pose and rates have it."""
-    x_dot, y_dot, r = s.eta_dot.T
-    return replace(s, nu=np.column_stack([*rotate_to_body(s.eta[:, 2], x_dot, y_dot), r]))
+    return replace(s, nu=body_velocity(s.eta[:, 2], s.eta_dot))
 
 
 def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Variances:

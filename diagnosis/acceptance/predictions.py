@@ -6,12 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from cosim import InputError
-from fmus.frames import rotate_to_body
 from fmus.ops import wrap
 
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
-from ..runs import Smoothed
+from ..runs import Smoothed, body_velocity
 from ..runs.run_constants import NEGLIGIBLE
 from .criterion import JUDGED
 
@@ -109,9 +108,7 @@ class Predictions:
         one[:, 2], two[:, 2] = wrap(one[:, 2]), wrap(two[:, 2])
         one, two = one / (t1 - t0)[:, None], two / (t2 - t1)[:, None]
         rate = two + (two - one) * ((t2 - t1) / (t2 - t0))[:, None]
-        psi = pose[k, 2]
-        u, v = rotate_to_body(psi, rate[:, 0], rate[:, 1])
-        return np.column_stack([pose[k], u, v, rate[:, 2]])
+        return np.column_stack([pose[k], body_velocity(pose[k, 2], rate)])
 
 
 def possible(smoothed: Smoothed, horizon: float) -> int:

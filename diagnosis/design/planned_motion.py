@@ -4,13 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fmus.frames import rotate_to_body
 from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..predictors import Model, WeakWindows, weak_windows
 from ..predictors.uncertainty import MEASURED
-from ..runs import Run, Smoothed
+from ..runs import Run, Smoothed, body_acceleration, body_velocity
 
 
 def usable_thrust() -> float:
@@ -83,8 +82,7 @@ class PlannedMotion:
     @property
     def nu(self) -> np.ndarray:
         """(n, 3), body-fixed velocity."""
-        u, v = rotate_to_body(self.eta[:, 2], self.eta_dot[:, 0], self.eta_dot[:, 1])
-        return np.column_stack([u, v, self.eta_dot[:, 2]])
+        return body_velocity(self.eta[:, 2], self.eta_dot)
 
     def thrust(self, model: Model) -> np.ndarray:
         """(n, 3), force that is commanded, or that a model needs for the motion [N, N, N m]."""
@@ -92,9 +90,7 @@ class PlannedMotion:
             ship = model.ship
             return self.orders if ship.description.allocates else ship.commanded_force(self.orders)
         nu = self.nu
-        u, v = rotate_to_body(self.eta[:, 2], self.eta_ddot[:, 0], self.eta_ddot[:, 1])
-        r = nu[:, 2]
-        nu_dot = np.column_stack([u + r * nu[:, 1], v - r * nu[:, 0], self.eta_ddot[:, 2]])
+        nu_dot = body_acceleration(self.eta[:, 2], nu, self.eta_ddot)
         state = vessel.State._make([*self.eta.T, *nu.T, self.time])
         free = vessel.disturbed(state, Force(0.0, 0.0, 0.0), model.hull)
         needed = (nu_dot - np.column_stack(np.broadcast_arrays(*free))) @ model.mass.T

@@ -28,10 +28,10 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from cosim import InputError
-from fmus.frames import rotate_to_body, rotate_to_earth
+from fmus.frames import rotate_to_earth
 from fmus.ops import wrap
 
-from ..runs import Fingerprint, Run, Smoothed
+from ..runs import Fingerprint, Run, Smoothed, body_velocity
 from ..runs.cleaning import between
 from ..runs.columns.columns import TAU
 from ..runs.run_constants import DIGITS
@@ -222,7 +222,7 @@ class BlackBox(ABC):
         nu = motion[:, 3:, 0]
         if np.isnan(nu).any():
             rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
-            nu = np.column_stack([*rotate_to_body(pose[:, 2], rate[:, 0], rate[:, 1]), rate[:, 2]])
+            nu = body_velocity(pose[:, 2], rate)
         time = smoothed.time[0] + h * np.arange(steps + 1)
         columns = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2]), nu])
         return between(smoothed.time, time, columns)

@@ -1,3 +1,5 @@
+from .body_motion import body_acceleration as body_acceleration
+from .body_motion import body_velocity as body_velocity
 from .cleaning import Counts as Counts
 from .cleaning import Track as Track
 from .cleaning import clean as clean

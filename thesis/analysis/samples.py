@@ -10,10 +10,9 @@ import numpy as np
 from cosim import InputError
 from diagnosis.execution import Advance, silent
 from diagnosis.predictors import Model
-from diagnosis.runs import PreparedRun, prepare, read_each
+from diagnosis.runs import PreparedRun, body_acceleration, prepare, read_each
 from fmus.controller.models import ROTATIONAL
 from fmus.controller.parametrisation import ControllerModel
-from fmus.frames import rotate_to_body
 from fmus.hull import mass_matrix
 from fmus.observer import mdf
 from fmus.observer.screen import Inputs
@@ -164,10 +163,7 @@ def _samples(
 def _smoothed(prepared: PreparedRun, of: Ship) -> Samples:
     """By the smoother, at all samples."""
     s = prepared.smoothed
-    ahead, aside = rotate_to_body(s.eta[:, 2], s.eta_ddot[:, 0], s.eta_ddot[:, 1])
-    u, v, r = s.nu.T
-    # The body-fixed axes turn at the yaw rate.
-    nu_dot = np.column_stack([ahead + r * v, aside - r * u, s.eta_ddot[:, 2]])
+    nu_dot = body_acceleration(s.eta[:, 2], s.nu, s.eta_ddot)
     return _samples(prepared, prepared.samples, s.nu, nu_dot, of)
 
 

@@ -17,12 +17,11 @@ from cosim.fmu import ConfinedFmu
 from cosim.fmu import FmuModel as FmuModel
 from cosim.system import prepare
 from cybership.scratch_folder import Scratch
-from fmus.frames import rotate_to_body
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
 from ...execution.result_folder import sha256
-from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed
+from ...runs import OF_UNIT, QUANTITY, Fingerprint, Run, Smoothed, body_acceleration, body_velocity
 from ...runs.run_constants import WIDTH
 from ..black_box import (
     MOTION,
@@ -297,10 +296,9 @@ class FmuPredictor(BlackBox):
         if set(VELOCITY) <= motion.keys():
             return np.column_stack([slopes(motion[s])[0] for s in VELOCITY])
         x, y, psi = (motion[s] for s in POSE)
-        (x_dot, x_ddot), (y_dot, y_ddot), (r, r_dot) = map(slopes, (x, y, np.unwrap(psi, axis=0)))
-        u, v = rotate_to_body(psi[0], x_dot, y_dot)
-        u_dot, v_dot = rotate_to_body(psi[0], x_ddot, y_ddot)
-        return np.column_stack([u_dot + r * v, v_dot - r * u, r_dot])
+        derivatives = zip(*map(slopes, (x, y, np.unwrap(psi, axis=0))), strict=True)
+        eta_dot, eta_ddot = map(np.column_stack, derivatives)
+        return body_acceleration(psi[0], body_velocity(psi[0], eta_dot), eta_ddot)
 
     @property
     def _started_by(self) -> str:

@@ -20,6 +20,7 @@ from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
 from ...execution.short_text import ShortRepr
+from ..body_motion import body_velocity
 from ..cleaning import BRIEF, HEADING, PLACE, WIDTH, Counts, Track, noise
 from ..columns.columns import POSE
 from ..frozen import repeated
@@ -212,8 +213,7 @@ def _motion(
 ) -> SmoothMotion:
     """The motion by the pose about an origin (3,), and its derivatives."""
     eta = offset + origin
-    u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])
-    return SmoothMotion(eta, eta_dot, eta_ddot, np.column_stack([u, v, eta_dot[:, 2]]))
+    return SmoothMotion(eta, eta_dot, eta_ddot, body_velocity(eta[:, 2], eta_dot))
 
 
 def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:

@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.frames import rotate_to_body
 from fmus.vessel.vessel import State
 
 from ...execution.parallel import for_each
 from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass, in_wind
-from ...runs import Run, Smoothed, SmoothMotion, without_commands
+from ...runs import Run, Smoothed, SmoothMotion, body_acceleration, without_commands
 from ...runs.cleaning import BRIEF, between
 from ...runs.files.telegrams import groups_of
 from ...runs.run_constants import NEGLIGIBLE
@@ -237,9 +236,7 @@ def model_error(smoothed: Smoothed, motion: SmoothMotion, model: Model) -> np.nd
     """omega (n, 3) [N, N, N m] by the acceleration of a run's motion, NaN where there is none."""
     run = smoothed.track.run
     eta, _, eta_ddot, nu = motion
-    u_dot, v_dot = rotate_to_body(eta[:, 2], eta_ddot[:, 0], eta_ddot[:, 1])
-    u, v, r = nu.T
-    nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, eta_ddot[:, 2]])
+    nu_dot = body_acceleration(eta[:, 2], nu, eta_ddot)
     between = Response(run, model).between_samples
     s = State._make([*eta.T, *nu.T, run.time])
     met = inflow(s, in_wind(model, smoothed, s))
