@@ -1112,7 +1112,12 @@ def test_the_line_that_mends_a_column_keeps_the_name_and_unit_it_was_read_by(tmp
         "y": {"name": "y", "flip": True},
     }
     (tmp_path / "a.csv.json").write_text(json.dumps(content))
-    np.testing.assert_allclose(read(path, of=OTTER).pose, run.pose * [1.0, -1.0, -1.0])
+    mended = read(path, of=OTTER)
+    np.testing.assert_allclose(mended.pose, run.pose * [1.0, -1.0, -1.0])
+    line = line_beside(path, mended.layout, {"x": Named(name="x", factor=-1.0)})
+    content = json.loads(line.partition("put ")[2].rpartition(" into ")[0])
+    only = {"x": {"name": "x [mm]", "unit": "mm", "flip": True}}
+    assert content["columns"] == only, "what the side-car states already is not said again"
 
 
 def test_units_that_numbers_alone_tell_are_named(tmp_path: Path) -> None:

@@ -271,12 +271,15 @@ def test_what_it_prints_is_kept_once_shortened_and_without_escape_codes(tmp_path
     assert len(cleaned("word " * 1000)) == LONGEST_PRINTED
 
 
-def test_only_so_many_lines_are_kept(tmp_path):
-    confined = opened(build_lag(tmp_path, habit='for (int k = 0; k < 5000; k++) printf("%d\\n", k);'))
+@pytest.mark.parametrize(("lines", "more"), [(MOST_PRINTED, 0), (5000, 5000 - MOST_PRINTED)])
+def test_only_so_many_lines_are_kept(tmp_path, lines, more):
+    habit = f'for (int k = 0; k < {lines}; k++) printf("%d\\n", k);'
+    confined = opened(build_lag(tmp_path, habit=habit))
     try:
         stepped(confined)
-        assert len(confined.printed) == MOST_PRINTED + 1
-        assert [*confined.printed][-1] == "... and 4900 more lines"
+        kept = [*confined.printed]
+        assert kept[:MOST_PRINTED] == [str(k) for k in range(MOST_PRINTED)]
+        assert kept[MOST_PRINTED:] == ([f"... and {more} more lines"] if more else [])
     finally:
         confined.close()
 

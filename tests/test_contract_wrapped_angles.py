@@ -42,6 +42,14 @@ def test_rows_of_a_line_through_a_wrap_are_on_the_short_way(rows, side):
     assert found[kept].tolist() == (side * seen)[kept].tolist()
 
 
+@pytest.mark.parametrize(("turn", "wrapped"), [(1.5, True), (2.0, True), (2.2, False)])
+def test_a_line_through_a_wrap_may_span_a_turn_of_less_than_half_of_itself(turn, wrapped):
+    """Rows between two telegrams while the ship turns: 2 pi less the turn is twice the turn at 2.09 rad."""
+    seen = np.concatenate([np.full(20, 2.5), np.linspace(2.5, 2.5 + turn - 2.0 * np.pi, 6)[1:-1]])
+    seen = np.concatenate([seen, np.full(20, 2.5 + turn - 2.0 * np.pi)])
+    assert (wraps.unwrapped(seen)[1].size == 4) == wrapped
+
+
 def test_rows_without_an_angle_are_passed_over():
     true, seen, inside = crossing(5, rate=0.1)
     gaps = np.full(2 * seen.size, np.nan)

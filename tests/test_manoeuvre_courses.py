@@ -125,6 +125,14 @@ def test_circles_are_ellipses_with_the_heading_along_them(side, astern):
     assert np.hypot(np.gradient(x, H), np.gradient(y, H)).max() <= 0.5 * 1.1
 
 
+@pytest.mark.parametrize("x", [0.0, 0.5, 1.0])
+def test_the_quickest_circle_is_as_quick_as_the_reach(x):
+    """From 0.3 of its speed to all of it, where no yaw rate limits it."""
+    _, pose = course("circle", (0.0, 0.0, 1.0, 1.0, x), 2000.0)
+    speed = np.hypot(np.gradient(pose[:, 0], H), np.gradient(pose[:, 1], H))
+    assert np.median(speed) == pytest.approx(0.5 * (0.3 + 0.7 * x), rel=0.05)
+
+
 @pytest.mark.parametrize("x", [0.0, 0.3, 1.0])
 def test_a_rotation_keeps_its_point_where_it_is(x):
     T = rounds(np.pi * (0.3 + 0.7 * x), 0.125, 3.5)

@@ -282,7 +282,7 @@ def test_columns_of_any_type_become_parquet(tmp_path):
 def test_parquet_holds_what_csv_holds(scenario, tmp_path):
     pytest.importorskip("pyarrow")
     command(scenario(), "--out", tmp_path / "csv", "--no-plots")
-    done = command(scenario(log={"format": "parquet"}), "--out", tmp_path / "parquet", "--no-plots")
+    done = command(scenario(), "--out", tmp_path / "parquet", "--no-plots", "--parquet")
     assert done.returncode == 0
     assert not (tmp_path / "parquet" / "log.csv").exists()
     a, b = cosim.read_log(tmp_path / "csv"), cosim.read_log(tmp_path / "parquet")
