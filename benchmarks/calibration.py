@@ -112,7 +112,7 @@ def simulated(seeds: Sequence[int], noise: str, folder: Path) -> Found:
         found.inside += held
         found.damping.append(float(np.mean(damping)))
         (e,) = evaluate(runs[-1:], Model(), model).evaluations
-        bands = prediction_bands(e.smoothed, e.windows, model, posterior, fit.push)
+        bands = prediction_bands(e.smoothed, e.windows, model, posterior, fit.disturbance)
         if bands is not None:
             found.add(window_shares(bands, e.after.residuals))
         print(f"{cell.name}, seed {cell.seed}: {sum(held)} of {len(held)}", flush=True)

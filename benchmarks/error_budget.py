@@ -94,7 +94,7 @@ def budget(runs: Sequence[WeakWindows], model: Model) -> Iterator[Part]:
     model, std = fit.findings.model, fit.posterior.std
     kept = [k for k, x in enumerate(std.values()) if x > 0.0]
     names, C = [[*std][k] for k in kept], fit.posterior.covariance[np.ix_(kept, kept)]
-    size = dict(zip(CONSTANTS, fit.unrecorded.push.size.tolist(), strict=True))
+    size = dict(zip(CONSTANTS, fit.unrecorded.disturbance.size.tolist(), strict=True))
     windows = Shooting([w.smoothed for w in runs], runs[0].horizon)
     around = windows.around(model, {n: SMALL * (std | size)[n] for n in (*names, *CONSTANTS)})
     numbers = np.unique(windows.run, return_inverse=True)[1]

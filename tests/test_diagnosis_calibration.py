@@ -19,7 +19,13 @@ from diagnosis.search.prediction_fit.coefficient_calibration import (
     as_missed,
     begin,
 )
-from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, push_of, shootings, whitened
+from diagnosis.search.prediction_fit.fit import (
+    PredictionFit,
+    disturbance_of,
+    fit_to,
+    shootings,
+    whitened,
+)
 from diagnosis.search.prediction_fit.joint_posterior import JointPosterior
 from diagnosis.search.prediction_fit.refit import prediction_bands
 from diagnosis.search.prior import NominalPrior
@@ -96,7 +102,7 @@ def test_the_disturbance_is_scaled_to_what_the_windows_miss():
     model = at.model(PRIOR)
     (spread,), around = plain.spreads, problem.around(windows, model)
     W = problem.whitening(windows, spread, around.residuals)
-    _, pushes = push_of(runs(), model_error(runs(), model), problem.std)
+    _, pushes = disturbance_of(runs(), model_error(runs(), model), problem.std)
     expected = np.einsum("wii->", problem.scatter(windows, around, W, pushes))
     assert share == pytest.approx(np.sum(whitened(W, around.residuals) ** 2) / expected, rel=2e-3)
 
@@ -118,7 +124,9 @@ def test_bands_are_as_wide_as_predictions_of_runs_left_out_are_off():
     model, posterior = fitted.estimate.model(PRIOR), JointPosterior.of(fitted, PRIOR)
     found = as_missed(problem, fitted, model, posterior)
     for times in (0.2, 5.0):
-        other = replace(fitted, push=replace(fitted.push, size=times * fitted.push.size))
+        other = replace(
+            fitted, disturbance=replace(fitted.disturbance, size=times * fitted.disturbance.size)
+        )
         assert as_missed(problem, other, model, posterior).size == pytest.approx(found.size, rel=1e-6)
     squares = []
     for w, left_out in zip(runs(), fitted.fold_models, strict=True):

@@ -459,7 +459,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
     found, error = fit.estimate.values["delta_N_r"], np.sqrt(fit.covariance[0, 0])
     assert abs(found - true) < 1.96 * error
     assert error < 0.1 * abs(LIGHTLY_DAMPED)
-    assert fit.push.size[2] > 10.0 * fit.push.size[:2].max()
+    assert fit.disturbance.size[2] > 10.0 * fit.disturbance.size[:2].max()
 
 
 def test_posterior_has_total_values_by_the_names_of_the_fmus(tmp_path):
@@ -495,7 +495,7 @@ def test_bands_hold_what_they_say_and_widen_with_a_push():
     fit, prior = fitted()
     run, model = hidden().smoothed, fit.estimate.model(prior)
     posterior, seen = JointPosterior.of(fit, prior), Windows([hidden().smoothed])
-    narrow = prediction_bands(run, seen, model, posterior, fit.push)
+    narrow = prediction_bands(run, seen, model, posterior, fit.disturbance)
     wide = prediction_bands(
         run, seen, model, posterior, ForceDisturbance(np.full(3, 0.5), np.full(3, 2.0))
     )
@@ -507,7 +507,7 @@ def test_bands_hold_what_they_say_and_widen_with_a_push():
     assert wide.coverage(residuals) > 0.99
     assert narrow.coverage(residuals + np.ones(3)) < 0.01
     assert wide.ellipses(0, 0.9).shape[::2] == (narrow.since.size, 2)
-    assert prediction_bands(run, None, model, posterior, fit.push) is None
+    assert prediction_bands(run, None, model, posterior, fit.disturbance) is None
 
 
 def test_fits_that_differ_are_told():

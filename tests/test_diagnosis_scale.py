@@ -117,9 +117,11 @@ def test_the_same_is_found_in_own_units_and_texts_say_the_seconds_of_the_ship(tm
     )
     np.testing.assert_allclose(np.sqrt(np.diag(posterior.covariance)) / unit, std, rtol=1e-2)
     np.testing.assert_allclose(
-        other.unrecorded.push.size / scale.forces, same.unrecorded.push.size, rtol=1e-2
+        other.unrecorded.disturbance.size / scale.forces, same.unrecorded.disturbance.size, rtol=1e-2
     )
-    np.testing.assert_allclose(other.unrecorded.push.time / scale.time, same.unrecorded.push.time)
+    np.testing.assert_allclose(
+        other.unrecorded.disturbance.time / scale.time, same.unrecorded.disturbance.time
+    )
     rate = scale.factor("1/s")
     assert other.stability.bounded == same.stability.bounded
     assert other.stability.learned_min_dissipation / rate == pytest.approx(

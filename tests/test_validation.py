@@ -504,5 +504,5 @@ def test_what_learn_wrote_is_read(tmp_path):
     assert read_learned(tmp_path).posterior is None, "where nothing was fitted"
     (tmp_path / "posterior.json").write_text(KNOWN)
     found = read_learned(tmp_path)
-    assert found.push.size.tolist() == [0.1, 0.2, 0.3]
+    assert found.disturbance.size.tolist() == [0.1, 0.2, 0.3]
     assert list(found.posterior.names) == ["vessel.m"]

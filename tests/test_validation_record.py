@@ -393,7 +393,9 @@ def test_a_posterior_of_another_model_says_nothing():
     learned = Learned(p, ForceDisturbance(np.ones(3), np.ones(3)), ())
     assert learned.is_of(Model({"X_u": -1.0}))
     assert not learned.is_of(Model())
-    assert not Learned(p.model_copy(update={"names": ["vessel.other"]}), learned.push, ()).is_of(Model())
+    assert not Learned(p.model_copy(update={"names": ["vessel.other"]}), learned.disturbance, ()).is_of(
+        Model()
+    )
 
 
 @pytest.mark.slow

@@ -46,13 +46,13 @@ class Learned(NamedTuple):
 
     Attributes:
         posterior: of its parameters; None where nothing was fitted.
-        push: the force that no command and no effect explains.
+        disturbance: the force that no command and no effect explains.
         files: that it was read from.
         learned_from: runs of which it was made.
     """
 
     posterior: Posterior | None
-    push: ForceDisturbance
+    disturbance: ForceDisturbance
     files: tuple[Path, ...]
     learned_from: tuple[Fingerprint, ...] = ()
 
@@ -258,6 +258,6 @@ def _process_noise(p: Predictions, learned: Learned | None) -> Variances:
         raise InputError("no diagnosis states the disturbance (--learned)")
     shots = Shooting([p.smoothed], p.windows.length)
     motion = shots.around(p.model, {}).motion
-    later = covariance(motion, np.zeros_like(shots.at_start), learned.push)[:, -1, :, -1]
+    later = covariance(motion, np.zeros_like(shots.at_start), learned.disturbance)[:, -1, :, -1]
     x, y, psi = later[np.searchsorted(shots.start, p.start - 1e-6)].diagonal(axis1=1, axis2=2).T
     return {"position": x + y, "heading": psi}

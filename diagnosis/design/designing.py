@@ -190,7 +190,7 @@ class Designer:
     def _motions(
         self, plans: Sequence[Sequence[PlanStep]], size: tuple[float, float], h: float
     ) -> list[PlannedMotion]:
-        """The same of several plans."""
+        """The motion of each of several plans, see :meth:`motion`."""
         (pace, room), T = size, self.limits.seconds
         if self.orders is not None:
             return self.orders.motions(plans, T, h, pace, self.model, self.basin)

@@ -40,11 +40,7 @@ TIME = "time"
 Positive = Annotated[PositiveFloat, AllowInfNan(False)]
 
 
-class MappedVariable(Named):
-    """A column in terms of a variable of the FMU: variable = factor * column + offset."""
-
-
-class MeasuredOutput(MappedVariable):
+class MeasuredOutput(Named):
     """An output that is compared with a column."""
 
     noise: Positive | None = Field(
@@ -52,7 +48,7 @@ class MeasuredOutput(MappedVariable):
     )
 
 
-class DrivenInput(MappedVariable):
+class DrivenInput(Named):
     """An input that a column drives."""
 
     linear: bool = Field(
@@ -68,7 +64,7 @@ class SystemMap(BaseModel):
 
     inputs: dict[str, DrivenInput] = Field(default_factory=dict)
     outputs: dict[str, MeasuredOutput] = Field(min_length=1)
-    start: dict[str, MappedVariable] = Field(
+    start: dict[str, Named] = Field(
         default_factory=dict, description="start values, by measured outputs or their derivatives"
     )
     disturbance_inputs: list[str] | None = Field(
@@ -82,7 +78,7 @@ class SystemMap(BaseModel):
     @property
     def variables(self) -> set[str]:
         """All variables that are in use."""
-        groups: tuple[Mapping[str, MappedVariable], ...] = (self.inputs, self.outputs, self.start)
+        groups: tuple[Mapping[str, Named], ...] = (self.inputs, self.outputs, self.start)
         return {c.name for group in groups for c in group.values()}
 
 
@@ -127,7 +123,7 @@ def check_map(found: SystemMap, model: FmuModel, where: str) -> None:
     }
     for group, (variables, role) in roles.items():
         possible = [v.name for v in variables]
-        channels: Mapping[str, MappedVariable] = getattr(found, group)
+        channels: Mapping[str, Named] = getattr(found, group)
         for column, channel in channels.items():
             place = f"{where}: {group}.{column}"
             if channel.name not in possible:

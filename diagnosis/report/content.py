@@ -47,7 +47,7 @@ STABILITY = (
     "nominal_min_dissipation learned_min_dissipation bounded region mass_definite closed_loop notes"
 )
 CHANGE = "before after difference standard_error"
-UNRECORDED = "size=push.size time=push.time values=differing stretches sentence"
+UNRECORDED = "size=disturbance.size time=disturbance.time values=differing stretches sentence"
 ERRORS = {
     "window_position_rmse": "position",
     "window_heading_rmse": "heading",

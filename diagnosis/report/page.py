@@ -198,18 +198,18 @@ def _places(r: ReportData, k: int, e: Evaluation) -> Iterator[Drawing]:
     """A run in which something is found at a place or at a time, or that acts from outside."""
     name = r.called(e)
     placed = any(region.covariate.id in PLACE for region in r.comparison.before.regions)
-    pushes: list[tuple[float, float]] = []
+    times: list[tuple[float, float]] = []
     if (d := r.diagnosis) is not None:
         effects = d.start.ship.effects
         placed = placed or any(effects[f.id].kind == "environment" for f in r.accepted)
         stretches = d.unrecorded.stretches
-        pushes = [(s.start, s.end) for s in stretches if s.run == e.name and s.axis != "N"]
+        times = [(s.start, s.end) for s in stretches if s.run == e.name and s.axis != "N"]
     if placed:
         caption = f"{name}: the model error along the track."
         yield drawing(tracks.place(e, r.learned), f"place-{k}", caption)
-    if pushes:
+    if times:
         caption = f"{name}: times of disturbances, and the residual force."
-        yield drawing(tracks.place(e, r.learned, pushes), f"push-{k}", caption)
+        yield drawing(tracks.place(e, r.learned, times), f"disturbance-{k}", caption)
 
 
 def _profiles(r: ReportData) -> Iterator[Drawing]:

@@ -84,8 +84,8 @@ class DecidedFindings(ShortRepr):
 
     def bands(self, smoothed: Smoothed, windows: Windows | None) -> Bands | None:
         """The bands about the learned model's predictions of a run; None: it has no window."""
-        push = self.unrecorded.push
-        return prediction_bands(smoothed, windows, self.learned.model, self.posterior, push)
+        disturbance = self.unrecorded.disturbance
+        return prediction_bands(smoothed, windows, self.learned.model, self.posterior, disturbance)
 
     @property
     def believed(self) -> list[bool]:

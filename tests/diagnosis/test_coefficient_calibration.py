@@ -27,7 +27,7 @@ NAMES = ["X_u", "N_r", "known"]
 
 
 @dataclass(frozen=True)
-class Push:
+class Disturbance:
     size: np.ndarray
 
 
@@ -58,7 +58,7 @@ def problem(monkeypatch, scale, noise=0.01, pushed=0.04, seed=0, lengths=1):
         coefficient_calibration, "WindowSpread", SimpleNamespace(of=lambda s, *_: abouts[id(s)])
     )
     made = SimpleNamespace(windows=shots, fold_of_window=[fold] * lengths)
-    fitted = SimpleNamespace(push=Push(np.array([1.0, 2.0, 3.0])), fold_models=others)
+    fitted = SimpleNamespace(disturbance=Disturbance(np.array([1.0, 2.0, 3.0])), fold_models=others)
     posterior = SimpleNamespace(std={"X_u": 0.1, "N_r": 0.1, "known": 0.0})
     return made, fitted, model, posterior
 

@@ -151,7 +151,7 @@ def test_whitened_residuals_of_what_is_expected_have_unit_covariance(monkeypatch
     s.noise[1, 2, 2] = 2.0 * UNKNOWN
     a.residuals[1, 2] = 99.0  # not seen
     V = np.array([spd(rng, 3 * T).reshape(T, 3, T, 3) for _ in range(W)])
-    monkeypatch.setattr(fits, "covariance", lambda motion, at_start, push: V[motion].copy())
+    monkeypatch.setattr(fits, "covariance", lambda motion, at_start, disturbance: V[motion].copy())
     a.slopes[4, 0, 0, 0] = np.nan
     V[3, 0, 0, 0, 0] = np.nan  # the prediction does not run away, the motion about it does
     found = alone().whitening(s, alone().spread(s, a), a.residuals)
@@ -172,19 +172,19 @@ def test_the_scatter_is_that_of_the_push_of_each_run(monkeypatch):
     problem._place = {id(run): k for k, run in enumerate(s.runs)}
     factor = rng.standard_normal((W, 3 * T, 3 * T))
     factor[0] = 0.0
-    pushes = [
+    disturbances = [
         SimpleNamespace(size=np.full(3, 2.0), time="times"),
         SimpleNamespace(size=np.full(3, 5.0), time="times"),
     ]
 
-    def covariance(motion, at_start, push):
-        assert push.time == "times"
-        return push.size[:, :1, None, None, None] * np.broadcast_to(
+    def covariance(motion, at_start, disturbance):
+        assert disturbance.time == "times"
+        return disturbance.size[:, :1, None, None, None] * np.broadcast_to(
             np.eye(3 * T).reshape(T, 3, T, 3), (len(motion), T, 3, T, 3)
         )
 
     monkeypatch.setattr(fits, "covariance", covariance)
-    found = problem.scatter(s, a, factor, pushes)
+    found = problem.scatter(s, a, factor, disturbances)
     assert (found[0] == 0.0).all()
     for w, size in ((1, 2.0), (2, 5.0), (4, 5.0)):
         V = size * np.eye(3 * T) + np.diag(s.noise[w].ravel())
@@ -220,7 +220,7 @@ class Linear:
     def information(self, at):
         H, g = self.parts(at)
         whole = H.sum(axis=0)
-        return Information(whole, whole * self.spread, g.sum(axis=0), [], "push", H, g)
+        return Information(whole, whole * self.spread, g.sum(axis=0), [], "disturbance", H, g)
 
     def cost(self, at, weights, power):
         return float(at @ self.precision @ at + power * np.sum((self.y - self.A @ at) ** 2))
@@ -248,7 +248,7 @@ def test_a_linear_problem_is_solved_with_its_covariance_and_without_each_fold(se
     assert np.asarray(found.estimate) == pytest.approx(S @ (k * p.A.T @ p.y), abs=1e-5)
     scores = k**2 * spread * p.A.T @ p.A
     assert found.covariance == pytest.approx(S @ (scores + P) @ S * np.outer(p.unit, p.unit), rel=1e-4)
-    assert (found.names, found.push) == (p.names, "push")
+    assert (found.names, found.disturbance) == (p.names, "disturbance")
     left_out = [[0], [1], [2], [3], [0, 1], [2, 3]]
     for parts, model in zip(left_out, [*found.fold_models, *found.run_models], strict=True):
         A, y = (x[~np.isin(p.part, parts)] for x in (p.A, p.y))

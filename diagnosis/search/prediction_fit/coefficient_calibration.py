@@ -122,8 +122,8 @@ class Calibrator:
         learned = Findings(
             [], f.ranking, model, wrong, f.sigma, model, moved, folds, None, at, f.searched
         )
-        push = as_missed(problem, fitted, model, posterior)
-        return RefitOutcome(learned, posterior, unrecorded(self.train, model, push, {}))
+        disturbance = as_missed(problem, fitted, model, posterior)
+        return RefitOutcome(learned, posterior, unrecorded(self.train, model, disturbance, {}))
 
 
 def as_missed(
@@ -136,7 +136,7 @@ def as_missed(
     names = [n for n, std in posterior.std.items() if std > 0.0]
     squares, still, pushed = [], [], []
     for shots, fold in zip(problem.windows, problem.fold_of_window, strict=True):
-        about = WindowSpread.of(shots, model, posterior, fitted.push)
+        about = WindowSpread.of(shots, model, posterior, fitted.disturbance)
         missed = np.zeros(shots.measured.shape)
         for k, other in enumerate(fitted.fold_models):
             step = [other.value(n) - model.value(n) for n in names]
@@ -158,7 +158,7 @@ def as_missed(
         factor = 1.0 / LEAST
     else:
         factor = np.exp(float(brentq(off, low, high)))  # pyright: ignore
-    return replace(fitted.push, size=fitted.push.size * np.sqrt(factor))
+    return replace(fitted.disturbance, size=fitted.disturbance.size * np.sqrt(factor))
 
 
 def begin(start: Model, prior: NominalPrior) -> RefinedModel:

@@ -95,7 +95,7 @@ OF_FORCE, OF_NOISE = _kernels()
 def estimate(
     data: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray, time: np.ndarray | None = None
 ) -> ForceDisturbance:
-    """The push that a model error shows.
+    """The disturbance that a model error shows.
 
     Args:
         data: windows of every run.
@@ -110,19 +110,19 @@ def estimate(
     return ForceDisturbance(np.sqrt(variance[best, range(3)]), times[best])
 
 
-def covariance(motion: Linear, at_start: np.ndarray, push: ForceDisturbance) -> np.ndarray:
-    """Covariance (w, T, 3, T, 3) of predicted poses, by the initial state and a push.
+def covariance(motion: Linear, at_start: np.ndarray, disturbance: ForceDisturbance) -> np.ndarray:
+    """Covariance (w, T, 3, T, 3) of predicted poses, by the initial state and a disturbance.
 
     Args:
         motion: about the predictions.
         at_start: (w, 6, 6), covariance of the initial state.
-        push: the unrecorded force, its size (3,) or that of each window (w, 3); at the start as large
-            as always.
+        disturbance: the unrecorded force, its size (3,) or that of each window (w, 3); at
+            the start as large as always.
     """
     windows, instants = motion.slope.shape[:2]
-    over, added = _steps(motion, push)
+    over, added = _steps(motion, disturbance)
     P = np.zeros((windows, 9, 9))
-    P[:, :6, :6], P[:, range(6, 9), range(6, 9)] = at_start, push.size**2
+    P[:, :6, :6], P[:, range(6, 9), range(6, 9)] = at_start, disturbance.size**2
     found = np.zeros((windows, instants, 3, instants, 3))
     for i in range(instants):
         P = over[:, i] @ P @ over[:, i].transpose(0, 2, 1) + added[:, i]
@@ -134,14 +134,14 @@ def covariance(motion: Linear, at_start: np.ndarray, push: ForceDisturbance) -> 
     return found
 
 
-def _steps(motion: Linear, push: ForceDisturbance) -> tuple[np.ndarray, np.ndarray]:
+def _steps(motion: Linear, disturbance: ForceDisturbance) -> tuple[np.ndarray, np.ndarray]:
     """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds."""
     A = np.zeros((*motion.slope.shape[:2], 9, 9))
     A[..., :6, :6], A[..., 3:6, 6:] = motion.slope, motion.by_mass
-    A[..., 6:, 6:] = -np.diag(1.0 / push.time)
-    if not push.size.any():
+    A[..., 6:, 6:] = -np.diag(1.0 / disturbance.time)
+    if not disturbance.size.any():
         return _exponential(motion.every * A), np.zeros_like(A)
-    rate = np.broadcast_to(2.0 * push.size**2 / push.time, (len(A), 3))[:, None, None]
+    rate = np.broadcast_to(2.0 * disturbance.size**2 / disturbance.time, (len(A), 3))[:, None, None]
     added = np.zeros_like(A)
     for x, weight in zip(*np.polynomial.legendre.leggauss(PARTS), strict=True):
         G = _exponential(0.5 * motion.every * (x + 1.0) * A)[..., 6:]

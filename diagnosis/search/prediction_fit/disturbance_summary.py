@@ -1,8 +1,8 @@
-"""The force that nobody recorded: how large, how long it lasts, and pushes at a time.
+"""The force that nobody recorded: how large, how long it lasts, and disturbances at single times.
 
-A push at a time is a stretch in which the force that is left is beyond what chance gives anywhere in
-the runs, were it as large there as it usually is. Its beginning, end and size are those of the constant
-force that explains most of what is left around. It is told, and never a part of a model.
+Such a disturbance is a stretch in which the force that is left is beyond what chance gives anywhere
+in the runs, were it as large there as it usually is. Its beginning, end and size are those of the
+constant force that explains most of what is left around. It is told, and never a part of a model.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw"
 
 
 class Stretch(NamedTuple):
-    """A push at a time: run, axis X, Y or N, start and end [s], force, were it constant [N or N m]."""
+    """A disturbance at a single time: run, axis X, Y or N, start, end [s], mean force [N or N m]."""
 
     run: str
     axis: str
@@ -39,20 +39,20 @@ class Unrecorded:
     """What acts and is in no command and no effect.
 
     Attributes:
-        push: its size and correlation time on each axis.
+        disturbance: its size and correlation time on each axis.
         differing: values of which the two fits differ by more than their intervals -> the value by the
             model error, and by predictions.
-        stretches: pushes at a time, the clearest first.
+        stretches: disturbances at single times, the clearest first.
     """
 
-    push: ForceDisturbance
+    disturbance: ForceDisturbance
     differing: Mapping[str, tuple[float, float]]
     stretches: Sequence[Stretch]
 
     @property
     def sentence(self) -> str:
         """What is to be said of it."""
-        size = zip(NAMES, self.push.size, UNITS, self.push.time, strict=True)
+        size = zip(NAMES, self.disturbance.size, UNITS, self.disturbance.time, strict=True)
         told = [
             f"{number(x, 2)} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0
         ]
@@ -65,11 +65,11 @@ class Unrecorded:
                 "The difference is significant: the fit to the model error and the fit to "
                 f"predictions differ by more than their intervals in {', '.join(self.differing)}. "
             )
-        return (text + self.pushes).strip()
+        return (text + self.at_single_times).strip()
 
     @property
-    def pushes(self) -> str:
-        """The pushes at a time; empty where there are none."""
+    def at_single_times(self) -> str:
+        """The disturbances at single times; empty where there are none."""
         named = {axis: f"{unit} in {name}" for axis, unit, name in zip(AXES, UNITS, NAMES, strict=True)}
         times = ((s, f"{s.run} {s.start:.1f} to {s.end:.1f} s") for s in self.stretches)
         each = [f"{time}, {signed(s.size, 2, '+')} {named[s.axis]}" for s, time in times]
@@ -79,10 +79,10 @@ class Unrecorded:
 def unrecorded(
     runs: Sequence[WeakWindows],
     model: Model,
-    push: ForceDisturbance,
+    disturbance: ForceDisturbance,
     differing: Mapping[str, tuple[float, float]],
 ) -> Unrecorded:
-    """What acts unrecorded in runs that a model was fitted to; push and differing as in the result."""
+    """What acts unrecorded in runs that a model was fitted to; arguments as the result has them."""
     left = [omega(w, model) for w in runs]
     noise = [NOISE_TOLERANCE * omega_std(w, model) for w in runs]
     # As far as the noise of the measurement allows, the same in all runs.
@@ -92,18 +92,18 @@ def unrecorded(
     found = []
     for w, error, std in zip(runs, left, noise, strict=True):
         for k in range(3):
-            found += _pushes(w, k, error[:, k], np.maximum(std[:, k], usual[k]), limit)
+            found += _disturbances(w, k, error[:, k], np.maximum(std[:, k], usual[k]), limit)
     clearest = sorted(found, key=lambda f: -f[0])[:MOST_REPORTED]
-    return Unrecorded(push, differing, [stretch for _, stretch in clearest])
+    return Unrecorded(disturbance, differing, [stretch for _, stretch in clearest])
 
 
-def _pushes(
+def _disturbances(
     w: WeakWindows, axis: int, error: np.ndarray, std: np.ndarray, limit: float
 ) -> Iterator[tuple[float, Stretch]]:
-    """Pushes of a run on an axis, each with how many standard deviations are left at its clearest.
+    """Disturbances of a run on an axis, each with how many standard deviations are left at its clearest.
 
-    What lasts longer than a block is no push but a remainder, and what is shorter than a third of a
-    window of the weak form cannot be told from a jump of the measured pose.
+    What lasts longer than a block is a remainder, and what is shorter than a third of a window of
+    the weak form cannot be told from a jump of the measured pose.
     """
     z = error / std
     rows = np.flatnonzero(np.abs(z) > limit)

@@ -14,7 +14,7 @@ else a model that misses more would have lower weights and a lower cost. To it t
 W^-1 is added.
 
 W takes the instants of a window as independent beyond the initial state; what really correlates them
-is the unrecorded force, :mod:`.push`. With V the covariance that it gives, H = J^T W J and
+is the unrecorded force, :mod:`.disturbance`. With V the covariance that it gives, H = J^T W J and
 G = J^T W V W J, the information in the data is that of a likelihood to the power k = tr(S H) / tr(S G),
 S the covariance at hand, and the posterior has the covariance
 
@@ -54,7 +54,7 @@ class Fitted:
         estimate: the model.
         names: of all fitted parameters.
         covariance: (q, q), of them, SI.
-        push: the unrecorded force.
+        disturbance: the unrecorded force.
         fold_models: the model fitted without each fold of the runs, by one step about the fit to all.
         run_models: the same, but each of two runs is a fold.
     """
@@ -62,7 +62,7 @@ class Fitted:
     estimate: RefinedModel
     names: Sequence[str]
     covariance: np.ndarray
-    push: ForceDisturbance
+    disturbance: ForceDisturbance
     fold_models: Sequence[Model]
     run_models: Sequence[Model]
 
@@ -82,10 +82,10 @@ def shootings(
     return [s for s in found if s.run.size]
 
 
-def push_of(
+def disturbance_of(
     runs: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray
 ) -> tuple[ForceDisturbance, list[ForceDisturbance]]:
-    """The push of all runs, and of each with the same correlation times, see :func:`.push.estimate`."""
+    """The disturbance of all runs, and of each with the same times, by :func:`.disturbance.estimate`."""
     edges = np.cumsum([w.middle.size for w in runs])[:-1]
     parts = zip(runs, np.split(error, edges), np.split(std, edges), strict=True)
     whole = estimate(runs, error, std)
@@ -103,7 +103,7 @@ class Information:
         g: (q,), J^T W r.
         spreads: of each length the covariance (w, 3T, 3T) of residuals by initial state and noise; zero
             where a model runs away.
-        push: the unrecorded force.
+        disturbance: the unrecorded force.
         fold_H, fold_g: (folds, q, q) and (folds, q), what each fold says; their sums are H and g.
     """
 
@@ -111,7 +111,7 @@ class Information:
     G: np.ndarray
     g: np.ndarray
     spreads: Sequence[np.ndarray]
-    push: ForceDisturbance
+    disturbance: ForceDisturbance
     fold_H: np.ndarray
     fold_g: np.ndarray
 
@@ -251,18 +251,18 @@ class PredictionFit:
         return found
 
     def scatter(
-        self, s: Shooting, around: Around, W: np.ndarray, pushes: Sequence[ForceDisturbance]
+        self, s: Shooting, around: Around, W: np.ndarray, disturbances: Sequence[ForceDisturbance]
     ) -> np.ndarray:
-        """Covariance (w, 3T, 3T) of whitened residuals by initial state, noise and the push of each run.
+        """Covariance (w, 3T, 3T) of residuals by initial state, noise and each run's disturbance.
 
         Args:
             s, around, W: windows, predictions in them, and what whitens these.
-            pushes: of each run.
+            disturbances: of each run.
         """
         fine, found = running(W), np.zeros_like(W)
-        each = [pushes[self._place[id(run)]] for run in s.runs]
-        push = ForceDisturbance(np.array([p.size for p in each])[s.run[fine]], each[0].time)
-        V = covariance(around.motion[fine], s.at_start[fine], push)
+        each = [disturbances[self._place[id(run)]] for run in s.runs]
+        disturbance = ForceDisturbance(np.array([p.size for p in each])[s.run[fine]], each[0].time)
+        V = covariance(around.motion[fine], s.at_start[fine], disturbance)
         found[fine] = W[fine] @ _square(V, s.noise[fine]) @ W[fine].transpose(0, 2, 1)
         return found
 
@@ -302,8 +302,10 @@ class PredictionFit:
         return 1.0
 
     def information(self, at: RefinedModel) -> Information:
-        """What the windows say, by the slopes at an estimate and the push that it leaves in each run."""
-        push, pushes = push_of(self.runs, model_error(self.runs, at.model(self.prior)), self.std)
+        """What the windows say, by slopes at a point and the disturbance that is left in each run."""
+        disturbance, disturbances = disturbance_of(
+            self.runs, model_error(self.runs, at.model(self.prior)), self.std
+        )
         model, q, folds = at.model(self.prior), self.unit.size, len(self.folds)
 
         def of_windows(group: tuple[Shooting, np.ndarray]) -> tuple[np.ndarray, ...]:
@@ -316,14 +318,14 @@ class PredictionFit:
             parts = [(A[of == k].reshape(-1, q), r[of == k].ravel()) for k in range(folds)]
             H = np.array([J.T @ J for J, _ in parts])
             g = np.array([J.T @ left for J, left in parts])
-            V = self.scatter(s, around, W, pushes)
+            V = self.scatter(s, around, W, disturbances)
             share = self.share(float(np.sum(r**2)), float(np.einsum("wii->", V)))
             return H, share * information_of(A, V), g, spread
 
         groups = [*zip(self.windows, self.fold_of_window, strict=True)]
         Hs, Gs, gs, spreads = zip(*for_each(of_windows, groups), strict=True)
         H, G, g = (np.mean(each, axis=0) for each in (Hs, Gs, gs))
-        return Information(H.sum(axis=0), G, g.sum(axis=0), spreads, push, H, g)
+        return Information(H.sum(axis=0), G, g.sum(axis=0), spreads, disturbance, H, g)
 
 
 def _square(V: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -376,4 +378,4 @@ def fit_to(problem: PredictionFit, at: RefinedModel) -> Fitted:
     S = np.linalg.inv(here.H)
     covariance = S @ (here.power**2 * here.known.G + P) @ S * np.outer(problem.unit, problem.unit)
     folds, runs = problem.without_each_fold(at, here.known, here.power)
-    return Fitted(at, problem.names, covariance, here.known.push, folds, runs)
+    return Fitted(at, problem.names, covariance, here.known.disturbance, folds, runs)

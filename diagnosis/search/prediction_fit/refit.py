@@ -39,8 +39,8 @@ class RefitOutcome:
 
     def bands(self, smoothed: Smoothed, windows: Windows | None) -> Bands | None:
         """The bands about the predictions of a run, see :func:`prediction_bands`."""
-        push = self.unrecorded.push
-        return prediction_bands(smoothed, windows, self.findings.model, self.posterior, push)
+        disturbance = self.unrecorded.disturbance
+        return prediction_bands(smoothed, windows, self.findings.model, self.posterior, disturbance)
 
     def about(self, found: Findings, prior: NominalPrior) -> "RefitOutcome":
         """Other findings with the covariance of this fit, by the same parameters.
@@ -73,8 +73,10 @@ def to_predictions(
     known = begin is None or not (begin.fitted or any(prior.std.values()))
     if known or begin is None or searched is None or not windows:
         std = np.concatenate([measurement_std(w, found.model) for w in runs])
-        push = estimate(runs, model_error(runs, found.model), std)
-        return RefitOutcome(found, JointPosterior.nothing(), unrecorded(runs, found.model, push, {}))
+        disturbance = estimate(runs, model_error(runs, found.model), std)
+        return RefitOutcome(
+            found, JointPosterior.nothing(), unrecorded(runs, found.model, disturbance, {})
+        )
     begin = replace(begin, offset=prior.rescaled(begin.offset, searched))
     weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
     fitted = fit_to(PredictionFit(runs, windows, weak, prior), weak)
@@ -104,7 +106,7 @@ def to_predictions(
         fold_models=fitted.fold_models,
         run_models=fitted.run_models,
     )
-    return RefitOutcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
+    return RefitOutcome(learned, posterior, unrecorded(runs, model, fitted.disturbance, differ))
 
 
 def fit_model_error(
@@ -124,19 +126,19 @@ def prediction_bands(
     windows: Windows | None,
     model: Model,
     posterior: JointPosterior,
-    push: ForceDisturbance,
+    disturbance: ForceDisturbance,
 ) -> Bands | None:
     """The bands about a model's predictions in the windows of a run; None: it has none.
 
     Args:
         smoothed, windows: the run.
         model, posterior: that predicts, and of its fitted values.
-        push: the unrecorded force.
+        disturbance: the unrecorded force.
     """
     if windows is None:
         return None
     shots = Shooting.accurate([smoothed], windows.length, model)
-    about = WindowSpread.of(shots, model, posterior, push)
+    about = WindowSpread.of(shots, model, posterior, disturbance)
     found = np.concatenate([np.zeros_like(about.still[:, :1]), about.still + about.pushed], axis=1)
     found[:, 0] = shots.at_start[:, :3, :3]
     found[..., range(3), range(3)] += smoothed.noise**2
@@ -162,7 +164,7 @@ class WindowSpread(NamedTuple):
 
     @classmethod
     def of(
-        cls, shots: Shooting, model: Model, posterior: JointPosterior, push: ForceDisturbance
+        cls, shots: Shooting, model: Model, posterior: JointPosterior, disturbance: ForceDisturbance
     ) -> "WindowSpread":
         """About a model's predictions, see :func:`prediction_bands`."""
         std = posterior.std
@@ -174,8 +176,8 @@ class WindowSpread(NamedTuple):
         moved = np.diff(predicted[..., :2], axis=1) / shots.every
         speed = np.nan_to_num(np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=1)), nan=0.0, posinf=0.0)
         parts = (
-            covariance(around.motion, shots.at_start, replace(push, size=np.zeros(3))),
-            covariance(around.motion, np.zeros_like(shots.at_start), push.at(speed)),
+            covariance(around.motion, shots.at_start, replace(disturbance, size=np.zeros(3))),
+            covariance(around.motion, np.zeros_like(shots.at_start), disturbance.at(speed)),
         )
         instants = np.arange(shots.since.size)
         still, pushed = (V[:, instants, :, instants].swapaxes(0, 1) for V in parts)
