@@ -18,10 +18,10 @@ from support.cse1 import VESSEL
 from support.measured import DATA, MEASURED, NOISE, VELOCITY, needs_data, sail, smoothed, table_of
 
 import diagnosis
-from benchmarks.ship_effects import causes
+from benchmarks.ship_effects import Cause, causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model, Run, omega, propose_columns, weak_windows
-from diagnosis.assessment import plausibility
+from diagnosis.assessment import plausibility, reading_odds
 from diagnosis.assessment.command_check import contradicted_commands, without_force
 from diagnosis.assessment.gains import gains, varying
 from diagnosis.assessment.plausibility import (
@@ -143,11 +143,24 @@ def test_the_unit_of_a_column_does_not_matter():
 @pytest.mark.parametrize("name", ["cse1", "kvlcc2"])
 def test_a_current_that_may_explain_an_error_is_that_of_the_ships_size(name):
     """A small share of a speed that grows with the root of the length (Froude)."""
-    odds = object.__new__(ReadingOdds)
-    odds.model = Model(ship=ship_with((), name))
-    speed = SETTINGS.inexact * np.sqrt(odds.model.ship.description.length / 1.105)
-    currents = [(m.value("V_n"), m.value("V_e")) for m in odds._streaming]
+    model = Model(ship=ship_with((), name))
+    speed = SETTINGS.inexact * np.sqrt(model.ship.description.length / 1.105)
+    currents = [(m.value("V_n"), m.value("V_e")) for m in reading_odds._streaming(model)]
     np.testing.assert_allclose(currents, speed * np.eye(2), rtol=1e-3)
+
+
+@pytest.mark.parametrize(("V_n", "V_e"), [(-0.9, -0.4), (0.3, 1.0)])
+def test_a_ship_in_a_current_as_fast_as_itself_is_not_in_another_unit(V_n, V_e):
+    """Its speed over ground was explained by feet, and its force sideways by no actuator."""
+    ship = ship_with((), "otter")
+    stream = Cause("current", {"V_n": V_n, "V_e": V_e}, {})
+    table = sail_of(ship, stream, np.random.default_rng(1), None, steps_of_thrust(), seconds=160.0)
+    (w,) = diagnosis.load(table, ship="otter")
+    assert w.smoothed.misread == ""
+    found = ReadingOdds(w, Model(ship=ship)).in_current().model
+    assert (found.value("V_n"), found.value("V_e")) == pytest.approx((V_n, V_e), abs=0.05)
+    feet = table.assign(x=table["x"] / 0.3048, y=table["y"] / 0.3048)
+    assert "its position is in ft" in doubt(feet)
 
 
 def test_what_explains_an_error_within_its_limits_makes_it_likelier_in_any_unit():
@@ -393,15 +406,17 @@ def test_propellers_that_are_slower_than_described_are_no_mistake(seed, lag, mon
     assert "s passed in each second of its time" in w.smoothed.misread
 
 
-@pytest.mark.parametrize(("lost", "line"), [(0.75, "perhaps"), (0.0, "")])
+@pytest.mark.parametrize(("lost", "line"), [(0.75, "or all thrusters give 0.25 of theirs"), (0.0, "")])
 def test_thrusters_that_are_weak_are_no_mistake(lost, line):
-    """As those of a flat battery."""
+    """As those of a flat battery: where damping is quadratic, a slow clock looks the same."""
     ship = ship_with((), "otter")
     weak = causes(ship)["none"]._replace(thrusters={"loss_port": lost, "loss_starboard": lost})
     rng = np.random.default_rng(1)
     table = sail_of(ship, weak, rng, None, steps_of_thrust(), seconds=160.0)
     (w,) = diagnosis.load(table, ship="otter")
-    assert w.smoothed.misread.partition(" ")[0] == line
+    before, _, said = w.smoothed.misread.partition(" (odds")[0].rpartition(", ")
+    assert said == line
+    assert before.partition(" ")[0] == ("perhaps" if lost else "")
 
 
 @pytest.mark.slow
@@ -716,6 +731,9 @@ class SomeOdds:
         self.better, self.dead = better, dead
 
     def __call__(self, w, model):
+        return self
+
+    def in_current(self):
         return self
 
     def log_density(self, reading):

@@ -3,8 +3,8 @@
 Each mistake that a file may have (an axis that points the other way, another unit, columns in each
 other's place, ...) is put right in turn, and the densities of the motion are compared
 (:mod:`.reading_odds`). A mistake is reported, with its odds, if it is likelier than the file as it was
-read by more than chance gives to one of all, and lawful effects, a constant offset of the heading or
-dead actuators, do not do as well; if these hardly do worse, as one that may be.
+read by more than chance gives to one of all, and lawful effects, a constant offset of the heading, a
+current or dead actuators, do not do as well; if these hardly do worse, as one that may be.
 """
 
 from collections.abc import Mapping, Sequence
@@ -123,14 +123,14 @@ def _late(w: WeakWindows, model: Model) -> Misreading | None:
 def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     """A clause about a force that a ship cannot give, on an axis on which no actuator acts.
 
-    A rudder acts sideways on a ship under way. What a current or a wind may give does not count, a
-    constant force in the ship's or the earth's axes.
+    A rudder acts sideways on a ship under way. What a current or a wind may give does not count: a
+    constant force in the ship's or the earth's axes, and that of the current that explains most.
     """
-    lacking, full = varying(w, omega(w, model)), most_thrust(w, model)
-    idle = lacking > SETTINGS.much * full
-    if not idle.any():
-        return None
-    idle &= ~np.nan_to_num(thrust_along(w, model)).any(axis=0)
+    full, idle = most_thrust(w, model), ~np.nan_to_num(thrust_along(w, model)).any(axis=0)
+    lacking = np.zeros(3)
+    for each in (model, ReadingOdds(w, model).in_current().model) if idle.any() else ():
+        lacking = varying(w, omega(w, each))
+        idle &= lacking > SETTINGS.much * full
     if not idle.any():
         return None
     k = int(np.argmax(idle))
@@ -169,12 +169,14 @@ class Mistake(NamedTuple):
     readings: Sequence[Reading]
     log_odds: float
     sure: bool = True
+    otherwise: str = ""  # what is no mistake and would look the same
 
     @property
     def clause(self) -> str:
         """What seems to be wrong, and how sure that is."""
         how = "probably" if self.sure else "perhaps"
-        return f"{how} {', or '.join(r.mistake for r in self.readings)} (odds {odds_of(self.log_odds)})"
+        found = ", or ".join([*(r.mistake for r in self.readings), *filter(None, [self.otherwise])])
+        return f"{how} {found} (odds {odds_of(self.log_odds)})"
 
 
 def odds_of(logarithm: float) -> str:
@@ -244,11 +246,12 @@ def likeliest_mistake(
     if not found.max() > as_read + asked:
         return None
     best = possible[int(np.argmax(found))]
-    turned = [Reading("", {"psi": Named(name="psi", offset=turn)}) for turn in TURNS]
-    dead = best.dead(TAU if w.run.commands is None else w.run.signals)
-    if doubted:  # no lawful effect gives accelerations the other way, or so many times too large
-        turned, dead = [], None
-    lawful = max([as_read, *map(odds.log_density, turned)])
+    lawful, dead = as_read, None
+    if not doubted:  # no lawful effect gives accelerations the other way, or so many times too large
+        turned = (Reading("", {"psi": Named(name="psi", offset=turn)}) for turn in TURNS)
+        in_current = odds.in_current().log_density(AS_READ)
+        lawful = max(as_read, in_current, *map(odds.log_density, turned))
+        dead = best.dead(TAU if w.run.commands is None else w.run.signals)
     # Of an actuator that acts the other way a dead one explains half: it may be nearly as likely.
     without = odds.log_density(dead) if dead else -np.inf
     if found.max() < lawful + asked or found.max() < without + np.log(2.0):
@@ -270,7 +273,10 @@ def likeliest_mistake(
     if order[0] < named:  # a unit with a name is as good as a number
         order = [k for k in order if k < named]
     # Thrusters that are weak, as by a flat battery, are as usual as a unit or clock without a name,
-    # unless this explains all of the motion.
+    # unless this alone explains all of the motion.
     weak = order[0] >= named and factor is not None and SETTINGS.least_gain < factor < 1.0
-    weak = weak and odds.explained(possible[order[0]]).left > 2.0
-    return Mistake([possible[k] for k in order], better, bool(better >= needed and not weak))
+    left = (odds.explained(r).left for r in (possible[order[0]], AS_READ))
+    weak = weak and not next(left) <= 2.0 < next(left)
+    otherwise = f"all thrusters give {factor:.2g} of theirs" if weak else ""
+    sure = bool(better >= needed and not weak)
+    return Mistake([possible[k] for k in order], better, sure, otherwise)

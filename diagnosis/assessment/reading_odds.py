@@ -132,7 +132,8 @@ class ReadingOdds:
             w = reread(self.w, reading, self.model)
             e, z = omega(w, self.model), needed_force(w, self.model)
             a = needed_force(w, self._undamped)
-            each, streams = ([omega(w, m) - e for m in some] for some in (self._lost, self._streaming))
+            both = self._lost, _streaming(self.model)
+            each, streams = ([omega(w, m) - e for m in some] for some in both)
             found = np.concatenate([e, z, a, *each, *streams])
         if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
             return ExplainedMotion(-np.inf, np.inf)
@@ -150,6 +151,20 @@ class ReadingOdds:
         found = why.explain(e, least, self.windows)
         return found._replace(density=found.density + self.windows * reading.density)
 
+    def in_current(self) -> "ReadingOdds":
+        """The same for a ship in the current that explains most of the run as it was read."""
+        model, unit = self.model, 1.0 / np.sqrt((needed_force(self.w, self._undamped) ** 2).mean(axis=0))
+        with np.errstate(all="ignore"):
+            for _ in range(STEPS):
+                e = omega(self.w, model)
+                slopes = [omega(self.w, m) - e for m in _streaming(model)]
+                columns = np.array([(slope * unit).ravel() for slope in slopes]).T
+                if not np.isfinite(columns).all():
+                    break
+                more = _current(model) * np.linalg.lstsq(columns, -(e * unit).ravel(), rcond=None)[0]
+                model = model.plus({"V_n": float(more[0]), "V_e": float(more[1])})
+        return ReadingOdds(self.w, model)
+
     def _steady(self, w: WeakWindows) -> Explanation:
         """Forces that are steady in the body or on earth."""
         north, east = (
@@ -162,12 +177,6 @@ class ReadingOdds:
         for column in ([north, -east, zero], [east, north, zero]):
             why.may(np.column_stack(column), SETTINGS.inexact * float(self._full[0]))
         return why
-
-    @cached_property
-    def _streaming(self) -> list[Model]:
-        """The model in a current to the north, and to the east, of its deviation."""
-        steady = SETTINGS.inexact * self.model.ship.scale.speed
-        return [self.model.plus({n: steady}) for n in ("V_n", "V_e")]
 
     @cached_property
     def _lost(self) -> list[Model]:
@@ -192,6 +201,16 @@ class ReadingOdds:
         others = [model.plus({n: k.deviation(model.value(n))}) for n, k in known]
         changes = [other.mass.diagonal() - own for other in others]
         return np.sqrt(np.square(changes).sum(axis=0)) / own
+
+
+def _current(model: Model) -> float:
+    """Deviation [m/s] of a current."""
+    return SETTINGS.inexact * model.ship.scale.speed
+
+
+def _streaming(model: Model) -> list[Model]:
+    """A model in a current to the north, and to the east, that is larger by its deviation."""
+    return [model.plus({n: _current(model)}) for n in ("V_n", "V_e")]
 
 
 def most_thrust(w: WeakWindows, model: Model) -> np.ndarray:
