@@ -14,7 +14,7 @@ from diagnosis.search import forward_selection
 from diagnosis.search.forward_selection import likely_effects
 from diagnosis.search.prior import MEASURED, NominalPrior
 from diagnosis.search.refinement import RefinedModel, TrainingSet
-from diagnosis.search.shortlist import NEW, novelty, rank
+from diagnosis.search.shortlist import LENGTH, NEW, novelty, rank, reweighted
 from diagnosis.search.significance import matters
 from diagnosis.verdict.confidence import probability
 
@@ -77,6 +77,21 @@ def test_model_error_is_the_force_that_was_hidden():
     w, nu = data(ship={"delta_X_u": -3.0})
     force = np.column_stack(np.broadcast_arrays(-3.0 * nu[:, 0], 0.0, 0.0))
     assert rms(omega(w, Model()) - w.smooth @ force).max() < 0.01
+
+
+def test_the_effect_whose_place_is_searched_is_refined_with_the_best():
+    """Coefficients that were fitted without it may make it one of many, as long as it is linear."""
+    w, _ = data(ship={"delta_X_u": -3.0})
+    prior = NominalPrior.of(Model(), MEASURED)
+    t, at = TrainingSet([w], None, prior), RefinedModel.at(Model(), prior)
+    ranking = rank(t, at, set())
+    ids = [ranking.candidates[s.candidate].effect.id for s in ranking.order]
+    late = ids[LENGTH + 3]
+    for present, more in (("", set()), (late, {late}), (ids[0], set())):
+        weighed = reweighted(t, at, ranking, present)
+        assert weighed is not None
+        assert (late in weighed[-1].ids) == bool(more)
+        assert len(weighed[-1].ids) == LENGTH + len(more)
 
 
 @pytest.mark.numerical

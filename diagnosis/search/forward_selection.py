@@ -178,7 +178,7 @@ def searched_again(
         ranking = rank(t, beside, {p.id for p in others}, made, nuisance)
         if leads(t, ranking, found[k].id):
             continue
-        weighed = reweighted(t, beside, ranking)
+        weighed = reweighted(t, beside, ranking, found[k].id)
         if weighed is None:
             continue
         again, ranking, best = weighed

@@ -174,9 +174,13 @@ class Shortlist:
         return replace(estimate, precision=np.asarray(precision))
 
 
-def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking) -> Shortlist:
-    """Refine the best candidates and score them again."""
-    best = sorted(ranking.order[:LENGTH], key=lambda s: s.candidate)
+def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking, present: str = "") -> Shortlist:
+    """Refine the best candidates, and the effect whose place is searched again, and score them again."""
+    chosen = {s.candidate: s for s in ranking.order[:LENGTH]}
+    chosen |= {
+        s.candidate: s for s in ranking.order if ranking.candidates[s.candidate].effect.id == present
+    }
+    best = [chosen[k] for k in sorted(chosen)]
     effects = [ranking.candidates[s.candidate].effect for s in best]
     starts = [start(at, ranking, s) for s in best]
     refined = for_each(lambda s: refine(t, at, ranking.nuisance, s), starts, [at.start])
@@ -202,7 +206,7 @@ def leads(t: TrainingSet, ranking: Ranking, present: str) -> bool:
 
 
 def reweighted(
-    t: TrainingSet, at: RefinedModel, ranking: Ranking
+    t: TrainingSet, at: RefinedModel, ranking: Ranking, present: str = ""
 ) -> tuple[TrainingSet, Ranking, Shortlist] | None:
     """A shortlist in which an error counts by what even the best candidate leaves over.
 
@@ -218,7 +222,7 @@ def reweighted(
     most = np.sqrt(np.mean(ranking.base**2, axis=0))
     if not ranking.order:
         return None
-    found = shortlist(t, at, ranking)
+    found = shortlist(t, at, ranking, present)
     for _ in range(STEPS):
         left = found.refined[found.scored[0].candidate].left
         spoiled = np.sqrt(np.mean(left**2, axis=0))
@@ -231,7 +235,7 @@ def reweighted(
         ranking = weighted(t, sigma, ranking.base, ranking.nuisance, ranking.candidates)
         if not ranking.order:
             return None
-        found = shortlist(t, at, ranking)
+        found = shortlist(t, at, ranking, present)
     return t, ranking, found
 
 

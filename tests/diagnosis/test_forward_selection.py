@@ -344,7 +344,8 @@ def search_places(monkeypatch, scores, accepted):
         assert others == beside.effects
         return SimpleNamespace(nuisance=nuisance, beside=beside)
 
-    def reweighted(t, beside, ranking):
+    def reweighted(t, beside, ranking, present):
+        assert beside.effects.isdisjoint(present), "the effect whose place is searched is a candidate"
         ids = sorted("abcd", key=lambda i: scores(beside.effects | {i}))
         ids = [i for i in ids if i not in beside.effects]
         found = [
