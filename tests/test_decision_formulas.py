@@ -22,6 +22,7 @@ from diagnosis.search.gram import (
 )
 from diagnosis.search.most_likely import beyond, ridge, rise
 from diagnosis.search.significance import Losses, gain, harm, predicts_worse
+from fmus.declare import Range, Variable
 from fmus.scale import REFERENCE
 
 seeds = st.integers(0, 10**6)
@@ -239,11 +240,22 @@ def test_coefficients_are_suspects_whose_posterior_excludes_what_is_known_of_the
     )
     limit = norm.ppf(1.0 - 0.01 / 3.0 / 2.0)
     std = np.array([0.1, 0.2, 0.3])
-    found = suspected(prior, np.array([limit * 0.1 + 1e-6, -1.5, 0.3 * limit - 1e-6]), std)
+    free = SimpleNamespace(declared=lambda name: Variable(name, "1", "any", 0.0), value=prior.mean.get)
+    found = suspected(prior, np.array([limit * 0.1 + 1e-6, -1.5, 0.3 * limit - 1e-6]), std, free)
     assert [s.name for s in found] == ["b", "a"]
     assert found[0].value == pytest.approx(-3.0 - 1.5 * 2.0)
     assert found[0].z == pytest.approx(-1.5)
     assert found[1].value == pytest.approx(1.0 + 0.1 * (0.1 * limit), abs=1e-6)
+
+
+def test_a_suspect_coefficient_stays_within_its_range():
+    """As a lag that the posterior has below zero."""
+    lag = SimpleNamespace(
+        declared=lambda name: Variable(name, "s", "lag", 1.0, Range(0.0, None)), value=lambda name: 4.0
+    )
+    prior = SimpleNamespace(std={"lag": 1.2}, mean={"lag": 4.0})
+    (found,) = suspected(prior, np.array([-4.1]), np.array([0.1]), lag)
+    assert (found.value, found.z) == (0.0, -4.1)
 
 
 # Blocks, folds and Gram matrices

@@ -92,6 +92,11 @@ def test_the_other_sign_says_the_other(name):
             "The heading is measured 2° to port of the true one.",
         ),
         ("delay", {"delay": 0.4}, "The thrusters act 0.4 s after they are commanded."),
+        (
+            "marker_offset",
+            {"marker_offset_dx": 0.0, "marker_offset_dy": -0.333},
+            "The position is measured 33.3 cm to port of the place in the model.",
+        ),
     ],
 )
 def test_sentences(name, given, said):

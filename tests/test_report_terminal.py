@@ -182,8 +182,8 @@ X = doubtful
 confidence 60 %, explains 90 % of the squared error with the coefficients,
 unique contribution 25 % (lost without this effect)
 Possibility: unlikely
-Possibly unlikely (20 % for unlikely): There is unlikely. However, something
-acts. It is not in the learned model, which predicts as well without it.
+Possibly unlikely (20 %): There is unlikely. However, something acts. It is
+not in the learned model, which predicts as well without it.
 X = unlikely
 Rejected
 gone: worse on held-out runs

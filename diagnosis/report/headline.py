@@ -95,7 +95,8 @@ def finding_sentence(e: ReportedEffect) -> str:
     if is_sure(e):
         return e.sentence
     others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
-    sure = f" ({percent(e.confidence)} for {e.id})" if np.isfinite(e.confidence) else ""
+    whose = f" for {e.id}" if e.indistinguishable else ""
+    sure = f" ({percent(e.confidence)}{whose})" if np.isfinite(e.confidence) else ""
     doubt = f" However, {e.doubt}." if e.doubt else ""
     if not e.in_model:
         doubt += f" {NOT_IN_MODEL}"

@@ -16,7 +16,7 @@ from .gram import WHOLE_RUNS, Nuisance, block_folds, gram_table
 from .map_regression import regression
 from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
-from .refinement import RefinedModel, TrainingSet, nuisance_of, refit, weighted_rows
+from .refinement import RefinedModel, TrainingSet, bounded, nuisance_of, refit, weighted_rows
 from .rivals import LinearProblem, may_be_modulated, modulated_forces, probability_beside
 from .shortlist import scored_alone
 
@@ -107,7 +107,7 @@ class Selection:
             return found
         return replace(
             found,
-            suspects=suspected(prior, self.at.offset, std[len(names) :]),
+            suspects=suspected(prior, self.at.offset, std[len(names) :], self.at.start),
             refitted=None if effects else self.at.without(self.at.values).model(prior),
             moved=dict(zip(prior.mean, self.at.offset.tolist(), strict=True)),
         )
@@ -249,15 +249,16 @@ def interval(value: float, std: float) -> tuple[float, float]:
     return value - half, value + half
 
 
-def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray) -> list[Suspect]:
+def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray, start: Model) -> list[Suspect]:
     """Nominal coefficients whose posterior excludes what is believed of them, the furthest first.
 
     Args:
         prior: of all nominal coefficients.
         offset, std: (q,), mean and standard deviation of the posterior, in prior standard deviations.
+        start: the initial model, whose parameters have ranges.
     """
     found = [
-        Suspect(name, float(k), prior.mean[name] + believed * float(k))
+        Suspect(name, float(k), prior.mean[name] + bounded(start, name, believed * float(k)))
         for (name, believed), k, s in zip(prior.std.items(), offset, std, strict=True)
         if abs(k) > beyond(offset.size) * s
     ]

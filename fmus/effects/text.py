@@ -83,11 +83,11 @@ def against_command(share: float, model: object) -> str:
 
 
 def offset(f: Found, name: str) -> str:
-    """A place on the ship, by the parameters ``name_dx`` and ``name_dy`` [m]."""
-    ways = ((f[f"{name}_dx"], "X"), (f[f"{name}_dy"], "Y"))
+    """A place on the ship, by ``name_dx`` and ``name_dy`` [m]; one of them where the other is 0."""
+    ways = [(f[f"{name}_dx"], "X"), (f[f"{name}_dy"], "Y")]
     return " and ".join(
         towards(way, "m", axis) if abs(way) >= 1.0 else towards(100.0 * way, "cm", axis)
-        for way, axis in ways
+        for way, axis in [each for each in ways if each[0]] or ways
     )
 
 

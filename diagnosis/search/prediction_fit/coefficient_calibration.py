@@ -118,7 +118,7 @@ class Calibrator:
         moved = dict(zip(self.prior.mean, at.offset.tolist(), strict=True))
         f = self.found
         posterior = JointPosterior.of(fitted, self.prior)
-        wrong = suspected(self.prior, at.offset, posterior.shares(self.prior))
+        wrong = suspected(self.prior, at.offset, posterior.shares(self.prior), at.start)
         learned = Findings(
             [], f.ranking, model, wrong, f.sigma, model, moved, folds, None, at, f.searched
         )

@@ -100,7 +100,7 @@ def to_predictions(
         found,
         effects=effects,
         model=model,
-        suspects=suspected(prior, at.offset, posterior.shares(prior)),
+        suspects=suspected(prior, at.offset, posterior.shares(prior), at.start),
         moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
         estimate=at,
         fold_models=fitted.fold_models,
