@@ -21,8 +21,9 @@ import diagnosis
 from benchmarks.ship_effects import Cause, causes
 from benchmarks.ship_effects import sail as sail_of
 from diagnosis import InputError, Model, Run, omega, propose_columns, weak_windows
-from diagnosis.assessment import plausibility, reading_odds
+from diagnosis.assessment import plausibility
 from diagnosis.assessment.command_check import contradicted_commands, without_force
+from diagnosis.assessment.currents import in_further_current
 from diagnosis.assessment.gains import gains, varying
 from diagnosis.assessment.plausibility import (
     Mistake,
@@ -145,7 +146,7 @@ def test_a_current_that_may_explain_an_error_is_that_of_the_ships_size(name):
     """A small share of a speed that grows with the root of the length (Froude)."""
     model = Model(ship=ship_with((), name))
     speed = SETTINGS.inexact * np.sqrt(model.ship.description.length / 1.105)
-    currents = [(m.value("V_n"), m.value("V_e")) for m in reading_odds._streaming(model)]
+    currents = [(m.value("V_n"), m.value("V_e")) for m in in_further_current(model)]
     np.testing.assert_allclose(currents, speed * np.eye(2), rtol=1e-3)
 
 

@@ -27,6 +27,7 @@ from ..predictors import Model, WeakWindows, omega
 from ..predictors.thrust import full_thrust
 from ..predictors.weak_form import OVERLAP, needed_force, undamped
 from ..runs.run_constants import STEPS
+from .currents import in_further_current, in_likeliest_current
 from .readings import Reading, reread
 from .settings import SETTINGS
 
@@ -132,7 +133,7 @@ class ReadingOdds:
             w = reread(self.w, reading, self.model)
             e, z = omega(w, self.model), needed_force(w, self.model)
             a = needed_force(w, self._undamped)
-            both = self._lost, _streaming(self.model)
+            both = self._lost, in_further_current(self.model)
             each, streams = ([omega(w, m) - e for m in some] for some in both)
             found = np.concatenate([e, z, a, *each, *streams])
         if not (np.isfinite(found).all() and (a != 0.0).any(axis=0).all()):
@@ -153,17 +154,8 @@ class ReadingOdds:
 
     def in_current(self) -> "ReadingOdds":
         """The same for a ship in the current that explains most of the run as it was read."""
-        model, unit = self.model, 1.0 / np.sqrt((needed_force(self.w, self._undamped) ** 2).mean(axis=0))
-        with np.errstate(all="ignore"):
-            for _ in range(STEPS):
-                e = omega(self.w, model)
-                slopes = [omega(self.w, m) - e for m in _streaming(model)]
-                columns = np.array([(slope * unit).ravel() for slope in slopes]).T
-                if not np.isfinite(columns).all():
-                    break
-                more = _current(model) * np.linalg.lstsq(columns, -(e * unit).ravel(), rcond=None)[0]
-                model = model.plus({"V_n": float(more[0]), "V_e": float(more[1])})
-        return ReadingOdds(self.w, model)
+        unit = np.sqrt((needed_force(self.w, self._undamped) ** 2).mean(axis=0))
+        return ReadingOdds(self.w, in_likeliest_current(self.w, self.model, unit))
 
     def _steady(self, w: WeakWindows) -> Explanation:
         """Forces that are steady in the body or on earth."""
@@ -201,16 +193,6 @@ class ReadingOdds:
         others = [model.plus({n: k.deviation(model.value(n))}) for n, k in known]
         changes = [other.mass.diagonal() - own for other in others]
         return np.sqrt(np.square(changes).sum(axis=0)) / own
-
-
-def _current(model: Model) -> float:
-    """Deviation [m/s] of a current."""
-    return SETTINGS.inexact * model.ship.scale.speed
-
-
-def _streaming(model: Model) -> list[Model]:
-    """A model in a current to the north, and to the east, that is larger by its deviation."""
-    return [model.plus({n: _current(model)}) for n in ("V_n", "V_e")]
 
 
 def most_thrust(w: WeakWindows, model: Model) -> np.ndarray:
