@@ -126,11 +126,19 @@ def pushed_aside(w: WeakWindows, model: Model) -> str | None:
     A rudder acts sideways on a ship under way. What a current or a wind may give does not count: a
     constant force in the ship's or the earth's axes, and that of the current that explains most.
     """
-    full, idle = most_thrust(w, model), ~np.nan_to_num(thrust_along(w, model)).any(axis=0)
-    lacking = np.zeros(3)
-    for each in (model, ReadingOdds(w, model).in_current().model) if idle.any() else ():
-        lacking = varying(w, omega(w, each))
-        idle &= lacking > SETTINGS.much * full
+    full = most_thrust(w, model)
+
+    def beyond(of: Model) -> tuple[np.ndarray, np.ndarray]:
+        lacking = varying(w, omega(w, of))
+        return lacking, lacking > SETTINGS.much * full
+
+    lacking, idle = beyond(model)
+    if not idle.any():
+        return None
+    idle &= ~np.nan_to_num(thrust_along(w, model)).any(axis=0)
+    if idle.any():
+        lacking, too_much = beyond(ReadingOdds(w, model).in_current().model)
+        idle &= too_much
     if not idle.any():
         return None
     k = int(np.argmax(idle))
@@ -272,11 +280,23 @@ def likeliest_mistake(
     )
     if order[0] < named:  # a unit with a name is as good as a number
         order = [k for k in order if k < named]
-    # Thrusters that are weak, as by a flat battery, are as usual as a unit or clock without a name,
-    # unless this alone explains all of the motion.
-    weak = order[0] >= named and factor is not None and SETTINGS.least_gain < factor < 1.0
-    left = (odds.explained(r).left for r in (possible[order[0]], AS_READ))
-    weak = weak and not next(left) <= 2.0 < next(left)
-    otherwise = f"all thrusters give {factor:.2g} of theirs" if weak else ""
-    sure = bool(better >= needed and not weak)
-    return Mistake([possible[k] for k in order], better, sure, otherwise)
+    found_best = [possible[k] for k in order]
+    otherwise = "" if order[0] < named else _weak_thrusters(odds, found_best[0], factor)
+    return Mistake(found_best, better, bool(better >= needed and not otherwise), otherwise)
+
+
+def _weak_thrusters(odds: ReadingOdds, likeliest: Reading, factor: float | None) -> str:
+    """Thrusters that are all weak, as by a flat battery, in words; empty where they are no explanation.
+
+    They are as usual as a unit or a clock without a name, unless this alone explains all of the motion,
+    which may be twice the noise off. Where damping is quadratic, both explain the same.
+
+    Args:
+        odds: of the run.
+        likeliest: reading in such a unit, or by such a clock.
+        factor: that the accelerations are off by; None: by none.
+    """
+    if factor is None or not SETTINGS.least_gain < factor < 1.0:
+        return ""
+    left, as_read = (odds.explained(reading).left for reading in (likeliest, AS_READ))
+    return "" if left <= 2.0 < as_read else f"all thrusters give {factor:.2g} of theirs"

@@ -57,7 +57,7 @@ class MotionFaults(NamedTuple):
         either: whether a compass that is off by heading would look like that clock.
         torn: whether way and turn would each need a clock of its own.
         by_way: whether the way alone tells of that clock.
-        scatter: (k,), of its constants, see :func:`_scatter`.
+        scatter: (k,), of its constants, see :func:`_scatter`; None: not yet known.
     """
 
     path: Path
@@ -65,12 +65,12 @@ class MotionFaults(NamedTuple):
     either: bool = False
     torn: bool = False
     by_way: bool = False
-    scatter: np.ndarray | float = 0.0
+    scatter: np.ndarray | None = None
 
     @property
     def std(self) -> np.ndarray:
         """(k,), standard deviation of the constants."""
-        return np.hypot(self.path.deviation, self.scatter)
+        return np.hypot(self.path.deviation, 0.0 if self.scatter is None else self.scatter)
 
 
 def motion(
@@ -189,12 +189,12 @@ def _estimated(
         wanders = False
         path = problem.solve([c for c in every if c.kind == "delay"], fixed_clock=True)
     found = MotionFaults(path, wanders, either, torn, wanders and e.rate is None)
-    while True:
-        while len(kept := _sure(found)) < len(found.path.columns):
-            found = found._replace(path=problem.solve(kept, not wanders), scatter=0.0)
-        if not isinstance(found.scatter, float):
-            return found
-        found = found._replace(scatter=_scatter(found.path, not wanders))
+    while len(kept := _sure(found)) < len(found.path.columns) or found.scatter is None:
+        if len(kept) < len(found.path.columns):
+            found = found._replace(path=problem.solve(kept, not wanders), scatter=None)
+        else:
+            found = found._replace(scatter=_scatter(found.path, not wanders))
+    return found
 
 
 def _sure(found: MotionFaults) -> list[FaultColumn]:
@@ -215,7 +215,7 @@ def _scatter(path: Path, fixed_clock: bool) -> np.ndarray:
     part = np.minimum((PARTS * (time[:-1] - time[0]) / (time[-1] - time[0])).astype(int), PARTS - 1)
     each = path.problem.solve([p for c in path.columns for p in c.in_parts(part, PARTS)], fixed_clock)
     values, own = (x.reshape(-1, PARTS) for x in (each.constants, each.deviation))
-    weights = np.where(own > 0.0, np.where(own > 0.0, own, 1.0) ** -2.0, 0.0)
+    weights = np.where(own > 0.0, own, np.inf) ** -2.0  # a part without any turn tells nothing
     total, squares = weights.sum(axis=1), (weights**2).sum(axis=1)
     mean = (weights * values).sum(axis=1) / total
     apart = (weights * (values - mean[:, None]) ** 2).sum(axis=1) - ((weights > 0.0).sum(axis=1) - 1)
