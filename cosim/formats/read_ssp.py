@@ -73,7 +73,7 @@ class _SspReader:
 
     def components(self, system: Element) -> dict[str, dict[str, Any]]:
         """Entries of ``fmus``; their FMUs are written to the scratch folder."""
-        elements = list(system.find("ssd:Elements", NAMES) or ())
+        elements = system.findall("ssd:Elements/*", NAMES)
         for element in elements:
             kind = element.tag.removeprefix(f"{{{SSP_SPACES['ssd']}}}")
             if kind != "Component":

@@ -12,6 +12,7 @@ from diagnosis.search import conclusion
 from diagnosis.search.conclusion import AcceptedEffect, Selection, interval
 from diagnosis.search.gram import WHOLE_RUNS, Nuisance
 from diagnosis.search.rivals import LinearProblem, probability_beside
+from fmus.declare import Variable
 
 K, BLOCK = 240, 12
 SIGMA = np.array([0.5, 2.0, 0.1])
@@ -21,7 +22,19 @@ EFFECTS, COEFFICIENTS = ["a", "b", "c"], ["X_u", "N_r"]
 COLUMN = {n: SIGMA * RNG.standard_normal((K, 3)) for n in (*EFFECTS, *COEFFICIENTS)}
 TRUE = {"a": 0.8, "b": -0.5, "c": 0.3, "X_u": 1.5, "N_r": -0.7}
 Y = sum(x * COLUMN[n] for n, x in TRUE.items()) + 0.5 * SIGMA * RNG.standard_normal((K, 3))
-START = "start"
+
+
+class Start:
+    """The initial model, whose parameters have no ranges."""
+
+    def declared(self, name):
+        return Variable(name, "1", "any", 0.0)
+
+    def value(self, name):
+        return PRIOR.mean[name]
+
+
+START = Start()
 
 
 @dataclass(frozen=True)
@@ -30,7 +43,7 @@ class Point:
 
     values: dict
     offset: np.ndarray
-    start: str = START
+    start: Start = START
 
     @property
     def fitted(self):

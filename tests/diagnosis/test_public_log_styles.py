@@ -284,10 +284,22 @@ def test_numbers_of_a_clock_are_its_times(tmp_path: Path) -> None:
     [
         *("{:g} sec", "0 days 00:00:{:09.6f}", "2021-06-01 08:58:{:06.3f} UTC"),
         *("2021-06-01_08:58:{:06.3f}", "[2021-06-01 08:58:{:06.3f}]", "20210601_0858{:06.3f}"),
+        *("01.06.2021 08.58.{:06.3f}", "01JUN2021:08:58:{:06.3f}", "2021-06-01 08:58:{:06.3f} CEST"),
+        *("2021-152T08:58:{:06.3f}Z", "2021年6月1日 8時58分{:06.3f}秒", "2021:06:01 08:58:{:06.3f}"),
     ],
 )
 def test_durations_and_zones_are_stamps(tmp_path: Path, form: str) -> None:
     is_the_motion(seen(tmp_path / "a.csv", log(time=[form.format(t) for t in TIME])))
+
+
+def test_a_day_that_no_year_has_and_a_zone_that_changes_are_refused(tmp_path: Path) -> None:
+    """At the end of summer time the same hour comes twice."""
+    zones = ["CEST" if t < TIME[-1] / 2.0 else "CET" for t in TIME]
+    changing = [f"2021-10-31 02:58:{t:06.3f} {zone}" for t, zone in zip(TIME, zones, strict=True)]
+    for stamps in (changing, [f"2021-400T08:58:{t:06.3f}" for t in TIME]):
+        log(time=stamps).to_csv(tmp_path / "a.csv", index=False)
+        with pytest.raises(InputError):
+            propose(tmp_path / "a.csv", OTTER)
 
 
 def test_names_of_other_quantities_are_none_of_the_pose(tmp_path: Path) -> None:

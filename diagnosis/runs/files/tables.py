@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from dateutil.parser import ParserError, parse
+from dateutil.parser import parse
 from scipy.constants import day, nano
 
 from cosim import InputError
@@ -43,8 +43,14 @@ WAYS = {"port": -1.0, "p": -1.0, "astern": -1.0, "starboard": 1.0, "s": 1.0, "ah
 STILL = ("midship", "midships", "amidships", "stop")
 REMARK = re.compile(r"(#|%|//|\(|[^\W\d_]{2}).*")  # such as "Total rows: 1800"
 ELAPSED = re.compile(r"(?P<min>\d+):(?P<s>[0-5]?\d[.,]\d+)")  # minutes and seconds
-ZONE = re.compile(r"\b(UTC|GMT|Z)\b")
+ZONE = re.compile(r"\b[A-Z]{1,5}\b")  # its letters, such as UTC, Z or CEST
+DOTTED = re.compile(r"(?<=\s)(\d{1,2})\.(\d\d)\.(\d\d)\b")  # a time of day behind a date, as in Finland
+# What Chinese and Japanese write behind the numbers of a date and a time.
+IDEOGRAPHS = str.maketrans(
+    {"年": "-", "月": "-", "日": " ", "时": ":", "時": ":", "分": ":", "秒": None}
+)
 TICKS = 1e17, 1e18  # 1, counts of 100 ns since the year 1601 or 1; of 1 ns since 1970 there are more
+ORDINAL = re.compile(r"\d{4}-\d{3}")  # a year and a day in it, as of ISO 8601
 FULL = 60.0  # 1, seconds in a minute, and minutes in an hour
 
 
@@ -248,8 +254,11 @@ def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
 
     Of a date whose day may be its month, the log takes the shorter time.
     """
-    parts = cells.astype(object).str.extract(STAMP)
-    rest = parts["rest"].str.replace(ZONE, "", regex=True)
+    written = cells.astype(object).str.translate(IDEOGRAPHS).str.replace(DOTTED, r"\1:\2:\3", regex=True)
+    parts = written.str.extract(STAMP)
+    rest = parts["rest"]
+    if rest.nunique() <= 1:  # of one zone none need be known
+        rest = rest.str.replace(ZONE, "", regex=True)
     dates = parts["date"].str.replace(":", "-").str.cat(rest, sep=" ").str.strip(" ,")
     half = parts["half"].str.lower().str[0]
     hours = parts["h"].astype(float)
@@ -268,9 +277,11 @@ def _day(text: str, day_first: bool) -> datetime | None:
     """A date in any form; None: it is none."""
     any_day = datetime.min.replace(year=1970)  # of times without a date
     try:
+        if ORDINAL.fullmatch(text):
+            return datetime.strptime(text, "%Y-%j")
         day = parse(text, dayfirst=day_first, default=any_day) if text else any_day
         return day if day.year >= any_day.year else None
-    except (ParserError, OverflowError):
+    except (ValueError, OverflowError):
         return None
 
 

@@ -18,7 +18,7 @@ EAST_ASIAN = ("gb18030", "big5", "cp932")  # encodings of Chinese and Japanese
 SEPARATORS = (",", ";", "\t", "|", " ")  # that a table may have between its cells
 # A time of day, a date before it, and half of the day, zone or year behind it.
 STAMP = re.compile(
-    r"^(?P<date>.*?)[\sT,]*(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
+    r"^(?P<date>.*?)[\sT,:]*(?<!\d)(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<rest>\D*\d{4}|[^\d:]*)$"
 )
 RULED = re.compile(r"[-=+|\s]*[-=]{3}[-=+|\s]*")  # a line below the names
