@@ -11,15 +11,19 @@ import csv
 import io
 import json
 import re
+import sys
 import tokenize
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import tomllib
-
 from cosim.command import command_parser, run_command
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 KINDS = ("module", "field", "default", "literal", "data")
 PACKAGE = Path(__file__).parents[1] / "diagnosis"

@@ -27,11 +27,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-import tomllib
 from scipy.stats import binomtest
 
 from benchmarks.line_map import WORKERS, LineMap, measure
 from benchmarks.line_mutants import PACKAGES, ROOT, Mutant, again, draw
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
 KILLED, SURVIVED, SAME = "killed", "survived", "equivalent"

@@ -241,7 +241,7 @@ def write_logs(runs, tmp_path):
     """Folders a and b of logs that hold the measured runs, and more that is not to be looked at."""
     for name in "ab":
         (tmp_path / name).mkdir()
-        table = pd.read_csv(runs / f"{name}.csv").rename(columns=SIGNALS)
+        table = pd.read_csv(runs / f"{name}.csv", dtype=str).rename(columns=SIGNALS)  # as it is written
         table.assign(**{"vessel.x": 7.0}).to_csv(tmp_path / name / "log.csv", index=False)
         plant = {"scenario": {"fmus": {"vessel": {"parameters": {"delta_X_u": 9.0, "m": 99.0}}}}}
         (tmp_path / name / "log.json").write_text(json.dumps(plant))
