@@ -32,9 +32,6 @@ from .matlab_files import matlab_table
 from .message_fields import MessageField, message_fields
 from .text_layout import STAMP, is_marked, plain_number
 
-# Numbers are the nearest of those that are written. pandas reads so from version 3 on.
-PANDAS = int(pd.__version__.partition(".")[0])
-EXACT: dict[str, Any] = {} if PANDAS >= 3 else {"float_precision": "round_trip"}
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 LEAP_SECOND = re.compile(r"(?<=:59):60(?!\d)")
@@ -178,6 +175,10 @@ def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFra
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
     units = [layout.skip + 1] if layout.units_line else []
     begin = layout.skip + ("names" in options)
+    if pd.__version__.startswith(
+        "2."
+    ):  # later, numbers are always the nearest ones
+        options["float_precision"] = "round_trip"
     try:
         with open(path, "rb") as content:  # a long log does not fit into memory twice
             return pd.read_csv(
@@ -186,7 +187,6 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
                 encoding=layout.encoding,
                 skiprows=[*range(begin), *units],
                 index_col=False,
-                **EXACT,
                 **options,
             )
     except ValueError as error:  # of the encoding, of the cells, or of names that are there twice
