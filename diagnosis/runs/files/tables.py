@@ -175,9 +175,7 @@ def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFra
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
     units = [layout.skip + 1] if layout.units_line else []
     begin = layout.skip + ("names" in options)
-    if pd.__version__.startswith(
-        "2."
-    ):  # later, numbers are always the nearest ones
+    if pd.__version__.startswith("2."):  # later, numbers are always the nearest ones
         options["float_precision"] = "round_trip"
     try:
         with open(path, "rb") as content:  # a long log does not fit into memory twice
