@@ -130,7 +130,7 @@ def test_a_fault_in_a_part_of_the_run_adds_what_it_adds_there(by):
     e = evidence(run_with(by))
     part = np.repeat([0, 1, 2], [500, 1000, T.size - 1501])
     for column in columns(e, REFERENCE):
-        each = np.array([own.path for own in column.in_parts(part, 3)])
+        each = np.array([column.during(part == k).path for k in range(3)])
         np.testing.assert_allclose(each.sum(axis=0), column.path - column.path[0], atol=1e-9)
         for own, first, last in zip(each, (0, 500, 1500), (500, 1500, T.size - 1), strict=True):
             assert not own[: first + 1].any()

@@ -176,11 +176,9 @@ class Shortlist:
 
 def shortlist(t: TrainingSet, at: RefinedModel, ranking: Ranking, present: str = "") -> Shortlist:
     """Refine the best candidates, and the effect whose place is searched again, and score them again."""
-    chosen = {s.candidate: s for s in ranking.order[:LENGTH]}
-    chosen |= {
-        s.candidate: s for s in ranking.order if ranking.candidates[s.candidate].effect.id == present
-    }
-    best = [chosen[k] for k in sorted(chosen)]
+    of = [ranking.candidates[s.candidate].effect.id for s in ranking.order]
+    chosen = [s for k, s in enumerate(ranking.order) if k < LENGTH or of[k] == present]
+    best = sorted(chosen, key=lambda s: s.candidate)
     effects = [ranking.candidates[s.candidate].effect for s in best]
     starts = [start(at, ranking, s) for s in best]
     refined = for_each(lambda s: refine(t, at, ranking.nuisance, s), starts, [at.start])

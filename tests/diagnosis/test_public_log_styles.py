@@ -292,6 +292,12 @@ def test_durations_and_zones_are_stamps(tmp_path: Path, form: str) -> None:
     is_the_motion(seen(tmp_path / "a.csv", log(time=[form.format(t) for t in TIME])))
 
 
+def test_a_year_that_ends_changes_no_zone(tmp_path: Path) -> None:
+    """Behind the time both are one text."""
+    stamps = pd.Timestamp("2021-12-31 23:59:50") + pd.to_timedelta(TIME, unit="s")
+    is_the_motion(seen(tmp_path / "a.csv", log(time=stamps.strftime("%a %b %d %H:%M:%S.%f CET %Y"))))
+
+
 def test_a_day_that_no_year_has_and_a_zone_that_changes_are_refused(tmp_path: Path) -> None:
     """At the end of summer time the same hour comes twice."""
     zones = ["CEST" if t < TIME[-1] / 2.0 else "CET" for t in TIME]

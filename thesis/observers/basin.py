@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import diagnosis
-from diagnosis.runs import lost, repeated
+from diagnosis.runs import body_acceleration, body_velocity, lost, repeated
 from fmus.frames import rotate_to_body
 
 from .estimates_replayed import SETTLED, Log, rms
@@ -75,12 +75,12 @@ def reference(log: Log) -> dict[str, np.ndarray]:
     h = float(np.median(np.diff(log["time"])))
     psi = log["observer.psi_m"].copy()
     psi[good] = np.unwrap(psi[good])
-    _, x_dot, x_ddot = local_cubic(log["observer.x_m"], good, h)
-    _, y_dot, y_ddot = local_cubic(log["observer.y_m"], good, h)
-    psi, r, r_dot = local_cubic(psi, good, h)
-    u, v = rotate_to_body(psi, x_dot, y_dot)
-    along, across = rotate_to_body(psi, x_ddot, y_ddot)
-    return {"u": u, "v": v, "r": r, "u_dot": along + r * v, "v_dot": across - r * u, "r_dot": r_dot}
+    each = [local_cubic(x, good, h) for x in (log["observer.x_m"], log["observer.y_m"], psi)]
+    eta, eta_dot, eta_ddot = (np.column_stack(x) for x in zip(*each, strict=True))
+    nu = body_velocity(eta[:, 2], eta_dot)
+    nu_dot = body_acceleration(eta[:, 2], nu, eta_ddot)
+    names = ("u", "v", "r", "u_dot", "v_dot", "r_dot")
+    return dict(zip(names, [*nu.T, *nu_dot.T], strict=True))
 
 
 def prediction_error(log: Log, estimate: Log, seconds: float) -> float:

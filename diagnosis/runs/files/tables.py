@@ -175,7 +175,7 @@ def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFra
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
     units = [layout.skip + 1] if layout.units_line else []
     begin = layout.skip + ("names" in options)
-    if pd.__version__.startswith("2."):  # later, numbers are always the nearest ones
+    if pd.__version__.startswith("2."):  # from 3 on it reads the nearest number anyway
         options["float_precision"] = "round_trip"
     try:
         with open(path, "rb") as content:  # a long log does not fit into memory twice
@@ -259,7 +259,7 @@ def _other_stamps(cells: pd.Series) -> tuple[pd.Series, bool]:
     written = cells.astype(object).str.translate(IDEOGRAPHS).str.replace(DOTTED, r"\1:\2:\3", regex=True)
     parts = written.str.extract(STAMP)
     rest = parts["rest"]
-    if rest.nunique() <= 1:  # of one zone none need be known
+    if rest.str.findall(ZONE).str.join(" ").nunique() <= 1:  # of one zone none need be known
         rest = rest.str.replace(ZONE, "", regex=True)
     dates = parts["date"].str.replace(":", "-").str.cat(rest, sep=" ").str.strip(" ,")
     half = parts["half"].str.lower().str[0]

@@ -52,11 +52,10 @@ class FaultColumn(NamedTuple):
     least: float
     clocked: bool = True
 
-    def in_parts(self, part: np.ndarray, count: int) -> "list[FaultColumn]":
-        """The same fault in each part of a run alone; ``part`` (n - 1,) is that of each step."""
-        steps, start = np.diff(self.path, axis=0), np.zeros((1, 3))
-        each = (np.where((part == k)[:, None], steps, 0.0) for k in range(count))
-        return [self._replace(path=np.vstack([start, np.cumsum(own, axis=0)])) for own in each]
+    def during(self, steps: np.ndarray) -> "FaultColumn":
+        """The same fault in some steps of a run alone, of which ``steps`` (n - 1,) are true."""
+        moved = np.where(steps[:, None], np.diff(self.path, axis=0), 0.0)
+        return self._replace(path=np.vstack([np.zeros((1, 3)), np.cumsum(moved, axis=0)]))
 
 
 def columns(e: Evidence, scale: Scale) -> list[FaultColumn]:
@@ -113,16 +112,14 @@ def _of_rate(e: Evidence, scale: Scale, late: float) -> list[FaultColumn]:
     """Scale, offset and delay of the yaw rate."""
     if e.rate is None:
         return []
-    measured = ~without_rate(e.run)[1:]
-    scaled, offset, delay = (
-        _path(e, turn=np.cumsum(np.append(0.0, np.diff(turn) * measured)))
-        for turn in (-e.turned, -e.time, e.rate)
-    )
-    return [
-        FaultColumn("r", "scale", "1", "rate", scaled, _least_scale(e.rate[:, None])),
+    offset = _path(e, turn=e.time[0] - e.time)
+    found = [
+        FaultColumn("r", "scale", "1", "rate", _path(e, turn=-e.turned), _least_scale(e.rate[:, None])),
         FaultColumn("r", "offset", "rad/s", "rate", offset, LEAST / (HORIZON * scale.time)),
-        FaultColumn("r", "delay", "s", "rate", delay, late, False),
+        FaultColumn("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
     ]
+    measured = ~without_rate(e.run)[1:]  # elsewhere the rate is that of the heading, which is right
+    return [fault.during(measured) for fault in found]
 
 
 def deviations(e: Evidence, heading: np.ndarray) -> list[FaultColumn]:

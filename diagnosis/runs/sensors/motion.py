@@ -213,7 +213,8 @@ def _scatter(path: Path, fixed_clock: bool) -> np.ndarray:
         return np.zeros(0)
     time = path.problem.evidence.time
     part = np.minimum((PARTS * (time[:-1] - time[0]) / (time[-1] - time[0])).astype(int), PARTS - 1)
-    each = path.problem.solve([p for c in path.columns for p in c.in_parts(part, PARTS)], fixed_clock)
+    in_parts = [c.during(part == k) for c in path.columns for k in range(PARTS)]
+    each = path.problem.solve(in_parts, fixed_clock)
     values, own = (x.reshape(-1, PARTS) for x in (each.constants, each.deviation))
     weights = np.where(own > 0.0, own, np.inf) ** -2.0  # a part without any turn tells nothing
     total, squares = weights.sum(axis=1), (weights**2).sum(axis=1)
