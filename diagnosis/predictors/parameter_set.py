@@ -52,12 +52,18 @@ def write_model(path: str | Path, model: Model) -> None:
     values = {
         part: _told(part, getattr(model, part), names) for part, names in model.ship.parameters.items()
     }
-    declared = model.ship.parameters[THRUSTERS]
-    runs = {run: {THRUSTERS: _told(THRUSTERS, own, declared)} for run, own in model.runs.items()}
-    for own in [*runs.values()][:1]:
-        values[THRUSTERS] = {**own[THRUSTERS], **values[THRUSTERS]}
+    runs = {
+        run: {
+            part: _told(part, of_part, model.ship.parameters[part])
+            for part, of_part in model.in_parts(own).items()
+        }
+        for run, own in model.runs.items()
+    }
+    for part, own in next(iter(runs.values()), {}).items():
+        values[part] = {**own, **values[part]}
     beside = values.pop(MEASUREMENT)
-    groups = (*values.values(), beside, *(own[THRUSTERS] for own in runs.values()))
+    of_runs = (own for parts in runs.values() for own in parts.values())
+    groups = (*values.values(), beside, *of_runs)
     used = [str(given.unit) for group in groups for given in group.values()]
     units = {unit: base_exponents(unit) for unit in sorted(set(used))}
     learned = [f.content() for f in model.learned_from]
@@ -125,7 +131,10 @@ def read_model(path: str | Path, of: Ship | None = None) -> Model:
     for part, names in given.of_one_run.items():
         for name in names:
             del found[part][name]
-    runs = {run: numbers(own)[THRUSTERS] for run, own in given.runs.items()}
+    runs = {
+        run: {name: x for of_part in numbers(own).values() for name, x in of_part.items()}
+        for run, own in given.runs.items()
+    }
     known = of.parameters[MEASUREMENT]
     beside = {name: p.value for name, p in given.beside.items() if name in known}
     learned = fingerprints(given.learned_from, Path(path))

@@ -101,9 +101,10 @@ def _declared(params: type[Any]) -> tuple[dict[str, int], list[float]]:
 class Model:
     """Parameters of a ship, by name; what is not named is nominal.
 
-    A time within a run, such as that of a failure, is of that run alone. Such a value is called
-    ``parameter@run``, wherever values have names, and stands in ``runs``; :meth:`during` is the model of
-    a run with its values. Without the run, or with another one, they are absent.
+    A time within a run, such as that of a failure, is of that run alone, and so may a current be. Such
+    a value is called ``parameter@run``, wherever values have names, and stands in ``runs``;
+    :meth:`during` is the model of a run with its values. Without the run, or with another one, they are
+    absent.
 
     Attributes:
         vessel, thrusters: parameter -> value.
@@ -111,7 +112,7 @@ class Model:
         ship: its components and effects.
         origin: the model that this one was made from by additions; None: itself. Its inertia is the one
             by which a model error is a force.
-        runs: run -> parameter of the thrusters -> value that it has in that run alone.
+        runs: run -> parameter of any part -> value that it has in that run alone.
         given: run -> force at its samples that acts beside all else.
         learned_from: runs of which the parameters were learned.
     """
@@ -139,9 +140,9 @@ class Model:
         if run not in self.runs:
             return self
         if run not in self._during:
-            thrusters = {**self.thrusters, **self.runs[run]}
-            origin = self.origin or self
-            self._during[run] = replace(self, thrusters=thrusters, origin=origin, runs={})
+            parts = self.in_parts(self.runs[run])
+            own = {part: {**getattr(self, part), **values} for part, values in parts.items()}
+            self._during[run] = replace(self, **own, origin=self.origin or self, runs={})
         return self._during[run]
 
     @cached_property
@@ -161,6 +162,17 @@ class Model:
             place = runs.setdefault(run, {}) if run else parts[self.owner(parameter)]
             place[parameter] = self.value(name) + value
         return replace(self, **parts, origin=self.origin or self, runs=runs)
+
+    def in_parts(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+        """Values by the part of the ship that their parameters are of, those of all parts that have any.
+
+        Raises:
+            InputError: no part of the ship has such a parameter.
+        """
+        parts: dict[str, dict[str, float]] = {}
+        for name, value in values.items():
+            parts.setdefault(self.owner(name), {})[name] = value
+        return parts
 
     def declared(self, name: str) -> Variable:
         """The declaration of a parameter of any part of the ship.

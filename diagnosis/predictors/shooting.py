@@ -16,7 +16,7 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed
 from ..runs.run_constants import DIGITS
-from .prediction import WindowStarts, arriving, filtered, propagate, stacked
+from .prediction import WindowStarts, arriving, filtered, merged, propagate, stacked
 from .ship_model import Model
 from .thrust import Response
 from .traced.recorded_step import Inputs, Ready, thrust_at
@@ -180,12 +180,20 @@ class Shooting:
         least = DIGITS * np.array([1.0, *model.ship.scale.speeds])
         variance = self.at_start[:, range(2, 6), range(2, 6)].T
         reach = np.maximum(np.sqrt(3.0 * variance), least[:, None])
-        ready = Ready(model.hull, self.starts.drive(model))
+        ready = Ready(self._of_windows(model).hull, self.starts.drive(model))
         with np.errstate(all="ignore"):
             rates = _slopes(s, self._inputs(model), ready, reach)
         i11, i22, i23, i32, i33 = model.hull.hull.inverse
         by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
+
+    def _of_windows(self, model: Model) -> Model:
+        """The model with the hull's values of each window's run, arrays (1, w) where these differ."""
+        if not model.runs:
+            return model
+        each = [model.during(name) for name, _ in self._each]
+        counts = np.bincount(self.run, minlength=len(each))
+        return merged(each, lambda x: np.repeat(x, counts)[None])
 
     def _inputs(self, model: Model) -> Inputs:
         """What acts at the start and at the instants, each (T + 1, w)."""

@@ -16,6 +16,7 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
+from ..predictors.ship_model import of_run, parameter_and_run
 from ..predictors.uncertainty import FLOOR, undone_variance
 from ..predictors.weak_form import SMALL
 from ..runs.run_constants import NEGLIGIBLE
@@ -65,6 +66,23 @@ def model_error(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     return np.concatenate([omega(w, model) for w in data])
 
 
+def changed_error(
+    data: Sequence[WeakWindows],
+    model: Model,
+    base: np.ndarray,
+    changes: Mapping[str, float],
+    name: str,
+) -> np.ndarray:
+    """Model error (K, 3) after changes; of one value's in a single run other runs keep theirs (K, 3)."""
+    changed, (_, run) = model.plus(changes), parameter_and_run(name)
+    if not run:
+        return model_error(data, changed)
+    parts = np.split(base, np.cumsum([w.block.size for w in data])[:-1])
+    return np.concatenate(
+        [omega(w, changed) if w.run.name == run else own for w, own in zip(data, parts, strict=True)]
+    )
+
+
 def quieted(data: Sequence[WeakWindows], model: Model, changed: Model) -> np.ndarray | None:
     """Sum of squares (3,) of the noise that a change of the measurement's filters takes out of omega.
 
@@ -91,7 +109,7 @@ def shape(
     start = model_error(data, model.plus(given)) if given else base
     unit = np.array([model.unit(n) for n in fitted])
     steps = zip(fitted, (step * unit).tolist(), strict=True)
-    columns = [(start - model_error(data, model.plus({**given, n: h}))) / h for n, h in steps]
+    columns = [(start - changed_error(data, model, start, {**given, n: h}, n)) / h for n, h in steps]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
     offset, noise = (base - start, quieted(data, model, model.plus(given))) if given else (None, None)
     return CandidateShape(dict(given), list(fitted), offset, stacked, unit, quieted=noise)
@@ -262,6 +280,9 @@ def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Ef
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
         shapes += [plain] if not e.search.smooth else curve(base, plain, e, model.ship.scale)
+    if e.search.of_a_day and len(data) > 1:
+        own = [of_run(n, w.run.name) for w in data for n in e.fitted]
+        shapes.append(shape(data, model, base, {}, own, step))
     if spread(e):
         return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
     for values in values_to_try(data, model, base, e):

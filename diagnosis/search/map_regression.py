@@ -151,20 +151,35 @@ class Scored:
 def score(t: GramTable, candidate: int, shapes: int) -> Scored:
     """Score of a candidate; in each fold its shape is chosen by the training part."""
     options = [regression(t, candidate, k) for k in range(shapes)]
-    by_block = held_out_loss(t, options, t.by_block)
-    by_run = held_out_loss(t, options, t.by_run) if len(t.by_run.held) > 1 else by_block
+    charges = np.array(
+        [
+            o.size(t.total) * t.per_parameter + e.quieted
+            for o, e in zip(options, t.entries[candidate], strict=False)
+        ]
+    )
+    by_block = held_out_loss(t, options, charges, t.by_block)
+    by_run = held_out_loss(t, options, charges, t.by_run) if len(t.by_run.held) > 1 else by_block
     fits = [o.fitted(t.total) for o in options]
-    noise = [e.quieted for e in t.entries[candidate]]
-    shape = int(np.argmin([f.loss(t.total) + f.penalty + q for f, q in zip(fits, noise, strict=False)]))
-    complexity = options[shape].size(t.total) * t.per_parameter + t.entries[candidate][shape].quieted
-    return Scored(candidate, shape, by_block, by_run, float(fits[shape].penalty), complexity)
+    shape = int(np.argmin(charges + [f.loss(t.total) + f.penalty for f in fits]))
+    return Scored(candidate, shape, by_block, by_run, float(fits[shape].penalty), float(charges[shape]))
 
 
-def held_out_loss(t: GramTable, options: Sequence[CandidateRegression], folds: Folds) -> np.ndarray:
-    """Loss of each block (blocks,) by the fit, of the shape that does best, to all other folds."""
+def held_out_loss(
+    t: GramTable, options: Sequence[CandidateRegression], charges: np.ndarray, folds: Folds
+) -> np.ndarray:
+    """Loss of each block (blocks,) by the fit, of the shape that does best, to all other folds.
+
+    Args:
+        t: all columns.
+        options: the candidate's shapes.
+        charges: (shapes,), of the complexity of each.
+        folds: whose loss is by the fit to the others.
+    """
     found = np.empty(len(t.grams))
     fits = [o.fitted(folds.train) for o in options]
-    best = np.argmin([f.loss(folds.train) + f.penalty for f in fits], axis=0)
+    best = np.argmin(
+        [f.loss(folds.train) + f.penalty + c for f, c in zip(fits, charges, strict=True)], axis=0
+    )
     for k, held in enumerate(folds.held):
         fit = fits[best[k]]
         # In one step: whole Gram matrices of the blocks would be copied, of which few columns are used.

@@ -20,7 +20,7 @@ from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import OVERLAP
 from ..runs.run_constants import NEGLIGIBLE, STEPS
-from .candidates import SMALL, CandidateShape, model_error, quieted
+from .candidates import SMALL, CandidateShape, changed_error, model_error, quieted
 from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, Quadratic, most_likely, ridge
 from .nonlinear.multistart import limits
@@ -173,7 +173,7 @@ def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[
 def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:
     """Force (K, 3) that the model gains by one unit of a parameter."""
     small = SMALL * max(abs(scale), SMALL * model.unit(name))
-    return (left - model_error(t.data, model.plus({name: small}))) / small
+    return (left - changed_error(t.data, model, left, {name: small}, name)) / small
 
 
 def nuisance_of(t: TrainingSet, at: RefinedModel, base: np.ndarray) -> Nuisance:

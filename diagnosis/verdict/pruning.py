@@ -89,11 +89,11 @@ def prune(
 def judgeable(found: Findings, start: Model) -> list[str]:
     """The effects that data can judge, by their ids.
 
-    Waves and failures are not: no model has waves, and the times of a failure are those of the run in
-    which it was found.
+    Waves, failures and currents of single runs are not: no model has waves, and what holds in one run
+    alone says nothing of another.
     """
-    search = {f.id: start.ship.effects[f.id].search for f in found.effects}
-    return [i for i, s in search.items() if s.by == "regression" and not s.times]
+    search = {f.id: start.ship.effects[f.id].search for f in found.effects if not f.of_runs}
+    return [i for i, s in search.items() if s.by == "regression"]
 
 
 def _alternative(rest: Findings, kept: Findings, start: Model) -> Findings | Model:

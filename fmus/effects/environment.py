@@ -131,7 +131,7 @@ def waves(
     source="Fossen 2011, 8.3; irrotational",
     linear=False,
     gives="water velocity",
-    search=Search(differentiable=True),
+    search=Search(differentiable=True, of_a_day=True),
     wording=Wording(
         lambda f: (
             f"The water moves at {number(math.hypot(f['V_n'], f['V_e']))} m/s "

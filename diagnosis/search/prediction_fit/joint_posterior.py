@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from ...execution.short_text import ShortRepr
+from ...predictors.ship_model import parameter_and_run
 from ...runs import Fingerprint
 from ..prior import NominalPrior
 from .fit import Fitted
@@ -41,7 +42,7 @@ class JointPosterior(ShortRepr):
             len(names), -1
         )
         return cls(
-            [f"{model.owner(n)}.{n}" for n in names],
+            [f"{model.owner(parameter_and_run(n)[0])}.{n}" for n in names],
             [model.declared(n).unit for n in names],
             np.array([model.value(n) for n in names]),
             parts @ fitted.covariance @ parts.T,
