@@ -15,23 +15,34 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from fmus.ship import Ship
 
 from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
+from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import commanded
 from .candidates import CandidateShape
 from .conclusion import AcceptedEffect, Selection
 from .effect_evidence import nearest_share
 from .findings import MOST_REPORTED, Finding, Findings, Ranked
-from .gram import Entry, GramTable
+from .gram import Entry, GramTable, charge_of
 from .map_regression import Scored, first_share, fitted_columns, score
 from .most_likely import ridge
 from .nonlinear.profile import profiled
 from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
-from .refinement import RefinedModel, TrainingSet, bounded, nuisance_of, refit
+from .refinement import (
+    CandidateStart,
+    RefinedModel,
+    TrainingSet,
+    bounded,
+    nuisance_of,
+    refine,
+    refit,
+    timed,
+)
 from .shortlist import (
     LENGTH,
     NEW,
@@ -142,9 +153,39 @@ def search(
         del accepted[-1]
     at = refit(t, at, nuisance_of(t, at, t.error(at))).estimate
     for k, p in enumerate(accepted):
+        at, p = alike_in_all_runs(t, at, p)
         at, intervals = profiled(t, at, p)
         accepted[k] = replace(p, intervals={**p.intervals, **intervals})
     return Selection(t, at, accepted, ranked, lacking, NominalPrior.of(start, prior))
+
+
+def alike_in_all_runs(
+    t: TrainingSet, at: RefinedModel, p: AcceptedEffect
+) -> tuple[RefinedModel, AcceptedEffect]:
+    """An effect with one value for all runs, if values of each are no better, by the charge of each.
+
+    When it was accepted other effects and coefficients were still wrong, and differ between runs.
+    """
+    ship = at.start.ship
+    parameters = dict.fromkeys(parameter_and_run(n)[0] for n in p.names)
+    if len(parameters) == len(p.names) or any(timed(ship, n) for n in p.names):
+        return at, p
+    of_all = {
+        n: float(
+            np.mean(
+                [x for of, x in at.values.items() if of in p.names and parameter_and_run(of)[0] == n]
+            )
+        )
+        for n in parameters
+    }
+    beside = at.without(p.names)
+    begin = CandidateStart(of_all, [*of_all], np.zeros((len(of_all), len(of_all))))
+    found = refine(t, beside, nuisance_of(t, beside, t.error(beside)), begin).estimate
+    found = replace(found, precision=np.asarray(block_diag(found.precision, begin.precision)))
+    charge = charge_of(t.blocks[:, 0].size) * (len(p.names) - len(of_all))
+    if scored_alone(t, found).score > scored_alone(t, at).score + charge:
+        return at, p
+    return found, replace(p, names=tuple(of_all))
 
 
 def searched_again(

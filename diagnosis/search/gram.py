@@ -135,7 +135,12 @@ class GramTable:
     @property
     def per_parameter(self) -> float:
         """Complexity penalty of one parameter: log n of the Bayesian information criterion."""
-        return float(np.log(3.0 * self.rows.sum() / OVERLAP))
+        return charge_of(int(self.rows.sum()))
+
+
+def charge_of(windows: int) -> float:
+    """Complexity penalty of one parameter by a number of windows, see :class:`GramTable`."""
+    return float(np.log(3.0 * windows / OVERLAP))
 
 
 def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:

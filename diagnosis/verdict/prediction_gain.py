@@ -64,6 +64,7 @@ class PredictionGain:
         gained: whether the predictions are better, by more than twice their paired standard error or in
             most windows by a test of ranks.
         over: the model with which it is compared: "initial" or "calibrated".
+        of_other_runs: whether the data are validation runs.
     """
 
     where: str
@@ -72,6 +73,7 @@ class PredictionGain:
     heading: PairedChange
     gained: bool
     over: Literal["initial", "calibrated"] = "initial"
+    of_other_runs: bool = False
 
 
 def prediction_gain(
@@ -90,7 +92,8 @@ def prediction_gain(
         return None
     position, heading = (PairedChange.of(*pair) for pair in zip(others[1:], its[1:], strict=True))
     gained = predicts_better(its, others)
-    return PredictionGain(data.where, its.position.size, position, heading, gained)
+    size, of_other_runs = its.position.size, bool(data.validate)
+    return PredictionGain(data.where, size, position, heading, gained, of_other_runs=of_other_runs)
 
 
 def gain_of_search(
@@ -133,8 +136,8 @@ def without_gain(
     An effect that is a change of coefficients of one kind, as an added mass or a lag, is a calibration,
     and stays; not if it is beyond their priors and other coefficients do as well within theirs. What
     only inertia, damping and thrust together make up, each far from its prior, is none: a sway force
-    by u r is, as the equation of each axis may be multiplied by a factor. Waves and failures in times
-    of one run are in no prediction of other data.
+    by u r is, as the equation of each axis may be multiplied by a factor. Waves and failures are in no
+    prediction of other data, and values of single runs in none of other runs.
 
     Args:
         gain: of the search over calibration; None: not known, so that nothing follows.
@@ -147,7 +150,9 @@ def without_gain(
     if gain is None or gain.gained:
         return set()
     effects = start.ship.effects
-    shown = [f for f in found.effects if not f.of_runs and effects[f.id].search.by != "spectrum"]
+    foretold = [f for f in found.effects if not (f.of_runs and gain.of_other_runs)]
+    searches = ((f, effects[f.id].search) for f in foretold)
+    shown = [f for f, search in searches if search.by != "spectrum" and not search.times]
     if gain.over == "initial" or not shown:
         return {f.id for f in shown}
     base, kinds = model_error(runs, start), dict[str, list[str]]()

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis import Model
-from diagnosis.search import refinement
+from diagnosis.search import candidates, refinement
 from diagnosis.search.candidates import SMALL
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import (
@@ -126,7 +126,8 @@ class Linear:
 def linear(monkeypatch):
     prior = NominalPrior.of(START, 0.1)
     t = Linear(["lag", "V_n", "V_e"], prior)
-    monkeypatch.setattr(refinement, "model_error", lambda data, model: t.of(model))
+    for module in (refinement, candidates):
+        monkeypatch.setattr(module, "model_error", lambda data, model: t.of(model))
     return t
 
 
