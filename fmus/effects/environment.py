@@ -24,6 +24,7 @@ _GOLDEN = 2.0 * math.pi * (math.sqrt(5.0) - 1.0) / 2.0
     sign="F_n acts north, F_e acts east",
     source="(2.3), (2.33)",
     settings=("earth_force_period", "earth_force_swing"),
+    search=Search(of_a_day=True),
     wording=Wording(
         lambda f: (
             f"A constant force of {number(math.hypot(f['F_n'], f['F_e']))} N acts towards "
