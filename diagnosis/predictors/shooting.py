@@ -4,7 +4,7 @@ Every window starts from the smoothed state. All windows of all runs are integra
 parameters' finite differences as further rows, with the functions of vessel and thrusters.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ class Linear:
 
     Attributes:
         slope: (w, T, 6, 6), derivative of the rate of (x, y, psi, u, v, r), from instant to instant.
-        by_mass: (3, 3), acceleration by a force.
+        by_mass: (3, 3), acceleration by a force; (w, 1, 3, 3) where the load differs between runs.
         every: time between instants [s].
     """
 
@@ -46,7 +46,8 @@ class Linear:
 
     def __getitem__(self, windows: np.ndarray) -> "Linear":
         """The motion in some of the windows."""
-        return Linear(self.slope[windows], self.by_mass, self.every)
+        by_mass = self.by_mass[windows] if self.by_mass.ndim > 2 else self.by_mass
+        return Linear(self.slope[windows], by_mass, self.every)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +168,25 @@ class Shooting:
     def _poses(self, states: Sequence[vessel.State], model: Model) -> np.ndarray:
         """(p, w, T, 3): measured pose at the instants; parameters of the model may be arrays (p, 1)."""
         with np.errstate(all="ignore"):
-            poses = np.stack(
-                np.broadcast_arrays(*(x for s in states for x in vessel.measured(s, model.hull)))
-            )
-            poses = poses.reshape(len(states), 3, *poses.shape[1:])
+            poses = np.concatenate([*self._measured(states, model)], axis=-1)
             found = filtered(poses, model, self.starts, self.every)
         return np.ascontiguousarray(found[1:].transpose(2, 3, 0, 1))
+
+    def _measured(self, states: Sequence[vessel.State], model: Model) -> Iterator[np.ndarray]:
+        """The measured pose (T + 1, 3, p, w) of all windows, or of those of each run in turn."""
+        parts = [(model, states)]
+        if model.runs:
+            edges = np.searchsorted(self.run, np.arange(len(self.runs) + 1)).tolist()
+            parts = [
+                (
+                    model.during(run.track.run.name),
+                    [vessel.State._make(x[..., first:last] for x in s) for s in states],
+                )
+                for run, first, last in zip(self.runs, edges[:-1], edges[1:], strict=True)
+            ]
+        for own, of in parts:
+            poses = np.stack(np.broadcast_arrays(*(x for s in of for x in vessel.measured(s, own.hull))))
+            yield poses.reshape(len(states), 3, *poses.shape[1:])
 
     def _linear(self, states: Sequence[vessel.State], model: Model) -> Linear:
         first = [[np.broadcast_arrays(x, s.u)[0][0] for x in s] for s in states]
@@ -180,11 +194,15 @@ class Shooting:
         least = DIGITS * np.array([1.0, *model.ship.scale.speeds])
         variance = self.at_start[:, range(2, 6), range(2, 6)].T
         reach = np.maximum(np.sqrt(3.0 * variance), least[:, None])
-        ready = Ready(self._of_windows(model).hull, self.starts.drive(model))
+        hull = self._of_windows(model).hull
+        ready = Ready(hull, self.starts.drive(model))
         with np.errstate(all="ignore"):
             rates = _slopes(s, self._inputs(model), ready, reach)
-        i11, i22, i23, i32, i33 = model.hull.hull.inverse
-        by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
+        i11, i22, i23, i32, i33 = np.broadcast_arrays(*hull.hull.inverse)
+        none = 0.0 * i11
+        by_mass = np.array([[i11, none, none], [none, i22, i23], [none, i32, i33]])
+        if by_mass.ndim > 2:
+            by_mass = by_mass.transpose(3, 2, 0, 1)
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
 
     def _of_windows(self, model: Model) -> Model:

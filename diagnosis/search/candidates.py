@@ -280,7 +280,7 @@ def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Ef
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
         shapes += [plain] if not e.search.smooth else curve(base, plain, e, model.ship.scale)
-    if e.search.of_a_day and len(data) > 1:
+    if e.search.of_each_run and len(data) > 1:
         own = [of_run(n, w.run.name) for w in data for n in e.fitted]
         shapes.append(shape(data, model, base, {}, own, step))
     if spread(e):

@@ -196,7 +196,7 @@ class Search:
         lasting: id of the effect that is the same as one interval without an end.
         smooth: whether the coefficients are values of a curve at equally spaced nodes, of which
             neighbours are similar.
-        of_a_day: whether its values may be others in each run, as of what acts on the ship from outside.
+        of_each_run: whether its values may be others in each run, as of weather, load and sensors.
     """
 
     by: Literal["regression", "spectrum", "given"] = "regression"
@@ -206,7 +206,7 @@ class Search:
     intervals: tuple[tuple[str, str], ...] = ()
     lasting: str = ""
     smooth: bool = False
-    of_a_day: bool = False
+    of_each_run: bool = False
 
     @property
     def times(self) -> tuple[str, ...]:

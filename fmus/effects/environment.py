@@ -24,7 +24,7 @@ _GOLDEN = 2.0 * math.pi * (math.sqrt(5.0) - 1.0) / 2.0
     sign="F_n acts north, F_e acts east",
     source="(2.3), (2.33)",
     settings=("earth_force_period", "earth_force_swing"),
-    search=Search(of_a_day=True),
+    search=Search(of_each_run=True),
     wording=Wording(
         lambda f: (
             f"A constant force of {number(math.hypot(f['F_n'], f['F_e']))} N acts towards "
@@ -62,6 +62,7 @@ def bias_sentence(f: Found) -> str:
     symbol="X, Y, N",
     sign="positive acts ahead, to starboard, and turns to starboard",
     source="(2.33)",
+    search=Search(of_each_run=True),
     wording=Wording(bias_sentence, BODY_FIXED),
 )
 def body_bias(
@@ -132,7 +133,7 @@ def waves(
     source="Fossen 2011, 8.3; irrotational",
     linear=False,
     gives="water velocity",
-    search=Search(differentiable=True, of_a_day=True),
+    search=Search(differentiable=True, of_each_run=True),
     wording=Wording(
         lambda f: (
             f"The water moves at {number(math.hypot(f['V_n'], f['V_e']))} m/s "

@@ -1,6 +1,7 @@
 """A heavier ship, or more water that moves with it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated
 
 from ..declare import Range, Variable
@@ -26,7 +27,7 @@ def half(name: str, moving: Callable[[Values], float]) -> Search:
     symbol="Δm",
     sign=_SIGN,
     source=_SOURCE,
-    search=half("mass", lambda p: p["m"]),
+    search=replace(half("mass", lambda p: p["m"]), of_each_run=True),
     wording=Wording(
         lambda f: (
             f"The ship has {number(f['mass'])} kg {'more' if f['mass'] > 0.0 else 'less'} mass than the "

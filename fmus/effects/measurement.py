@@ -30,7 +30,7 @@ OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)
     symbol="dx, dy",
     sign="positive: markers ahead and to starboard of the assumed place",
     source="4.3.1, bias",
-    search=Search(differentiable=True),
+    search=Search(differentiable=True, of_each_run=True),
     wording=Wording(
         lambda f: f"The position is measured {offset(f, 'marker_offset')} of the place in the model.",
         MEASUREMENT,
@@ -60,7 +60,7 @@ def heading_sentence(f: Found) -> str:
     symbol="δ",
     sign="positive: measured to starboard of the true heading",
     source="4.3.1, bias",
-    search=Search(differentiable=True),
+    search=Search(differentiable=True, of_each_run=True),
     usual=AXIS,
     wording=Wording(heading_sentence, MEASUREMENT),
 )

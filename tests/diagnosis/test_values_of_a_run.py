@@ -27,13 +27,19 @@ def data():
     return runs(NORTH, WEST)
 
 
-OF_DAYS = {of_run("V_n", "run0"): 0.06, of_run("V_e", "run1"): -0.06, of_run("loss_bow", "run1"): 0.2}
+OF_DAYS = {
+    of_run("V_n", "run0"): 0.06,
+    of_run("V_e", "run1"): -0.06,
+    of_run("loss_bow", "run1"): 0.2,
+    of_run("mass", "run0"): 1.0,
+    of_run("marker_offset_dx", "run1"): 0.05,
+}
 
 
 def test_a_value_of_a_run_is_that_of_its_part_of_the_ship_in_that_run_alone():
     model = Model(vessel={"V_n": 0.01}).plus(OF_DAYS)
-    assert model.during("run0").vessel == {"V_n": pytest.approx(0.07)}
-    assert model.during("run1").vessel == {"V_n": 0.01, "V_e": -0.06}
+    assert model.during("run0").vessel == {"V_n": pytest.approx(0.07), "mass": 1.0}
+    assert model.during("run1").vessel == {"V_n": 0.01, "V_e": -0.06, "marker_offset_dx": 0.05}
     assert model.during("run1").thrusters == {"loss_bow": 0.2}
     assert model.during("another") is model
     assert model.value(of_run("V_n", "run1")) == model.value("V_n") == 0.01
@@ -53,8 +59,8 @@ def test_stacked_models_keep_the_values_of_runs_of_each():
     for k, each in enumerate((START, *changed)):
         for run in ("run0", "run1"):
             of = both.during(run)
-            for name, part in (("V_n", of.vessel), ("V_e", of.vessel), ("loss_bow", of.thrusters)):
-                value = np.ravel(part.get(name, 0.0))
+            for name, _ in map(parameter_and_run, OF_DAYS):
+                value = np.ravel(of.vessel.get(name, of.thrusters.get(name, 0.0)))
                 assert value[k if value.size > 1 else 0] == each.during(run).value(name)
 
 
@@ -96,7 +102,9 @@ def test_predictions_and_their_slopes_are_those_of_the_current_of_their_run(data
         plain = alone.around(own, {parameter_and_run(n)[0]: 1e-4 for n in names})
         assert found.residuals[of] == pytest.approx(plain.residuals, abs=1e-12)
         assert found.motion.slope[of] == pytest.approx(plain.motion.slope, abs=1e-9)
-        assert found.motion.by_mass == pytest.approx(plain.motion.by_mass)
+        assert found.motion[of].by_mass == pytest.approx(
+            np.broadcast_to(plain.motion.by_mass, (of.sum(), 1, 3, 3))
+        )
         for n, name in enumerate(names):
             here = parameter_and_run(name)[1] == f"run{k}"
             expected = plain.slopes[..., n] if here else 0.0 * plain.slopes[..., n]
