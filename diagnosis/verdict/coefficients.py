@@ -15,7 +15,15 @@ from ..search.gram import WHOLE_RUNS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import RefitOutcome
 from ..search.prior import NominalPrior
-from ..search.significance import Losses, as_good, gain, harm, predicts_better, predicts_worse
+from ..search.significance import (
+    Losses,
+    as_good,
+    gain,
+    gain_of_predictions,
+    harm,
+    predicts_better,
+    predicts_worse,
+)
 from .confidence import FOUND, confidence_of, may_be_none
 from .pruning import judgeable, without
 from .validation_data import ValidationData
@@ -157,8 +165,9 @@ def better_calibration(
         gained: whether the search predicts better than the calibration, beyond chance.
 
     Returns:
-        None where it predicts no better, beyond chance, predicts worse than the initial model, or has a
-        hull that drives the ship on; or the method does not fit its findings without a part of the data.
+        None where it predicts no better, beyond chance, predicts worse than the initial model, be it by
+        chance, or has a hull that drives the ship on; or the method does not fit its findings without a
+        part of the data.
     """
     if isinstance(found, Findings) and not data.judges(found):
         return None
@@ -169,7 +178,7 @@ def better_calibration(
         not believed or (not predicts_worse(its, now) and sufficient(calibration.findings, found, data))
     )
     better = needless(found, without_gain) or enough or predicts_better(its, now)
-    return calibration if better and not predicts_worse(its, first) else None
+    return calibration if better and gain_of_predictions(its, first) <= 0.0 else None
 
 
 def sufficient(its: Findings, found: Findings | Model, data: ValidationData) -> bool:
