@@ -16,7 +16,7 @@ from diagnosis.predictors import ship_with
 from diagnosis.predictors.weak_form import SMALL
 from diagnosis.search.candidates import model_error
 from diagnosis.search.prior import NominalPrior
-from diagnosis.search.significance import Losses
+from diagnosis.search.significance import Losses, predicts_worse
 from diagnosis.verdict import coefficients
 from diagnosis.verdict import prediction_gain as gain_module
 from diagnosis.verdict.coefficients import any_sure, better_calibration, needless, sufficient
@@ -133,6 +133,23 @@ def test_effects_none_of_which_is_a_finding_give_way_where_they_gain_nothing(lea
         given = better_calibration(fit, end, data, lambda *_: False, believed=believed, gained=gained)
         taken = learned > 4.0 or not (believed or gained)
         assert given is (fit if taken else None)
+
+
+@pytest.mark.parametrize(("other", "taken"), [(1.5, True), (2.5, False)])
+def test_coefficients_that_predict_worse_than_the_initial_model_by_chance_are_not_taken(other, taken):
+    """Where runs contradict each other a fit to one of them is worse in the other one."""
+    fit, end = SimpleNamespace(findings=Findings(model=BETTER)), found(1)
+    same, apart = np.ones(40), np.repeat([0.1, other], 20)
+    losses = {id(fit.findings): Losses(same, apart, apart)}
+    data = SimpleNamespace(
+        start=START,
+        validate=(),
+        judges=lambda _: True,
+        losses=lambda *models: [losses.get(id(m), Losses(same, same, same)) for m in models],
+    )
+    assert not predicts_worse(*data.losses(fit.findings, START))
+    given = better_calibration(fit, end, data, lambda *_: False, believed=False, gained=False)
+    assert given is (fit if taken else None)
 
 
 @pytest.mark.parametrize(("learned", "taken"), [(4.0, True), (1.0, False)])
