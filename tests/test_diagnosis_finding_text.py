@@ -30,7 +30,7 @@ def values(effect, x):
     return dict.fromkeys(effect.coefficients, x) | ends
 
 
-@pytest.mark.parametrize("runs", [["a"], ["a", "b"]])
+@pytest.mark.parametrize("runs", [["a"], ["a", "b"], [*"abcd"], [*"abcde"]])
 def test_what_holds_in_single_runs_is_said_of_each_where_there_are_several(runs):
     start, name = Model(), "bow_failure_time"
     times = {f"{name}@{run}": 20.0 + 5.0 * k for k, run in enumerate(runs)}
@@ -42,7 +42,9 @@ def test_what_holds_in_single_runs_is_said_of_each_where_there_are_several(runs)
     each = {
         run: sentence(Found(EFFECTS[f.id], {name: times[f"{name}@{run}"]}, d.speeds)) for run in runs
     }
-    said = " ".join(f"Run {run}: {text}" for run, text in each.items()) if len(runs) > 1 else each["a"]
+    told = [f"Run {run}: {text}" for run, text in each.items()][:4]
+    told += ["diagnosis.json has 1 more."] if len(runs) > 4 else []
+    said = " ".join(told) if len(runs) > 1 else each["a"]
     assert f.of_runs == runs
     assert _sentence(d, f, times) == said
 

@@ -10,6 +10,7 @@ from fmus.effects.force import damping_sentence
 from fmus.effects.text import Found, towards
 
 from ..assessment.stability import force
+from ..execution.short_text import SHOWN
 from ..predictors import Model
 from ..predictors.ship_model import of_one_run, parameter_and_run
 from ..runs.run_constants import DIGITS
@@ -127,7 +128,8 @@ def _reported(
     effects = d.start.ship.effects
     effect = effects[f.id]
     # Of a coefficient the addition counts, of any other parameter of the effect its value.
-    present = {n: 0.0 if n in effect.coefficients else d.start.value(n) for n in f.values}
+    added = {n: parameter_and_run(n)[0] in effect.coefficients for n in f.values}
+    present = {n: 0.0 if is_addition else d.start.value(n) for n, is_addition in added.items()}
     values = {n: x + present[n] for n, x in f.values.items()}
     ci95 = {
         n: within_range(d.start, n, values[n], low + present[n], high + present[n])
@@ -164,14 +166,17 @@ def _plain(name: str, f: Finding) -> str:
 
 
 def _sentence(d: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
-    """A finding in words; what holds in single runs, one after the other."""
+    """A finding in words; what holds in single runs, one after the other, of the first ones."""
 
     def told(own: Mapping[str, float]) -> str:
         return sentence(Found(d.start.ship.effects[f.id], own, d.speeds))
 
     shown = _shown(d, values)
     runs = [run for run in f.of_runs if shown is values]
-    said = " ".join(f"Run {run}: {told(of_one_run(values, run))}" for run in runs) or told(shown)
+    each = [f"Run {run}: {told(of_one_run(values, run))}" for run in runs[:SHOWN]]
+    if more := len(runs[SHOWN:]):
+        each.append(f"diagnosis.json has {more} more.")
+    said = " ".join(each) or told(shown)
     return said + of_whole_hull(f, d.start, d.learned.model, d.speeds)
 
 
