@@ -194,10 +194,10 @@ class Shooting:
         least = DIGITS * np.array([1.0, *model.ship.scale.speeds])
         variance = self.at_start[:, range(2, 6), range(2, 6)].T
         reach = np.maximum(np.sqrt(3.0 * variance), least[:, None])
-        hull = self._of_windows(model).hull
-        ready = Ready(hull, self.starts.drive(model))
+        of_windows = self._of_windows(model)
+        hull, drive = of_windows.hull, self.starts.drive(of_windows)
         with np.errstate(all="ignore"):
-            rates = _slopes(s, self._inputs(model), ready, reach)
+            rates = _slopes(s, self._inputs(model), Ready(hull, drive), reach)
         i11, i22, i23, i32, i33 = np.broadcast_arrays(*hull.hull.inverse)
         none = 0.0 * i11
         by_mass = np.array([[i11, none, none], [none, i22, i23], [none, i32, i33]])
@@ -206,7 +206,7 @@ class Shooting:
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
 
     def _of_windows(self, model: Model) -> Model:
-        """The model with the hull's values of each window's run, arrays (1, w) where these differ."""
+        """The model with the values of each window's run, arrays (1, w) where these differ."""
         if not model.runs:
             return model
         each = [model.during(name) for name, _ in self._each]

@@ -35,6 +35,7 @@ def loss(d: Devices, others: bool = True) -> Effect:
         }
         if others
         else {},
+        search=Search(of_each_run=True),
         measured=against_command,
         formula="f (1 - δ)",
         symbol="δ",
