@@ -17,10 +17,12 @@ from diagnosis.report.headline import (
     NOTHING_FOUND,
     OTHER_CALIBRATION,
     OTHER_FIT,
+    OWN_VALUES,
     SEARCH_GAINED,
     SEARCH_GAINED_NOTHING,
     SEARCH_NAMES_CAUSE,
     first_sentences,
+    gain_of_search,
     gain_sentences,
 )
 from diagnosis.report.pictures import figures, tracks
@@ -30,7 +32,7 @@ from diagnosis.report.terminal import as_text, show_calibration, show_comparison
 from diagnosis.runs import MeasuredChannel
 from diagnosis.runs.measured_channels import UNUSED
 from diagnosis.runs.sensors.sensor_finding import SensorFinding
-from diagnosis.search.findings import Findings
+from diagnosis.search.findings import Finding, Findings
 from diagnosis.verdict.prediction_gain import PairedChange, PredictionGain
 
 
@@ -297,6 +299,15 @@ def test_what_the_search_gained_is_the_first_sentence(gained):
         "heading": vars(change),
         "sentence": "One. Two.",
     }
+
+
+@pytest.mark.parametrize("name", ["V_n@a", "V_n"])
+def test_what_single_runs_have_of_their_own_is_said_beside_the_gain(name):
+    change = PairedChange(0.03, 0.02, 0.03**2 - 0.02**2, 1e-4)
+    gain = PredictionGain("data left out of the fit", 54, change, change, True, "calibrated")
+    r = found(gain=gain)
+    r.diagnosis.learned = Findings([Finding("current", {name: 0.1}, {}, 0.99, [], 1.0, 1.0)])
+    assert (OWN_VALUES in gain_of_search(r)) is ("@" in name)
 
 
 def test_a_report_says_how_commands_are_read_where_files_do_not():

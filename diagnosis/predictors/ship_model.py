@@ -132,7 +132,7 @@ class Model:
             f"{part}.{n}": x for part in dict.fromkeys(parts) for n, x in getattr(self, part).items()
         }
         values = ", ".join(f"{name} = {x:.4g}" for name, x in told.items())
-        runs = f"; times of {', '.join(self.runs)}" if self.runs else ""
+        runs = f"; values of {', '.join(self.runs)}" if self.runs else ""
         return f"<model: {values or 'nominal'}{runs}>"
 
     def during(self, run: str) -> "Model":

@@ -34,6 +34,10 @@ OTHER_CALIBRATION = (
 NO_CALIBRATION = (
     "The comparison is with the initial model, because calibration does not improve the predictions."
 )
+OWN_VALUES = (
+    "Values that hold in one run alone are of that run where it is left out as a whole, and other runs "
+    "are predicted without them."
+)
 CALIBRATION_GAINED = "Calibration improves the predictions of the initial model."
 CALIBRATION_GAINED_NOTHING = (
     "Calibration does not improve the predictions of the initial model by more than chance."
@@ -141,6 +145,8 @@ def gain_of_search(r: ReportData) -> list[str]:
     said = gain_sentences(gain, SEARCH_GAINED, nothing, r.lengths[0])
     if d and gain and d.refitted and not d.learned.effects and gain.position.difference:
         said.insert(1, OTHER_CALIBRATION if d.calibrated else OTHER_FIT)
+    if d and gain and any(f.of_runs for f in d.learned.effects):
+        said.append(OWN_VALUES)
     return [*said, NO_CALIBRATION] if gain is not None and gain.over == "initial" else said
 
 
