@@ -1121,7 +1121,7 @@ def test_a_small_finding_is_no_surer_than_what_explains_most(explained, believed
     assert seen.own == pytest.approx(0.99 * 0.3 if doubted else 0.99)
     assert seen.is_finding == (not doubted)
     assert bool(seen.doubt) == bool(doubted)
-    of_a_run = replace(made[1], values={"loss_surge@a": 0.1})
+    of_a_run = replace(made[1], id="bow_failure", values={"bow_failure_time@a": 9.0})
     assert of_a_run.of_runs
     assert not beside_possibility(Findings([made[0], of_a_run]), explained, sure)
 

@@ -73,7 +73,7 @@ def test_what_is_shown_is_a_line(run):
     assert repr([loaded]) == f"[{loaded}]"
     assert str(loaded).startswith(f"<run table 1: {run.time.size} samples in 63.98 s, ")
     model = diagnosis.Model().plus({"delta_X_u": -2.0, "bow_outage_start_1@a": 3.0})
-    assert str(model) == "<model: vessel.delta_X_u = -2; times of a>"
+    assert str(model) == "<model: vessel.delta_X_u = -2; values of a>"
     assert str(diagnosis.Model()) == "<model: nominal>"
 
 

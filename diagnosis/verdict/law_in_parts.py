@@ -128,7 +128,9 @@ def beside_possibility(
     each = [*zip(found.effects, explained, alone, strict=True)]
     possible = ((share, c.of_set) for _, share, c in each if not c.is_finding)
     most, sure = max(possible, default=(0.0, 1.0))
-    return {f.id: sure for f, share, _ in each if share < min(NEGLIGIBLE, most) and not f.of_runs}
+    effects = found.model.ship.effects
+    small = (f for f, share, _ in each if share < min(NEGLIGIBLE, most))
+    return {f.id: sure for f in small if not effects[f.id].search.times}
 
 
 def on_one_line(found: Findings, start: Model, runs: Sequence[WeakWindows]) -> set[str]:
