@@ -24,6 +24,7 @@ from .commands.command_line import (
     fmu_options,
     import_later_parts,
     inputs_of,
+    moment,
     out_options,
     parser,
     prior,
@@ -105,6 +106,7 @@ def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
     """The runs and the model, read and checked."""
     from .assessment.gathering import gather  # only now: it takes a while to import
     from .predictors import DescribedShip, open_model, ship_of_model, ship_with
+    from .runs import cut, read_each
     from .search import shares
 
     by = method(options.method)  # before any work: an unknown name, or a library that is missing
@@ -115,12 +117,16 @@ def _begun(options: argparse.Namespace, advance: Advance) -> "Session":
     if options.fit and not model.parametric:
         raise InputError(f"--fit needs a model with parameters; {model.name} has none")
     shares(craft, options.prior)
-    paths = [*options.train, *options.validate, *options.test]
+    learned = options.train
+    if options.split:
+        advance("reading")
+        learned = cut(read_each(options.train, craft), options.split)
+    paths = [*learned, *options.validate, *options.test]
     runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
     from . import session
     from .search.prediction_fit.output_fit import fitted
 
-    train, decide = len(options.train), len(options.train) + len(options.validate)
+    train, decide = len(learned), len(learned) + len(options.validate)
     if options.fit and start is not None:
         model = DescribedShip(fitted(runs[:train], start, options.prior, options.fit))
     parts = runs[:train], runs[decide:]
@@ -243,6 +249,7 @@ def _parser() -> argparse.ArgumentParser:
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
         "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
+        "           %(prog)s run1.csv run2.csv --split run1@131\n"
         "           %(prog)s run1.csv --model vendor.fmu --parameters parameters.json\n"
         "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
         "            130 interrupted (the files of answers that were shown are kept)",
@@ -270,6 +277,15 @@ def _parser() -> argparse.ArgumentParser:
             default=[],
             help=f"runs that {what}",
         )
+    made.add_argument(
+        "--split",
+        type=moment,
+        action="append",
+        metavar="RUN@SECONDS",
+        default=[],
+        help="a time at which a training run is cut, as something changed there: each part has values "
+        "of its own, as a run has; may be repeated",
+    )
     made.add_argument(
         "--quick",
         action="store_true",

@@ -421,6 +421,30 @@ def test_a_prior_that_is_none_is_refused(prior, runs, capfd):
         diagnosis.diagnose([], prior=-0.1)
 
 
+@pytest.mark.parametrize(
+    ("moment", "said"),
+    [
+        ("b@30", "there is no training run 'b' to split; there is a"),
+        ("a@1e9", "run 'a' has no row in a part of it: it is from 0 to "),
+        ("a", "needs the name of a run and seconds, as run1@131, not 'a'"),
+        ("a@noon", "needs the name of a run and seconds, as run1@131, not 'a@noon'"),
+        ("@30", "needs the name of a run and seconds, as run1@131, not '@30'"),
+    ],
+)
+def test_a_moment_at_which_no_run_is_cut_is_refused(moment, said, runs, capfd):
+    code, _ = run(learn.main, runs / "a.csv", "--test", runs / "b.csv", "--split", moment)
+    assert code == 2
+    assert said in " ".join(capfd.readouterr().err.split())
+
+
+def test_a_run_that_is_split_is_two_runs(runs, tmp_path):
+    given = [runs / "a.csv", "--split", "a@40", "--prior", "0", "--quick", "--out", tmp_path / "out"]
+    code, _ = run(learn.main, *given)
+    assert code == 0
+    errors = strict(tmp_path / "out" / learn.COMPARISON)["errors"]
+    assert [each["run"] for each in errors] == ["a until 40 s", "a from 40 s"]
+
+
 def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):
     (tmp_path / "a.csv").write_bytes((runs / "b.csv").read_bytes())
     names = [w.run.name for w in diagnosis.gather([runs / "a.csv", tmp_path / "a.csv"])]

@@ -187,7 +187,7 @@ def repeats(best=None, lasts=10.0, in_part=False):
             repeats(in_part=True)._replace(changes=("lap", 71.2)),
             1.0,
             "at about 71 s of lap",
-            "that sticks",
+            "other water (learn --split lap@71 gives both parts values of their own)",
         ),
         (repeats(lasts=3.1), 1.0, "lasts for about 3 s", "gusts"),
         (repeats(lasts=2.9), 1.0, "and lasts for 3 s at the most, the width of a window", "waves"),

@@ -24,7 +24,16 @@ from diagnosis import (
     sysid,
     watch,
 )
-from diagnosis.runs import Examined, Run, SensorFinding, prepare, prepared_run, read_each, thinning
+from diagnosis.runs import (
+    Examined,
+    Run,
+    SensorFinding,
+    cut,
+    prepare,
+    prepared_run,
+    read_each,
+    thinning,
+)
 from thesis.open_loop import loop_of
 from thesis.open_loop.playback import fed
 
@@ -256,3 +265,20 @@ def test_every_command_refuses_what_cannot_be_repaired_unless_told(
     monkeypatch.setattr(prepared_run, "clean", cleaned)
     done = command(module.main, spoilt, "--anyway", *others, *out)
     assert "cleaned True" in done.stderr + done.stdout
+
+
+def test_parts_of_a_run_are_all_of_it_one_after_the_other():
+    time = np.arange(0.0, 30.0, 0.5)
+    rows = np.arange(time.size)
+    pose = np.column_stack([rows, 2.0 * rows, 0.0 * rows])
+    lap, other = (Run(name, time, pose, 3.0 * pose, measured={"u": 4.0 * rows}) for name in ("lap", "b"))
+    *parts, last = cut([lap, other], [("lap", 20.0), ("lap", 7.5)])
+    assert last is not lap
+    assert [part.name for part in (*parts, last)] == [
+        "lap until 7.5 s", "lap from 7.5 s until 20 s", "lap from 20 s", "b"
+    ]  # fmt: skip
+    for name in ("time", "pose", "tau_cmd"):
+        assert np.array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(lap, name))
+    assert np.array_equal(np.concatenate([p.measured["u"] for p in parts]), lap.measured["u"])
+    assert [p.time[0] for p in parts] == [0.0, 7.5, 20.0]
+    assert np.array_equal(last.pose, other.pose)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
+from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -53,6 +54,20 @@ def prior(text: str) -> Prior:
     except ValueError:
         form = "a number of zero or more, or names with numbers as in mass=0.01,thrust=0.5"
         raise argparse.ArgumentTypeError(f"needs {form}, not '{text}'") from None
+
+
+def moment(text: str) -> tuple[str, float]:
+    """What ``--split`` says: the name of a run, and a time [s]."""
+    name, _, time = text.rpartition("@")
+    try:
+        seconds = float(time)
+    except ValueError:
+        seconds = nan
+    if not (name and isfinite(seconds)):
+        raise argparse.ArgumentTypeError(
+            f"needs the name of a run and seconds, as run1@131, not '{text}'"
+        )
+    return name, seconds
 
 
 def _share(text: str) -> float:

@@ -36,6 +36,7 @@ from .measured_channels import MeasuredChannel as MeasuredChannel
 from .measured_channels import by_name as by_name
 from .measured_channels import channels_of as channels_of
 from .prepared_run import PreparedRun as PreparedRun
+from .prepared_run import cut as cut
 from .prepared_run import examine as examine
 from .prepared_run import prepare as prepare
 from .prepared_run import read_each as read_each

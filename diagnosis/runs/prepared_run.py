@@ -7,11 +7,14 @@ and smoothed with the velocities and rates that agree with its pose.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from math import inf
 from pathlib import Path
 
 import numpy as np
 
 from cosim import InputError
+from cosim.errors import nearest
 from fmus.scale import Scale
 from fmus.ship import Ship, ship
 
@@ -159,4 +162,33 @@ def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> li
         known[content] = path
         taken = any(run.name == other.name for other in found)
         found.append(replace(run, name=Path(path).absolute().as_posix()) if taken else run)
+    return found
+
+
+def cut(runs: Sequence[Run], moments: Sequence[tuple[str, float]]) -> list[Run]:
+    """Runs of which some are cut into parts, each a run of its own.
+
+    Args:
+        runs: that were read.
+        moments: names of runs, each with a time of its log [s] at which a part ends and another begins.
+
+    Raises:
+        InputError: no run has the name, or none of its rows is between two moments.
+    """
+    names = [run.name for run in runs]
+    for name, _ in moments:
+        if name not in names:
+            raise InputError(f"there is no training run '{name}' to split{nearest(name, names)}")
+    found = []
+    for run in runs:
+        edges = [-inf, *sorted(time for name, time in moments if name == run.name), inf]
+        for begin, end in pairwise(edges):
+            rows = (run.time >= begin) & (run.time < end)
+            if not rows.any():
+                begins, ends = run.time[[0, -1]]
+                raise InputError(
+                    f"run '{run.name}' has no row in a part of it: it is from {begins:g} to {ends:g} s"
+                )
+            of = [f"from {begin:g} s"] * (begin > -inf) + [f"until {end:g} s"] * (end < inf)
+            found.append(replace(run.rows(rows), name=" ".join([run.name, *of])))
     return found

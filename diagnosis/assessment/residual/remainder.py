@@ -71,7 +71,8 @@ IN_PART = (
 )
 CHANGES = (
     "changes at about {1:.0f} s of {0}, and is another function of speed and command from then on",
-    "an event at that time, such as an actuator that sticks or fails, a change of load, or other water",
+    "an event at that time, such as an actuator that sticks or fails, a change of load, or other water "
+    "(learn --split {0}@{1:.0f} gives both parts values of their own)",
 )
 IN_ONE_RUN = (
     "occurs in {0} alone, so that these runs do not show what it depends on",
@@ -312,7 +313,7 @@ def _amount(axis: str, r: AxisRemainder) -> str:
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
     if r.changes:
-        return CHANGES[0].format(*r.changes), CHANGES[1]
+        return CHANGES[0].format(*r.changes), CHANGES[1].format(*r.changes)
     if r.in_part and r.best != "place":
         return IN_PART
     if r.best is not None:
