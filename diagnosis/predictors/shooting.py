@@ -4,7 +4,7 @@ Every window starts from the smoothed state. All windows of all runs are integra
 parameters' finite differences as further rows, with the functions of vessel and thrusters.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -16,8 +16,8 @@ from fmus.vessel import vessel
 
 from ..runs import Smoothed
 from ..runs.run_constants import DIGITS
-from .prediction import WindowStarts, arriving, filtered, merged, propagate, stacked
-from .ship_model import Model
+from .prediction import WindowStarts, arriving, filtered, propagate, stacked
+from .ship_model import Model, parameter_and_run
 from .thrust import Response
 from .traced.recorded_step import Inputs, Ready, thrust_at
 from .windows import usable_windows
@@ -93,7 +93,8 @@ class Shooting:
         seen = [_seen(s, s.time[r][:, None] + self.since, 0.5 * self.every) for s, r in groups]
         self.measured, self.noise = (np.concatenate(part) for part in zip(*seen, strict=True))
         self.at_start = np.concatenate([s.state_covariance(r) for s, r in groups])
-        self._thrust: dict[object, tuple[object, tuple[np.ndarray, np.ndarray]]] = {}
+        self._thrust: dict[object, tuple[np.ndarray, np.ndarray]] = {}
+        self._of_runs: list[Shooting] = []
 
     @classmethod
     def accurate(cls, runs: Sequence[Smoothed], length: float, model: Model) -> "Shooting":
@@ -118,42 +119,58 @@ class Shooting:
         """The same windows with another number of steps between two instants."""
         found = copy(self)
         found.starts = replace(self.starts, h=self.every / parts, steps=INSTANTS * parts)
-        found._thrust = {}
+        found._thrust, found._of_runs = {}, []
+        return found
+
+    def _alone(self, model: Model) -> list[tuple["Shooting", str]]:
+        """Windows that have the same values of a model: all, or those of each run, with its name."""
+        if not model.runs:
+            return [(self, "")]
+        if not self._of_runs:
+            groups = [(k, one) for k, one in enumerate(self.starts.runs) if one[1].size]
+            self._of_runs = [self._part(self.run == k, one) for k, one in groups]
+        return [(one, one.runs[0].track.run.name) for one in self._of_runs]
+
+    def _part(self, own: np.ndarray, group: tuple[Smoothed, np.ndarray]) -> "Shooting":
+        found = copy(self)
+        found.runs, found.starts = (group[0],), replace(self.starts, runs=(group,))
+        found.run, found.start = np.zeros(own.sum(), int), self.start[own]
+        found.measured, found.noise, found.at_start = (
+            x[own] for x in (self.measured, self.noise, self.at_start)
+        )
+        found._thrust, found._of_runs = {}, []
         return found
 
     def _states(self, model: Model, like: Model | None = None) -> list[vessel.State]:
         """States at the start and at the instants; the thrusters respond as those of ``like``."""
-        like = like or model
-        if not like.runs:
-            return self._stepped(self.starts, model, like)
-        parts = [self._stepped(one, model.during(name), like.during(name)) for name, one in self._each]
-        return [_beside(states) for states in zip(*parts, strict=True)]
-
-    @property
-    def _each(self) -> list[tuple[str, WindowStarts]]:
-        """The name of each run, and its windows."""
-        return [(one[0].track.run.name, replace(self.starts, runs=(one,))) for one in self.starts.runs]
-
-    def _stepped(self, starts: WindowStarts, model: Model, like: Model) -> list[vessel.State]:
-        steps = propagate(starts, model, self._arriving(starts, like))
+        steps = propagate(self.starts, model, self._arriving(like or model))
         return [s for k, s in enumerate(steps) if k % self.parts == 0]
 
-    def _arriving(self, starts: WindowStarts, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    def _arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares that act, kept for models whose thrusters respond alike."""
-        runs = tuple(smoothed.track.run.name for smoothed, _ in starts.runs)
-        key, kept = Response.key(model), self._thrust.get(runs)
-        if kept is None or kept[0] != key:
-            kept = self._thrust[runs] = key, arriving(starts, model)
-        return kept[1]
+        key = Response.key(model)
+        if key not in self._thrust:
+            self._thrust = {key: arriving(self.starts, model)}
+        return self._thrust[key]
 
     def residuals(self, model: Model) -> np.ndarray:
         """(w, T, 3): measured minus predicted pose [m, m, rad], heading wrapped."""
+        return np.concatenate([one._residuals(model.during(run)) for one, run in self._alone(model)])
+
+    def _residuals(self, model: Model) -> np.ndarray:
         return _off(self.measured, self._poses(self._states(model), model)[0])
 
     def around(self, model: Model, steps: Mapping[str, float]) -> Around:
         """A model's predictions and what changes them."""
-        key = Response.key(model), model.filters
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
+        parts = []
+        for one, run in self._alone(model):
+            own = {n: m.during(run) for n, m in changed.items() if parameter_and_run(n)[1] in ("", run)}
+            parts.append(one._around(model.during(run), own, steps))
+        return parts[0] if len(parts) == 1 else _together(parts)
+
+    def _around(self, model: Model, changed: Mapping[str, Model], steps: Mapping[str, float]) -> Around:
+        key = Response.key(model), model.filters
         same = {n: m for n, m in changed.items() if (Response.key(m), m.filters) == key}
         together = stacked([model, *same.values()])
         states = self._states(together, model)
@@ -161,32 +178,19 @@ class Shooting:
         base, *others = self._poses(states, together)
         found = dict(zip(same, others, strict=True))
         found |= {n: self._poses(self._states(m), m)[0] for n, m in changed.items() if n not in found}
-        slopes = [_off(found[n], base) / h for n, h in steps.items()]
+        slopes = [_off(found.get(n, base), base) / h for n, h in steps.items()]
         by_parameter = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
         return Around(_off(self.measured, base), by_parameter, motion)
 
     def _poses(self, states: Sequence[vessel.State], model: Model) -> np.ndarray:
         """(p, w, T, 3): measured pose at the instants; parameters of the model may be arrays (p, 1)."""
         with np.errstate(all="ignore"):
-            poses = np.concatenate([*self._measured(states, model)], axis=-1)
+            poses = np.stack(
+                np.broadcast_arrays(*(x for s in states for x in vessel.measured(s, model.hull)))
+            )
+            poses = poses.reshape(len(states), 3, *poses.shape[1:])
             found = filtered(poses, model, self.starts, self.every)
         return np.ascontiguousarray(found[1:].transpose(2, 3, 0, 1))
-
-    def _measured(self, states: Sequence[vessel.State], model: Model) -> Iterator[np.ndarray]:
-        """The measured pose (T + 1, 3, p, w) of all windows, or of those of each run in turn."""
-        parts = [(model, states)]
-        if model.runs:
-            edges = np.searchsorted(self.run, np.arange(len(self.runs) + 1)).tolist()
-            parts = [
-                (
-                    model.during(run.track.run.name),
-                    [vessel.State._make(x[..., first:last] for x in s) for s in states],
-                )
-                for run, first, last in zip(self.runs, edges[:-1], edges[1:], strict=True)
-            ]
-        for own, of in parts:
-            poses = np.stack(np.broadcast_arrays(*(x for s in of for x in vessel.measured(s, own.hull))))
-            yield poses.reshape(len(states), 3, *poses.shape[1:])
 
     def _linear(self, states: Sequence[vessel.State], model: Model) -> Linear:
         first = [[np.broadcast_arrays(x, s.u)[0][0] for x in s] for s in states]
@@ -194,35 +198,18 @@ class Shooting:
         least = DIGITS * np.array([1.0, *model.ship.scale.speeds])
         variance = self.at_start[:, range(2, 6), range(2, 6)].T
         reach = np.maximum(np.sqrt(3.0 * variance), least[:, None])
-        of_windows = self._of_windows(model)
-        hull, drive = of_windows.hull, self.starts.drive(of_windows)
+        ready = Ready(model.hull, self.starts.drive(model))
         with np.errstate(all="ignore"):
-            rates = _slopes(s, self._inputs(model), Ready(hull, drive), reach)
-        i11, i22, i23, i32, i33 = np.broadcast_arrays(*hull.hull.inverse)
-        none = 0.0 * i11
-        by_mass = np.array([[i11, none, none], [none, i22, i23], [none, i32, i33]])
-        if by_mass.ndim > 2:
-            by_mass = by_mass.transpose(3, 2, 0, 1)
+            rates = _slopes(s, self._inputs(model), ready, reach)
+        i11, i22, i23, i32, i33 = model.hull.hull.inverse
+        by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
-
-    def _of_windows(self, model: Model) -> Model:
-        """The model with the values of each window's run, arrays (1, w) where these differ."""
-        if not model.runs:
-            return model
-        each = [model.during(name) for name, _ in self._each]
-        counts = np.bincount(self.run, minlength=len(each))
-        return merged(each, lambda x: np.repeat(x, counts)[None])
 
     def _inputs(self, model: Model) -> Inputs:
         """What acts at the start and at the instants, each (T + 1, w)."""
         starts = self.starts
         row = np.minimum(self.parts * np.arange(INSTANTS + 1), starts.steps - 1)
-        if model.runs:
-            each = [self._arriving(one, model.during(name)) for name, one in self._each]
-            thrust = [np.concatenate(part, axis=-1) for part in zip(*each, strict=True)]
-        else:
-            thrust = [*self._arriving(starts, model)]
-        given, acting = (x[row][:, :, 0].swapaxes(0, 1) for x in thrust)
+        given, acting = (x[row][:, :, 0].swapaxes(0, 1) for x in self._arriving(model))
         power, air = starts.power(model.clock), starts.air(model)
         return Inputs(
             given,
@@ -251,11 +238,15 @@ def _seen(s: Smoothed, times: np.ndarray, reach: float) -> tuple[np.ndarray, np.
     return smooth + (sums[high] - sums[low]) / some, noise
 
 
-def _beside(states: Sequence[vessel.State]) -> vessel.State:
-    """The states (p, w) of some runs in one; a run that no parameter moves has p = 1."""
-    models = max(np.broadcast_shapes(*map(np.shape, s))[0] for s in states)
-    whole = [[np.broadcast_to(x, (models, s.u.shape[-1])) for x in s] for s in states]
-    return vessel.State._make(np.concatenate(x, axis=-1) for x in zip(*whole, strict=True))
+def _together(parts: Sequence[Around]) -> Around:
+    """Predictions in the windows of some runs, one after the other."""
+    motions = [part.motion for part in parts]
+    by_mass = [np.broadcast_to(m.by_mass, (len(m.slope), 1, 3, 3)) for m in motions]
+    slope = np.concatenate([m.slope for m in motions])
+    residuals, slopes = (
+        np.concatenate(each) for each in zip(*((p.residuals, p.slopes) for p in parts), strict=True)
+    )
+    return Around(residuals, slopes, Linear(slope, np.concatenate(by_mass), motions[0].every))
 
 
 def _squares(off: np.ndarray) -> np.ndarray:

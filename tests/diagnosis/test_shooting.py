@@ -15,7 +15,6 @@ from diagnosis.predictors.shooting import (
     PARTS,
     UNKNOWN,
     Shooting,
-    _beside,
     _off,
     _seen,
     _slopes,
@@ -104,15 +103,6 @@ def test_squares_are_of_place_and_heading_but_for_windows_that_run_away():
     expected = (off[[0, 1, 3, 4]] ** 2).sum(axis=(0, 1))
     off[2, 1, 0] = np.nan
     assert _squares(off) == pytest.approx([expected[0] + expected[1], expected[2]])
-
-
-def test_runs_that_no_parameter_moves_stand_beside_those_that_are_moved():
-    rng = np.random.default_rng(1)
-    moved, still = rng.standard_normal((6, 3, 4)), rng.standard_normal((6, 1, 2))
-    found = _beside([state(*moved), state(*still)])
-    assert found.u.shape == (3, 6)
-    assert found.psi[:, :4].tolist() == moved[2].tolist()
-    assert found.psi[:, 4:].tolist() == [still[2, 0].tolist()] * 3
 
 
 @settings(max_examples=10)

@@ -87,8 +87,8 @@ def test_a_current_is_tried_for_all_runs_and_for_each(data):
     assert of_each.columns[..., :2] + of_each.columns[..., 2:] == pytest.approx(of_all.columns)
     alone = candidate(data[:1], START, base[: data[0].middle.size], e).shapes
     assert len(alone) == 1, "of one run both are the same"
-    wind = START.ship.effects["body_bias"]
-    assert len(candidate(data, START, base, wind).shapes) == 1
+    drag = START.ship.effects["X_u"]
+    assert len(candidate(data, START, base, drag).shapes) == 1
 
 
 def test_predictions_and_their_slopes_are_those_of_the_current_of_their_run(data):
